@@ -1,0 +1,78 @@
+#pragma once
+/// case.json -> typed structs in internal units (design section 4). Every wrong key or value is
+/// collected before one Error tells them all, each with file, key, value, expectation and remedy.
+/// The keys, their ranges and defaults are also in schemas/case.schema.json, for editors.
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "pipeline/json_reader.h"
+#include "plan/candidates.h"
+#include "plan/ranking.h"
+#include "preprocess/surface.h"
+#include "preprocess/wall.h"
+
+namespace wireplan::pipeline {
+
+/// An input has its path twice: resolved, and as the case file gives it, which names no folder of
+/// this machine and so may stand in a report.
+struct VolumeInput {
+  std::filesystem::path path;
+  std::string given;
+};
+
+struct SurfaceInput {
+  std::filesystem::path path;
+  std::string given;
+  std::string unit;   // "mm", "cm", "m"
+  std::string frame;  // "LPS", "RAS"
+};
+
+/// Mirrors preprocess::SegmentOptions, which exists only where imaging is built.
+struct SegmentationInput {
+  double lower_hu = 0.0, upper_hu = 0.0;
+  std::vector<Vec3> seeds;  // the access point where the case gives none                 [mm]
+  double smoothing_mm = 0.0, neck_opening_mm = 0.0;
+};
+
+struct Case {
+  std::filesystem::path file;  // the case file itself
+  std::string name;
+  std::optional<VolumeInput> volume;  // exactly one of volume and surface_input is given
+  std::optional<SurfaceInput> surface_input;
+  SegmentationInput segmentation;  // of a volume
+  preprocess::SurfaceOptions surface;
+  preprocess::WallOptions wall;  // young_modulus 0: chosen by the wall stage
+  /// Its tangent is found later, from the centerline. insertion.length 0: chosen from the path's
+  /// length by the trials stage, 1.25 times it and 20 mm more.
+  plan::Study study;
+  plan::Limits limits;
+  plan::Weights weights;
+};
+
+/// Reads CASE (a file, or a folder with a case.json), applies `overrides` ("wall.thickness_mm=2":
+/// the value is JSON, and else text), defaults and units. Throws Error with all problems at once.
+Case read_case(const std::filesystem::path& path, const std::vector<std::string>& overrides = {});
+
+/// Every parameter after defaults, under the keys of the case file; catalogue wires written out.
+Json case_parameters(const Case& input);
+
+/// A path of a case or scene file: ${WIREPLAN_DATA} is the environment's, and else ../shared/data
+/// beside the checkout; what is relative counts from `folder`.
+std::filesystem::path resolve_path(const std::string& given, const std::filesystem::path& folder);
+
+/// Reads {"path", "unit", "frame"} and checks that the file is there; unit and frame may be left
+/// out for VTP alone, which is ours and in mm LPS. Leaves other keys to the caller.
+SurfaceInput read_surface_input(JsonReader& reader, const std::filesystem::path& folder);
+
+/// Adds a problem where the key is given: a part of the design that this version does not have.
+void refuse(JsonReader& reader, const std::string& key, const std::string& what);
+
+/// A number that this version knows only as 0, also its default.
+void expect_zero(JsonReader& reader, const std::string& key, const std::string& what);
+
+/// Reads {"model", "thickness_mm", "young_modulus_kpa", "poisson_ratio"} of the wall.
+preprocess::WallOptions read_wall(JsonReader& reader);
+
+}  // namespace wireplan::pipeline

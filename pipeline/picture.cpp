@@ -1,0 +1,453 @@
+#include "pipeline/picture.h"
+
+#include <vtkFreeTypeTools.h>
+#include <vtkImageData.h>
+#include <vtkNew.h>
+#include <vtkPNGWriter.h>
+#include <vtkPointData.h>
+#include <vtkTextProperty.h>
+#include <vtkUnsignedCharArray.h>
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdio>
+#include <fstream>
+#include <limits>
+
+namespace wireplan::pipeline {
+namespace {
+
+constexpr int kSamples = 2;  // per pixel and axis
+constexpr float kFarAway = -std::numeric_limits<float>::infinity();
+const Color kPaper(1.0F, 1.0F, 1.0F), kInk(0.15F, 0.15F, 0.15F), kGrey(0.5F, 0.5F, 0.5F);
+const Color kVessel(0.80F, 0.50F, 0.42F), kContact(0.90F, 0.05F, 0.05F);
+const Color kAccess(0.10F, 0.35F, 0.90F), kTarget(0.05F, 0.60F, 0.25F);
+
+/// One view, drawn as samples. A sample's depth counts toward the viewer.
+struct Panel {
+  int width, height;                 // samples
+  std::vector<float> depth;          // of the solid thing seen
+  std::vector<Color> solid;          // its shaded color
+  std::vector<float> transmittance;  // of the vessel layers before it
+  std::vector<Color> layers;         // their colors, weighted by opacity
+  std::vector<float> layer_weight;   // sum of these weights
+
+  Panel(int w, int h)
+      : width(w),
+        height(h),
+        depth(static_cast<std::size_t>(w) * h, kFarAway),
+        solid(depth.size(), kPaper),
+        transmittance(depth.size(), 1.0F),
+        layers(depth.size(), Color::Zero()),
+        layer_weight(depth.size(), 0.0F) {}
+};
+
+/// Samples of a panel that a box from `low` to `high` covers.
+struct SampleBox {
+  int x_0, x_1, y_0, y_1;
+};
+SampleBox covered_samples(const Panel& panel, const Vec3& low, const Vec3& high) {
+  const auto clamped = [](double value, int size) {
+    return static_cast<int>(std::clamp(value, 0.0, static_cast<double>(size)));
+  };
+  return {clamped(std::floor(low.x()), panel.width), clamped(std::ceil(high.x()), panel.width),
+          clamped(std::floor(low.y()), panel.height), clamped(std::ceil(high.y()), panel.height)};
+}
+
+/// Diffuse light from above, left of the viewer; `normal` is unit and in view axes.
+float shade(const Vec3& normal) {
+  static const Vec3 kLight = Vec3(-0.4, 0.5, 0.8).normalized();
+  return static_cast<float>(0.45 + 0.55 * std::max(0.0, normal.dot(kLight)));
+}
+
+/// A solid round bar from `a` to `b` with round ends, in samples; a ball where they are equal.
+void draw_bar(Panel& panel, const Vec3& a, const Vec3& b, double radius, const Color& color) {
+  const SampleBox box =
+      covered_samples(panel, a.cwiseMin(b).array() - radius, a.cwiseMax(b).array() + radius);
+  const Eigen::Vector2d axis = (b - a).head<2>();
+  const double squared_length = axis.squaredNorm();
+  for (int y = box.y_0; y < box.y_1; ++y) {
+    for (int x = box.x_0; x < box.x_1; ++x) {
+      // The nearest point of the axis as seen, and the height of the round surface over it.
+      const Eigen::Vector2d from_a = Eigen::Vector2d(x + 0.5, y + 0.5) - a.head<2>();
+      const double along =
+          squared_length > 0.0 ? std::clamp(from_a.dot(axis) / squared_length, 0.0, 1.0) : 0.0;
+      const Eigen::Vector2d offset = from_a - along * axis;
+      const double squared_height = radius * radius - offset.squaredNorm();
+      if (squared_height < 0.0) continue;
+      const double height = std::sqrt(squared_height);
+      const auto z = static_cast<float>(a.z() + along * (b.z() - a.z()) + height);
+      const std::size_t i = static_cast<std::size_t>(y) * panel.width + x;
+      if (z <= panel.depth[i]) continue;
+      panel.depth[i] = z;
+      panel.solid[i] = color * shade(Vec3(offset.x(), offset.y(), height) / radius);
+    }
+  }
+}
+
+/// One translucent triangle of the vessel, `p` in samples and `normal` per corner in view axes.
+/// The more a layer is seen from its side the more opaque it is, so outlines show as in an x-ray.
+/// Blending does not depend on the order of triangles. Solid things must have been drawn before.
+void draw_layer(Panel& panel, const std::array<Vec3, 3>& p, const std::array<Vec3, 3>& normal) {
+  const Eigen::Vector2d u = (p[1] - p[0]).head<2>(), v = (p[2] - p[0]).head<2>();
+  const double area = u.x() * v.y() - u.y() * v.x();
+  if (std::abs(area) < 1e-12) return;
+  const SampleBox box = covered_samples(panel, p[0].cwiseMin(p[1]).cwiseMin(p[2]),
+                                        p[0].cwiseMax(p[1]).cwiseMax(p[2]));
+  for (int y = box.y_0; y < box.y_1; ++y) {
+    for (int x = box.x_0; x < box.x_1; ++x) {
+      const Eigen::Vector2d d = Eigen::Vector2d(x + 0.5, y + 0.5) - p[0].head<2>();
+      const double b = (d.x() * v.y() - d.y() * v.x()) / area;
+      const double c = (u.x() * d.y() - u.y() * d.x()) / area;
+      if (b < 0.0 || c < 0.0 || b + c > 1.0) continue;
+      const std::size_t i = static_cast<std::size_t>(y) * panel.width + x;
+      const double z = (1.0 - b - c) * p[0].z() + b * p[1].z() + c * p[2].z();
+      if (z < panel.depth[i]) continue;  // hidden behind a wire
+      Vec3 n = ((1.0 - b - c) * normal[0] + b * normal[1] + c * normal[2]).normalized();
+      if (n.z() < 0.0) n = -n;
+      const auto opacity = static_cast<float>(0.08 + 0.62 * std::pow(1.0 - n.z(), 2.5));
+      panel.transmittance[i] *= 1.0F - opacity;
+      panel.layers[i] += opacity * shade(n) * kVessel;
+      panel.layer_weight[i] += opacity;
+    }
+  }
+}
+
+/// Averages the panel's samples into pixels of the picture, from column `left` and row `bottom`.
+void resolve(const Panel& panel, Picture& picture, int left, int bottom) {
+  for (int row = 0; row < panel.height / kSamples; ++row) {
+    for (int column = 0; column < panel.width / kSamples; ++column) {
+      Color sum = Color::Zero();
+      for (int s = 0; s < kSamples * kSamples; ++s) {
+        const int x = column * kSamples + s % kSamples, y = row * kSamples + s / kSamples;
+        const std::size_t i = static_cast<std::size_t>(y) * panel.width + x;
+        sum += panel.transmittance[i] * panel.solid[i];
+        if (panel.layer_weight[i] > 0.0F) {
+          sum += (1.0F - panel.transmittance[i]) / panel.layer_weight[i] * panel.layers[i];
+        }
+      }
+      const Color mean = sum / static_cast<float>(kSamples * kSamples);
+      const std::size_t pixel =
+          static_cast<std::size_t>(row + bottom) * picture.width + column + left;
+      for (int k = 0; k < 3; ++k) {
+        picture.rgb[3 * pixel + k] =
+            static_cast<std::uint8_t>(std::lround(255.0F * std::clamp(mean[k], 0.0F, 1.0F)));
+      }
+    }
+  }
+}
+
+void fill_box(Picture& picture, int x_0, int y_0, int width, int height, const Color& color) {
+  for (int y = std::max(0, y_0); y < std::min(picture.height, y_0 + height); ++y) {
+    for (int x = std::max(0, x_0); x < std::min(picture.width, x_0 + width); ++x) {
+      const std::size_t pixel = static_cast<std::size_t>(y) * picture.width + x;
+      for (int k = 0; k < 3; ++k) {
+        picture.rgb[3 * pixel + k] = static_cast<std::uint8_t>(std::lround(255.0F * color[k]));
+      }
+    }
+  }
+}
+
+enum class Align { kLeft, kCenter, kRight };
+
+/// Text in VTK's built-in font with its middle at row `y`. Text that cannot be set is left out.
+void draw_text(Picture& picture, const std::string& text, int x, int y, int size, Align align,
+               const Color& color = kInk) {
+  vtkNew<vtkTextProperty> property;
+  property->SetFontFamilyToArial();
+  property->SetFontSize(size);
+  property->SetColor(color.x(), color.y(), color.z());
+  vtkNew<vtkImageData> image;
+  std::array<int, 2> dims{};
+  constexpr int kDotsPerInch = 72;  // so that one point is one pixel
+  if (text.empty() || !vtkFreeTypeTools::GetInstance()->RenderString(property, text, kDotsPerInch,
+                                                                     image, dims.data())) {
+    return;
+  }
+  // Blend the rendered RGBA over the picture.
+  vtkUnsignedCharArray* bytes =
+      vtkUnsignedCharArray::SafeDownCast(image->GetPointData()->GetScalars());
+  if (bytes == nullptr || bytes->GetNumberOfComponents() != 4) return;
+  const int image_width = image->GetDimensions()[0];
+  const int shift = align == Align::kLeft ? 0 : align == Align::kCenter ? dims[0] / 2 : dims[0];
+  for (int row = 0; row < dims[1]; ++row) {
+    for (int column = 0; column < dims[0]; ++column) {
+      const int px = x - shift + column, py = y - dims[1] / 2 + row;
+      if (px < 0 || px >= picture.width || py < 0 || py >= picture.height) continue;
+      const vtkIdType source = 4 * (static_cast<vtkIdType>(row) * image_width + column);
+      const int opacity = bytes->GetValue(source + 3);
+      const std::size_t pixel = static_cast<std::size_t>(py) * picture.width + px;
+      for (int k = 0; k < 3; ++k) {
+        std::uint8_t& target = picture.rgb[3 * pixel + k];
+        target = static_cast<std::uint8_t>(
+            (opacity * bytes->GetValue(source + k) + (255 - opacity) * target + 127) / 255);
+      }
+    }
+  }
+}
+
+/// The side of the patient that a direction along an axis points to, as a word or its letter.
+std::string side_name(const Vec3& direction) {
+  static const std::array<std::array<const char*, 2>, 3> kNames{
+      {{"right", "left"}, {"anterior", "posterior"}, {"inferior", "superior"}}};
+  Eigen::Index axis = 0;
+  direction.cwiseAbs().maxCoeff(&axis);
+  return kNames[axis][direction[axis] > 0.0 ? 1 : 0];
+}
+std::string side_letter(const Vec3& direction) {
+  return std::string(1, static_cast<char>(std::toupper(side_name(direction).front())));
+}
+
+struct Box {
+  Vec3 low = Vec3::Constant(std::numeric_limits<double>::max());
+  Vec3 high = Vec3::Constant(std::numeric_limits<double>::lowest());
+  void include(const Vec3& p) {
+    low = low.cwiseMin(p);
+    high = high.cwiseMax(p);
+  }
+};
+Box scene_box(const Surface& vessel, const std::vector<PictureWire>& wires,
+              const PictureMarks& marks) {
+  Box box;
+  for (const Vec3& p : vessel.vertices.colwise()) box.include(p);
+  for (const PictureWire& wire : wires) {
+    for (const Vec3& p : wire.nodes.colwise()) box.include(p);
+  }
+  box.include(marks.access);
+  box.include(marks.target.array() - marks.target_radius);
+  box.include(marks.target.array() + marks.target_radius);
+  return box;
+}
+
+/// Rows of each view are its right, up and toward the viewer, in LPS. Up is the longest axis:
+/// toward the head for z, and else such that the target is above the access. The first view is the
+/// one that looks at the patient's front where up is z.
+std::array<Mat3, 2> choose_views(const Box& box, const PictureMarks& marks) {
+  Eigen::Index longest = 2;
+  const Vec3 extent = box.high - box.low;
+  if (extent.head<2>().maxCoeff() > extent.z()) extent.head<2>().maxCoeff(&longest);
+  Vec3 up = Vec3::Unit(longest);
+  if (longest != 2 && marks.target[longest] < marks.access[longest]) up = -up;
+  static const std::array<std::array<Vec3, 2>, 3> kTowardViewer{{{-Vec3::UnitY(), Vec3::UnitZ()},
+                                                                 {Vec3::UnitZ(), Vec3::UnitX()},
+                                                                 {-Vec3::UnitY(), Vec3::UnitX()}}};
+  std::array<Mat3, 2> views;
+  for (int k = 0; k < 2; ++k) {
+    const Vec3& toward = kTowardViewer[longest][k];
+    views[k] << up.cross(toward).transpose(), up.transpose(), toward.transpose();
+  }
+  return views;
+}
+
+/// The longest of 1, 2, 5, 10, ... that is at most `limit`.
+double round_length(double limit) {
+  const double power = std::pow(10.0, std::floor(std::log10(limit)));
+  for (const double factor : {5.0, 2.0}) {
+    if (factor * power <= limit) return factor * power;
+  }
+  return power;
+}
+
+std::string format(const char* pattern, double value) {
+  std::array<char, 64> text{};
+  std::snprintf(text.data(), text.size(), pattern, value);
+  return text.data();
+}
+
+double largest_force(const std::vector<PictureWire>& wires) {
+  double largest = 0.0;
+  for (const PictureWire& wire : wires) {
+    if (wire.contact_force.size() > 0) largest = std::max(largest, wire.contact_force.maxCoeff());
+  }
+  return largest;
+}
+
+/// Area unweighted by angle is enough for shading: the sum of the neighbours' area vectors.
+Eigen::Matrix3Xd vertex_normals(const Surface& vessel) {
+  Eigen::Matrix3Xd normals = Eigen::Matrix3Xd::Zero(3, vessel.vertices.cols());
+  for (const Eigen::Vector3i& t : vessel.triangles.colwise()) {
+    const Vec3 a = vessel.vertices.col(t[0]);
+    const Vec3 area_vector =
+        Vec3(vessel.vertices.col(t[1]) - a).cross(Vec3(vessel.vertices.col(t[2]) - a));
+    for (int k = 0; k < 3; ++k) normals.col(t[k]) += area_vector;
+  }
+  return normals.colwise().normalized();
+}
+
+/// What turns mm into samples of a panel: the scene's middle goes to the panel's middle.
+struct Projection {
+  Mat3 axes;
+  Vec3 middle;
+  double scale;  // samples per mm
+  Vec3 center;   // of the panel, samples
+  Vec3 operator()(const Vec3& p) const { return scale * (axes * (p - middle)) + center; }
+};
+
+void draw_wire(Panel& panel, const Projection& project, const PictureWire& wire,
+               double force_scale) {
+  const double radius = std::max(wire.radius * project.scale, 1.0 * kSamples);
+  for (Eigen::Index k = 0; k + 1 < wire.nodes.cols(); ++k) {
+    draw_bar(panel, project(wire.nodes.col(k)), project(wire.nodes.col(k + 1)), radius, wire.color);
+  }
+  // A bead where the wall pushes, its area in proportion to the force.
+  if (force_scale <= 0.0) return;
+  const double largest = std::max(2.0 * radius, 6.0 * kSamples);
+  for (Eigen::Index k = 0; k < wire.contact_force.size(); ++k) {
+    const double size = largest * std::sqrt(wire.contact_force[k] / force_scale);
+    const Vec3 center = project(wire.nodes.col(k));
+    if (size > radius) draw_bar(panel, center, center, size, kContact);
+  }
+}
+
+/// Balls at access and target, and a ring of the target's radius that faces the viewer.
+void draw_marks(Panel& panel, const Projection& project, const PictureMarks& marks) {
+  const double ball = 5.0 * kSamples;
+  const Vec3 access = project(marks.access), target = project(marks.target);
+  draw_bar(panel, access, access, ball, kAccess);
+  draw_bar(panel, target, target, ball, kTarget);
+  constexpr int kSides = 64;
+  const double radius = std::max(marks.target_radius * project.scale, 2.0 * ball);
+  const auto corner = [&](int k) -> Vec3 {
+    const double angle = 2.0 * kPi * k / kSides;
+    return target + radius * Vec3(std::cos(angle), std::sin(angle), 0.0);
+  };
+  for (int k = 0; k < kSides; ++k) draw_bar(panel, corner(k), corner(k + 1), kSamples, kTarget);
+}
+
+void draw_vessel(Panel& panel, const Projection& project, const Surface& vessel) {
+  const Eigen::Matrix3Xd normals = vertex_normals(vessel);
+  for (const Eigen::Vector3i& t : vessel.triangles.colwise()) {
+    std::array<Vec3, 3> corners, corner_normals;
+    for (int k = 0; k < 3; ++k) {
+      corners[k] = project(vessel.vertices.col(t[k]));
+      corner_normals[k] = project.axes * normals.col(t[k]);
+    }
+    draw_layer(panel, corners, corner_normals);
+  }
+}
+
+/// Title, legend, scale bar and the notice, below and above the panels.
+void draw_legend(Picture& picture, const std::vector<PictureWire>& wires, const PictureMarks& marks,
+                 double pixels_per_mm, int line) {
+  const int left = line, text_size = line * 6 / 10;
+  draw_text(picture, marks.title, picture.width / 2, picture.height - line, line * 8 / 10,
+            Align::kCenter);
+
+  // The scale bar and the notice share the lowest line.
+  const double length = round_length(0.2 * picture.width / pixels_per_mm);
+  const int bar = static_cast<int>(std::lround(length * pixels_per_mm));
+  fill_box(picture, left, line - 2, bar, 4, kInk);
+  draw_text(picture, format("%g mm", length), left + bar + line / 2, line, text_size, Align::kLeft);
+  draw_text(picture, "wireplan: research use only, no medical device", picture.width - line, line,
+            text_size, Align::kRight, kGrey);
+
+  // One entry per wire, then contact and marks, in two columns.
+  std::vector<std::pair<std::string, Color>> entries;
+  for (const PictureWire& wire : wires) entries.emplace_back(wire.name, wire.color);
+  if (const double force = largest_force(wires); force > 0.0) {
+    entries.emplace_back(format("wall contact, largest %.3g N", force), kContact);
+  }
+  entries.emplace_back("access", kAccess);
+  entries.emplace_back("target", kTarget);
+  const int rows = static_cast<int>(entries.size() + 1) / 2;
+  for (std::size_t k = 0; k < entries.size(); ++k) {
+    const int x = left + static_cast<int>(k % 2) * picture.width / 2;
+    const int y = line * (1 + rows - static_cast<int>(k / 2));
+    fill_box(picture, x, y - line / 5, line * 2 / 5, line * 2 / 5, entries[k].second);
+    draw_text(picture, entries[k].first, x + line * 3 / 4, y, text_size, Align::kLeft);
+  }
+}
+
+/// Names of the view and of its four sides, round the panel.
+void draw_sides(Picture& picture, const Mat3& view, int left, int bottom, int width, int height,
+                int line) {
+  const int size = line * 6 / 10, x = left + width / 2, y = bottom + height / 2;
+  const Vec3 right = view.row(0), up = view.row(1), toward = view.row(2);
+  draw_text(picture, "seen from " + side_name(toward), x, bottom + height + line / 2, size,
+            Align::kCenter);
+  draw_text(picture, side_letter(-right), left + line / 2, y, size, Align::kCenter, kGrey);
+  draw_text(picture, side_letter(right), left + width - line / 2, y, size, Align::kCenter, kGrey);
+  draw_text(picture, side_letter(up), x, bottom + height - line / 2, size, Align::kCenter, kGrey);
+  draw_text(picture, side_letter(-up), x, bottom + line / 2, size, Align::kCenter, kGrey);
+}
+
+}  // namespace
+
+Color wire_color(int k) {
+  static const std::array<Color, 6> kColors{Color(0.05F, 0.10F, 0.55F), Color(0.00F, 0.45F, 0.45F),
+                                            Color(0.50F, 0.00F, 0.60F), Color(0.55F, 0.40F, 0.00F),
+                                            Color(0.00F, 0.50F, 0.75F), Color(0.25F, 0.25F, 0.25F)};
+  return kColors[static_cast<std::size_t>(k) % kColors.size()];
+}
+
+Picture draw_picture(const Surface& vessel, const std::vector<PictureWire>& wires,
+                     const PictureMarks& marks, const PictureSize& size) {
+  expects(size.width >= 200 && size.height >= 200);
+  const Box box = scene_box(vessel, wires, marks);
+  expects(box.low.allFinite() && box.high.allFinite());
+  for (const PictureWire& wire : wires) {
+    expects(wire.nodes.cols() >= 2 && wire.nodes.allFinite());
+    expects(wire.contact_force.size() == 0 || wire.contact_force.size() == wire.nodes.cols());
+  }
+
+  // Two panels between the title above and the legend below; one scale fits both.
+  Picture picture{size.width, size.height, {}};
+  picture.rgb.resize(3UL * size.width * size.height);
+  fill_box(picture, 0, 0, size.width, size.height, kPaper);
+  const int line = std::max(10, size.width / 40);
+  const int legend_rows = (static_cast<int>(wires.size()) + 4) / 2;
+  const int bottom = line * (2 + legend_rows), width = size.width / 2;
+  const int height = size.height - bottom - 3 * line;
+  expects(height > 4 * line);
+  const std::array<Mat3, 2> views = choose_views(box, marks);
+  double pixels_per_mm = std::numeric_limits<double>::max();
+  for (const Mat3& view : views) {
+    const Vec3 extent = (view * (box.high - box.low)).cwiseAbs().cwiseMax(1e-3);
+    pixels_per_mm = std::min(
+        {pixels_per_mm, (width - 2 * line) / extent.x(), (height - 2 * line) / extent.y()});
+  }
+
+  // Solid things first: the vessel's layers need to know what they cover.
+  for (int k = 0; k < 2; ++k) {
+    Panel panel(width * kSamples, height * kSamples);
+    const Projection project{views[k], 0.5 * (box.low + box.high), pixels_per_mm * kSamples,
+                             0.5 * Vec3(panel.width, panel.height, 0.0)};
+    for (const PictureWire& wire : wires) draw_wire(panel, project, wire, largest_force(wires));
+    draw_marks(panel, project, marks);
+    draw_vessel(panel, project, vessel);
+    resolve(panel, picture, k * width, bottom);
+    draw_sides(picture, views[k], k * width, bottom, width, height, line);
+  }
+  draw_legend(picture, wires, marks, pixels_per_mm, line);
+  return picture;
+}
+
+void write_picture(const Surface& vessel, const std::vector<PictureWire>& wires,
+                   const PictureMarks& marks, const std::filesystem::path& png) {
+  const Picture picture = draw_picture(vessel, wires, marks);
+  vtkNew<vtkImageData> image;
+  image->SetDimensions(picture.width, picture.height, 1);
+  image->AllocateScalars(VTK_UNSIGNED_CHAR, 3);
+  std::copy(picture.rgb.begin(), picture.rgb.end(),
+            static_cast<std::uint8_t*>(image->GetScalarPointer()));
+
+  // VTK only warns about a file it cannot open, so the file is written to memory first.
+  vtkNew<vtkPNGWriter> writer;
+  writer->SetInputData(image);
+  writer->WriteToMemoryOn();
+  writer->Write();
+  vtkUnsignedCharArray* bytes = writer->GetResult();
+  expects(bytes != nullptr);
+  std::ofstream file(png, std::ios::binary);
+  file.write(reinterpret_cast<const char*>(bytes->GetPointer(0)), bytes->GetNumberOfValues());
+  file.close();
+  if (!file) {
+    throw Error(png.string() +
+                ": cannot write the picture; expected a folder that exists, may be "
+                "written to and has space left");
+  }
+}
+
+}  // namespace wireplan::pipeline

@@ -1,0 +1,311 @@
+#include "pipeline/report.h"
+
+#include <Eigen/Core>
+#include <algorithm>
+#include <cmath>
+#include <optional>
+
+#include "pipeline/hash.h"
+
+namespace wireplan::pipeline {
+namespace {
+
+constexpr const char* kStatement =
+    "Research use only. Not a medical device. Not for diagnosis or treatment decisions.";
+
+constexpr const char* kRigidWall = "the wall is rigid in this version";
+constexpr const char* kNoRepeats = "no perturbed repeats are run in this version";
+
+Json limits_of_validity() {
+  return {
+      "Friction between wire and wall is left out: push forces are lower bounds.",
+      "The wall is rigid: contact forces are those of a vessel that does not give way, and the "
+      "wall's stiffness is reported but does not act.",
+      "Quasi-static: every push ends in equilibrium; no inertia, no blood flow, no breathing or "
+      "heart motion.",
+      "Wire stiffness is that of the catalogue or the case, not measured on the wire at hand; "
+      "wall parameters are not measured on the patient.",
+      "The vessel is as the segmentation found it; plaque, thrombus and branches that it left "
+      "out are not there.",
+      "Score scales are proposals from the literature, not clinical limits."};
+}
+
+// Writes numbers under keys; what has none becomes null, with the reason under "null_reasons".
+class Row {
+ public:
+  void put(const char* key, Json value) { row_[key] = std::move(value); }
+  void put_number(const char* key, double value, const std::string& reason) {
+    put_optional(key, std::isfinite(value) ? std::optional(value) : std::nullopt, reason);
+  }
+  void put_optional(const char* key, std::optional<double> value, const std::string& reason) {
+    row_[key] = value ? Json(*value) : Json(nullptr);
+    if (!value) reasons_[key] = reason;
+  }
+  Json finish() {
+    if (!reasons_.empty()) row_["null_reasons"] = std::move(reasons_);
+    return std::move(row_);
+  }
+
+ private:
+  Json row_, reasons_;
+};
+
+void put_candidate(Row& row, const plan::Study& study, const plan::Candidate& candidate) {
+  row.put("wire", study.wires[static_cast<std::size_t>(candidate.wire)].name);
+  row.put("inclination_deg", clean(candidate.inclination / kRadPerDeg));
+  row.put("azimuth_deg", clean(candidate.azimuth / kRadPerDeg));
+  row.put("roll_deg", clean(candidate.roll / kRadPerDeg));
+}
+
+const plan::Refinement* find_refinement(const ReportInput& input, int trial) {
+  const auto found = std::find_if(input.refinements.begin(), input.refinements.end(),
+                                  [&](const plan::Refinement& r) { return r.trial == trial; });
+  return found == input.refinements.end() ? nullptr : &*found;
+}
+
+Json provenance_json(const ReportInput& input) {
+  Json warnings = Json::array();
+  for (const Json& figures : input.figures) {
+    for (const Json& warning : figures.at("warnings")) warnings.push_back(warning);
+  }
+  std::vector<std::string> terms;
+  for (const simulate::TrialResult& trial : input.trials) {
+    for (const std::string& term : trial.terms) {
+      if (std::find(terms.begin(), terms.end(), term) == terms.end()) terms.push_back(term);
+    }
+  }
+  Row row;
+  row.put("inputs", Json::array({{{"name", input.input_name}, {"sha256", input.input_sha256}}}));
+  row.put("parameters_sha256", hash_text(input.parameters.dump()));
+  row.put("program", build_info());
+  row.put_optional("seed", {}, "no random numbers are drawn in this version");
+  row.put("stages", input.stages);
+  row.put("terms", terms);
+  row.put("parameters", input.parameters);
+  row.put("warnings", std::move(warnings));
+  return row.finish();
+}
+
+void put_figures(Row& row, const char* key, const Json& figures, const char* stage) {
+  if (!figures.contains(stage)) {
+    row.put_optional(key, {}, "the case enters at a surface");
+    return;
+  }
+  Json values = figures.at(stage);
+  values.erase("schema");
+  values.erase("warnings");
+  row.put(key, std::move(values));
+}
+
+Json vessel_json(const ReportInput& input) {
+  const Json& surface = input.figures.at("surface");
+  const Json& line = input.figures.at("centerline");
+  const Json& wall = input.figures.at("wall");
+  Row branch;
+  branch.put("name", "access to target");
+  branch.put("length_mm", line.at("length_mm"));
+  for (const char* key : {"mean_diameter_mm", "min_diameter_mm", "max_diameter_mm"}) {
+    branch.put(key, line.at(key));
+  }
+  const Json& tortuosity = line.at("tortuosity");
+  branch.put_optional("tortuosity",
+                      tortuosity.is_null() ? std::nullopt : std::optional<double>(tortuosity),
+                      "the path ends where it starts");
+
+  Row row;
+  for (const char* key : {"volume_mm3", "area_mm2", "triangles", "euler_number"}) {
+    row.put(key, surface.at(key));
+  }
+  row.put("tetrahedra", wall.at("tetrahedra"));
+  row.put("wall_thickness_mm", wall.at("thickness_mm"));
+  row.put("wall_young_modulus_kpa", wall.at("young_modulus_kpa"));
+  row.put("wall_stiffness_kpa_per_mm", wall.at("normal_stiffness_kpa_per_mm"));
+  put_figures(row, "image", input.figures, "volume");
+  put_figures(row, "segmentation", input.figures, "segment");
+  row.put("branches", Json::array({branch.finish()}));
+  return row.finish();
+}
+
+Json trial_json(const ReportInput& input, std::size_t k) {
+  const simulate::TrialResult& trial = input.trials[k];
+  const plan::Metrics& m = input.metrics[k];
+  const std::string ended = "the trial ended " + std::string(outcome_name(trial.outcome)) +
+                            (trial.reason.empty() ? "" : ": " + trial.reason);
+  Row row;
+  row.put("id", k);
+  put_candidate(row, input.study, input.candidates[k]);
+  row.put("outcome", outcome_name(trial.outcome));
+  row.put("reason", trial.reason);
+  row.put("reached", m.reached);
+  row.put_number("insertion_mm", m.insertion, ended);
+  row.put_number("tip_to_target_mm", m.tip_to_target, ended);
+  row.put_number("peak_tip_force_n", m.peak_tip_force, ended);
+  row.put_number("peak_contact_force_n", m.peak_contact_force, ended);
+  row.put_number("mean_contact_force_n", m.mean_contact_force, ended);
+  row.put_number("force_impulse_n_mm", m.force_impulse, ended);
+  row.put_number("peak_push_force_n", m.peak_push_force, ended);
+  row.put_optional("peak_wall_displacement_mm", {}, kRigidWall);
+  row.put_number("peak_curvature_per_mm", m.peak_curvature, ended);
+  row.put_number("centerline_deviation_mm", m.centerline_deviation, ended);
+  row.put_number("max_penetration_mm", m.max_penetration, ended);
+  row.put_number("residual_n", m.residual, ended);
+  const plan::Refinement* refined = find_refinement(input, static_cast<int>(k));
+  if (refined == nullptr) {
+    row.put_optional("position_error_mm", {}, "only the best plans are refined");
+  } else {
+    row.put_optional("position_error_mm",
+                     refined->error ? std::optional(refined->error->position) : std::nullopt,
+                     refined->reason);
+  }
+  row.put("iterations", m.iterations);
+  return row.finish();
+}
+
+Json ranked_json(const ReportInput& input, std::size_t k) {
+  const plan::RankedPlan& plan = input.ranking.plans[k];
+  Row row;
+  row.put("rank", k + 1);
+  row.put("trial", plan.trial);
+  put_candidate(row, input.study, input.candidates[static_cast<std::size_t>(plan.trial)]);
+  row.put("score", plan.score.total);
+  row.put("score_components", {{"reach", plan.score.reach},
+                               {"peak_force", plan.score.peak_force},
+                               {"mean_force", plan.score.mean_force},
+                               {"margin", plan.score.margin}});
+  row.put("score_error", plan.score_error);
+  row.put_optional("success_rate", {}, kNoRepeats);
+  row.put_optional("success_rate_interval", {}, kNoRepeats);
+  row.put("tied_with", plan.tied_with);
+  row.put("sentence", plan.sentence);
+  return row.finish();
+}
+
+Json wire_summary_json(const ReportInput& input, const plan::WireSummary& summary) {
+  const bool reached = summary.reached > 0;
+  const auto force = [&](double value) { return reached ? std::optional(value) : std::nullopt; };
+  Row row;
+  row.put("wire", input.study.wires[static_cast<std::size_t>(summary.wire)].name);
+  row.put("trials", summary.trials);
+  row.put("reached", summary.reached);
+  if (summary.best_trial) {
+    row.put("best_trial", *summary.best_trial);
+  } else {
+    row.put_optional("best_trial", {}, "no trial of this wire is ranked");
+  }
+  const char* none = "no trial of this wire reached the target";
+  row.put_optional("median_peak_contact_force_n", force(summary.median_peak_force), none);
+  row.put_optional("worst_peak_contact_force_n", force(summary.worst_peak_force), none);
+  return row.finish();
+}
+
+Json numerics_json(const ReportInput& input) {
+  Json rows = Json::array(), plans = Json::array();
+  for (const plan::Refinement& refinement : input.refinements) {
+    for (const plan::NumericsRow& run : refinement.rows) {
+      Row row;
+      row.put("trial", refinement.trial);
+      row.put("element_length_mm", run.element_length);
+      row.put_optional("position_error_mm", run.position_error, refinement.reason);
+      row.put("peak_contact_force_n", run.peak_force);
+      row.put("iterations", run.iterations);
+      rows.push_back(row.finish());
+    }
+    const std::optional<plan::NumericalError>& error = refinement.error;
+    const auto part = [&](double plan::NumericalError::*member) {
+      return error ? std::optional((*error).*member) : std::nullopt;
+    };
+    Row row;
+    row.put("trial", refinement.trial);
+    row.put_optional("position_error_mm", part(&plan::NumericalError::position), refinement.reason);
+    row.put_optional("peak_contact_force_error_n", part(&plan::NumericalError::peak_force),
+                     refinement.reason);
+    row.put_optional("mean_contact_force_error_n", part(&plan::NumericalError::mean_force),
+                     refinement.reason);
+    row.put_optional("peak_tip_force_error_n", part(&plan::NumericalError::tip_force),
+                     refinement.reason);
+    row.put_optional("observed_order", refinement.observed_order,
+                     refinement.reason.empty() ? "the runs do not differ" : refinement.reason);
+    plans.push_back(row.finish());
+  }
+  const Json& trials = input.figures.at("trials");
+  return {{"lumen_grid_mm", trials.at("lumen_grid_mm")},
+          {"lumen_max_deviation_mm", trials.at("lumen_max_deviation_mm")},
+          {"lumen_mean_deviation_mm", trials.at("lumen_mean_deviation_mm")},
+          {"plans", std::move(plans)},
+          {"rows", std::move(rows)},
+          {"rows_time", "cpu_s of each row stands in timing.numerics"}};
+}
+
+}  // namespace
+
+Json build_report(const ReportInput& input) {
+  expects(input.trials.size() == input.candidates.size() &&
+          input.metrics.size() == input.candidates.size());
+  Json trials = Json::array(), ranking = Json::array(), excluded = Json::array();
+  for (std::size_t k = 0; k < input.trials.size(); ++k) trials.push_back(trial_json(input, k));
+  for (std::size_t k = 0; k < input.ranking.plans.size(); ++k) {
+    ranking.push_back(ranked_json(input, k));
+  }
+  for (const plan::ExcludedTrial& trial : input.ranking.excluded) {
+    excluded.push_back({{"trial", trial.trial}, {"reason", trial.reason}});
+  }
+  Json wires = Json::array();
+  for (const plan::WireSummary& summary : input.ranking.wires) {
+    wires.push_back(wire_summary_json(input, summary));
+  }
+
+  Json report;
+  report["schema"] = kReportSchema;
+  report["name"] = input.name;
+  report["statement"] = kStatement;
+  report["limits"] = limits_of_validity();
+  report["outcome"] = ranking.empty() ? "no plan reaches the target" : "ranked";
+  report["provenance"] = provenance_json(input);
+  report["vessel"] = vessel_json(input);
+  report["ranking"] = std::move(ranking);
+  report["excluded"] = std::move(excluded);
+  report["wires"] = std::move(wires);
+  report["pareto"] = input.ranking.pareto;
+  report["numerics"] = numerics_json(input);
+  report["trials"] = std::move(trials);
+  report["timing"] = input.timing;
+  return report;
+}
+
+Json build_info() {
+  const std::string eigen = std::to_string(EIGEN_WORLD_VERSION) + "." +
+                            std::to_string(EIGEN_MAJOR_VERSION) + "." +
+                            std::to_string(EIGEN_MINOR_VERSION);
+  const std::string json = std::to_string(NLOHMANN_JSON_VERSION_MAJOR) + "." +
+                           std::to_string(NLOHMANN_JSON_VERSION_MINOR) + "." +
+                           std::to_string(NLOHMANN_JSON_VERSION_PATCH);
+  return {{"name", "wireplan"},
+          {"version", WIREPLAN_VERSION},
+          {"revision", WIREPLAN_REVISION},
+          {"compiler", WIREPLAN_COMPILER},
+          {"build_type", WIREPLAN_BUILD_TYPE},
+          {"libraries",
+           {{"Eigen", eigen},
+            {"TBB", WIREPLAN_TBB_VERSION},
+            {"VTK", WIREPLAN_VTK_VERSION},
+            {"CGAL", WIREPLAN_CGAL_VERSION},
+            {"ITK", WIREPLAN_ITK_VERSION},
+            {"nlohmann_json", json}}}};
+}
+
+std::string describe_best(const Json& report) {
+  const Json& ranking = report.at("ranking");
+  const Json& trials = report.at("trials");
+  if (ranking.empty()) {
+    return "no plan reaches the target within the limits: " + std::to_string(trials.size()) +
+           " trials; the report says why for each";
+  }
+  const Json& best = ranking.front();
+  return "best plan of " + std::to_string(ranking.size()) + " that reach, out of " +
+         std::to_string(trials.size()) + " tried: " + best.at("wire").get<std::string>() +
+         ", inclination " + best.at("inclination_deg").dump() + " deg, azimuth " +
+         best.at("azimuth_deg").dump() + " deg, roll " + best.at("roll_deg").dump() + " deg, " +
+         best.at("sentence").get<std::string>();
+}
+
+}  // namespace wireplan::pipeline

@@ -1,0 +1,38 @@
+#pragma once
+/// report.json (design section 6): what a run found, as plain JSON with a fixed order of keys.
+/// Outside "timing" it is the same, byte for byte, for the same inputs and build.
+#include <string>
+#include <vector>
+
+#include "pipeline/json_reader.h"
+#include "plan/ranking.h"
+#include "plan/refine.h"
+
+namespace wireplan::pipeline {
+
+inline constexpr const char* kReportSchema = "wireplan.report/1";
+
+struct ReportInput {
+  std::string name;                      // of the case
+  std::string input_name, input_sha256;  // of the volume or surface: no folder names
+  Json parameters;                       // of the case, after defaults
+  std::vector<std::string> stages;       // that were run or found, in order
+  Json figures;                          // per stage name, what its figures.json holds
+  plan::Study study;                     // as the trials used it
+  std::vector<plan::Candidate> candidates;
+  std::vector<simulate::TrialResult> trials;
+  std::vector<plan::Metrics> metrics;
+  plan::Ranking ranking;
+  std::vector<plan::Refinement> refinements;
+  Json timing;  // all that differs between equal runs
+};
+
+Json build_report(const ReportInput& input);
+
+/// Version, revision, compiler, build type and library versions of this program.
+Json build_info();
+
+/// The best plan of a report in one line, or why there is none.
+std::string describe_best(const Json& report);
+
+}  // namespace wireplan::pipeline

@@ -1,0 +1,412 @@
+#include "pipeline/scene_file.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace wireplan::pipeline {
+namespace {
+
+constexpr const char* kSceneSchema = "wireplan.scene/1";
+constexpr const char* kResultSchema = "wireplan.result/1";
+constexpr Range kAboveZero{.min = 0.0, .open_min = true};
+constexpr Range kFromZero{.min = 0.0};
+
+// ---- reading ----------------------------------------------------------------------------------
+
+/// A stiffness given as such or as the paper's coefficient, whose value depends on the edge length.
+struct StiffnessKeys {
+  const char* value;
+  const char* coefficient;
+};
+constexpr StiffnessKeys kBend{"bending_stiffness_n_mm2", "bend_coefficient_n_per_m"};
+constexpr StiffnessKeys kStretch{"axial_stiffness_n", "stretch_coefficient_n_per_m3"};
+
+/// Tells where both forms are given, or a required one in neither; true if there is one to read.
+bool check_one_form(JsonReader& reader, const StiffnessKeys& keys, bool required) {
+  const bool has_value = reader.has(keys.value), has_coefficient = reader.has(keys.coefficient);
+  if (has_value && has_coefficient) {
+    reader.problems().add(reader.path_of(keys.coefficient), "given twice",
+                          std::string("one of it and ") + keys.value);
+  } else if (required && !has_value && !has_coefficient) {
+    reader.problems().add(reader.path_of(keys.value), "missing",
+                          std::string("a number above 0, or ") + keys.coefficient);
+  }
+  return has_value != has_coefficient;
+}
+
+/// The section, with the paper's coefficients left to convert once the wire's length is known.
+struct SectionInput {
+  simulate::Section section;
+  double radius = 0.0;               // [mm]
+  double bend_coefficient = 0.0;     // k_b; 0 where EI is given                          [N/m]
+  double stretch_coefficient = 0.0;  // k_s; 0 where EA is given                          [N/m^3]
+};
+
+SectionInput read_section(JsonReader& reader) {
+  SectionInput input;
+  simulate::Section& section = input.section;
+  section.length = reader.number("length_mm", std::nullopt, kAboveZero);
+  if (check_one_form(reader, kBend, true)) {
+    const bool raw = reader.has(kBend.coefficient);
+    (raw ? input.bend_coefficient : section.bending_stiffness) =
+        reader.number(raw ? kBend.coefficient : kBend.value, std::nullopt, kAboveZero);
+  }
+  if (check_one_form(reader, kStretch, false)) {
+    const bool raw = reader.has(kStretch.coefficient);
+    (raw ? input.stretch_coefficient : section.axial_stiffness) =
+        reader.number(raw ? kStretch.coefficient : kStretch.value, std::nullopt, kFromZero);
+  }
+  section.twist_stiffness = reader.number("twist_stiffness_n_mm2", 0.0, kFromZero);
+  section.mass_per_length = reader.number("mass_kg_per_m", 0.0, kFromZero) * kTonnePerMmFromKgPerM;
+  section.rest_curvature =
+      reader.number("rest_curvature_per_mm", 0.0, {.min = 0.0, .max = 2.0}, "given in 1/m?");
+  input.radius =
+      reader.number("radius_mm", std::nullopt, {.min = 0.001, .max = 10.0}, "given in m?");
+  reader.finish();
+  return input;
+}
+
+struct WireInput {
+  simulate::Wire wire;
+  int elements = 0;
+  double edge_length = 0.0;  // [mm]
+};
+
+WireInput read_wire_of_scene(JsonReader& root) {
+  JsonReader reader = root.object("wire", true);
+  WireInput input;
+  input.wire.name = reader.text("name", "wire");
+  input.elements = reader.integer("elements", std::nullopt, 2, 20000);
+  std::vector<SectionInput> sections;
+  for (JsonReader& section : reader.objects("sections", true)) {
+    sections.push_back(read_section(section));
+  }
+  reader.finish();
+
+  // One wire has one radius here.
+  for (const SectionInput& section : sections) {
+    if (section.radius == sections.front().radius) continue;
+    reader.problems().add("wire.sections", "of several radius_mm", "the same in each",
+                          "a changing radius is not in this version");
+    break;
+  }
+  if (!sections.empty()) input.wire.radius = sections.front().radius;
+
+  // The paper's coefficients are those of edges of one length.
+  double length = 0.0;
+  for (const SectionInput& section : sections) length += section.section.length;
+  input.edge_length = length / input.elements;
+  for (SectionInput& section : sections) {
+    if (section.bend_coefficient > 0.0) {
+      section.section.bending_stiffness =
+          bending_stiffness_from_paper(section.bend_coefficient, input.edge_length);
+    }
+    if (section.stretch_coefficient > 0.0) {
+      section.section.axial_stiffness =
+          axial_stiffness_from_paper(section.stretch_coefficient, input.edge_length);
+    }
+    input.wire.sections.push_back(section.section);
+  }
+  return input;
+}
+
+simulate::Support read_support(JsonReader& reader) {
+  using simulate::SupportKind;
+  simulate::Support support;
+  support.at = reader.choice("at", std::nullopt, {"proximal", "distal"}) == "proximal"
+                   ? simulate::WireEnd::kProximal
+                   : simulate::WireEnd::kDistal;
+  const std::string kind = reader.choice("kind", std::nullopt, {"clamped", "pinned", "guided"});
+  support.kind = kind == "clamped"  ? SupportKind::kClamped
+                 : kind == "pinned" ? SupportKind::kPinned
+                                    : SupportKind::kGuided;
+  support.point = reader.point("point_mm", std::nullopt);
+  support.direction = reader.direction("direction", Vec3(Vec3::UnitX()));
+  support.roll = reader.number("roll_deg", 0.0, {.min = -360.0, .max = 360.0}) * kRadPerDeg;
+  reader.finish();
+  return support;
+}
+
+/// The supports must hold the wire against rigid motion, or it has no equilibrium.
+void check_supports(const std::vector<simulate::Support>& supports, Problems& problems) {
+  using simulate::SupportKind;
+  int proximal = 0, clamped = 0, pinned = 0;
+  for (const simulate::Support& support : supports) {
+    proximal += support.at == simulate::WireEnd::kProximal;
+    clamped += support.kind == SupportKind::kClamped;
+    pinned += support.kind == SupportKind::kPinned;
+  }
+  const int count = static_cast<int>(supports.size());
+  if (count > 2 || (count == 2 && proximal != 1)) {
+    problems.add("supports", "several at one end", "one at an end");
+  } else if (proximal != 1) {
+    problems.add("supports", "without one at the proximal end", "one there",
+                 "the wire starts straight from it");
+  } else if (clamped == 0 && !(count == 2 && pinned > 0)) {
+    problems.add("supports", "not enough to hold the wire",
+                 "one clamped end, or a pinned end and a support at the other");
+  }
+}
+
+simulate::Loads read_loads(JsonReader& root) {
+  JsonReader reader = root.object("loads", false);
+  simulate::Loads loads;
+  loads.gravity = reader.point("gravity_m_per_s2", Vec3(Vec3::Zero())) * kMmPerM;
+  loads.tip_force = reader.point("tip_force_n", Vec3(Vec3::Zero()));
+  if (!reader.point("tip_moment_n_mm", Vec3(Vec3::Zero())).isZero(0.0)) {
+    reader.problems().add("loads.tip_moment_n_mm", reader.raw("tip_moment_n_mm").dump(),
+                          "[0, 0, 0]", "a moment on the tip is not in this version");
+  }
+  reader.finish();
+  return loads;
+}
+
+simulate::SolverOptions read_solver(JsonReader& root) {
+  JsonReader reader = root.object("solver", false);
+  const Json& method = reader.raw("method");
+  const std::vector<std::string> later = {"conjugate_gradient", "explicit", "semi_implicit"};
+  if (std::find(later.begin(), later.end(), method) != later.end()) {
+    reader.problems().add("solver.method", method.dump(), "\"newton\"",
+                          "the paper's own methods are not in this version");
+  } else {
+    reader.choice("method", "newton", {"newton"});
+  }
+  for (const char* key : {"time_step_s", "duration_s", "damping_per_s"}) {
+    refuse(reader, key, "methods that run in time are");
+  }
+  simulate::SolverOptions options;
+  options.residual_tolerance =
+      reader.number("residual_tolerance_n", options.residual_tolerance, {.min = 1e-14, .max = 1.0});
+  options.max_iterations = reader.integer("max_iterations", options.max_iterations, 1, 10000000);
+  options.load_steps = reader.integer("load_steps", options.load_steps, 1, 100000);
+  reader.finish();
+  return options;
+}
+
+simulate::Scene read_bench(JsonReader& root, const WireInput& wire) {
+  simulate::Scene scene;
+  scene.wire = wire.wire;
+  scene.elements = wire.elements;
+  const std::size_t problems_before = root.problems().count();
+  for (JsonReader& support : root.objects("supports", true)) {
+    scene.supports.push_back(read_support(support));
+  }
+  if (root.problems().count() == problems_before) check_supports(scene.supports, root.problems());
+  scene.loads = read_loads(root);
+  scene.solver = read_solver(root);
+  return scene;
+}
+
+SurfaceInput read_vessel(JsonReader& root, const std::filesystem::path& folder) {
+  JsonReader reader = root.object("vessel", true);
+  JsonReader surface = reader.object("surface", true);
+  const SurfaceInput input = read_surface_input(surface, folder);
+  surface.finish();
+  JsonReader wall = reader.object("wall", false);
+  read_wall(wall);  // checked; a rigid wall has no parameters
+  wall.finish();
+  expect_zero(reader, "friction", "friction is");
+  reader.finish();
+  return input;
+}
+
+/// The target of a scene, which need not have one.
+simulate::Goal read_goal(JsonReader& root, const simulate::Introducer& introducer) {
+  constexpr double kFarAway = 1e6;  // [mm]
+  simulate::Goal goal{.point = introducer.point - kFarAway * introducer.direction, .radius = 1.0};
+  if (!root.has("target")) return goal;
+  JsonReader target = root.object("target", true);
+  goal.point = target.point("point_mm", std::nullopt);
+  goal.radius = target.number("radius_mm", simulate::Goal().radius, kAboveZero);
+  target.finish();
+  return goal;
+}
+
+InsertionScene read_insertion_scene(JsonReader& root, const WireInput& wire,
+                                    const std::filesystem::path& folder) {
+  InsertionScene scene;
+  scene.wire = wire.wire;
+  scene.vessel = read_vessel(root, folder);
+  refuse(root, "supports", "supports beside the introducer are");
+  const simulate::Loads loads = read_loads(root);
+  if (!loads.gravity.isZero(0.0) || !loads.tip_force.isZero(0.0)) {
+    root.problems().add("loads", root.raw("loads").dump(), "none but 0",
+                        "loads on a wire in a vessel are not in this version");
+  }
+
+  // The introducer and the push.
+  JsonReader insertion = root.object("insertion", true);
+  scene.introducer.point = insertion.point("point_mm", std::nullopt);
+  scene.introducer.direction = insertion.direction("direction", std::nullopt);
+  scene.introducer.roll =
+      insertion.number("roll_deg", 0.0, {.min = -360.0, .max = 360.0}) * kRadPerDeg;
+  scene.options.length = insertion.number("length_mm", std::nullopt, kAboveZero);
+  scene.options.step = insertion.number("step_mm", scene.options.step, kAboveZero);
+  insertion.finish();
+  if (root.problems().empty() && scene.options.length > scene.wire.length()) {
+    root.problems().add("insertion.length_mm", Json(scene.options.length).dump(),
+                        "at most the wire's length, " + Json(scene.wire.length()).dump());
+  }
+
+  // How finely.
+  const simulate::SolverOptions solver = read_solver(root);
+  scene.options.element_length = wire.edge_length;
+  scene.options.residual_tolerance = solver.residual_tolerance;
+  scene.options.max_iterations = solver.max_iterations;
+  scene.goal = read_goal(root, scene.introducer);
+  return scene;
+}
+
+// ---- writing ----------------------------------------------------------------------------------
+
+constexpr const char* kNotFinite = "the solver left no finite number here";
+
+/// Adds the value, or null and the reason where it is not finite.
+void put(Json& object, const std::string& key, double value) {
+  object[key] = std::isfinite(value) ? Json(value) : Json();
+  if (!std::isfinite(value)) object[key + "_reason"] = kNotFinite;
+}
+
+template <typename Matrix>
+void put_points(Json& object, const std::string& key, const Matrix& points) {
+  object[key] = points.allFinite() ? to_json(points) : Json();
+  if (!points.allFinite()) object[key + "_reason"] = kNotFinite;
+}
+
+Json energy_json(const simulate::SceneResult& result) {
+  Json json = Json::object();
+  put(json, "stretch", result.energy.stretch);
+  put(json, "bend", result.energy.bend);
+  put(json, "twist", result.energy.twist);
+  put(json, "gravity", result.gravity_energy);
+  put(json, "tip_force", result.energy.load - result.gravity_energy);
+  put(json, "contact", result.energy.contact);
+  json["wall"] = 0.0;  // a bench has none
+  put(json, "total", result.energy.total());
+  return json;
+}
+
+Json reaction_json(const simulate::Reaction& reaction) {
+  Json json = {{"at", reaction.at == simulate::WireEnd::kProximal ? "proximal" : "distal"}};
+  put_points(json, "force_n", reaction.force);
+  put_points(json, "moment_n_mm", reaction.moment);
+  return json;
+}
+
+Json contact_json(const simulate::NodeContact& contact) {
+  Json json = {{"node", contact.node}};
+  put_points(json, "point_mm", contact.point);
+  put_points(json, "force_n", contact.force);
+  put(json, "normal_force_n", contact.force.norm());
+  put(json, "penetration_mm", contact.penetration);
+  return json;
+}
+
+/// One row per `every_mm` of insertion, and one for the last push.
+Json history_json(const std::vector<simulate::Push>& pushes, double every_mm) {
+  Json rows = Json::array();
+  double next = every_mm, peak = 0.0, peak_tip = 0.0;
+  for (std::size_t i = 0; i < pushes.size(); ++i) {
+    const simulate::Push& push = pushes[i];
+    peak = std::max(peak, push.peak_contact_force);
+    peak_tip = std::max(peak_tip, push.tip_force);
+    if (push.insertion < next && i + 1 < pushes.size()) continue;
+    Json row;
+    put(row, "insertion_mm", push.insertion);
+    put(row, "push_force_n", push.push_force);
+    put_points(row, "tip_mm", push.tip);
+    put(row, "peak_tip_force_n", peak_tip);
+    put(row, "peak_contact_force_n", peak);
+    rows.push_back(row);
+    peak = peak_tip = 0.0;
+    while (next <= push.insertion) next += every_mm;
+  }
+  return rows;
+}
+
+}  // namespace
+
+double axial_stiffness_from_paper(double stretch_coefficient, double edge_length) {
+  const double h = edge_length / kMmPerM;  // [m]
+  return 2.0 * stretch_coefficient * h * h * h;
+}
+
+double bending_stiffness_from_paper(double bend_coefficient, double edge_length) {
+  const double h = edge_length / kMmPerM;                   // [m]
+  return bend_coefficient * h * h * h * kMmPerM * kMmPerM;  // N m^2 -> N mm^2
+}
+
+SceneFile read_scene(const std::filesystem::path& path) {
+  SceneFile scene{.file = path, .bench = std::nullopt, .insertion = std::nullopt};
+  const Json file = read_json(path, kSceneSchema);
+  Problems problems(path.string());
+  JsonReader root(file, "", problems);
+  root.text("schema", std::nullopt);
+  const WireInput wire = read_wire_of_scene(root);
+  JsonReader output = root.object("output", false);
+  const double every = output.number("every_mm", simulate::InsertionOptions().record_every,
+                                     {.min = 0.001, .max = 1e4});
+  output.finish();
+
+  // A bench, or an insertion: the vessel and the insertion belong together.
+  if (root.has("vessel") || root.has("insertion")) {
+    scene.insertion = read_insertion_scene(root, wire, path.parent_path());
+    scene.insertion->options.record_every = every;
+  } else {
+    scene.bench = read_bench(root, wire);
+  }
+  root.finish();
+  problems.throw_if_any();
+  return scene;
+}
+
+Json result_json(const simulate::SceneResult& result) {
+  Json json = {{"schema", kResultSchema}, {"outcome", simulate::outcome_name(result.outcome)}};
+  if (!result.reason.empty()) json["reason"] = result.reason;
+  json["terms"] = result.terms;
+  put_points(json, "nodes_mm", result.nodes);
+  json["twist_rad"] = nullptr;
+  if (result.twist.size() == 0) {
+    json["twist_rad_reason"] = "the wire is straight at rest, so no twist was solved for";
+  } else if (!result.twist.allFinite()) {
+    json["twist_rad_reason"] = kNotFinite;
+  } else {
+    json["twist_rad"] = std::vector<double>(result.twist.begin(), result.twist.end());
+  }
+  json["energy_n_mm"] = energy_json(result);
+  put(json, "residual_n", result.residual);
+  json["iterations"] = result.iterations;
+  json["steps"] = result.steps;
+  put(json, "cpu_time_s", result.cpu_time_s);
+  json["reactions"] = Json::array();
+  for (const simulate::Reaction& reaction : result.reactions) {
+    json["reactions"].push_back(reaction_json(reaction));
+  }
+  return json;
+}
+
+Json result_json(const simulate::TrialResult& result, double every_mm) {
+  Json json = {{"schema", kResultSchema}, {"outcome", simulate::outcome_name(result.outcome)}};
+  if (!result.reason.empty()) json["reason"] = result.reason;
+  json["terms"] = result.terms;
+  put_points(json, "nodes_mm", result.nodes);
+  long iterations = 0;
+  double residual = 0.0, penetration = 0.0;
+  for (const simulate::Push& push : result.pushes) {
+    iterations += push.iterations;
+    residual = std::max(residual, push.residual);
+    penetration = std::max(penetration, push.max_penetration);
+  }
+  put(json, "residual_n", residual);
+  json["iterations"] = iterations;
+  json["steps"] = result.pushes.size();
+  json["contacts"] = Json::array();
+  for (const simulate::NodeContact& contact : result.contacts) {
+    json["contacts"].push_back(contact_json(contact));
+  }
+  put(json, "max_penetration_mm", penetration);
+  json["history"] = history_json(result.pushes, every_mm);
+  return json;
+}
+
+}  // namespace wireplan::pipeline

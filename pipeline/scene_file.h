@@ -1,0 +1,47 @@
+#pragma once
+/// SCENE.json -> one wire on the laboratory bench, or one insertion into a vessel (design section
+/// 5), and its result.json. What the design has and this version not is refused by name.
+#include <filesystem>
+#include <optional>
+#include <string>
+
+#include "pipeline/case_file.h"
+#include "pipeline/json_reader.h"
+#include "simulate/scene.h"
+#include "simulate/trial.h"
+
+namespace wireplan::pipeline {
+
+/// A wire pushed into a vessel: what run_trial asks for, and the vessel's surface.
+struct InsertionScene {
+  simulate::Wire wire;
+  SurfaceInput vessel;
+  simulate::Introducer introducer;
+  simulate::Goal goal;  // where the scene gives none: one so far away that no tip reaches it
+  simulate::InsertionOptions options;  // edges as long as the wire in its number of elements
+};
+
+/// Exactly one of the two is there.
+struct SceneFile {
+  std::filesystem::path file;
+  std::optional<simulate::Scene> bench;
+  std::optional<InsertionScene> insertion;
+};
+
+/// Reads, checks and converts to internal units. Throws Error with all problems at once.
+SceneFile read_scene(const std::filesystem::path& path);
+
+/// EA [N] from the paper's k_s [N/m^3] and EI [N mm^2] from its k_b [N/m], for edges of
+/// `edge_length` h [mm]: k_s = EA / (2 h^3) and k_b = EI / h^3 with h in m.
+double axial_stiffness_from_paper(double stretch_coefficient, double edge_length);
+double bending_stiffness_from_paper(double bend_coefficient, double edge_length);
+
+/// result.json, "wireplan.result/1". A number that is not finite becomes null with the reason
+/// beside it, under "KEY_reason".
+Json result_json(const simulate::SceneResult& result);
+
+/// The same for an insertion; `every_mm` spaces the rows of its history, whose forces are the
+/// largest since the row before.
+Json result_json(const simulate::TrialResult& result, double every_mm);
+
+}  // namespace wireplan::pipeline

@@ -1,0 +1,482 @@
+#include "pipeline/stage_work.h"
+
+#include <algorithm>
+#include <array>
+#include <chrono>
+#include <cmath>
+#include <thread>
+#include <utility>
+
+#include "pipeline/picture.h"
+#include "pipeline/report.h"
+#include "pipeline/trial_file.h"
+#include "plan/batch.h"
+#include "plan/metrics.h"
+#include "preprocess/centerline.h"
+#include "preprocess/segment.h"
+#include "preprocess/surface.h"
+#include "preprocess/vessel_io.h"
+#include "preprocess/wall.h"
+
+namespace wireplan::pipeline {
+namespace {
+
+namespace fs = std::filesystem;
+
+// The direction of the vessel at the access is that of its first centimetre.
+constexpr double kTangentSpan = 10.0;
+// Wire that is brought along where the case leaves it open: a wire does not keep to the middle.
+constexpr double kInsertionFactor = 1.25, kInsertionExtra = 20.0;
+// The best plans are also written as files for viewers.
+constexpr std::size_t kPlansShown = 5;
+// Spacing of the control points that Slicer draws a curve through.
+constexpr double kMarkupSpacing = 2.0;
+
+constexpr std::array kStagesBeforeReport = {"volume",     "segment", "surface",
+                                            "centerline", "wall",    "trials"};
+constexpr const char* kTimingSchema = "wireplan.timing/1";
+
+Json figures_of(const std::string& stage) {
+  return {{"schema", "wireplan." + stage + "/1"}, {"warnings", Json::array()}};
+}
+
+void write_figures(const Json& figures, const fs::path& folder) {
+  write_json(figures, folder / kFiguresFile);
+}
+
+#ifndef WIREPLAN_IMAGING
+[[noreturn]] void throw_no_imaging() {
+  throw Error("this wireplan is built without imaging and reads no volumes; enter the case at a " +
+              std::string("surface, or configure with -DWIREPLAN_IMAGING=ON"));
+}
+#endif
+
+// Points every `spacing` or more along a line, and its last.
+std::vector<Vec3> thin_out(const Eigen::Matrix3Xd& points, double spacing) {
+  std::vector<Vec3> kept;
+  for (Eigen::Index k = 0; k < points.cols(); ++k) {
+    const bool last = k + 1 == points.cols();
+    if (kept.empty() || last || (points.col(k) - kept.back()).norm() >= spacing) {
+      kept.emplace_back(points.col(k));
+    }
+  }
+  return kept;
+}
+
+// A curve for 3D Slicer (references G).
+void write_markups(const Eigen::Matrix3Xd& points, const std::string& name, const fs::path& path) {
+  Json controls = Json::array();
+  for (const Vec3& point : thin_out(points, kMarkupSpacing)) {
+    const std::string id = std::to_string(controls.size() + 1);
+    controls.push_back({{"id", id}, {"label", name + "-" + id}, {"position", to_json(point)}});
+  }
+  const Json curve = {{"type", "Curve"},
+                      {"coordinateSystem", "LPS"},
+                      {"coordinateUnits", "mm"},
+                      {"controlPoints", std::move(controls)},
+                      {"display", {{"pointLabelsVisibility", false}}}};
+  write_json({{"@schema",
+               "https://raw.githubusercontent.com/slicer/slicer/master/Modules/Loadable/Markups/"
+               "Resources/Schema/markups-schema-v1.0.0.json#"},
+              {"markups", Json::array({curve})}},
+             path);
+}
+
+void require_inside(const Surface& surface, const std::string& key, const Vec3& point) {
+  const preprocess::InsideAnswer answer = preprocess::locate_point(surface, point);
+  if (answer.inside) return;
+  throw Error(key + " is " + to_json(point).dump() + ", " +
+              Json(std::round(answer.distance * 10.0) / 10.0).dump() +
+              " mm outside the vessel, expected a point inside it; look at surface.vtp and move " +
+              "the point, or mend the segmentation that left its place out");
+}
+
+// Enough wire for a way round the middle, as far as the shortest wire goes.
+double choose_insertion(const Centerline& path, const plan::Study& study) {
+  const double path_length = path.arc_length(path.arc_length.size() - 1);
+  double length = std::ceil(kInsertionFactor * path_length + kInsertionExtra);
+  for (const simulate::Wire& wire : study.wires) length = std::min(length, wire.length());
+  return length;
+}
+
+// The trials to be done: those that an interrupted run did not finish.
+std::vector<int> list_unfinished(std::size_t count, const fs::path& folder) {
+  std::vector<int> ids;
+  for (int id = 0; id < static_cast<int>(count); ++id) {
+    if (!find_trial(folder / trial_file_name(id))) ids.push_back(id);
+  }
+  return ids;
+}
+
+// A plan's insertion as a time series over the insertion [mm], and its final wire for Slicer.
+void write_plan(const simulate::TrialResult& trial, const std::string& name,
+                const fs::path& folder) {
+  fs::create_directories(folder / name);
+  std::vector<fs::path> files;
+  std::vector<double> insertions;
+  for (const simulate::Shape& shape : trial.shapes) {
+    const std::vector<double> force(shape.contact_force.begin(), shape.contact_force.end());
+    files.push_back(folder / name / (std::to_string(files.size()) + ".vtp"));
+    insertions.push_back(shape.insertion);
+    preprocess::write_polyline(shape.nodes, {{"contact_force_n", force}}, files.back());
+  }
+  preprocess::write_time_series(files, insertions, folder / (name + ".pvd"));
+  write_markups(trial.nodes, name, folder / (name + ".mrk.json"));
+}
+
+// All of the report that the stages before it tell.
+ReportInput describe_run(Workspace& work) {
+  const Case& given = work.given();
+  ReportInput report;
+  report.name = given.name;
+  report.input_name = work.input.filename().string();
+  report.input_sha256 = work.input_sha256;
+  report.study = work.study();
+  report.candidates = plan::list_candidates(report.study);
+  for (const char* stage : kStagesBeforeReport) {
+    if (!work.has(stage)) continue;
+    report.stages.push_back(stage);
+    report.figures[stage] = work.figures(stage);
+  }
+
+  // The values that stages chose where the case left them open.
+  report.parameters = work.parameters;
+  report.parameters["insertion"]["length_mm"] = report.study.insertion.length;
+  report.parameters["wall"]["young_modulus_kpa"] =
+      report.figures.at("wall").at("young_modulus_kpa");
+  return report;
+}
+
+Json timing_json(const Workspace& work, const std::vector<plan::Refinement>& refinements) {
+  const int threads = work.options().threads;
+  Json timing;
+  timing["threads"] = threads > 0 ? threads : static_cast<int>(std::thread::hardware_concurrency());
+  timing["stages"] = Json::array();
+  for (const char* stage : kStagesBeforeReport) {
+    if (!work.has(stage)) continue;
+    timing["stages"].push_back({{"stage", stage}, {"seconds", work.artifact(stage).seconds}});
+  }
+  timing["trials"] = read_json(work.artifact("trials").folder / kTimingFile, kTimingSchema);
+  timing["numerics"] = Json::array();
+  for (const plan::Refinement& refinement : refinements) {
+    for (std::size_t k = 0; k < refinement.rows.size(); ++k) {
+      timing["numerics"].push_back({{"trial", refinement.trial},
+                                    {"element_length_mm", refinement.rows[k].element_length},
+                                    {"cpu_s", refinement.cpu_seconds[k]}});
+    }
+  }
+  return timing;
+}
+
+}  // namespace
+
+Workspace::Workspace(Case given, WorkOptions options)
+    : given_(std::move(given)), options_(std::move(options)) {
+  input = given_.volume ? given_.volume->path : given_.surface_input->path;
+}
+
+const Artifact& Workspace::artifact(const std::string& stage) const {
+  const auto found = artifacts_.find(stage);
+  expects(found != artifacts_.end());
+  return found->second;
+}
+
+Json Workspace::figures(const std::string& stage) const {
+  return read_json(artifact(stage).folder / kFiguresFile, "wireplan." + stage + "/1");
+}
+
+const preprocess::Image& Workspace::image() {
+#ifdef WIREPLAN_IMAGING
+  if (!image_) image_ = preprocess::read_image(input);
+  return *image_;
+#else
+  throw_no_imaging();
+#endif
+}
+
+const Vessel& Workspace::vessel() {
+  if (!vessel_) {
+    vessel_ = Vessel{preprocess::read_surface_artifact(artifact("surface").folder / "surface.vtp"),
+                     preprocess::read_centerline(artifact("centerline").folder / "centerline.vtp"),
+                     preprocess::read_wall(artifact("wall").folder / "wall.vtu")};
+    expects(vessel_->wall.apexes.cols() == vessel_->surface.triangles.cols());
+  }
+  return *vessel_;
+}
+
+const simulate::Lumen& Workspace::lumen() {
+  if (!lumen_) lumen_ = std::make_unique<simulate::Lumen>(vessel().surface);
+  return *lumen_;
+}
+
+const plan::Study& Workspace::study() {
+  if (!study_) {
+    const Centerline& path = vessel().path;
+    study_ = given_.study;
+    study_->tangent = preprocess::start_tangent(path, kTangentSpan);
+    if (study_->insertion.length == 0.0) study_->insertion.length = choose_insertion(path, *study_);
+  }
+  return *study_;
+}
+
+void make_volume(Workspace& work, const fs::path& folder) {
+  const preprocess::Image& image = work.image();
+  const preprocess::Grid& grid = image.grid;
+
+  // Statistics of the values, summed in order.
+  double sum = 0.0;
+  for (const float value : image.values) sum += static_cast<double>(value);
+  const auto [low, high] = std::minmax_element(image.values.begin(), image.values.end());
+  expects(!image.values.empty());
+
+  Json figures = figures_of("volume");
+  figures["size"] = grid.size;
+  figures["spacing_mm"] = to_json(grid.spacing);
+  figures["origin_mm"] = to_json(grid.origin);
+  figures["direction_ijk_to_lps"] = to_json(Eigen::Matrix3Xd(grid.direction.transpose()));
+  figures["min_hu"] = *low;
+  figures["mean_hu"] = sum / static_cast<double>(image.values.size());
+  figures["max_hu"] = *high;
+  write_figures(figures, folder);
+}
+
+void make_segment([[maybe_unused]] Workspace& work, [[maybe_unused]] const fs::path& folder) {
+#ifdef WIREPLAN_IMAGING
+  const SegmentationInput& asked = work.given().segmentation;
+  const preprocess::Segmentation segmentation =
+      preprocess::segment(work.image(), {.lower_hu = asked.lower_hu,
+                                         .upper_hu = asked.upper_hu,
+                                         .seeds = asked.seeds,
+                                         .smoothing_mm = asked.smoothing_mm,
+                                         .neck_opening_mm = asked.neck_opening_mm});
+  work.drop_image();
+  preprocess::write_mask(segmentation.mask, folder / "mask.nrrd");
+
+  const preprocess::SegmentStatistics& statistics = segmentation.statistics;
+  Json figures = figures_of("segment");
+  figures["volume_mm3"] = statistics.volume_mm3;
+  figures["mean_hu"] = statistics.mean_hu;
+  figures["removed_by_opening_mm3"] = statistics.removed_by_opening_mm3;
+  figures["touches_border"] = statistics.touches_border;
+  if (statistics.touches_border) {
+    figures["warnings"].push_back(
+        "segment: the vessel touches the border of the volume and is closed there by a flat cap");
+  }
+  write_figures(figures, folder);
+#else
+  throw_no_imaging();
+#endif
+}
+
+void make_surface(Workspace& work, const fs::path& folder) {
+  // From the mask, or from the case's file, which must be sound before anything mends it.
+  const Case& given = work.given();
+  Surface surface;
+  if (given.surface_input) {
+    surface =
+        preprocess::read_surface(work.input, given.surface_input->unit, given.surface_input->frame);
+    preprocess::require_sound(preprocess::check_surface(surface), work.input.string());
+    surface = preprocess::remesh(surface, given.surface.edge_length_mm);
+  } else {
+#ifdef WIREPLAN_IMAGING
+    surface = preprocess::surface_from_mask(
+        preprocess::read_mask(work.artifact("segment").folder / "mask.nrrd"), given.surface);
+#else
+    throw_no_imaging();
+#endif
+  }
+  const preprocess::SurfaceCheck check = preprocess::check_surface(surface);
+  preprocess::require_sound(check, "stage surface");
+  preprocess::write_surface(surface, folder / "surface.vtp");
+
+  Json figures = figures_of("surface");
+  figures["vertices"] = check.vertices;
+  figures["triangles"] = check.triangles;
+  figures["volume_mm3"] = check.volume_mm3;
+  figures["area_mm2"] = check.area_mm2;
+  figures["euler_number"] = check.euler_number;
+  figures["mean_edge_mm"] = check.mean_edge_mm;
+  figures["min_angle_deg"] = check.min_angle_deg;
+  if (check.euler_number != 2) {
+    figures["warnings"].push_back("surface: it has " +
+                                  std::to_string((2 - check.euler_number) / 2) +
+                                  " handles (Euler number " + std::to_string(check.euler_number) +
+                                  "): arteries that touch or loop; look whether the loop is real");
+  }
+  write_figures(figures, folder);
+}
+
+void make_centerline(Workspace& work, const fs::path& folder) {
+  // Both ends must lie inside, told by their keys.
+  const Surface surface =
+      preprocess::read_surface_artifact(work.artifact("surface").folder / "surface.vtp");
+  const plan::Study& study = work.given().study;
+  require_inside(surface, "access.point_mm", study.access);
+  require_inside(surface, "target.point_mm", study.goal.point);
+
+  const Centerline line = preprocess::find_centerline(surface, study.access, study.goal.point);
+  preprocess::write_centerline(line, folder / "centerline.vtp");
+  write_markups(line.points, "centerline", folder / "centerline.mrk.json");
+
+  const Eigen::Index last = line.points.cols() - 1;
+  const double length = line.arc_length(last);
+  const double distance = (line.points.col(last) - line.points.col(0)).norm();
+  Json figures = figures_of("centerline");
+  figures["length_mm"] = length;
+  figures["mean_diameter_mm"] = 2.0 * line.radius.mean();
+  figures["min_diameter_mm"] = 2.0 * line.radius.minCoeff();
+  figures["max_diameter_mm"] = 2.0 * line.radius.maxCoeff();
+  figures["tortuosity"] = distance > 0.0 ? Json(length / distance) : Json(nullptr);
+  write_figures(figures, folder);
+}
+
+void make_wall(Workspace& work, const fs::path& folder) {
+  const Surface surface =
+      preprocess::read_surface_artifact(work.artifact("surface").folder / "surface.vtp");
+  const preprocess::WallOptions& options = work.given().wall;
+  const preprocess::ExtrudedWall extruded = preprocess::extrude_wall(surface, options);
+  preprocess::write_wall(surface, extruded.wall, folder / "wall.vtu");
+
+  Json figures = figures_of("wall");
+  figures["tetrahedra"] = extruded.wall.apexes.cols();
+  figures["thickness_mm"] = options.thickness_mm;
+  figures["young_modulus_kpa"] = clean(extruded.wall.young_modulus / kMpaPerKpa);
+  figures["poisson_ratio"] = extruded.wall.poisson_ratio;
+  figures["normal_stiffness_kpa_per_mm"] =
+      clean(wall_normal_stiffness(extruded.wall.young_modulus, extruded.wall.poisson_ratio,
+                                  options.thickness_mm) /
+            kMpaPerKpa);
+  figures["limited_tetrahedra"] = extruded.statistics.limited;
+  figures["min_height_mm"] = extruded.statistics.min_height_mm;
+  write_figures(figures, folder);
+}
+
+void make_trials(Workspace& work, const fs::path& folder) {
+  const plan::Study& study = work.study();
+  const std::vector<plan::Candidate> candidates = plan::list_candidates(study);
+  const simulate::Lumen& lumen = work.lumen();
+
+  // Each trial is kept as soon as it is finished, so that a run goes on where it was stopped.
+  fs::create_directories(work.unfinished / "trials");
+  const std::vector<int> ids = list_unfinished(candidates.size(), work.unfinished);
+  const int total = static_cast<int>(candidates.size());
+  const int kept = total - static_cast<int>(ids.size());
+  plan::BatchOptions batch{
+      .threads = work.options().threads, .progress = {}, .cancelled = work.options().cancelled};
+  if (work.options().progress) {
+    batch.progress = [&](int done, int) { work.options().progress(kept + done, total); };
+  }
+  std::vector<double> cpu_seconds(ids.size());
+  const std::vector<bool> finished = plan::for_each_slot(
+      static_cast<int>(ids.size()),
+      [&](int slot) {
+        const double start = plan::thread_cpu_seconds();
+        const int id = ids[static_cast<std::size_t>(slot)];
+        const plan::Candidate& candidate = candidates[static_cast<std::size_t>(id)];
+        const simulate::TrialResult trial = plan::run_candidate(study, candidate, lumen);
+        write_trial(id, study, candidate, trial, work.unfinished / trial_file_name(id));
+        cpu_seconds[static_cast<std::size_t>(slot)] = plan::thread_cpu_seconds() - start;
+      },
+      batch);
+  if (std::find(finished.begin(), finished.end(), false) != finished.end()) throw Interrupted();
+  fs::rename(work.unfinished / "trials", folder / "trials");
+
+  Json figures = figures_of("trials");
+  figures["trials"] = total;
+  figures["tangent"] = to_json(study.tangent);
+  figures["insertion_length_mm"] = study.insertion.length;
+  figures["lumen_grid_mm"] = lumen.grid_spacing();
+  figures["lumen_max_deviation_mm"] = lumen.max_deviation();
+  figures["lumen_mean_deviation_mm"] = lumen.mean_deviation();
+  write_figures(figures, folder);
+  double cpu_sum = 0.0;
+  for (const double seconds : cpu_seconds) cpu_sum += seconds;
+  write_json({{"schema", kTimingSchema}, {"trials_run", ids.size()}, {"cpu_s", cpu_sum}},
+             folder / kTimingFile);
+}
+
+namespace {
+
+/// The best plan of each wire in the vessel, or its closest attempt where it has none.
+void write_overview(const ReportInput& report, const Surface& vessel, const fs::path& png) {
+  std::vector<PictureWire> wires;
+  for (std::size_t w = 0; w < report.study.wires.size(); ++w) {
+    std::optional<std::size_t> shown;
+    for (std::size_t id = 0; id < report.trials.size(); ++id) {
+      if (report.candidates[id].wire != static_cast<int>(w) || report.trials[id].nodes.cols() < 2)
+        continue;
+      if (!shown || report.metrics[id].tip_to_target < report.metrics[*shown].tip_to_target)
+        shown = id;
+    }
+    const std::optional<int> best = report.ranking.wires[w].best_trial;
+    if (best) shown = static_cast<std::size_t>(*best);
+    if (!shown) continue;
+    const simulate::TrialResult& trial = report.trials[*shown];
+    wires.push_back(
+        {.name = report.study.wires[w].name + ": " +
+                 (best ? "best plan" : "no plan, " + std::string(outcome_name(trial.outcome))),
+         .nodes = trial.nodes,
+         .contact_force = {},
+         .radius = report.study.wires[w].radius,
+         .color = wire_color(static_cast<int>(wires.size()))});
+  }
+  write_picture(vessel, wires,
+                {.title = report.name,
+                 .access = report.study.access,
+                 .target = report.study.goal.point,
+                 .target_radius = report.study.goal.radius},
+                png);
+}
+
+}  // namespace
+
+void make_report(Workspace& work, const fs::path& folder) {
+  const auto start = std::chrono::steady_clock::now();
+  const plan::Study& study = work.study();
+  const fs::path trials_folder = work.artifact("trials").folder;
+
+  // Read the trials and measure them.
+  ReportInput report = describe_run(work);
+  const std::vector<plan::Candidate>& candidates = report.candidates;
+  for (std::size_t id = 0; id < candidates.size(); ++id) {
+    std::optional<simulate::TrialResult> trial =
+        find_trial(trials_folder / trial_file_name(static_cast<int>(id)));
+    expects(trial.has_value());
+    report.metrics.push_back(plan::compute_metrics(*trial, study, work.vessel().path));
+    report.trials.push_back(std::move(*trial));
+  }
+
+  // Rank, find the errors of the best by refining them, and rank again with these.
+  const Case& given = work.given();
+  const auto rank = [&](const std::vector<std::optional<plan::NumericalError>>& errors) {
+    return plan::rank(study, candidates, report.trials, report.metrics, given.limits, given.weights,
+                      errors);
+  };
+  report.ranking = rank({});
+  const plan::BatchOptions batch{
+      .threads = work.options().threads, .progress = {}, .cancelled = work.options().cancelled};
+  report.refinements = plan::refine_plans(study, candidates, report.metrics, report.ranking,
+                                          work.lumen(), {.batch = batch});
+  report.ranking =
+      rank(plan::errors_by_trial(report.refinements, static_cast<int>(candidates.size())));
+
+  // Repeat the best for their shapes on the way.
+  const std::size_t shown = std::min(kPlansShown, report.ranking.plans.size());
+  plan::for_each_slot(
+      static_cast<int>(shown),
+      [&](int slot) {
+        const int id = report.ranking.plans[static_cast<std::size_t>(slot)].trial;
+        const plan::Candidate& candidate = candidates[static_cast<std::size_t>(id)];
+        write_plan(plan::run_candidate(study, candidate, work.lumen()),
+                   "plan-" + std::to_string(slot + 1), folder / "trials");
+      },
+      batch);
+  if (work.options().cancelled && work.options().cancelled()) throw Interrupted();
+  write_overview(report, work.vessel().surface, folder / "plans.png");
+  report.timing = timing_json(work, report.refinements);
+  report.timing["report_s"] =
+      std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  write_json(build_report(report), folder / "report.json");
+}
+
+}  // namespace wireplan::pipeline

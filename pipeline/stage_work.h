@@ -1,0 +1,79 @@
+#pragma once
+/// What each stage does with its inputs. The order of the stages, their keys and the cache are in
+/// stages.h.
+#include <filesystem>
+#include <functional>
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "pipeline/case_file.h"
+#include "pipeline/json_reader.h"
+#include "pipeline/store.h"
+#include "preprocess/image.h"
+#include "simulate/contact.h"
+
+namespace wireplan::pipeline {
+
+/// Work was stopped by the user; what was finished is kept.
+class Interrupted : public std::exception {
+ public:
+  const char* what() const noexcept override { return "interrupted; what was finished is kept"; }
+};
+
+/// How a stage speaks to whom started it; each may be empty.
+struct WorkOptions {
+  int threads = 0;                                    // of the trials; 0: all cores
+  std::function<void(int done, int total)> progress;  // trials; from any thread, one at a time
+  std::function<bool()> cancelled;                    // from any thread
+};
+
+/// The artifacts made so far and what was read from them, each once and only when a stage asks.
+class Workspace {
+ public:
+  Workspace(Case given, WorkOptions options);
+
+  const Case& given() const { return given_; }
+  const WorkOptions& options() const { return options_; }
+
+  void add(const Artifact& artifact) { artifacts_[artifact.stage] = artifact; }
+  bool has(const std::string& stage) const { return artifacts_.count(stage) != 0; }
+  /// Expects the stage to be done.
+  const Artifact& artifact(const std::string& stage) const;
+  Json figures(const std::string& stage) const;  // its figures.json
+
+  const preprocess::Image& image();
+  void drop_image() { image_.reset(); }
+  const Vessel& vessel();
+  const simulate::Lumen& lumen();
+  /// The case's study with what the centerline tells: the tangent at the access, and the insertion
+  /// length where the case leaves it open.
+  const plan::Study& study();
+
+  std::filesystem::path input;  // the volume or surface that the case names
+  std::string input_sha256;
+  Json parameters;                   // of the case after defaults, without folder names
+  std::filesystem::path unfinished;  // where the stage under way may keep what it finished
+
+ private:
+  Case given_;
+  WorkOptions options_;
+  std::map<std::string, Artifact> artifacts_;
+  std::optional<preprocess::Image> image_;
+  std::optional<Vessel> vessel_;
+  std::optional<plan::Study> study_;
+  std::unique_ptr<simulate::Lumen> lumen_;
+};
+
+/// Each fills `folder` with the artifact of its stage. All but the report write figures.json,
+/// numbers for the report with a list of warnings.
+void make_volume(Workspace& work, const std::filesystem::path& folder);
+void make_segment(Workspace& work, const std::filesystem::path& folder);
+void make_surface(Workspace& work, const std::filesystem::path& folder);
+void make_centerline(Workspace& work, const std::filesystem::path& folder);
+void make_wall(Workspace& work, const std::filesystem::path& folder);
+void make_trials(Workspace& work, const std::filesystem::path& folder);
+void make_report(Workspace& work, const std::filesystem::path& folder);
+
+}  // namespace wireplan::pipeline

@@ -1,0 +1,201 @@
+#include "pipeline/stages.h"
+
+#include <algorithm>
+#include <chrono>
+#include <utility>
+
+#include "pipeline/hash.h"
+#include "pipeline/report.h"
+
+namespace wireplan::pipeline {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr const char* kNotMade = "to be made";  // in the place of contents not yet known
+
+double seconds_since(std::chrono::steady_clock::time_point start) {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+}
+
+// One line per value: objects and lists of objects are walked, lists of numbers stay whole.
+void add_parameter(const std::string& name, const Json& value, std::vector<KeyLine>& lines) {
+  const bool objects = value.is_array() && !value.empty() && value.front().is_object();
+  if (value.is_object()) {
+    for (const auto& [key, part] : value.items()) {
+      add_parameter(name.empty() ? key : name + "." + key, part, lines);
+    }
+  } else if (objects) {
+    for (std::size_t k = 0; k < value.size(); ++k) {
+      add_parameter(name + "[" + std::to_string(k) + "]", value[k], lines);
+    }
+  } else {
+    lines.push_back({"parameter " + name, value.dump()});
+  }
+}
+
+// "/wall/thickness_mm" -> "wall.thickness_mm"
+std::string dotted(const std::string& pointer) {
+  std::string name = pointer.substr(pointer.empty() ? 0 : 1);
+  std::replace(name.begin(), name.end(), '/', '.');
+  return name;
+}
+
+std::string stage_key_text(const Stage& stage, const Workspace& work) {
+  std::vector<KeyLine> lines = {{"stage", stage.name}, {"version", std::to_string(stage.version)}};
+  if (stage.reads_input) lines.push_back({"input file", work.input_sha256});
+  for (const std::string& earlier : stage.after) {
+    lines.push_back(
+        {"input " + earlier, work.has(earlier) ? work.artifact(earlier).contents() : kNotMade});
+  }
+  for (const std::string& pointer : stage.parameters) {
+    add_parameter(dotted(pointer), work.parameters.at(Json::json_pointer(pointer)), lines);
+  }
+  if (stage.names_program) lines.push_back({"program", build_info().dump()});
+  return key_text(lines);
+}
+
+// What changed since the stage last ran for this case.
+std::vector<std::string> why_it_runs(const Store& store, const Case& given, const Stage& stage,
+                                     const std::string& key_text, bool forced) {
+  if (forced) return {"it is forced"};
+  const std::string before = store.last_key_text(given.file, stage.name);
+  if (before.empty()) return {"it has no earlier result for this case"};
+  std::vector<std::string> reasons = describe_difference(before, key_text);
+  if (reasons.empty()) reasons = {"its result is gone from the cache or damaged"};
+  return reasons;
+}
+
+bool contains(const std::vector<std::string>& names, const std::string& name) {
+  return std::find(names.begin(), names.end(), name) != names.end();
+}
+
+void require_known(const std::vector<Stage>& stages, const std::string& name) {
+  std::string list;
+  for (const Stage& stage : stages) {
+    if (stage.name == name) return;
+    list += (list.empty() ? "" : ", ") + stage.name;
+  }
+  throw Error("stage \"" + name + "\": this case has none of that name, expected one of " + list);
+}
+
+// What a stage says of the world is told with the case and the stage, and where to look.
+std::string in_context(const Workspace& work, const std::string& stage, const std::string& what) {
+  std::string text = work.given().file.string() + ": stage " + stage + ": " + what;
+  if (work.has("surface")) {
+    text += " (the surface: " + (work.artifact("surface").folder / "surface.vtp").string() + ")";
+  }
+  return text;
+}
+
+Artifact make_artifact(const Stage& stage, const Store& store, const std::string& key_text,
+                       Workspace& work) {
+  work.unfinished = store.unfinished(stage.name, key_text);
+  try {
+    return store.commit(stage.name, key_text,
+                        [&](const fs::path& folder) { stage.make(work, folder); });
+  } catch (const Error& error) {
+    throw Error(in_context(work, stage.name, error.what()));
+  }
+}
+
+}  // namespace
+
+std::vector<Stage> stages_of(const Case& given) {
+  const bool from_volume = given.volume.has_value();
+  std::vector<Stage> stages;
+  if (from_volume) {
+    stages.push_back({.name = "volume", .reads_input = true, .make = make_volume});
+    stages.push_back({.name = "segment",
+                      .reads_input = true,
+                      .parameters = {"/segmentation"},
+                      .make = make_segment});
+    stages.push_back({.name = "surface",
+                      .after = {"segment"},
+                      .parameters = {"/surface/edge_length_mm"},
+                      .make = make_surface});
+  } else {
+    stages.push_back({.name = "surface",
+                      .reads_input = true,
+                      .parameters = {"/surface/unit", "/surface/frame", "/surface/edge_length_mm"},
+                      .make = make_surface});
+  }
+  stages.push_back({.name = "centerline",
+                    .after = {"surface"},
+                    .parameters = {"/access/point_mm", "/target/point_mm"},
+                    .make = make_centerline});
+  stages.push_back(
+      {.name = "wall", .after = {"surface"}, .parameters = {"/wall"}, .make = make_wall});
+  stages.push_back({.name = "trials",
+                    .after = {"surface", "centerline", "wall"},
+                    .parameters = {"/access", "/target", "/wires", "/tip_roll_deg", "/insertion"},
+                    .make = make_trials});
+  Stage report{.name = "report",
+               .reads_input = true,
+               .after = {},
+               .parameters = {""},
+               .names_program = true,
+               .make = make_report};
+  for (const Stage& stage : stages) report.after.push_back(stage.name);
+  stages.push_back(report);
+  return stages;
+}
+
+Json used_parameters(const Case& given) {
+  Json parameters = case_parameters(given);
+  const auto name_only = [](const fs::path& path) { return path.filename().string(); };
+  if (given.volume) parameters["volume"]["path"] = name_only(given.volume->path);
+  if (given.surface_input) parameters["surface"]["path"] = name_only(given.surface_input->path);
+  return parameters;
+}
+
+RunResult run_stages(const Case& given, const RunOptions& options) {
+  const std::vector<Stage> stages = stages_of(given);
+  if (!options.to.empty()) require_known(stages, options.to);
+  for (const std::string& name : options.force) require_known(stages, name);
+
+  const Store store(options.cache);
+  Workspace work(given, options.work);
+  work.parameters = used_parameters(given);
+  work.input_sha256 = hash_input(work.input);
+  RunResult result;
+  for (const Stage& stage : stages) {
+    if (options.work.cancelled && options.work.cancelled()) throw Interrupted();
+
+    // Look it up.
+    const auto start = std::chrono::steady_clock::now();
+    const std::string text = stage_key_text(stage, work);
+    const bool forced = contains(options.force, stage.name);
+    std::optional<Artifact> artifact;
+    if (!forced) artifact = store.find(stage.name, text);
+    StageOutcome outcome{.stage = stage.name};
+
+    // Run it, unless another process just did; or in a dry run say so.
+    if (!artifact && !options.dry_run) {
+      const std::optional<StoreLock> lock = store.lock(stage.name, text, options.work.cancelled);
+      if (!lock) throw Interrupted();
+      if (forced) store.forget(stage.name, text);
+      artifact = store.find(stage.name, text);
+      if (!artifact) {
+        outcome = {stage.name, StageState::kMade, 0.0,
+                   why_it_runs(store, given, stage, text, forced)};
+        artifact = make_artifact(stage, store, text, work);
+      }
+    } else if (!artifact) {
+      outcome = {stage.name, StageState::kWouldRun, 0.0,
+                 why_it_runs(store, given, stage, text, forced)};
+    }
+    if (artifact) {
+      if (!options.dry_run) store.remember(given.file, *artifact);
+      work.add(*artifact);
+      result.artifacts.push_back(*artifact);
+    }
+    outcome.seconds = seconds_since(start);
+    result.stages.push_back(outcome);
+    if (options.on_stage) options.on_stage(outcome);
+    if (stage.name == options.to) break;
+  }
+  return result;
+}
+
+}  // namespace wireplan::pipeline

@@ -1,0 +1,23 @@
+#pragma once
+/// One trial <-> trials/NNNN.json: what was tried, how it ended, every push as columns, the final
+/// shape and its contacts. The shapes on the way are not kept: a trial is deterministic and is
+/// repeated for the few plans whose pictures are wanted.
+#include <filesystem>
+#include <optional>
+#include <string>
+
+#include "plan/candidates.h"
+
+namespace wireplan::pipeline {
+
+/// "trials/0007.json"
+std::string trial_file_name(int id);
+
+void write_trial(int id, const plan::Study& study, const plan::Candidate& candidate,
+                 const simulate::TrialResult& trial, const std::filesystem::path& path);
+
+/// Reads what write_trial wrote, bit for bit but for `shapes`, which is empty. Nothing where the
+/// file is absent or cut.
+std::optional<simulate::TrialResult> find_trial(const std::filesystem::path& path);
+
+}  // namespace wireplan::pipeline

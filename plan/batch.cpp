@@ -1,0 +1,120 @@
+#include "plan/batch.h"
+
+#include <tbb/blocked_range.h>
+#include <tbb/global_control.h>
+#include <tbb/info.h>
+#include <tbb/parallel_for.h>
+#include <tbb/partitioner.h>
+#include <tbb/task_arena.h>
+#include <time.h>
+
+#include <algorithm>
+#include <cmath>
+#include <exception>
+#include <mutex>
+
+namespace wireplan::plan {
+namespace {
+
+/// A number that is not finite would pass through maxima and comparisons unseen.
+bool is_finite(const simulate::TrialResult& trial) {
+  const auto push_is_finite = [](const simulate::Push& push) {
+    const double sum = push.insertion + push.push_force + push.tip.sum() + push.tip_force +
+                       push.peak_contact_force + push.total_contact_force + push.max_penetration +
+                       push.peak_curvature + push.residual;
+    return std::isfinite(sum);
+  };
+  return trial.nodes.allFinite() &&
+         std::all_of(trial.pushes.begin(), trial.pushes.end(), push_is_finite);
+}
+
+}  // namespace
+
+std::vector<bool> for_each_slot(int count, const std::function<void(int slot)>& work,
+                                const BatchOptions& options) {
+  expects(count >= 0 && options.threads >= 0 && work);
+
+  // TBB starts no more threads than there are cores, whatever an arena asks for, unless allowed to.
+  const int cores = tbb::info::default_concurrency();
+  const int threads = options.threads > 0 ? options.threads : cores;
+  const tbb::global_control allowed(tbb::global_control::max_allowed_parallelism,
+                                    static_cast<std::size_t>(std::max(threads, cores)));
+
+  std::mutex mutex;  // guards all of these, and keeps the callbacks one at a time
+  std::vector<bool> finished(count, false);
+  bool stopped = false;
+  int done = 0;
+
+  const auto may_start = [&] {
+    const std::scoped_lock lock(mutex);
+    stopped = stopped || (options.cancelled && options.cancelled());
+    return !stopped;
+  };
+  const auto mark_finished = [&](int slot) {
+    const std::scoped_lock lock(mutex);
+    finished[slot] = true;
+    ++done;
+    if (options.progress) options.progress(done, count);
+  };
+  const auto run_slots = [&](const tbb::blocked_range<int>& slots) {
+    for (int slot = slots.begin(); slot < slots.end(); ++slot) {
+      if (!may_start()) return;
+      work(slot);
+      mark_finished(slot);
+    }
+  };
+
+  // Trials differ in cost by ten times and more, so they are handed out one by one.
+  { const std::scoped_lock lock(mutex); }  // what is set up above is seen by every slot
+  tbb::task_arena arena(threads);
+  arena.execute([&] {
+    tbb::parallel_for(tbb::blocked_range<int>(0, count, 1), run_slots, tbb::simple_partitioner());
+  });
+
+  const std::scoped_lock lock(mutex);  // what the slots wrote is seen from here on
+  return finished;
+}
+
+simulate::TrialResult run_candidate(const Study& study, const Candidate& candidate,
+                                    const simulate::Lumen& lumen) {
+  try {
+    expects(candidate.wire >= 0 && candidate.wire < std::ssize(study.wires));
+    simulate::TrialResult trial =
+        simulate::run_trial(study.wires[candidate.wire], make_introducer(study, candidate),
+                            study.goal, lumen, study.insertion);
+    if (!is_finite(trial)) throw LogicError("the trial has a number that is not finite");
+    return trial;
+  } catch (const std::exception& exception) {
+    simulate::TrialResult failed;
+    failed.outcome = simulate::Outcome::kFailed;
+    failed.reason = std::string("internal error: ") + exception.what();
+    return failed;
+  }
+}
+
+BatchResult run_batch(const Study& study, const std::vector<Candidate>& candidates,
+                      const simulate::Lumen& lumen, const BatchOptions& options) {
+  // A slot that is never run keeps this.
+  simulate::TrialResult left_out;
+  left_out.outcome = simulate::Outcome::kFailed;
+  left_out.reason = "not run: cancelled";
+
+  BatchResult result;
+  result.trials.assign(candidates.size(), left_out);
+  result.cpu_seconds.assign(candidates.size(), 0.0);
+  const auto run_slot = [&](int slot) {
+    const double start = thread_cpu_seconds();
+    result.trials[slot] = run_candidate(study, candidates[slot], lumen);
+    result.cpu_seconds[slot] = thread_cpu_seconds() - start;
+  };
+  result.finished = for_each_slot(static_cast<int>(candidates.size()), run_slot, options);
+  return result;
+}
+
+double thread_cpu_seconds() {
+  timespec now{};
+  expects(clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now) == 0);
+  return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
+}
+
+}  // namespace wireplan::plan

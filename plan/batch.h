@@ -1,0 +1,44 @@
+#pragma once
+/// Many trials, any thread count, the same answer.
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "plan/candidates.h"
+
+namespace wireplan::plan {
+
+/// The callbacks come from any thread, one at a time, and must not call back into the batch.
+struct BatchOptions {
+  int threads = 0;                                              // 0: all cores
+  std::function<void(int done, int total)> progress = nullptr;  // `done` rises by one
+  std::function<bool()> cancelled = nullptr;                    // asked before each trial
+};
+
+struct BatchResult {
+  std::vector<simulate::TrialResult> trials;  // slot k belongs to candidate k
+  std::vector<bool> finished;                 // false for those that a cancel left out
+  std::vector<double> cpu_seconds;            // per trial; timing, so never twice the same   [s]
+};
+
+/// Runs every candidate. A trial that throws is our fault and becomes Outcome::kFailed with the
+/// message as its reason; it never ends the batch. After a cancel the trials under way are
+/// finished, and those left out are Outcome::kFailed with the reason "not run: cancelled".
+BatchResult run_batch(const Study& study, const std::vector<Candidate>& candidates,
+                      const simulate::Lumen& lumen, const BatchOptions& options);
+
+/// One trial of the batch: what it throws, or a number that is not finite, becomes
+/// Outcome::kFailed.
+simulate::TrialResult run_candidate(const Study& study, const Candidate& candidate,
+                                    const simulate::Lumen& lumen);
+
+/// The parallel driver below run_batch: calls work(slot) once for each slot in [0, count), in no
+/// promised order; slots must write to places of their own. Returns which slots were finished: all,
+/// unless cancelled. What `work` throws ends the loop and reaches the caller.
+std::vector<bool> for_each_slot(int count, const std::function<void(int slot)>& work,
+                                const BatchOptions& options);
+
+/// CPU time that the calling thread has used so far [s].
+double thread_cpu_seconds();
+
+}  // namespace wireplan::plan

@@ -1,0 +1,81 @@
+#include "plan/candidates.h"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+
+namespace wireplan::plan {
+namespace {
+
+constexpr double kSameAngle = 1e-9;  // far below what a hand can set                    [rad]
+
+bool same_angle(double a, double b) {
+  return std::abs(std::remainder(a - b, 2.0 * kPi)) < kSameAngle;
+}
+
+/// The angles in their order, without those that repeat an earlier one up to full turns.
+std::vector<double> distinct_angles(const std::vector<double>& angles) {
+  std::vector<double> kept;
+  for (const double angle : angles) {
+    const bool seen =
+        std::any_of(kept.begin(), kept.end(), [&](double k) { return same_angle(k, angle); });
+    if (!seen) kept.push_back(angle);
+  }
+  return kept;
+}
+
+/// "15", "22.5": degrees without the rounding of the conversion, and never "-0".
+std::string degrees(double angle) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%.6g", angle / kRadPerDeg + 0.0);
+  return text;
+}
+
+}  // namespace
+
+std::vector<Candidate> list_candidates(const Study& study) {
+  expects(!study.wires.empty() && !study.inclinations.empty() && !study.azimuths.empty() &&
+          !study.rolls.empty());
+  const std::vector<double> inclinations = distinct_angles(study.inclinations);
+  const std::vector<double> azimuths = distinct_angles(study.azimuths);
+  const std::vector<double> rolls = distinct_angles(study.rolls);
+
+  std::vector<Candidate> candidates;
+  for (int wire = 0; wire < std::ssize(study.wires); ++wire) {
+    const std::size_t roll_count = study.wires[wire].straight() ? 1 : rolls.size();
+    for (const double inclination : inclinations) {
+      const std::size_t azimuth_count = same_angle(inclination, 0.0) ? 1 : azimuths.size();
+      for (std::size_t a = 0; a < azimuth_count; ++a) {
+        for (std::size_t r = 0; r < roll_count; ++r) {
+          candidates.push_back({wire, inclination, azimuths[a], rolls[r]});
+        }
+      }
+    }
+  }
+  return candidates;
+}
+
+Vec3 introducer_direction(const Vec3& tangent, double inclination, double azimuth) {
+  expects(tangent.allFinite() && tangent.norm() > 0.0);
+  const Vec3 t = tangent.normalized();
+  const Vec3 u = simulate::reference_normal(t);
+  const Vec3 side = std::cos(azimuth) * u + std::sin(azimuth) * t.cross(u);
+  return (std::cos(inclination) * t + std::sin(inclination) * side).normalized();
+}
+
+simulate::Introducer make_introducer(const Study& study, const Candidate& candidate) {
+  return {
+      .point = study.access,
+      .direction = introducer_direction(study.tangent, candidate.inclination, candidate.azimuth),
+      .roll = candidate.roll};
+}
+
+std::string describe(const Study& study, const Candidate& candidate) {
+  expects(candidate.wire >= 0 && candidate.wire < std::ssize(study.wires));
+  return study.wires[candidate.wire].name + ", inclination " + degrees(candidate.inclination) +
+         " deg, azimuth " + degrees(candidate.azimuth) + " deg, roll " + degrees(candidate.roll) +
+         " deg";
+}
+
+}  // namespace wireplan::plan

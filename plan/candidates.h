@@ -1,0 +1,42 @@
+#pragma once
+/// Which insertions are worth a trial: wires x inclination x azimuth x roll as one flat list.
+#include <string>
+#include <vector>
+
+#include "simulate/trial.h"
+
+namespace wireplan::plan {
+
+/// What the case asks, in internal units.
+struct Study {
+  std::vector<simulate::Wire> wires;
+  std::vector<double> inclinations, azimuths, rolls;  //                            [rad]
+  Vec3 access = Vec3::Zero();    //                                                 [mm]
+  Vec3 tangent = Vec3::UnitZ();  // of the centerline at the access, into the vessel
+  simulate::Goal goal;
+  simulate::InsertionOptions insertion;
+};
+
+struct Candidate {
+  int wire = 0;                                         // index into Study::wires
+  double inclination = 0.0, azimuth = 0.0, roll = 0.0;  //                          [rad]
+};
+
+/// All combinations, wires outermost, roll innermost. What cannot differ is listed once: at
+/// inclination 0 only the first azimuth, for a straight wire only the first roll, and an angle that
+/// repeats an earlier one (0 and 360 deg) not again. Expects at least one of each.
+std::vector<Candidate> list_candidates(const Study& study);
+
+/// Unit direction of the introducer, into the vessel: `tangent` tilted by `inclination` toward the
+/// side that `azimuth` names. Azimuth 0 is the patient's anterior (-y in LPS) made normal to the
+/// tangent (superior, +z, where the tangent runs within 10 deg of front to back); positive azimuths
+/// turn right-handed round the tangent. Expects a tangent of any length but 0.
+Vec3 introducer_direction(const Vec3& tangent, double inclination, double azimuth);
+
+/// Where and how the candidate enters the vessel.
+simulate::Introducer make_introducer(const Study& study, const Candidate& candidate);
+
+/// "amplatz-stiff, inclination 15 deg, azimuth 90 deg, roll 0 deg"
+std::string describe(const Study& study, const Candidate& candidate);
+
+}  // namespace wireplan::plan

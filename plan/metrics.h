@@ -1,0 +1,36 @@
+#pragma once
+/// One trial -> the numbers that plans are compared by (references C1; design section 6).
+#include "plan/candidates.h"
+#include "preprocess/vessel.h"
+
+namespace wireplan::plan {
+
+struct Metrics {
+  bool reached = false;
+  double insertion = 0.0;             // wire in the body at the end of the trial          [mm]
+  double tip_to_target = 0.0;         // distance at the end                               [mm]
+  double peak_tip_force = 0.0;        // over the insertion                                [N]
+  double peak_contact_force = 0.0;    // largest single contact                            [N]
+  double mean_contact_force = 0.0;    // all contacts together, mean over the insertion    [N]
+  double force_impulse = 0.0;         // integral of all contacts' force over insertion    [N mm]
+  double peak_push_force = 0.0;       // largest size, pushed or held back                 [N]
+  double peak_curvature = 0.0;        //                                                   [1/mm]
+  double centerline_deviation = 0.0;  // mean distance of the final wire from the path     [mm]
+  double max_penetration = 0.0;       // wire surface past the wall, over the insertion    [mm]
+  double residual = 0.0;              // largest over the pushes                           [N]
+  long iterations = 0;                // of all pushes together
+};
+
+/// All of the trial's numbers. Without a push the wire counts as lying at the access, free of
+/// force. The deviation is the mean over the nodes of the exact distance to the path's segments.
+/// Expects a path of at least one point.
+Metrics compute_metrics(const simulate::TrialResult& trial, const Study& study,
+                        const Centerline& path);
+
+/// The part that the pushes alone tell: insertion, forces, curvature, penetration, residual and
+/// iterations. The impulse is the integral of the total contact force by the trapezoidal rule, from
+/// rest (no force at insertion 0) through the pushes; the mean is the impulse over the insertion.
+/// Expects pushes in order of insertion.
+Metrics compute_push_metrics(const std::vector<simulate::Push>& pushes);
+
+}  // namespace wireplan::plan

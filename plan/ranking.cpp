@@ -1,0 +1,335 @@
+#include "plan/ranking.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdio>
+#include <tuple>
+
+namespace wireplan::plan {
+namespace {
+
+/// "0.21", "1.9", "12": two significant digits, at most four decimals, never an exponent.
+std::string two_digits(double value) {
+  const double size = std::max(std::abs(value), 1e-4);
+  const int decimals = std::clamp(1 - static_cast<int>(std::floor(std::log10(size))), 0, 4);
+  char text[64];
+  std::snprintf(text, sizeof text, "%.*f", decimals, value);
+  return text;
+}
+
+std::string one_decimal(double value) {
+  char text[64];
+  std::snprintf(text, sizeof text, "%.1f", value);
+  return text;
+}
+
+/// As many digits as it takes to tell a value from a limit that it just broke.
+std::string four_digits(double value) {
+  char text[64];
+  std::snprintf(text, sizeof text, "%.4g", value);
+  return text;
+}
+
+double saturating(double force, double scale) { return force / (force + scale); }
+
+double saturating_slope(double force, double scale) {
+  return scale / ((force + scale) * (force + scale));
+}
+
+double weighted_mean(const Score& score, const Weights& weights) {
+  const double sum = weights.reach + weights.peak_force + weights.mean_force + weights.margin;
+  return (weights.reach * score.reach + weights.peak_force * score.peak_force +
+          weights.mean_force * score.mean_force + weights.margin * score.margin) /
+         sum;
+}
+
+void expects_valid(const Limits& limits, const Weights& weights) {
+  expects(limits.tip_force_warn > 0.0 && limits.tip_force_fail > 0.0 &&
+          limits.penetration_fail > 0.0);
+  expects(weights.reach >= 0.0 && weights.peak_force >= 0.0 && weights.mean_force >= 0.0 &&
+          weights.margin >= 0.0);
+  expects(weights.reach + weights.peak_force + weights.mean_force + weights.margin > 0.0);
+}
+
+/// `summary`, and behind a colon what the trial itself says of it.
+std::string with_reason(const std::string& summary, const simulate::TrialResult& trial) {
+  return trial.reason.empty() ? summary : summary + ": " + trial.reason;
+}
+
+/// Why a trial that reached the target is not a plan; empty if it is one.
+std::string broken_limits(const Metrics& metrics, const Limits& limits) {
+  std::string reason;
+  if (metrics.peak_tip_force > limits.tip_force_fail) {
+    reason = "tip force " + four_digits(metrics.peak_tip_force) + " N over the limit of " +
+             four_digits(limits.tip_force_fail) + " N";
+  }
+  if (metrics.max_penetration > limits.penetration_fail) {
+    if (!reason.empty()) reason += "; ";
+    reason += "left the lumen: wire " + four_digits(metrics.max_penetration) +
+              " mm past the wall, over the limit of " + four_digits(limits.penetration_fail) +
+              " mm";
+  }
+  return reason;
+}
+
+/// Smallest distance of the tip from the target after any push.
+double nearest_distance(const simulate::TrialResult& trial, const Study& study,
+                        const Metrics& metrics) {
+  double nearest = metrics.tip_to_target;
+  for (const simulate::Push& push : trial.pushes) {
+    nearest = std::min(nearest, (push.tip - study.goal.point).norm());
+  }
+  return nearest;
+}
+
+/// Why the trial is no plan; empty if it is one.
+std::string exclusion_reason(const simulate::TrialResult& trial, const Metrics& metrics,
+                             const Study& study, const Limits& limits) {
+  using simulate::Outcome;
+  const std::string place = "at " + one_decimal(metrics.insertion) + " mm of wire, tip " +
+                            one_decimal(metrics.tip_to_target) + " mm from the target";
+  switch (trial.outcome) {
+    case Outcome::kReached:
+      return broken_limits(metrics, limits);
+    case Outcome::kMissed:
+      return "missed: tip ended " + one_decimal(metrics.tip_to_target) +
+             " mm from the target and came no nearer than " +
+             one_decimal(nearest_distance(trial, study, metrics)) + " mm, expected within " +
+             four_digits(study.goal.radius) + " mm";
+    case Outcome::kStuck:
+      return with_reason("stuck " + place, trial);
+    case Outcome::kLeftLumen:
+      return with_reason("left the lumen " + place, trial);
+    case Outcome::kNotConverged:
+      return with_reason("did not converge " + place, trial);
+    case Outcome::kFailed:
+      return trial.reason.empty() ? "failed" : trial.reason;
+  }
+  throw LogicError("an outcome without a reason");
+}
+
+void sort_plans(std::vector<RankedPlan>& plans) {
+  std::sort(plans.begin(), plans.end(), [](const RankedPlan& a, const RankedPlan& b) {
+    return std::tie(a.score.total, a.trial) < std::tie(b.score.total, b.trial);
+  });
+}
+
+void find_ties(std::vector<RankedPlan>& plans) {
+  for (RankedPlan& a : plans) {
+    for (const RankedPlan& b : plans) {
+      const double difference = std::abs(a.score.total - b.score.total);
+      if (a.trial != b.trial && difference <= a.score_error + b.score_error) {
+        a.tied_with.push_back(b.trial);
+      }
+    }
+  }
+}
+
+/// "35 % less than", "12 % more than", "3.2 times as much as", "as much as".
+std::string compare_forces(double force, double other) {
+  const double nothing = 1e-4;  // N: below what a sentence prints
+  if (other < nothing) return force < nothing ? "as much as" : "more than";
+  const double ratio = force / other;
+  if (ratio >= 2.0) return two_digits(ratio) + " times as much as";
+  const double percent = std::round(100.0 * std::abs(ratio - 1.0));
+  if (percent == 0.0) return "as much as";
+  return std::to_string(static_cast<int>(percent)) +
+         (ratio < 1.0 ? " % less than" : " % more than");
+}
+
+/// The best plan against the best plan of the next wire; empty in a study of one wire.
+std::string compare_with_next_wire(const std::vector<RankedPlan>& plans, const Study& study,
+                                   const std::vector<Candidate>& candidates,
+                                   const std::vector<Metrics>& metrics) {
+  const int wire = candidates[plans.front().trial].wire;
+  for (const RankedPlan& plan : plans) {
+    const int next = candidates[plan.trial].wire;
+    if (next == wire) continue;
+    return ", " +
+           compare_forces(metrics[plans.front().trial].peak_contact_force,
+                          metrics[plan.trial].peak_contact_force) +
+           " the next wire (" + study.wires[next].name + ")";
+  }
+  return study.wires.size() > 1 ? "; no other wire has a plan" : "";
+}
+
+/// A later plan against the best one: its force, and the component that costs it most.
+std::string compare_with_first(const RankedPlan& plan, const RankedPlan& first,
+                               const std::vector<Metrics>& metrics, const Weights& weights) {
+  struct Loss {
+    double size;
+    const char* name;
+  };
+  const std::array<Loss, 4> losses{{
+      {weights.reach * (plan.score.reach - first.score.reach), "its distance from the centre"},
+      {weights.peak_force * (plan.score.peak_force - first.score.peak_force),
+       "its peak contact force"},
+      {weights.mean_force * (plan.score.mean_force - first.score.mean_force),
+       "its mean contact force"},
+      {weights.margin * (plan.score.margin - first.score.margin), "its tip force"},
+  }};
+  const auto largest = std::max_element(
+      losses.begin(), losses.end(), [](const Loss& a, const Loss& b) { return a.size < b.size; });
+
+  std::string text = ", " +
+                     compare_forces(metrics[plan.trial].peak_contact_force,
+                                    metrics[first.trial].peak_contact_force) +
+                     " the first plan";
+  if (largest->size > 0.0) text += std::string("; behind it mostly by ") + largest->name;
+  const auto& ties = plan.tied_with;
+  if (std::find(ties.begin(), ties.end(), first.trial) != ties.end()) {
+    text += "; the error estimate cannot tell the two apart";
+  }
+  return text;
+}
+
+void write_sentences(Ranking& ranking, const Study& study, const std::vector<Candidate>& candidates,
+                     const std::vector<Metrics>& metrics, const Limits& limits,
+                     const Weights& weights) {
+  for (RankedPlan& plan : ranking.plans) {
+    const Metrics& m = metrics[plan.trial];
+    const RankedPlan& first = ranking.plans.front();
+    plan.sentence = "reaches the target " + one_decimal(m.tip_to_target) +
+                    " mm from its centre with at most " + two_digits(m.peak_contact_force) +
+                    " N on the wall";
+    plan.sentence += plan.trial == first.trial
+                         ? compare_with_next_wire(ranking.plans, study, candidates, metrics)
+                         : compare_with_first(plan, first, metrics, weights);
+    if (m.peak_tip_force > limits.tip_force_warn) {
+      plan.sentence += "; warning: tip force " + four_digits(m.peak_tip_force) +
+                       " N over the warning level of " + four_digits(limits.tip_force_warn) + " N";
+    }
+  }
+}
+
+double median(std::vector<double> values) {
+  std::sort(values.begin(), values.end());
+  const std::size_t half = values.size() / 2;
+  return values.size() % 2 == 1 ? values[half] : 0.5 * (values[half - 1] + values[half]);
+}
+
+std::vector<WireSummary> summarise_wires(const Study& study,
+                                         const std::vector<Candidate>& candidates,
+                                         const std::vector<Metrics>& metrics,
+                                         const std::vector<RankedPlan>& plans) {
+  std::vector<WireSummary> wires(study.wires.size());
+  std::vector<std::vector<double>> forces(study.wires.size());
+  for (std::size_t k = 0; k < candidates.size(); ++k) {
+    const int wire = candidates[k].wire;
+    ++wires[wire].trials;
+    if (metrics[k].reached) forces[wire].push_back(metrics[k].peak_contact_force);
+  }
+
+  for (int wire = 0; wire < std::ssize(wires); ++wire) {
+    WireSummary& summary = wires[wire];
+    summary.wire = wire;
+    summary.reached = static_cast<int>(forces[wire].size());
+    if (!forces[wire].empty()) {
+      summary.median_peak_force = median(forces[wire]);
+      summary.worst_peak_force = *std::max_element(forces[wire].begin(), forces[wire].end());
+    }
+    const auto best = std::find_if(plans.begin(), plans.end(), [&](const RankedPlan& plan) {
+      return candidates[plan.trial].wire == wire;
+    });
+    if (best != plans.end()) summary.best_trial = best->trial;
+  }
+  return wires;
+}
+
+/// Walks the plans by rising force; one stays if it is nearer to the target than all before it, or
+/// equal in both to the last that stayed.
+std::vector<int> find_pareto_front(const std::vector<RankedPlan>& plans,
+                                   const std::vector<Metrics>& metrics) {
+  const auto key = [&](int trial) {
+    return std::pair(metrics[trial].peak_contact_force, metrics[trial].tip_to_target);
+  };
+  std::vector<int> order;
+  for (const RankedPlan& plan : plans) order.push_back(plan.trial);
+  std::sort(order.begin(), order.end(),
+            [&](int a, int b) { return std::pair(key(a), a) < std::pair(key(b), b); });
+
+  std::vector<int> front;
+  for (const int trial : order) {
+    if (front.empty() || key(trial).second < key(front.back()).second ||
+        key(trial) == key(front.back())) {
+      front.push_back(trial);
+    }
+  }
+  return front;
+}
+
+}  // namespace
+
+NumericalError assumed_error(const Metrics& metrics) {
+  return {.position = kAssumedPositionError,
+          .tip = kAssumedPositionError,
+          .peak_force = kAssumedRelativeForceError * metrics.peak_contact_force,
+          .mean_force = kAssumedRelativeForceError * metrics.mean_contact_force,
+          .tip_force = kAssumedRelativeForceError * metrics.peak_tip_force};
+}
+
+Score compute_score(const Metrics& metrics, const simulate::Goal& goal, const Limits& limits,
+                    const Weights& weights) {
+  expects_valid(limits, weights);
+  expects(goal.radius > 0.0);
+  const double scale = limits.tip_force_warn;
+  Score score;
+  score.reach = std::min(metrics.tip_to_target / goal.radius, 1.0);
+  score.peak_force = saturating(metrics.peak_contact_force, scale);
+  score.mean_force = saturating(metrics.mean_contact_force, scale);
+  score.margin = std::min(metrics.peak_tip_force / limits.tip_force_fail, 1.0);
+  score.total = weighted_mean(score, weights);
+  return score;
+}
+
+double compute_score_error(const Metrics& metrics, const NumericalError& error,
+                           const simulate::Goal& goal, const Limits& limits,
+                           const Weights& weights) {
+  expects_valid(limits, weights);
+  expects(goal.radius > 0.0);
+  const double scale = limits.tip_force_warn;
+  Score change;
+  change.reach = std::min(error.tip / goal.radius, 1.0);
+  change.peak_force = saturating_slope(metrics.peak_contact_force, scale) * error.peak_force;
+  change.mean_force = saturating_slope(metrics.mean_contact_force, scale) * error.mean_force;
+  change.margin = std::min(error.tip_force / limits.tip_force_fail, 1.0);
+  return weighted_mean(change, weights);
+}
+
+Ranking rank(const Study& study, const std::vector<Candidate>& candidates,
+             const std::vector<simulate::TrialResult>& trials, const std::vector<Metrics>& metrics,
+             const Limits& limits, const Weights& weights,
+             const std::vector<std::optional<NumericalError>>& errors) {
+  expects(trials.size() == candidates.size() && metrics.size() == candidates.size());
+  expects(errors.empty() || errors.size() == candidates.size());
+  expects_valid(limits, weights);
+
+  // A trial is a plan or has a reason.
+  Ranking ranking;
+  for (int k = 0; k < std::ssize(candidates); ++k) {
+    const std::string reason = exclusion_reason(trials[k], metrics[k], study, limits);
+    if (!reason.empty()) {
+      ranking.excluded.push_back({k, reason});
+      continue;
+    }
+    RankedPlan plan;
+    plan.trial = k;
+    plan.score = compute_score(metrics[k], study.goal, limits, weights);
+    const std::optional<NumericalError> known = errors.empty() ? std::nullopt : errors[k];
+    if (known) plan.position_error = known->position;
+    plan.score_error = compute_score_error(metrics[k], known.value_or(assumed_error(metrics[k])),
+                                           study.goal, limits, weights);
+    ranking.plans.push_back(plan);
+  }
+
+  // The order, and then all that is said relative to the others.
+  sort_plans(ranking.plans);
+  find_ties(ranking.plans);
+  write_sentences(ranking, study, candidates, metrics, limits, weights);
+  ranking.wires = summarise_wires(study, candidates, metrics, ranking.plans);
+  ranking.pareto = find_pareto_front(ranking.plans, metrics);
+  return ranking;
+}
+
+}  // namespace wireplan::plan

@@ -1,0 +1,101 @@
+#pragma once
+/// Metrics -> ordered plans, with the reasons.
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "plan/metrics.h"
+
+namespace wireplan::plan {
+
+/// Beyond these a trial is excluded; beyond `tip_force_warn` its sentence warns.
+struct Limits {
+  double tip_force_warn = 0.3;    // references B3                                          [N]
+  double tip_force_fail = 1.5;    // references B3                                          [N]
+  double penetration_fail = 0.3;  // a wire further past the wall has left the lumen        [mm]
+};
+
+/// Weights of the score's components; none negative, not all 0.
+struct Weights {
+  double reach = 1.0, peak_force = 1.0, mean_force = 0.5, margin = 0.5;
+};
+
+/// What a plan costs: each component in [0, 1], 0 the best, and their weighted mean. The scales are
+/// absolute, so that a score does not depend on which other plans were tried. With the scale of
+/// force s = Limits::tip_force_warn (references B3), so that forces on the wall weigh as soon as
+/// they are felt:
+///   reach       tip_to_target / goal radius                         metric: references C1, success
+///   peak_force  f / (f + s), f = peak_contact_force                 C1, contact force, max
+///   mean_force  f / (f + s), f = mean_contact_force                 C1, contact force, mean
+///   margin      peak_tip_force / Limits::tip_force_fail: what is used up of it   C1, tip force
+/// f / (f + s) is 1/2 at the scale and never full, as side-wall forces have no agreed limit.
+struct Score {
+  double total = 0.0;  // smaller is better
+  double reach = 0.0, peak_force = 0.0, mean_force = 0.0, margin = 0.0;
+};
+
+/// How far a trial's numbers may be from those of infinitely short elements (refine.h).
+struct NumericalError {
+  double position = 0.0;    // of the final shape, where it is largest                      [mm]
+  double tip = 0.0;         // of the final tip                                             [mm]
+  double peak_force = 0.0;  // of Metrics::peak_contact_force                               [N]
+  double mean_force = 0.0;  // of Metrics::mean_contact_force                               [N]
+  double tip_force = 0.0;   // of Metrics::peak_tip_force                                   [N]
+};
+
+/// What is assumed of a trial that was not refined. Refining 15 plans in a bent tube at elements of
+/// 1 mm found 0.02 to 0.62 mm, median 0.09, and forces within 4 %. It only decides ties, and is
+/// never reported as an error.
+inline constexpr double kAssumedPositionError = 0.2;        //                              [mm]
+inline constexpr double kAssumedRelativeForceError = 0.05;  // of each force                [-]
+NumericalError assumed_error(const Metrics& metrics);
+
+Score compute_score(const Metrics& metrics, const simulate::Goal& goal, const Limits& limits,
+                    const Weights& weights);
+
+/// Largest change of the total score that the error allows, to first order: the components' changes
+/// added without regard to sign, as one cause moves all forces alike.
+double compute_score_error(const Metrics& metrics, const NumericalError& error,
+                           const simulate::Goal& goal, const Limits& limits,
+                           const Weights& weights);
+
+struct RankedPlan {
+  int trial = 0;  // index of the candidate
+  Score score;
+  double score_error = 0.0;              // from the known error, else from the assumed one
+  std::optional<double> position_error;  // from halving the elements; empty if not known   [mm]
+  std::vector<int> tied_with;  // trials whose score differs by no more than both errors, best first
+  std::string sentence;        // why it stands here
+};
+
+struct ExcludedTrial {
+  int trial = 0;
+  std::string reason;
+};
+
+/// Forces are medians and maxima of peak_contact_force over the trials that reached the target,
+/// also those that broke a limit; 0 if none did.
+struct WireSummary {
+  int wire = 0, trials = 0, reached = 0;
+  std::optional<int> best_trial;                           // of the ranked plans
+  double median_peak_force = 0.0, worst_peak_force = 0.0;  //                               [N]
+};
+
+struct Ranking {
+  std::vector<RankedPlan> plans;        // best first: reached, within limits, converged
+  std::vector<ExcludedTrial> excluded;  // the rest, each with its reason, in order of trial
+  std::vector<WireSummary> wires;       // in order of the study's wires
+  /// Ranked plans that no other beats in both peak contact force and reach margin (goal radius -
+  /// tip_to_target), by rising force.
+  std::vector<int> pareto;
+};
+
+/// Orders by score, then by index of the candidate. `errors` holds what refining has found, per
+/// trial; empty if nothing was refined. Expects one trial and one Metrics per candidate, and
+/// positive limits.
+Ranking rank(const Study& study, const std::vector<Candidate>& candidates,
+             const std::vector<simulate::TrialResult>& trials, const std::vector<Metrics>& metrics,
+             const Limits& limits, const Weights& weights,
+             const std::vector<std::optional<NumericalError>>& errors = {});
+
+}  // namespace wireplan::plan

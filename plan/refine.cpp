@@ -1,0 +1,183 @@
+#include "plan/refine.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+
+namespace wireplan::plan {
+namespace {
+
+/// Below this a change of position is rounding, and says nothing of the order [mm].
+constexpr double kRoundingDistance = 1e-9;
+
+std::string in_mm(double length) {
+  char text[64];
+  std::snprintf(text, sizeof text, "%.6g mm", length);
+  return text;
+}
+
+/// The study of one run: other elements, and pushed to `insertion` whether or not the tip passes
+/// the goal on the way.
+Study with_elements(const Study& study, double element_length, double insertion) {
+  Study changed = study;
+  changed.insertion.element_length = element_length;
+  changed.insertion.length = insertion;
+  changed.goal.radius = 1e-9;  // no push ends that near, so none ends the trial
+  return changed;
+}
+
+/// Arc length of each node from the tip, nodes counted from the tip.
+std::vector<double> arc_from_tip(const Eigen::Matrix3Xd& nodes) {
+  std::vector<double> arc{0.0};
+  for (Eigen::Index k = nodes.cols() - 1; k > 0; --k) {
+    arc.push_back(arc.back() + (nodes.col(k) - nodes.col(k - 1)).norm());
+  }
+  return arc;
+}
+
+/// Why the run cannot be compared; empty if it came to the insertion.
+std::string why_incomplete(const RefinedRun& run, double insertion) {
+  const auto& pushes = run.trial.pushes;
+  const double reached = pushes.empty() ? 0.0 : pushes.back().insertion;
+  if (std::abs(reached - insertion) <= 1e-6 * insertion && run.trial.nodes.cols() > 0) return "";
+  const std::string why =
+      run.trial.reason.empty() ? outcome_name(run.trial.outcome) : run.trial.reason;
+  return "with elements of " + in_mm(run.element_length) + " the wire came to " + in_mm(reached) +
+         " of " + in_mm(insertion) + ": " + why;
+}
+
+/// The change from one run to the next finer one.
+struct Change {
+  double position = 0.0, tip = 0.0, peak_force = 0.0, mean_force = 0.0, tip_force = 0.0;
+};
+
+Change compare_runs(const RefinedRun& coarse, const RefinedRun& fine) {
+  const Metrics a = compute_push_metrics(coarse.trial.pushes);
+  const Metrics b = compute_push_metrics(fine.trial.pushes);
+  return {.position = shape_distance(coarse.trial.nodes, fine.trial.nodes),
+          .tip = (coarse.trial.nodes.rightCols<1>() - fine.trial.nodes.rightCols<1>()).norm(),
+          .peak_force = std::abs(a.peak_contact_force - b.peak_contact_force),
+          .mean_force = std::abs(a.mean_contact_force - b.mean_contact_force),
+          .tip_force = std::abs(a.peak_tip_force - b.peak_tip_force)};
+}
+
+std::optional<double> find_order(const std::optional<Change>& coarse,
+                                 const std::optional<Change>& fine) {
+  if (!coarse || !fine) return std::nullopt;
+  if (coarse->position < kRoundingDistance || fine->position < kRoundingDistance) {
+    return std::nullopt;
+  }
+  return std::log2(coarse->position / fine->position);
+}
+
+}  // namespace
+
+std::vector<Refinement> refine_plans(const Study& study, const std::vector<Candidate>& candidates,
+                                     const std::vector<Metrics>& metrics, const Ranking& ranking,
+                                     const simulate::Lumen& lumen, const RefineOptions& options) {
+  expects(options.plans >= 0 && metrics.size() == candidates.size());
+  const int plans = std::min(options.plans, static_cast<int>(ranking.plans.size()));
+
+  // Plan by plan: 2h, h, h/2.
+  std::vector<RefinedRun> runs;
+  for (int k = 0; k < plans; ++k) {
+    for (const double factor : {2.0, 1.0, 0.5}) {
+      RefinedRun& run = runs.emplace_back();
+      run.element_length = factor * study.insertion.element_length;
+      run.trial.reason = "not run: cancelled";
+    }
+  }
+  const auto run_slot = [&](int slot) {
+    RefinedRun& run = runs[slot];
+    const int trial = ranking.plans[slot / 3].trial;
+    const double start = thread_cpu_seconds();
+    run.trial = run_candidate(with_elements(study, run.element_length, metrics[trial].insertion),
+                              candidates[trial], lumen);
+    run.cpu_seconds = thread_cpu_seconds() - start;
+  };
+  for_each_slot(static_cast<int>(runs.size()), run_slot, options.batch);
+
+  std::vector<Refinement> refinements;
+  for (int k = 0; k < plans; ++k) {
+    const int trial = ranking.plans[k].trial;
+    refinements.push_back(estimate_error(trial, metrics[trial].insertion,
+                                         {runs[3 * k], runs[3 * k + 1], runs[3 * k + 2]}));
+  }
+  return refinements;
+}
+
+Refinement estimate_error(int trial, double insertion, const std::vector<RefinedRun>& runs) {
+  expects(runs.size() == 3 && runs[0].element_length > runs[1].element_length &&
+          runs[1].element_length > runs[2].element_length);
+  Refinement result;
+  result.trial = trial;
+  std::vector<bool> complete;
+  for (const RefinedRun& run : runs) {
+    const std::string why = why_incomplete(run, insertion);
+    complete.push_back(why.empty());
+    if (!why.empty()) result.reason += (result.reason.empty() ? "" : "; ") + why;
+  }
+
+  // The order from both changes, and from it the share of a change that is still missing.
+  std::optional<Change> coarse, fine;
+  if (complete[0] && complete[1]) coarse = compare_runs(runs[0], runs[1]);
+  if (complete[1] && complete[2]) fine = compare_runs(runs[1], runs[2]);
+  result.observed_order = find_order(coarse, fine);
+  const double ratio = std::exp2(std::clamp(result.observed_order.value_or(2.0), 0.5, 2.0));
+  const double of_longer = ratio / (ratio - 1.0), of_shorter = 1.0 / (ratio - 1.0);
+
+  // The study's own run, by comparison with the finer one.
+  if (fine) {
+    result.error = NumericalError{.position = of_longer * fine->position,
+                                  .tip = of_longer * fine->tip,
+                                  .peak_force = of_longer * fine->peak_force,
+                                  .mean_force = of_longer * fine->mean_force,
+                                  .tip_force = of_longer * fine->tip_force};
+  }
+
+  // The table.
+  std::vector<std::optional<double>> position_errors(3);
+  if (coarse) position_errors[0] = of_longer * coarse->position;
+  if (fine) position_errors[1] = of_longer * fine->position;
+  if (fine) position_errors[2] = of_shorter * fine->position;
+  for (int k = 0; k < 3; ++k) {
+    if (!complete[k]) continue;
+    const Metrics metrics = compute_push_metrics(runs[k].trial.pushes);
+    result.rows.push_back({.element_length = runs[k].element_length,
+                           .position_error = position_errors[k],
+                           .peak_force = metrics.peak_contact_force,
+                           .iterations = metrics.iterations});
+    result.cpu_seconds.push_back(runs[k].cpu_seconds);
+  }
+  return result;
+}
+
+double shape_distance(const Eigen::Matrix3Xd& coarse, const Eigen::Matrix3Xd& fine) {
+  expects(coarse.cols() > 0 && fine.cols() > 0);
+  const std::vector<double> arc = arc_from_tip(coarse), fine_arc = arc_from_tip(fine);
+  const Eigen::Index last = coarse.cols() - 1, fine_last = fine.cols() - 1;
+
+  double largest = (coarse.col(last) - fine.col(fine_last)).norm();
+  std::size_t edge = 1;  // of the fine wire, its end nearer to the tip being node edge - 1
+  for (std::size_t k = 1; k < arc.size(); ++k) {
+    while (edge < fine_arc.size() && fine_arc[edge] < arc[k]) ++edge;
+    if (edge == fine_arc.size()) break;
+    const double t = (arc[k] - fine_arc[edge - 1]) / (fine_arc[edge] - fine_arc[edge - 1]);
+    const Vec3 on_fine = (1.0 - t) * fine.col(fine_last - static_cast<Eigen::Index>(edge) + 1) +
+                         t * fine.col(fine_last - static_cast<Eigen::Index>(edge));
+    largest = std::max(largest, (coarse.col(last - static_cast<Eigen::Index>(k)) - on_fine).norm());
+  }
+  return largest;
+}
+
+std::vector<std::optional<NumericalError>> errors_by_trial(
+    const std::vector<Refinement>& refinements, int trial_count) {
+  std::vector<std::optional<NumericalError>> errors(trial_count);
+  for (const Refinement& refinement : refinements) {
+    expects(refinement.trial >= 0 && refinement.trial < trial_count);
+    errors[refinement.trial] = refinement.error;
+  }
+  return errors;
+}
+
+}  // namespace wireplan::plan

@@ -1,0 +1,47 @@
+#pragma once
+/// What every folder shares: vectors, the one exception type, preconditions and unit constants.
+/// Inside wireplan everything is in mm, N, s, rad (hence MPa, N mm = mJ, tonnes) and in the
+/// patient's LPS frame; the constants here convert on the way in (files) and on the way out
+/// (reports).
+#include <Eigen/Core>
+#include <numbers>
+#include <source_location>
+#include <stdexcept>
+#include <string>
+
+namespace wireplan {
+
+using Vec3 = Eigen::Vector3d;
+using Mat3 = Eigen::Matrix3d;
+
+/// The world is wrong: a file, a case, a mesh. The message names the place, the value, what was
+/// expected and what to do. `main` prints the message alone and exits 2.
+class Error : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
+};
+
+/// The code is wrong: a precondition of a function does not hold. `main` exits 3.
+class LogicError : public std::logic_error {
+ public:
+  using std::logic_error::logic_error;
+};
+
+/// Checks a precondition, in every build.
+inline void expects(bool condition,
+                    const std::source_location& where = std::source_location::current()) {
+  if (!condition) {
+    throw LogicError(std::string(where.file_name()) + ":" + std::to_string(where.line()) + ": " +
+                     where.function_name() + ": precondition violated");
+  }
+}
+
+inline constexpr double kPi = std::numbers::pi;
+inline constexpr double kRadPerDeg = kPi / 180.0;
+inline constexpr double kMpaPerKpa = 1e-3;
+inline constexpr double kMpaPerGpa = 1e3;
+inline constexpr double kMmPerM = 1e3;
+/// Mass per length: 1 kg/m = 1e-3 t / 1e3 mm.
+inline constexpr double kTonnePerMmFromKgPerM = 1e-6;
+
+}  // namespace wireplan

@@ -1,0 +1,74 @@
+#pragma once
+/// Mask or surface file -> closed, oriented, checked triangles.
+#include <filesystem>
+#include <string>
+
+#include "preprocess/image.h"
+#include "preprocess/vessel.h"
+
+namespace wireplan::preprocess {
+
+struct SurfaceOptions {
+  double edge_length_mm = 1.0;  // of the isotropic remesh                               [mm]
+};
+
+/// What a surface is, as measured. A sound surface: one piece, closed, manifold, normals outward,
+/// no degenerate triangle, no self-intersection; handles (Euler number 2 - 2g) are reported, not
+/// refused.
+struct SurfaceCheck {
+  int vertices = 0, triangles = 0, pieces = 0;  // vertices that a triangle uses
+  int open_edges = 0;                           // of one triangle
+  int non_manifold_edges = 0;                   // of three or more
+  int misoriented_edges = 0;                    // of two whose normals disagree
+  int non_manifold_vertices = 0;                // where sheets touch in a point
+  int degenerate_triangles = 0;                 // without area
+  int euler_number = 0;
+  int self_intersections =
+      0;  // pairs of triangles; not looked for where the surface is not manifold
+  bool outward = false;
+  double volume_mm3 = 0.0, area_mm2 = 0.0;
+  double min_angle_deg = 0.0, mean_edge_mm = 0.0, max_edge_mm = 0.0;
+};
+
+/// Isosurface of the mask at 1/2, smoothed with a volume-keeping windowed sinc, remeshed to the
+/// edge length, largest piece (cavities inside it are filled). Where the mask meets the border of
+/// its grid the surface is capped there. Sound but for handles; throws `Error` for an empty mask or
+/// where no sound surface is found.
+Surface surface_from_mask(const Mask& mask, const SurfaceOptions& options);
+
+/// Reads STL, PLY, OBJ or VTP. `unit` is "mm", "cm" or "m"; `frame` is "LPS" or "RAS" (x, y
+/// flipped). Turns normals to agree and outward, merges equal vertices, drops triangles that this
+/// collapses, keeps the largest piece. Throws `Error` where the file is missing or no surface; it
+/// may still be unsound (open, self-intersecting): pass it to `require_sound`.
+Surface read_surface(const std::filesystem::path& path, const std::string& unit,
+                     const std::string& frame);
+
+/// Remesh isotropically to the edge length, coarser or finer; checks for self-intersections the
+/// remesh brought in and retries finer (prototypes B). An edge length that the surface already has
+/// (mean within 10 %, none over twice as long) leaves it as it is. Expects a sound surface; throws
+/// `Error` where none of the tries gives one.
+Surface remesh(const Surface& surface, double edge_length_mm);
+
+SurfaceCheck check_surface(const Surface& surface);
+
+bool is_sound(const SurfaceCheck& check);
+
+/// Throws `Error`, naming `origin` (a file or stage), every failed check and a remedy, unless
+/// sound.
+void require_sound(const SurfaceCheck& check, const std::string& origin);
+
+/// Volume enclosed [mm^3], negative where the normals point inward.
+double signed_volume(const Surface& surface);
+
+/// The piece (connected through edges) of the largest volume, turned outward as a whole, without
+/// unused vertices.
+Surface largest_piece(const Surface& surface);
+
+/// True where the point [mm] lies inside the closed surface, and its distance to it [mm].
+struct InsideAnswer {
+  bool inside = false;
+  double distance = 0.0;
+};
+InsideAnswer locate_point(const Surface& surface, const Vec3& point);
+
+}  // namespace wireplan::preprocess

@@ -1,0 +1,39 @@
+#pragma once
+/// Vessel <-> artifact files, lossless (64 bit, VTK XML with raw appended data compressed by zlib,
+/// no dates: the same values give the same bytes), readable by 3D Slicer and ParaView. Every file
+/// carries the field data SPACE = LPS. Functions throw `Error` naming the file where it cannot be
+/// written, is missing, damaged or holds something else.
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "preprocess/vessel.h"
+
+namespace wireplan::preprocess {
+
+void write_surface(const Surface& surface, const std::filesystem::path& path);  // .vtp
+Surface read_surface_artifact(const std::filesystem::path& path);
+
+/// .vtp polyline with point arrays `radius_mm` and `arc_length_mm`.
+void write_centerline(const Centerline& line, const std::filesystem::path& path);
+Centerline read_centerline(const std::filesystem::path& path);
+
+/// .vtu of tetrahedra: points are the surface's vertices, then the apexes; cell array `height_mm`,
+/// field data `young_modulus_mpa` and `poisson_ratio`.
+void write_wall(const Surface& surface, const Wall& wall, const std::filesystem::path& path);
+Wall read_wall(const std::filesystem::path& path);
+
+/// A polyline with named point arrays (3-vectors are not needed), for wires: .vtp.
+struct NamedArray {
+  std::string name;
+  std::vector<double> values;  // one per point
+};
+void write_polyline(const Eigen::Matrix3Xd& points, const std::vector<NamedArray>& arrays,
+                    const std::filesystem::path& path);
+
+/// ParaView collection (.pvd) of the files, one per time value; the files are named relative to the
+/// collection's folder.
+void write_time_series(const std::vector<std::filesystem::path>& files,
+                       const std::vector<double>& times, const std::filesystem::path& path);
+
+}  // namespace wireplan::preprocess

@@ -1,0 +1,83 @@
+#pragma once
+/// Wire against wall: a smooth signed distance field of the vessel's surface, shared by all trials,
+/// and the law that turns a gap into a force.
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include "preprocess/vessel.h"
+
+namespace wireplan::simulate {
+
+struct LumenOptions {
+  double grid_spacing = 0.5;  // of the distance samples                                  [mm]
+  double band = 2.0;          // the field follows the wall within this distance of it    [mm]
+};
+
+/// Distance to the wall at a point with its derivatives; positive inside the lumen.
+struct WallSample {
+  double distance = 0.0;         //                                                       [mm]
+  Vec3 gradient = Vec3::Zero();  // points into the lumen                                 [-]
+  Mat3 hessian = Mat3::Zero();   //                                                       [1/mm]
+};
+
+/// The lumen as a wire feels it. Signed distances to the triangles, exact on the nodes of a sparse
+/// grid round the wall, interpolated by cubic B-splines (C2), so that a wire slides over facets
+/// without chatter. Beyond the band the distance is +-band, without derivatives.
+class Lumen {
+ public:
+  /// Expects a closed surface with outward triangles.
+  explicit Lumen(const Surface& surface, const LumenOptions& options = {});
+
+  double distance(const Vec3& point) const;
+  WallSample sample(const Vec3& point) const;
+
+  double grid_spacing() const { return spacing_; }
+  double band() const { return band_; }
+  /// Largest and mean |distance| of the field at vertices and centroids of the triangles, where the
+  /// exact answer is 0: how far the smooth wall departs from the surface [mm].
+  double max_deviation() const { return max_deviation_; }
+  double mean_deviation() const { return mean_deviation_; }
+  std::size_t memory_bytes() const;
+
+ private:
+  static constexpr int kCells = 8;           // cells of a brick along each axis
+  static constexpr int kNodes = kCells + 3;  // spline coefficients that they need
+
+  struct Place {                // a point in the grid
+    const float* coefficients;  // of the brick's first node; null beyond the band
+    double sign;                // of the distance there
+    std::array<int, 3> cell;    // within the brick
+    Vec3 fraction;              // within the cell
+  };
+  Place find_place(const Vec3& point) const;
+
+  double spacing_ = 0.0, band_ = 0.0, max_deviation_ = 0.0, mean_deviation_ = 0.0;
+  Vec3 origin_ = Vec3::Zero();             // of brick (0, 0, 0)                          [mm]
+  std::array<int, 3> bricks_ = {0, 0, 0};  // along each axis
+  std::vector<std::int32_t> brick_;        // slot of each brick, or -1 outside, -2 inside
+  std::vector<float> coefficients_;        // kNodes^3 per slot, x fastest                [mm]
+};
+
+/// Potential of one millimetre of wire against the wall at the gap between wire surface and wall:
+/// zero beyond `smoothing`, f = stiffness * penetration (paper 1.6) below -smoothing, a cubic
+/// between, so that force and stiffness are continuous.
+struct ContactLaw {
+  double stiffness = 20.0;  // per length of wire                                        [N/mm^2]
+  double smoothing = 0.05;  //                                                           [mm]
+
+  struct Value {
+    double energy = 0.0;     //                                                           [N]
+    double slope = 0.0;      // d energy / d gap, never positive                          [N/mm]
+    double curvature = 0.0;  //                                                           [N/mm^2]
+  };
+  Value at(double gap) const {
+    const double s = smoothing, k = stiffness;
+    if (gap >= s) return {};
+    if (gap <= -s) return {0.5 * k * gap * gap + k * s * s / 6.0, k * gap, k};
+    const double d = s - gap;
+    return {k * d * d * d / (12.0 * s), -k * d * d / (4.0 * s), k * d / (2.0 * s)};
+  }
+};
+
+}  // namespace wireplan::simulate

@@ -1,0 +1,81 @@
+#pragma once
+/// The guidewire as a chain of straight edges: what it is (Wire, Rod) and where it is (RodState).
+/// Symbols and equation numbers: the paper "FEM model for real-time guide wire simulation in
+/// vasculature". Directors, twist and their derivatives: Bergou et al., "Discrete Viscous Threads",
+/// SIGGRAPH 2010. Departures from both are named where they occur.
+#include <Eigen/Core>
+#include <string>
+#include <vector>
+
+#include "preprocess/base.h"
+
+namespace wireplan::simulate {
+
+/// A stretch of wire with constant properties.
+struct Section {
+  double length = 0.0;             //                                                     [mm]
+  double bending_stiffness = 0.0;  // EI                                                  [N mm^2]
+  double axial_stiffness = 0.0;    // EA; 0: that of a solid round rod, 16 EI / d^2       [N]
+  double twist_stiffness = 0.0;    // GJ; 0: that of a solid round rod, EI / 1.3          [N mm^2]
+  double mass_per_length = 0.0;    //                                                     [t/mm]
+  double rest_curvature = 0.0;     // of the unloaded wire, 1/radius                      [1/mm]
+};
+
+/// A device: sections listed from the tip backwards.
+struct Wire {
+  std::string name;
+  double radius = 0.0;  //                                                                [mm]
+  std::vector<Section> sections;
+
+  double length() const;
+  bool straight() const;  // no section has a rest curvature: its roll has no effect
+};
+
+/// What the discretised wire is: n nodes, n-1 edges, node 0 proximal, node n-1 the tip. Built once
+/// per wire, shared read-only. Node quantities vanish where the node has no two edges.
+struct Rod {
+  Eigen::VectorXd rest_length;   // (n-1)  l                                              [mm]
+  Eigen::VectorXd stretch;       // (n-1)  EA                                             [N]
+  Eigen::VectorXd bend;          // (n)    EI over the node's share of length             [N mm]
+  Eigen::VectorXd twist;         // (n)    GJ over the node's share of length             [N mm]
+  Eigen::VectorXd rest_angle;    // (n)    turning angle at rest                          [rad]
+  Eigen::VectorXd share;         // (n)    length that the node stands for                [mm]
+  Eigen::VectorXd mass;          // (n)                                                   [t]
+  Eigen::VectorXd tip_distance;  // (n)    arc length from the tip                        [mm]
+  double radius = 0.0;           //                                                       [mm]
+  double proximal_bend = 0.0;  // EI / (l/2) of the first and last edge: half a bend element, which
+  double distal_bend = 0.0;    // a clamp needs to be second order (design 7)           [N mm]
+  bool twisted = false;        // has a rest angle somewhere, so that twist matters
+
+  int nodes() const { return static_cast<int>(share.size()); }
+};
+
+/// The distal `length` of the wire in `elements` equal edges. EI at a node between two edges is
+/// that of springs in series; so are EA and GJ along an edge that spans sections. Expects 0 <
+/// length <= the wire's length and at least 2 elements.
+Rod build_rod(const Wire& wire, double length, int elements);
+
+/// Where the wire is. One per trial, never shared.
+struct RodState {
+  Eigen::Matrix3Xd x;               // (3, n)  node positions                             [mm]
+  Eigen::VectorXd theta;            // (n-1)   reference to material director, per edge   [rad]
+  Eigen::Matrix3Xd director;        // (3, n-1) reference director, normal to the edge    [-]
+  Eigen::VectorXd reference_twist;  // (n)     of the reference directors, at nodes       [rad]
+};
+
+/// The wire straight from `point` along the unit `direction`, its material director turned by
+/// `roll` from reference_normal(direction). A curved tip bends toward its material director.
+RodState straight_state(const Rod& rod, const Vec3& point, const Vec3& direction, double roll);
+
+/// The direction that roll and azimuth count from: the patient's anterior (-y) made normal to the
+/// axis; superior (+z) where the axis runs within 10 degrees of it. Unit.
+Vec3 reference_normal(const Vec3& axis);
+
+/// Turns a vector normal to unit `from` into one normal to unit `to`, without twist about it.
+Vec3 parallel_transport(const Vec3& vector, const Vec3& from, const Vec3& to);
+
+/// Moves directors and reference twist along with nodes that moved from those of `base`; copies
+/// theta. Called only for twisted rods. `first` and `last` bound the edges that moved.
+void transport_frames(const RodState& base, RodState& moved, int first_edge, int last_edge);
+
+}  // namespace wireplan::simulate

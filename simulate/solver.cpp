@@ -1,0 +1,690 @@
+#include "simulate/solver.h"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+namespace wireplan::simulate {
+
+namespace {
+
+Mat3 cross_matrix(const Vec3& v) {
+  Mat3 m;
+  m << 0.0, -v[2], v[1], v[2], 0.0, -v[0], -v[1], v[0], 0.0;
+  return m;
+}
+
+Mat3 symmetric_product(const Vec3& a, const Vec3& b) {
+  return a * b.transpose() + b * a.transpose();
+}
+
+// ---------------------------------------------------------------- elements
+//
+// Each element adds its derivatives to a sink: gradient(node, g), gradient_theta(edge, g),
+// hessian(i, j, H) for x_i x_j, hessian_theta(edge, i, h) for theta x_i, hessian_theta_theta(e, f,
+// h). Both halves of the symmetric matrix are implied: a pair i != j is given once.
+
+/// Stretch of edge i, paper Eq. (5): W = k_s/4 (|e|^2 - l^2)^2 with k_s = EA/(2 l^3).
+template <class Sink>
+double add_stretch(const Problem& problem, const RodState& state, int i, Sink& sink) {
+  const Rod& rod = *problem.rod;
+  const double l = rod.rest_length[i], k = rod.stretch[i] / (2.0 * l * l * l);
+  const Vec3 e = state.x.col(i + 1) - state.x.col(i);
+  const double excess = e.squaredNorm() - l * l;
+  const Vec3 f = k * excess * e;
+  sink.gradient(i, -f);
+  sink.gradient(i + 1, f);
+  if constexpr (Sink::kHessian) {
+    Mat3 H = (2.0 * k) * e * e.transpose();
+    H.diagonal().array() += k * excess;
+    sink.hessian(i, i, H);
+    sink.hessian(i + 1, i + 1, H);
+    sink.hessian(i + 1, i, -H);
+  }
+  return 0.25 * k * excess * excess;
+}
+
+/// Bend at node i between its edges a and b, for unequal lengths too. With u = e_b/l_b - e_a/l_a it
+/// is W = B (cos(r) |u|^2 / 2 + 1 - cos(r)) + add_rest_bend, which for rest angle r = 0 and equal
+/// lengths is paper Eq. (10) with k_b = EI/h^3, and for an inextensible chain turning by phi is B
+/// (1 - cos(phi - r)).
+template <class Sink>
+double add_bend(const Problem& problem, const RodState& state, int i, Sink& sink) {
+  const Rod& rod = *problem.rod;
+  const double a = 1.0 / rod.rest_length[i - 1], c = 1.0 / rod.rest_length[i], b = -(a + c);
+  const double cosine = rod.rest_angle[i] == 0.0 ? 1.0 : std::cos(rod.rest_angle[i]);
+  const double B = rod.bend[i] * cosine;
+  const Vec3 u = a * state.x.col(i - 1) + b * state.x.col(i) + c * state.x.col(i + 1);
+  sink.gradient(i - 1, B * a * u);
+  sink.gradient(i, B * b * u);
+  sink.gradient(i + 1, B * c * u);
+  if constexpr (Sink::kHessian) {
+    const std::array<double, 3> w = {a, b, c};
+    for (int p = 0; p < 3; ++p) {
+      for (int q = 0; q <= p; ++q)
+        sink.hessian_scaled_identity(i - 1 + p, i - 1 + q, B * w[p] * w[q]);
+    }
+  }
+  return 0.5 * B * u.squaredNorm() + rod.bend[i] * (1.0 - cosine);
+}
+
+/// A clamp as half a bend element, B/2 |e/l - t|^2 with B = 2 EI/l (design 7): the first edge leans
+/// toward the tangent without being frozen to it.
+template <class Sink>
+double add_clamp(const RodState& state, int edge, double l, double B, const Vec3& tangent,
+                 Sink& sink) {
+  const Vec3 u = (state.x.col(edge + 1) - state.x.col(edge)) / l - tangent;
+  sink.gradient(edge, -(B / l) * u);
+  sink.gradient(edge + 1, (B / l) * u);
+  if constexpr (Sink::kHessian) {
+    sink.hessian_scaled_identity(edge, edge, B / (l * l));
+    sink.hessian_scaled_identity(edge + 1, edge + 1, B / (l * l));
+    sink.hessian_scaled_identity(edge + 1, edge, -B / (l * l));
+  }
+  return 0.5 * B * u.squaredNorm();
+}
+
+/// An edge with its directors: t tangent, m material director, n = t x m.
+struct Edge {
+  double length;
+  Vec3 t, m, n;
+};
+
+Edge edge_at(const RodState& state, int i) {
+  const Vec3 e = state.x.col(i + 1) - state.x.col(i);
+  Edge edge;
+  edge.length = e.norm();
+  edge.t = e / edge.length;
+  const Vec3 d = state.director.col(i);
+  const double c = std::cos(state.theta[i]), s = std::sin(state.theta[i]);
+  edge.m = c * d + s * edge.t.cross(d);
+  edge.n = edge.t.cross(edge.m);
+  return edge;
+}
+
+/// Adds a Hessian given for the edges a = (i-1, i) and b = (i, i+1) to the nodes.
+template <class Sink>
+void add_edge_hessian(int i, const Mat3& H_aa, const Mat3& H_ab, const Mat3& H_bb, Sink& sink) {
+  sink.hessian(i - 1, i - 1, H_aa);
+  sink.hessian(i, i, H_aa - H_ab - H_ab.transpose() + H_bb);
+  sink.hessian(i + 1, i + 1, H_bb);
+  sink.hessian(i, i - 1, -H_aa + H_ab.transpose());
+  sink.hessian(i + 1, i, -H_bb + H_ab.transpose());
+  sink.hessian(i + 1, i - 1, -H_ab.transpose());
+}
+
+/// The same for the derivative of theta of `edge` with e_a and e_b.
+template <class Sink>
+void add_theta_hessian(int i, int edge, const Vec3& h_a, const Vec3& h_b, Sink& sink) {
+  sink.hessian_theta(edge, i - 1, -h_a);
+  sink.hessian_theta(edge, i, h_a - h_b);
+  sink.hessian_theta(edge, i + 1, h_b);
+}
+
+template <class Sink>
+void add_edge_gradient(int i, const Vec3& g_a, const Vec3& g_b, Sink& sink) {
+  sink.gradient(i - 1, -g_a);
+  sink.gradient(i, g_a - g_b);
+  sink.gradient(i + 1, g_b);
+}
+
+/// Part of the bend energy that knows which way a curved wire is curved: W = -B sin(r) u . (m_a +
+/// m_b)/2. The directors follow the edges by parallel transport: dm = -t (m . de)/|e|.
+template <class Sink>
+double add_rest_bend(const Problem& problem, const RodState& state, int i, Sink& sink) {
+  const Rod& rod = *problem.rod;
+  const double c = 0.5 * rod.bend[i] * std::sin(rod.rest_angle[i]);
+  const double l_a = rod.rest_length[i - 1], l_b = rod.rest_length[i];
+  const Edge a = edge_at(state, i - 1), b = edge_at(state, i);
+  const Vec3 u = (b.length / l_b) * b.t - (a.length / l_a) * a.t;
+  const Vec3 sum = a.m + b.m;
+  const double ua = u.dot(a.t) / a.length, ub = u.dot(b.t) / b.length;
+  add_edge_gradient(i, c * (sum / l_a + ua * a.m), c * (-sum / l_b + ub * b.m), sink);
+  sink.gradient_theta(i - 1, -c * u.dot(a.n));
+  sink.gradient_theta(i, -c * u.dot(b.n));
+  if constexpr (Sink::kHessian) {
+    sink.hessian_theta_theta(i - 1, i - 1, c * u.dot(a.m));
+    sink.hessian_theta_theta(i, i, c * u.dot(b.m));
+    add_theta_hessian(i, i - 1, c * (1.0 / l_a + ua) * a.n, -(c / l_b) * a.n, sink);
+    add_theta_hessian(i, i, (c / l_a) * b.n, c * (-1.0 / l_b + ub) * b.n, sink);
+    // Second variation of u . m under parallel transport of m along one edge.
+    const auto second = [&u](const Edge& e) -> Mat3 {
+      const Vec3 across = u - u.dot(e.t) * e.t;
+      return (u.dot(e.t) * symmetric_product(e.t, e.m) - 0.5 * symmetric_product(e.m, across)) /
+             (e.length * e.length);
+    };
+    const Mat3 H_aa = -c * (symmetric_product(a.t, a.m) / (l_a * a.length) + second(a));
+    const Mat3 H_bb = c * (symmetric_product(b.t, b.m) / (l_b * b.length) - second(b));
+    const Mat3 H_ab = (c / (l_b * a.length)) * a.m * a.t.transpose() -
+                      (c / (l_a * b.length)) * b.t * b.m.transpose();
+    add_edge_hessian(i, H_aa, H_ab, H_bb, sink);
+  }
+  return -c * u.dot(sum);
+}
+
+/// Twist at node i, W = T/2 (theta_b - theta_a + reference twist)^2; derivatives of the reference
+/// twist: "Discrete Viscous Threads", Eq. (16) and appendix.
+template <class Sink>
+double add_twist(const Problem& problem, const RodState& state, int i, Sink& sink) {
+  const double T = problem.rod->twist[i];
+  const Vec3 e_a = state.x.col(i) - state.x.col(i - 1), e_b = state.x.col(i + 1) - state.x.col(i);
+  const double a = e_a.norm(), b = e_b.norm();
+  const Vec3 t_a = e_a / a, t_b = e_b / b;
+  const double chi = 1.0 + t_a.dot(t_b);
+  const Vec3 kb = (2.0 / chi) * t_a.cross(t_b);
+  const double angle = state.theta[i] - state.theta[i - 1] + state.reference_twist[i];
+  const Vec3 m_a = kb / (2.0 * a), m_b = kb / (2.0 * b);  // d angle / d e
+  add_edge_gradient(i, T * angle * m_a, T * angle * m_b, sink);
+  sink.gradient_theta(i - 1, -T * angle);
+  sink.gradient_theta(i, T * angle);
+  if constexpr (Sink::kHessian) {
+    Mat3 H_aa = T * m_a * m_a.transpose(), H_bb = T * m_b * m_b.transpose(),
+         H_ab = T * m_a * m_b.transpose();
+    {
+      const Vec3 mean = (t_a + t_b) / chi;
+      H_aa -= (0.25 * T * angle / (a * a)) * symmetric_product(kb, t_a + mean);
+      H_bb -= (0.25 * T * angle / (b * b)) * symmetric_product(kb, t_b + mean);
+      H_ab +=
+          (0.5 * T * angle / (a * b)) * ((2.0 / chi) * cross_matrix(t_a) - kb * mean.transpose());
+    }
+    add_edge_hessian(i, H_aa, H_ab, H_bb, sink);
+    add_theta_hessian(i, i - 1, -T * m_a, -T * m_b, sink);
+    add_theta_hessian(i, i, T * m_a, T * m_b, sink);
+    sink.hessian_theta_theta(i - 1, i - 1, T);
+    sink.hessian_theta_theta(i, i, T);
+    sink.hessian_theta_theta(i, i - 1, -T);
+  }
+  return 0.5 * T * angle * angle;
+}
+
+/// Contact of node i with the wall. `distance` gets the wall's distance from the node.
+template <class Sink>
+double add_contact(const Problem& problem, const RodState& state, int i, double& distance,
+                   Sink& sink) {
+  const Rod& rod = *problem.rod;
+  const double near = rod.radius + problem.contact.smoothing;
+  if constexpr (!Sink::kHessian) {
+    distance = problem.lumen->distance(state.x.col(i));
+    if (distance >= near) return 0.0;
+  }
+  const WallSample wall = problem.lumen->sample(state.x.col(i));
+  distance = wall.distance;
+  if (distance >= near) return 0.0;
+  const ContactLaw::Value law = problem.contact.at(distance - rod.radius);
+  const double share = rod.share[i];
+  sink.gradient(i, share * law.slope * wall.gradient);
+  if constexpr (Sink::kHessian) {
+    Mat3 H = (share * law.curvature) * wall.gradient * wall.gradient.transpose();
+    H += (share * law.slope) * wall.hessian;
+    sink.hessian(i, i, H);
+  }
+  return share * law.energy;
+}
+
+/// All elements that touch a free node. `distances` (n) is written where there is a lumen.
+template <class Sink>
+Energy assemble(const Problem& problem, const RodState& state, std::vector<double>* distances,
+                Sink& sink) {
+  const Rod& rod = *problem.rod;
+  const int n = rod.nodes();
+  Energy energy;
+  for (int i = std::max(0, problem.first - 1); i <= std::min(n - 2, problem.last - 1); ++i) {
+    energy.stretch += add_stretch(problem, state, i, sink);
+  }
+  for (int i = std::max(1, problem.first - 1); i <= std::min(n - 2, problem.last); ++i) {
+    energy.bend += add_bend(problem, state, i, sink);
+  }
+  if (problem.first == 0 && problem.proximal.tangent) {
+    energy.bend +=
+        add_clamp(state, 0, rod.rest_length[0], rod.proximal_bend, *problem.proximal.tangent, sink);
+  }
+  if (problem.last == n && problem.distal.tangent) {
+    energy.bend += add_clamp(state, n - 2, rod.rest_length[n - 2], rod.distal_bend,
+                             *problem.distal.tangent, sink);
+  }
+  if (rod.twisted) {
+    for (int i = std::max(1, problem.first - 1); i <= std::min(n - 2, problem.last); ++i) {
+      energy.twist += add_twist(problem, state, i, sink);
+      if (rod.rest_angle[i] != 0.0) energy.bend += add_rest_bend(problem, state, i, sink);
+    }
+  }
+  if (problem.load != nullptr) {
+    for (int i = problem.first; i < problem.last; ++i) {
+      const Vec3 f = problem.load->col(i);
+      sink.gradient(i, -f);
+      energy.load -= f.dot(state.x.col(i));
+    }
+  }
+  if (problem.lumen != nullptr) {
+    double distance = 0.0;
+    for (int i = problem.first; i < problem.last; ++i) {
+      energy.contact += add_contact(problem, state, i, distance, sink);
+      if (distances != nullptr) (*distances)[static_cast<std::size_t>(i)] = distance;
+    }
+  }
+  return energy;
+}
+
+// ---------------------------------------------------------------- sinks
+
+/// Gradient with respect to every node; no Hessian.
+struct GradientSink {
+  static constexpr bool kHessian = false;
+  Eigen::Ref<Eigen::Matrix3Xd> target;
+  void gradient(int i, const Vec3& g) { target.col(i) += g; }
+  void gradient_theta(int, double) {}
+};
+
+/// Gradient and dense Hessian over all x, then all theta.
+struct DenseSink {
+  static constexpr bool kHessian = true;
+  int n;
+  Eigen::VectorXd& g;
+  Eigen::MatrixXd& H;
+
+  void gradient(int i, const Vec3& v) { g.segment<3>(3 * i) += v; }
+  void gradient_theta(int e, double v) { g[3 * n + e] += v; }
+  void hessian(int i, int j, const Mat3& block) {
+    H.block<3, 3>(3 * i, 3 * j) += block;
+    if (i != j) H.block<3, 3>(3 * j, 3 * i) += block.transpose();
+  }
+  void hessian_scaled_identity(int i, int j, double v) { hessian(i, j, v * Mat3::Identity()); }
+  void hessian_theta(int e, int i, const Vec3& v) {
+    H.block<3, 1>(3 * i, 3 * n + e) += v;
+    H.block<1, 3>(3 * n + e, 3 * i) += v.transpose();
+  }
+  void hessian_theta_theta(int e, int f, double v) {
+    H(3 * n + e, 3 * n + f) += v;
+    if (e != f) H(3 * n + f, 3 * n + e) += v;
+  }
+};
+
+/// Gradient and banded Hessian of the free nodes: block k holds x and, for D = 4, theta of node
+/// first + k.
+template <int D>
+struct BandSink {
+  static constexpr bool kHessian = true;
+  int first, last;
+  Eigen::VectorXd& g;
+  BlockBand<D>& H;
+
+  bool is_free(int i) const { return i >= first && i < last; }
+  void gradient(int i, const Vec3& v) {
+    if (is_free(i)) g.template segment<3>(D * (i - first)) += v;
+  }
+  void gradient_theta(int e, double v) {
+    if (D == 4 && is_free(e)) g[D * (e - first) + 3] += v;
+  }
+  typename BlockBand<D>::Block& block(int i, int j) {  // i >= j
+    return i == j ? H.own(i - first) : i == j + 1 ? H.one(i - first) : H.two(i - first);
+  }
+  void hessian(int i, int j, const Mat3& v) {
+    if (is_free(i) && is_free(j)) block(i, j).template topLeftCorner<3, 3>() += v;
+  }
+  void hessian_scaled_identity(int i, int j, double v) {
+    if (is_free(i) && is_free(j))
+      block(i, j).template topLeftCorner<3, 3>().diagonal().array() += v;
+  }
+  void hessian_theta(int e, int i, const Vec3& v) {
+    if constexpr (D == 4) {
+      if (!is_free(e) || !is_free(i)) return;
+      if (e >= i) {
+        block(e, i).template block<1, 3>(3, 0) += v.transpose();
+      }
+      if (i >= e) {
+        block(i, e).template block<3, 1>(0, 3) += v;
+      }
+    }
+  }
+  void hessian_theta_theta(int e, int f, double v) {
+    if constexpr (D == 4) {
+      if (is_free(e) && is_free(f)) block(e, f)(3, 3) += v;
+    }
+  }
+};
+
+// ---------------------------------------------------------------- supports
+
+/// Projector on what an end support leaves free at its node.
+Mat3 free_directions(const EndSupport& support) {
+  const Mat3 along = support.axis * support.axis.transpose();
+  Mat3 P = Mat3::Zero();
+  if (!support.hold_along) P += along;
+  if (!support.hold_across) P += Mat3::Identity() - along;
+  return P;
+}
+
+/// Takes what a support holds out of the system: rows and columns of block k are projected and the
+/// held directions get a unit pivot.
+template <int D>
+void hold(const Mat3& P, bool hold_theta, int k, Eigen::VectorXd& g, BlockBand<D>& H) {
+  typename BlockBand<D>::Block Q = BlockBand<D>::Block::Identity();
+  Q.template topLeftCorner<3, 3>() = P;
+  if constexpr (D == 4) {
+    if (hold_theta) Q(3, 3) = 0.0;
+  }
+  g.template segment<D>(D * k) = (Q * g.template segment<D>(D * k)).eval();
+  H.own(k) = (Q * H.own(k).template selfadjointView<Eigen::Lower>() * Q).eval();
+  H.own(k) += BlockBand<D>::Block::Identity() - Q;
+  if (k >= 1) H.one(k) = (Q * H.one(k)).eval();
+  if (k >= 2) H.two(k) = (Q * H.two(k)).eval();
+  if (k + 1 < H.size()) H.one(k + 1) = (H.one(k + 1) * Q).eval();
+  if (k + 2 < H.size()) H.two(k + 2) = (H.two(k + 2) * Q).eval();
+}
+
+template <int D>
+void apply_supports(const Problem& problem, Eigen::VectorXd& g, BlockBand<D>& H) {
+  const int n = problem.rod->nodes();
+  if (problem.first == 0) {
+    hold<D>(free_directions(problem.proximal), problem.proximal.hold_roll, 0, g, H);
+  }
+  if (problem.last == n) {
+    hold<D>(free_directions(problem.distal), true, n - 1 - problem.first, g, H);  // no edge n-1
+    if (D == 4 && problem.distal.hold_roll && n - 2 >= problem.first) {
+      hold<D>(Mat3::Identity(), true, n - 2 - problem.first, g, H);
+    }
+  }
+}
+
+// ---------------------------------------------------------------- line search
+
+/// Energy along a step, a1 s + a2 s^2 + a3 s^3 + a4 s^4: exact for stretch, bend and loads, paper
+/// Eq. (22).
+struct Quartic {
+  double a1 = 0.0, a2 = 0.0, a3 = 0.0, a4 = 0.0;
+  double at(double s) const { return s * (a1 + s * (a2 + s * (a3 + s * a4))); }
+};
+
+template <int D>
+Quartic elastic_along(const Problem& problem, const RodState& state, const Eigen::VectorXd& step) {
+  const Rod& rod = *problem.rod;
+  const int n = rod.nodes();
+  const auto move = [&](int i) -> Vec3 {
+    if (i < problem.first || i >= problem.last) return Vec3::Zero();
+    return step.segment<3>(D * (i - problem.first));
+  };
+  Quartic q;
+  for (int i = std::max(0, problem.first - 1); i <= std::min(n - 2, problem.last - 1); ++i) {
+    const double l = rod.rest_length[i], k = rod.stretch[i] / (8.0 * l * l * l);
+    const Vec3 e = state.x.col(i + 1) - state.x.col(i), p = move(i + 1) - move(i);
+    const double A = e.squaredNorm() - l * l, B = 2.0 * e.dot(p), C = p.squaredNorm();
+    q.a1 += k * 2.0 * A * B;
+    q.a2 += k * (B * B + 2.0 * A * C);
+    q.a3 += k * 2.0 * B * C;
+    q.a4 += k * C * C;
+  }
+  const auto add_quadratic = [&q](double B, const Vec3& u, const Vec3& p) {
+    q.a1 += B * u.dot(p);
+    q.a2 += 0.5 * B * p.squaredNorm();
+  };
+  for (int i = std::max(1, problem.first - 1); i <= std::min(n - 2, problem.last); ++i) {
+    const double a = 1.0 / rod.rest_length[i - 1], c = 1.0 / rod.rest_length[i], b = -(a + c);
+    add_quadratic(rod.bend[i] * std::cos(rod.rest_angle[i]),
+                  a * state.x.col(i - 1) + b * state.x.col(i) + c * state.x.col(i + 1),
+                  a * move(i - 1) + b * move(i) + c * move(i + 1));
+  }
+  const auto add_end = [&](int edge, double B, const Vec3& tangent) {
+    const double l = rod.rest_length[edge];
+    add_quadratic(B, (state.x.col(edge + 1) - state.x.col(edge)) / l - tangent,
+                  (move(edge + 1) - move(edge)) / l);
+  };
+  if (problem.first == 0 && problem.proximal.tangent) {
+    add_end(0, rod.proximal_bend, *problem.proximal.tangent);
+  }
+  if (problem.last == n && problem.distal.tangent) {
+    add_end(n - 2, rod.distal_bend, *problem.distal.tangent);
+  }
+  if (problem.load != nullptr) {
+    for (int i = problem.first; i < problem.last; ++i) q.a1 -= problem.load->col(i).dot(move(i));
+  }
+  return q;
+}
+
+/// The lowest point of a quartic that falls at 0, within (0, cap], paper Eq. (23).
+double lowest_point(const Quartic& q, double cap) {
+  // Real roots of the derivative, by Cardano's formula on the depressed cubic.
+  std::array<double, 3> roots{};
+  int count = 0;
+  const double a = 4.0 * q.a4, b = 3.0 * q.a3, c = 2.0 * q.a2, d = q.a1;
+  const double scale = std::abs(b) + std::abs(c) + std::abs(d);
+  if (std::abs(a) > 1e-14 * scale) {
+    const double shift = -b / (3.0 * a);
+    const double p = (3.0 * a * c - b * b) / (3.0 * a * a);
+    const double r = (2.0 * b * b * b - 9.0 * a * b * c + 27.0 * a * a * d) / (27.0 * a * a * a);
+    const double discriminant = 0.25 * r * r + p * p * p / 27.0;
+    if (discriminant > 0.0) {
+      const double root = std::sqrt(discriminant);
+      const double u = std::cbrt(-0.5 * r - std::copysign(root, r));
+      roots[count++] = shift + (u == 0.0 ? 0.0 : u - p / (3.0 * u));
+    } else {
+      const double radius = 2.0 * std::sqrt(-p / 3.0);
+      const double angle =
+          radius == 0.0 ? 0.0 : std::acos(std::clamp(3.0 * r / (p * radius), -1.0, 1.0)) / 3.0;
+      for (int k = 0; k < 3; ++k)
+        roots[count++] = shift + radius * std::cos(angle - 2.0 * kPi * k / 3.0);
+    }
+  } else if (c > 0.0) {
+    roots[count++] = -d / c;
+  }
+  double best = std::isfinite(cap) ? cap : 1.0;
+  for (int k = 0; k < count; ++k) {
+    double s = roots[k];
+    for (int polish = 0; polish < 2; ++polish) {
+      const double second = c + s * (2.0 * b + 3.0 * a * s);
+      if (second != 0.0) s -= (d + s * (c + s * (b + a * s))) / second;
+    }
+    if (s > 0.0 && s <= cap && q.at(s) < q.at(best)) best = s;
+  }
+  return best;
+}
+
+/// Largest part of the step that no node can cross the wall with: a node may go as far as it is
+/// from the wall, and a quarter of a millimetre into it, where contact pushes it back.
+template <int D>
+double largest_safe_step(const Problem& problem, const std::vector<double>& distances,
+                         const Eigen::VectorXd& step) {
+  constexpr double kInto = 0.25;  // [mm]
+  double cap = std::numeric_limits<double>::infinity();
+  for (int i = problem.first; i < problem.last; ++i) {
+    const double move = step.segment<3>(D * (i - problem.first)).norm();
+    const double room = kInto + std::max(0.0, distances[static_cast<std::size_t>(i)]);
+    if (move > room) cap = std::min(cap, room / move);
+  }
+  return cap;
+}
+
+/// A twisted rod's directors are carried along by parallel transport, which is lost where an edge
+/// turns back: no edge changes by more than half of its length in one step.
+template <int D>
+double largest_turning_step(const Problem& problem, const Eigen::VectorXd& step) {
+  double cap = std::numeric_limits<double>::infinity();
+  for (int i = problem.first; i + 1 < problem.last; ++i) {
+    const int k = D * (i - problem.first);
+    const double change = (step.segment<3>(k + D) - step.segment<3>(k)).norm();
+    const double allowed = 0.5 * problem.rod->rest_length[i];
+    if (change > allowed) cap = std::min(cap, allowed / change);
+  }
+  return cap;
+}
+
+/// The step with second-order lengthening taken out: each edge gets the direction that the step
+/// gives it, and the length whose tension is the one that the step predicts to first order. Nodes
+/// are laid out anew from the proximal end; what that moves a held distal end by is spread over the
+/// wire. A step that turns stiff edges by an angle a would else stretch them by a^2/2, and Newton
+/// would spend its iterations on undoing that.
+template <int D>
+void turn_edges(const Problem& problem, const RodState& state, const Eigen::VectorXd& step,
+                double s, RodState& trial) {
+  const Rod& rod = *problem.rod;
+  const int n = rod.nodes();
+  const auto move = [&](int i) -> Vec3 {
+    if (i < problem.first || i >= problem.last) return Vec3::Zero();
+    return s * step.segment<3>(D * (i - problem.first));
+  };
+  const int start = std::max(0, problem.first - 1), end = std::min(n - 1, problem.last);
+  trial.x.col(start) = state.x.col(start) + move(start);
+  for (int i = start; i < end; ++i) {
+    const Vec3 e = state.x.col(i + 1) - state.x.col(i), p = move(i + 1) - move(i);
+    const double smallest = 0.25 * rod.rest_length[i] * rod.rest_length[i];
+    const double squared_length = std::max(smallest, e.squaredNorm() + 2.0 * e.dot(p));
+    const Vec3 turned = e + p;
+    trial.x.col(i + 1) = trial.x.col(i) + std::sqrt(squared_length / turned.squaredNorm()) * turned;
+  }
+  const bool held = problem.last < n || problem.distal.hold_along || problem.distal.hold_across;
+  if (held) {
+    const Vec3 gap = state.x.col(end) + move(end) - trial.x.col(end);
+    for (int i = start; i <= end; ++i) trial.x.col(i) += (double(i - start) / (end - start)) * gap;
+  }
+}
+
+}  // namespace
+
+// ---------------------------------------------------------------- Newton
+
+template <int D>
+NewtonResult Statics::solve_with(BlockBand<D>& hessian, BlockBand<D>& untouched,
+                                 const Problem& problem, RodState& state,
+                                 const NewtonOptions& options) {
+  const int count = problem.last - problem.first;
+  const int n = problem.rod->nodes();
+  gradient_.resize(D * count);
+  step_.resize(D * count);
+  distances_.resize(static_cast<std::size_t>(n));
+  constexpr double kSmallestShift = 1e-7;  // [N/mm]
+  const bool bounded = problem.lumen != nullptr, twisted = D == 4;
+
+  const auto derivatives_at = [&](const RodState& where) {
+    gradient_.setZero();
+    hessian.reset(count);
+    BandSink<D> sink{problem.first, problem.last, gradient_, hessian};
+    const Energy energy = assemble(problem, where, &distances_, sink);
+    apply_supports<D>(problem, gradient_, hessian);
+    return energy.total();
+  };
+  const auto largest_force = [&] {
+    double residual = 0.0;
+    for (int k = 0; k < count; ++k) {
+      residual = std::max(residual, gradient_.segment<3>(D * k).squaredNorm());
+    }
+    residual = std::sqrt(residual);
+    if constexpr (D == 4) {  // a torque out of balance counts as a force at the wire's radius
+      for (int k = 0; k < count; ++k) {
+        residual = std::max(residual, std::abs(gradient_[D * k + 3]) / problem.rod->radius);
+      }
+    }
+    return residual;
+  };
+
+  NewtonResult result;
+  double shift = 0.0;  // of the Hessian's diagonal
+  trial_ = state;
+  result.energy = derivatives_at(state);
+  for (;; ++result.iterations) {
+    result.residual = largest_force();
+    if (result.residual <= options.residual_tolerance) {
+      result.converged = true;
+      return result;
+    }
+    if (result.iterations == options.max_iterations || !std::isfinite(result.residual))
+      return result;
+
+    // 1. Direction: Newton's, with the Hessian shifted just far enough to be positive definite.
+    untouched = hessian;
+    shift *= 0.1;
+    if (shift < kSmallestShift) shift = 0.0;
+    for (;; shift = std::max(kSmallestShift, 8.0 * shift)) {
+      if (shift > 0.0) {
+        hessian = untouched;
+        for (int k = 0; k < count; ++k) hessian.own(k).diagonal().array() += shift;
+      }
+      if (hessian.factor()) break;
+    }
+    step_ = -gradient_;
+    hessian.solve(step_);
+    const double slope = gradient_.dot(step_);
+
+    // 2. Full step, edges turned rather than lengthened; most steps end here.
+    double cap = std::numeric_limits<double>::infinity();
+    if (bounded) cap = largest_safe_step<D>(problem, distances_, step_);
+    if (twisted) cap = std::min(cap, largest_turning_step<D>(problem, step_));
+    // Rounding may hide the fall of the energy close to the minimum.
+    const double rounding = 1e-13 * (1.0 + std::abs(result.energy));
+    bool accepted = false;
+    const auto try_trial = [&](double length) {
+      if constexpr (D == 4) {
+        for (int k = 0; k < count && problem.first + k < n - 1; ++k) {
+          trial_.theta[problem.first + k] =
+              state.theta[problem.first + k] + length * step_[D * k + 3];
+        }
+        transport_frames(state, trial_, std::max(0, problem.first - 1),
+                         std::min(n - 2, problem.last - 1));
+      }
+      const double energy = derivatives_at(trial_);
+      accepted = energy <= result.energy + 1e-4 * length * slope + rounding;
+      if (accepted) {
+        result.worst_energy_rise = std::max(result.worst_energy_rise, energy - result.energy);
+        result.energy = energy;
+      }
+      return energy;
+    };
+    turn_edges<D>(problem, state, step_, std::min(1.0, cap), trial_);
+    try_trial(std::min(1.0, cap));
+
+    // 3. Else straight along the step to the lowest point of the exact quartic, plus a parabola for
+    // the terms that are no polynomial; shorter until the energy falls.
+    double length = 0.0;
+    if (!accepted) {
+      Quartic along = elastic_along<D>(problem, state, step_);
+      if (bounded || twisted) {
+        const double second = std::max(0.0, -slope - shift * step_.squaredNorm() - 2.0 * along.a2);
+        along.a1 = slope;
+        along.a2 += 0.5 * second;
+      }
+      length = lowest_point(along, cap);
+    }
+    for (int cut = 0; cut < 40 && !accepted; ++cut) {
+      for (int k = 0; k < count; ++k) {
+        trial_.x.col(problem.first + k) =
+            state.x.col(problem.first + k) + length * step_.segment<3>(D * k);
+      }
+      const double energy = try_trial(length);
+      if (accepted) break;
+      // Lowest point of the parabola through both energies and the slope, within a safe bracket.
+      const double curvature = (energy - result.energy - length * slope) / (length * length);
+      const double parabola = curvature > 0.0 ? -slope / (2.0 * curvature) : 0.5 * length;
+      length = std::clamp(parabola, 0.1 * length, 0.5 * length);
+    }
+    if (!accepted) return result;
+    std::swap(state, trial_);
+    if constexpr (D == 4) {
+      trial_.director = state.director;
+      trial_.reference_twist = state.reference_twist;
+    }
+  }
+}
+
+NewtonResult Statics::solve(const Problem& problem, RodState& state, const NewtonOptions& options) {
+  expects(problem.rod != nullptr && problem.first >= 0 && problem.first < problem.last &&
+          problem.last <= problem.rod->nodes());
+  if (problem.rod->twisted) return solve_with<4>(hessian4_, untouched4_, problem, state, options);
+  return solve_with<3>(hessian3_, untouched3_, problem, state, options);
+}
+
+Energy Statics::evaluate(const Problem& problem, const RodState& state,
+                         Eigen::Ref<Eigen::Matrix3Xd> gradient) {
+  gradient.setZero();
+  GradientSink sink{gradient};
+  return assemble(problem, state, nullptr, sink);
+}
+
+void Statics::derivatives(const Problem& problem, const RodState& state, Eigen::VectorXd& gradient,
+                          Eigen::MatrixXd& hessian) {
+  const int n = problem.rod->nodes();
+  gradient.setZero(4 * n - 1);
+  hessian.setZero(4 * n - 1, 4 * n - 1);
+  DenseSink sink{n, gradient, hessian};
+  assemble(problem, state, nullptr, sink);
+}
+
+}  // namespace wireplan::simulate

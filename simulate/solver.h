@@ -1,0 +1,82 @@
+#pragma once
+/// Static equilibrium of a rod: the minimum of stretch + bend + twist + loads + contact over its
+/// free nodes, by Newton's method with a block-banded factorisation (DESIGN.md).
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "simulate/block_band.h"
+#include "simulate/contact.h"
+#include "simulate/rod.h"
+
+namespace wireplan::simulate {
+
+/// How an end of the rod is held. `tangent` (unit, proximal to distal) is imposed by half a bend
+/// element, which is second order where freezing the first edge is first order (design 7).
+struct EndSupport {
+  bool hold_along = false;    // the node's motion along `axis`
+  bool hold_across = false;   // its motion normal to `axis`
+  bool hold_roll = false;     // theta of the end's edge
+  Vec3 axis = Vec3::UnitX();  // unit
+  std::optional<Vec3> tangent;
+};
+
+/// What is in equilibrium. Nodes first..last-1 are free, apart from what the end supports hold;
+/// nodes before and after are where they are, and their edges' theta too. Terms that are absent
+/// cost nothing.
+struct Problem {
+  const Rod* rod = nullptr;
+  int first = 0, last = 0;
+  EndSupport proximal, distal;             // of nodes 0 and n-1, where those are free
+  const Eigen::Matrix3Xd* load = nullptr;  // (3, n) dead forces on the nodes                [N]
+  const Lumen* lumen = nullptr;
+  ContactLaw contact;
+};
+
+struct NewtonOptions {
+  double residual_tolerance = 1e-6;  // largest nodal force out of balance           [N]
+  int max_iterations = 200;
+};
+
+struct NewtonResult {
+  bool converged = false;
+  double residual = 0.0;           //                                              [N]
+  double energy = 0.0;             // all terms                                    [N mm]
+  double worst_energy_rise = 0.0;  // over accepted steps; 0 unless rounding       [N mm]
+  int iterations = 0;
+};
+
+/// Energy by term [N mm].
+struct Energy {
+  double stretch = 0.0, bend = 0.0, twist = 0.0, load = 0.0, contact = 0.0;
+  double total() const { return stretch + bend + twist + load + contact; }
+};
+
+/// Solver with the memory that its solves reuse. One per thread.
+class Statics {
+ public:
+  /// Moves `state` to equilibrium, starting from where it is. On failure `state` is the last
+  /// iterate.
+  NewtonResult solve(const Problem& problem, RodState& state, const NewtonOptions& options);
+
+  /// Energy at the state and, in `gradient` (3, n), its derivative with respect to all nodes, held
+  /// ones included: minus the gradient is the force of the rod and its loads on a node [N].
+  static Energy evaluate(const Problem& problem, const RodState& state,
+                         Eigen::Ref<Eigen::Matrix3Xd> gradient);
+  /// For tests: gradient and dense Hessian over all x, then all theta (4n-1), supports ignored.
+  static void derivatives(const Problem& problem, const RodState& state, Eigen::VectorXd& gradient,
+                          Eigen::MatrixXd& hessian);
+
+ private:
+  template <int D>
+  NewtonResult solve_with(BlockBand<D>& hessian, BlockBand<D>& untouched, const Problem& problem,
+                          RodState& state, const NewtonOptions& options);
+
+  BlockBand<3> hessian3_, untouched3_;
+  BlockBand<4> hessian4_, untouched4_;
+  RodState trial_;
+  Eigen::VectorXd gradient_, step_;
+  std::vector<double> distances_;  // of the nodes from the wall, where there is one         [mm]
+};
+
+}  // namespace wireplan::simulate

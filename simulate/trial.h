@@ -1,0 +1,89 @@
+#pragma once
+/// One insertion of one wire into one vessel: run_trial(wire, insertion, goal, lumen) ->
+/// TrialResult. Serial and deterministic; shares the lumen read-only with other trials.
+#include <string>
+#include <vector>
+
+#include "simulate/contact.h"
+#include "simulate/rod.h"
+
+namespace wireplan::simulate {
+
+/// How finely and how far to push; the same for all trials of a study.
+struct InsertionOptions {
+  double length = 250.0;             // most wire to bring into the body                 [mm]
+  double step = 1.0;                 // of one push                                      [mm]
+  double element_length = 1.0;       //                                                  [mm]
+  double residual_tolerance = 1e-6;  // largest nodal force out of balance               [N]
+  int max_iterations = 200;          // Newton iterations per push
+  double record_every = 5.0;         // spacing of the stored shapes                     [mm]
+};
+
+/// The introducer: wire slides along its axis and is free beyond its point.
+struct Introducer {
+  Vec3 point = Vec3::Zero();       // where the wire becomes free, inside the lumen      [mm]
+  Vec3 direction = Vec3::UnitZ();  // unit, into the vessel
+  double roll = 0.0;               // of the hub, right-handed about the direction     [rad]
+};
+
+struct Goal {
+  Vec3 point = Vec3::Zero();  //                                                  [mm]
+  double radius = 4.0;        // the tip within this distance has reached it      [mm]
+};
+
+enum class Outcome {
+  kReached,       // the tip came within the goal's radius; ends where it was nearest
+  kMissed,        // all wire was pushed in, the goal not reached
+  kStuck,         // pushing no longer advances the tip
+  kLeftLumen,     // the wire went further through the wall than contact explains
+  kNotConverged,  // a push had no equilibrium to the tolerance, also when cut smaller
+  kFailed,        // our fault; the reason holds the message
+};
+const char* outcome_name(Outcome outcome);  // "reached", "missed", "stuck", ...
+
+/// State after one push, in equilibrium. Forces are those of the wall on the wire. A contact is
+/// a maximal run of neighbouring nodes that touch; its force is the norm of their sum.
+struct Push {
+  double insertion = 0.0;            // wire beyond the introducer's point               [mm]
+  double push_force = 0.0;           // axial force of the introducer on the wire        [N]
+  Vec3 tip = Vec3::Zero();           //                                                  [mm]
+  double tip_force = 0.0;            // norm of the contact force on the last 2 mm       [N]
+  double peak_contact_force = 0.0;   // of the largest contact                           [N]
+  double total_contact_force = 0.0;  // sum of the normal forces of all nodes            [N]
+  double max_penetration = 0.0;      // of the wire's surface past the wall              [mm]
+  double peak_curvature = 0.0;       //                                                  [1/mm]
+  double residual = 0.0;             //                                                  [N]
+  int iterations = 0;                // Newton iterations of this push
+};
+
+struct NodeContact {
+  int node = 0;               // column of TrialResult::nodes
+  Vec3 point = Vec3::Zero();  // on the wire's surface toward the wall            [mm]
+  Vec3 force = Vec3::Zero();  // of the wall on the wire                          [N]
+  double penetration = 0.0;   //                                                  [mm]
+};
+
+/// A shape on the way, for pictures and time series.
+struct Shape {
+  double insertion = 0.0;         //                                                  [mm]
+  Eigen::Matrix3Xd nodes;         // (3, k) beyond the introducer, proximal to distal [mm]
+  Eigen::VectorXd contact_force;  // (k) norm per node                                [N]
+};
+
+struct TrialResult {
+  Outcome outcome = Outcome::kFailed;
+  std::string reason;        // one sentence; with the place in mm where it failed
+  std::vector<Push> pushes;  // in order of insertion
+  Eigen::Matrix3Xd nodes;    // (3, k) final shape beyond the introducer, proximal to distal
+  std::vector<NodeContact> contacts;  // of the final shape
+  std::vector<Shape> shapes;          // every `record_every`, and the final one
+  std::vector<std::string> terms;     // energy terms that the scene built: "stretch", "bend", ...
+};
+
+/// Pushes the wire in along the introducer until the tip reaches the goal, all wire is in, or a
+/// named failure. Never throws for what the physics does. Expects a unit direction and positive
+/// lengths.
+TrialResult run_trial(const Wire& wire, const Introducer& introducer, const Goal& goal,
+                      const Lumen& lumen, const InsertionOptions& options);
+
+}  // namespace wireplan::simulate

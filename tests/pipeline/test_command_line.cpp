@@ -1,0 +1,287 @@
+// The program itself: its exit codes, what it says of bad input, and that it then writes nothing.
+#include <gtest/gtest.h>
+#include <sys/wait.h>
+
+#include <array>
+#include <chrono>
+#include <cstdint>
+#include <cstdlib>
+#include <functional>
+
+#include "pipeline/catalogue.h"
+#include "tests/pipeline/small_case.h"
+
+namespace wireplan::pipeline {
+namespace {
+
+namespace fs = std::filesystem;
+
+struct Answer {
+  int code = -1;
+  std::string out, log;
+};
+
+// A folder with the tube case, and the program run within it.
+class CommandLine : public testing::Test {
+ protected:
+  void SetUp() override { case_ = write_tube_case(folder_.path()); }
+
+  Answer call(const std::string& arguments) const {
+    const std::string command = "cd '" + folder_.path().string() + "' && XDG_CACHE_HOME='" +
+                                (folder_ / "cache").string() + "' '" + WIREPLAN_PROGRAM + "' " +
+                                arguments + " > out.txt 2> log.txt";
+    const int status = std::system(command.c_str());
+    return {WIFEXITED(status) ? WEXITSTATUS(status) : -1, read_text(folder_ / "out.txt"),
+            read_text(folder_ / "log.txt")};
+  }
+
+  // Runs a case that is wrong: exit 2, told in words that name `expected`, nothing written over.
+  void expect_refused(const Json& file, const std::string& expected) const {
+    write_json(file, folder_ / "bad.json");
+    expect_file_refused(expected);
+  }
+  void expect_file_refused(const std::string& expected) const {
+    write_text("earlier", folder_ / "results" / "report.json");
+    const Answer answer = call("run bad.json -o results");
+    EXPECT_EQ(answer.code, 2) << answer.log;
+    EXPECT_EQ(answer.out, "");
+    EXPECT_NE(answer.log.find(expected), std::string::npos) << answer.log;
+    EXPECT_EQ(read_text(folder_ / "results" / "report.json"), "earlier");
+    EXPECT_EQ(std::distance(fs::directory_iterator(folder_ / "results"), {}), 1);
+  }
+
+  TemporaryFolder folder_;
+  Json case_;
+};
+
+// Two tubes of 300 HU, 12 mm wide, side by side in soft tissue under a layer of air, 1 mm voxels:
+// raw NRRD, 40 x 40 x 36.
+void write_two_tubes(const fs::path& file) {
+  std::string voxels;
+  for (int k = 0; k < 36; ++k) {
+    for (int j = 0; j < 40; ++j) {
+      for (int i = 0; i < 40; ++i) {
+        const double y = j - 20.0, a = std::hypot(i - 10.0, y), b = std::hypot(i - 30.0, y);
+        const int hu = j < 4 ? -1000 : std::min(a, b) < 6.0 ? 300 : 40;
+        const auto bits = static_cast<std::uint16_t>(static_cast<std::int16_t>(hu));
+        voxels += static_cast<char>(bits & 255U);
+        voxels += static_cast<char>(bits >> 8U);
+      }
+    }
+  }
+  write_text(
+      "NRRD0004\ntype: short\ndimension: 3\nspace: left-posterior-superior\nsizes: 40 40 36\n"
+      "space directions: (1,0,0) (0,1,0) (0,0,1)\nkinds: domain domain domain\nendian: little\n"
+      "encoding: raw\nspace origin: (0,0,0)\n\n" +
+          voxels,
+      file);
+}
+
+Json volume_case(const Json& tube) {
+  Json file = tube;
+  file["volume"] = {{"path", "ct.nrrd"}};
+  file["surface"] = {{"edge_length_mm", 1.5}};
+  file["segmentation"] = {
+      {"lower_hu", 150}, {"upper_hu", 500}, {"seeds_mm", Json::array({{10, 20, 18}})}};
+  file["access"]["point_mm"] = {10, 20, 8};
+  file["target"]["point_mm"] = {10, 20, 30};
+  return file;
+}
+
+TEST_F(CommandLine, RunsACaseAndTheSecondTimeDoesNothing) {
+  const Answer first = call("run case.json");
+  ASSERT_EQ(first.code, 0) << first.log;
+  EXPECT_NE(first.out.find("best plan of 2 that reach, out of 2 tried"), std::string::npos);
+  EXPECT_NE(first.out.find("report: wireplan-out/tube/report.json"), std::string::npos);
+  const fs::path results = folder_ / "wireplan-out" / "tube";
+  for (const char* name : {"surface.vtp", "centerline.vtp", "centerline.mrk.json", "wall.vtu",
+                           "report.json", "trials/0000.json", "trials/0001.json",
+                           "trials/plan-1.pvd", "trials/plan-1.mrk.json", "trials/plan-1/0.vtp"}) {
+    EXPECT_TRUE(fs::exists(results / name)) << name;
+  }
+
+  const std::string report = read_text(results / "report.json");
+  const Answer second = call("run case.json");
+  EXPECT_EQ(second.code, 0);
+  EXPECT_EQ(second.out, first.out);
+  EXPECT_EQ(second.log.find("made"), std::string::npos) << second.log;
+  EXPECT_EQ(read_text(results / "report.json"), report);
+}
+
+TEST_F(CommandLine, SegmentsAVolumeAndPlansInIt) {
+  write_two_tubes(folder_ / "ct.nrrd");
+  write_json(volume_case(case_), folder_ / "case.json");
+  const Answer answer = call("run case.json -o results");
+  ASSERT_EQ(answer.code, 0) << answer.log;
+  EXPECT_TRUE(fs::exists(folder_ / "results" / "mask.nrrd"));
+  const Json report = read_json(folder_ / "results" / "report.json", "wireplan.report/1");
+  // One tube of radius 6 and length 36: 4072 mm^3, of which voxels keep all but some per cent.
+  EXPECT_NEAR(report.at("vessel").at("volume_mm3").get<double>(), 4072.0, 300.0);
+}
+
+TEST_F(CommandLine, ExitsWithOneWhereNoPlanReaches) {
+  const Answer answer = call("run case.json --set insertion.length_mm=12");
+  EXPECT_EQ(answer.code, 1) << answer.log;
+  EXPECT_NE(answer.out.find("no plan reaches the target"), std::string::npos);
+}
+
+TEST_F(CommandLine, StatusTellsWhyStagesWouldRun) {
+  ASSERT_EQ(call("run case.json").code, 0);
+  const Answer status = call("status case.json --set wall.thickness_mm=2");
+  EXPECT_EQ(status.code, 0);
+  EXPECT_NE(status.out.find("parameter wall.thickness_mm: 1.0 -> 2.0"), std::string::npos)
+      << status.out;
+  EXPECT_EQ(call("run case.json --dry-run").out.find("would run"), std::string::npos);
+}
+
+TEST_F(CommandLine, StopsAtAStageAndForcesOne) {
+  EXPECT_EQ(call("run case.json --to centerline -o results").code, 0);
+  EXPECT_TRUE(fs::exists(folder_ / "results" / "centerline.vtp"));
+  EXPECT_FALSE(fs::exists(folder_ / "results" / "wall.vtu"));
+  const Answer forced = call("run case.json --to centerline --force centerline --explain");
+  EXPECT_NE(forced.log.find("it is forced"), std::string::npos) << forced.log;
+  EXPECT_EQ(call("run case.json --to nowhere").code, 2);
+}
+
+TEST_F(CommandLine, HelpAndVersionAreAnswersAndUnknownArgumentsAreBadInput) {
+  for (const char* command : {"", "run", "check", "status", "wires", "simulate", "phantom"}) {
+    SCOPED_TRACE(command);
+    const Answer help = call(std::string(command) + " --help");
+    EXPECT_EQ(help.code, 0);
+    EXPECT_GT(help.out.size(), 100u);
+    EXPECT_LE(std::count(help.out.begin(), help.out.end(), '\n'), 24);  // a screen
+  }
+  EXPECT_EQ(call("--version").code, 0);
+  EXPECT_EQ(call("").code, 2);
+  EXPECT_EQ(call("run").code, 2);
+  EXPECT_EQ(call("run case.json --no-such-option").code, 2);
+  EXPECT_EQ(call("run case.json -j 0").code, 2);
+}
+
+TEST_F(CommandLine, ListsEveryWireOfTheCatalogue) {
+  const Answer answer = call("wires");
+  EXPECT_EQ(answer.code, 0);
+  const std::vector<CatalogueWire> wires = catalogue();
+  ASSERT_FALSE(wires.empty());
+  for (const CatalogueWire& entry : wires) {
+    EXPECT_NE(answer.out.find(entry.wire.name), std::string::npos) << entry.wire.name;
+  }
+}
+
+TEST_F(CommandLine, ChecksACaseWithoutRunningIt) {
+  EXPECT_EQ(call("check .").code, 0);
+  const Answer good = call("check case.json");
+  EXPECT_EQ(good.code, 0) << good.log;
+  EXPECT_NE(good.out.find("2 trials"), std::string::npos) << good.out;
+  EXPECT_FALSE(fs::exists(folder_ / "cache"));
+
+  // Both ends outside: told at once.
+  const Answer bad =
+      call("check case.json --set access.point_mm=[0,0,-9] --set target.point_mm=[0,30,28]");
+  EXPECT_EQ(bad.code, 2);
+  EXPECT_NE(bad.log.find("access.point_mm"), std::string::npos) << bad.log;
+  EXPECT_NE(bad.log.find("target.point_mm"), std::string::npos) << bad.log;
+}
+
+TEST_F(CommandLine, SimulatesTheBench) {
+  // Clamped along x, bent by a small force at the tip: F L^3 / (3 EI) = 0.0213 mm.
+  write_json({{"schema", "wireplan.scene/1"},
+              {"wire",
+               {{"elements", 40},
+                {"sections",
+                 Json::array(
+                     {{{"length_mm", 40}, {"bending_stiffness_n_mm2", 10}, {"radius_mm", 0.4}}})}}},
+              {"supports", Json::array({{{"at", "proximal"},
+                                         {"kind", "clamped"},
+                                         {"point_mm", {0, 0, 0}},
+                                         {"direction", {1, 0, 0}}}})},
+              {"loads", {{"tip_force_n", {0, -1e-5, 0}}}}},
+             folder_ / "scene.json");
+  const Answer answer = call("simulate scene.json -o bench");
+  ASSERT_EQ(answer.code, 0) << answer.log;
+  EXPECT_NE(answer.out.find("converged: tip (40.0000, -0.0213, 0.0000) mm"), std::string::npos)
+      << answer.out;
+  EXPECT_TRUE(fs::exists(folder_ / "bench" / "result.json"));
+  EXPECT_TRUE(fs::exists(folder_ / "bench" / "wire.vtp"));
+}
+
+TEST_F(CommandLine, RefusesAFileThatIsMissingOrBroken) {
+  const Answer missing = call("run absent.json -o results");
+  EXPECT_EQ(missing.code, 2);
+  EXPECT_NE(missing.log.find("absent.json"), std::string::npos) << missing.log;
+  EXPECT_FALSE(fs::exists(folder_ / "results"));
+
+  const std::string text = case_.dump(2);
+  write_text(text.substr(0, text.size() / 2), folder_ / "bad.json");
+  expect_file_refused("bad.json");
+}
+
+TEST_F(CommandLine, RefusesWhatTheCaseSaysWrong) {
+  struct Mistake {
+    std::function<void(Json&)> make;
+    std::string expected;
+  };
+  const std::vector<Mistake> mistakes = {
+      {[](Json& f) { f["surface"]["path"] = "absent.stl"; }, "absent.stl"},
+      {[](Json& f) { f["acess"] = f["access"]; }, "acess"},
+      {[](Json& f) { f["wires"][0]["diameter_mm"] = 0.000889; }, "wires[0].diameter_mm"},
+      {[](Json& f) { f["wires"][0]["diameter_mm"] = 889; }, "wires[0].diameter_mm"},
+      {[](Json& f) { f["wires"] = Json::array(); }, "wires"},
+      {[](Json& f) { f["wires"][0]["sections"][0]["bending_stiffness_n_mm2"] = -50; },
+       "wires[0].sections[0].bending_stiffness_n_mm2"},
+      {[](Json& f) {
+         f["access"]["point_mm"] = {0, 0};
+       },
+       "access.point_mm"},
+      {[](Json& f) {
+         f["target"]["point_mm"] = {0, 30, 28};
+       },
+       "target.point_mm"},
+      {[](Json& f) {
+         f["access"]["point_mm"] = {0, 0, -7};
+       },
+       "access.point_mm"},
+  };
+  for (const Mistake& mistake : mistakes) {
+    SCOPED_TRACE(mistake.expected);
+    Json file = case_;
+    mistake.make(file);
+    expect_refused(file, mistake.expected);
+  }
+}
+
+TEST_F(CommandLine, RefusesASurfaceThatIsNoneOrOpen) {
+  write_text("not a surface", folder_ / "tube.stl");
+  expect_refused(case_, "tube.stl");
+
+  Surface open = shapes::straight_tube(4.0, 36.0, 1.5);
+  open.triangles.conservativeResize(3, open.triangles.cols() - 1);
+  write_stl(open, folder_ / "tube.stl");
+  expect_refused(case_, "tube.stl");
+}
+
+TEST_F(CommandLine, RefusesAVolumeThatIsNoneAndPointsThatAreNotInTheVessel) {
+  const Json good = volume_case(case_);
+  write_text("not an image", folder_ / "ct.nrrd");
+  expect_refused(good, "ct.nrrd");
+
+  write_two_tubes(folder_ / "ct.nrrd");
+  const auto with_seed = [&](double x, double y, double z) {
+    Json file = good;
+    file["segmentation"]["seeds_mm"] = Json::array({{x, y, z}});
+    return file;
+  };
+  expect_refused(with_seed(10, 20, 400), "outside the volume");
+  expect_refused(with_seed(10, 2, 18), "-1000");  // in air: the value found there is told
+
+  // The other tube is no part of what the seed lies in.
+  Json other = good;
+  other["target"]["point_mm"] = {30, 20, 30};
+  expect_refused(other, "target.point_mm");
+  // With a seed in both, one of the two pieces is left out of the surface.
+  other["segmentation"]["seeds_mm"] = Json::array({{10, 20, 18}, {30, 20, 18}});
+  expect_refused(other, "point_mm");
+}
+
+}  // namespace
+}  // namespace wireplan::pipeline

@@ -1,0 +1,276 @@
+// The artifact store, the digests below it and the keys of the stages above it.
+#include <gtest/gtest.h>
+
+#include <fstream>
+
+#include "pipeline/case_file.h"
+#include "pipeline/hash.h"
+#include "pipeline/stages.h"
+#include "pipeline/store.h"
+#include "tests/pipeline/small_case.h"
+
+namespace wireplan::pipeline {
+namespace {
+
+namespace fs = std::filesystem;
+
+// Artifacts are read-only; a test that damages one must first be allowed to.
+void overwrite(const fs::path& file, const std::string& text) {
+  fs::permissions(file, fs::perms::owner_write, fs::perm_options::add);
+  write_text(text, file);
+}
+
+Artifact commit_two_files(const Store& store, const std::string& key) {
+  return store.commit("surface", key, [](const fs::path& folder) {
+    write_text("triangles", folder / "surface.vtp");
+    write_text("figures", folder / "more" / "surface.json");
+  });
+}
+
+TEST(Hash, MatchesThePublishedVectors) {
+  // FIPS 180-4 examples and NIST's one million 'a'.
+  EXPECT_EQ(hash_text(""), "e3b0c44298fc1c149afbf4c8996fb92427ae41e4649b934ca495991b7852b855");
+  EXPECT_EQ(hash_text("abc"), "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad");
+  EXPECT_EQ(hash_text(std::string(1000000, 'a')),
+            "cdc76e5c9914fb9281a1c7e284d73e67f1809a48a497200e046d39ccc7112cd0");
+}
+
+TEST(Hash, OfAFileIsThatOfItsBytesOverManyPieces) {
+  const TemporaryFolder folder;
+  const std::string text(3500000, 'x');  // more than three buffers, not a whole number of them
+  write_text(text, folder / "large");
+  EXPECT_EQ(hash_file(folder / "large"), hash_text(text));
+  EXPECT_THROW(hash_file(folder / "absent"), Error);
+}
+
+TEST(Hash, OfAFolderFollowsNamesAndContentsAndNotItsPlace) {
+  const TemporaryFolder folder;
+  write_text("1", folder / "a" / "image_1");
+  write_text("2", folder / "a" / "image_2");
+  fs::copy(folder / "a", folder / "b");
+  const std::string first = hash_input(folder / "a");
+  EXPECT_EQ(hash_input(folder / "b"), first);
+
+  write_text("3", folder / "b" / "image_2");
+  EXPECT_NE(hash_input(folder / "b"), first);
+  write_text("2", folder / "b" / "image_2");
+  fs::rename(folder / "b" / "image_2", folder / "b" / "image_3");
+  EXPECT_NE(hash_input(folder / "b"), first);
+}
+
+TEST(Key, ValuesCannotPassForOtherLines) {
+  // A name of a wire that holds a line break and a key stays within its line.
+  const std::string sly = Json("x\nparameter b: 2").dump();
+  const std::string text = key_text({{"parameter a", sly}, {"parameter b", "1"}});
+  EXPECT_EQ(std::count(text.begin(), text.end(), '\n'), 2);
+  EXPECT_NE(text, key_text({{"parameter a", "\"x\""}, {"parameter b", "2"}, {"parameter b", "1"}}));
+  EXPECT_NE(key_text({{"a", "12"}, {"b", "3"}}), key_text({{"a", "1"}, {"b", "23"}}));
+  EXPECT_THROW(key_text({{"a", "1\n2"}}), LogicError);
+  EXPECT_THROW(key_text({{"a: 1", "2"}}), LogicError);
+}
+
+TEST(Key, DifferencesAreToldLineByLine) {
+  const std::string before = key_text({{"version", "1"}, {"a", "1"}, {"b", "2"}});
+  const std::string now = key_text({{"version", "1"}, {"a", "5"}, {"c", "3"}});
+  EXPECT_EQ(describe_difference(before, now),
+            (std::vector<std::string>{"a: 1 -> 5", "c: new, 3", "b: no longer there, was 2"}));
+  EXPECT_TRUE(describe_difference(now, now).empty());
+}
+
+TEST(Store, FindsWhatWasCommittedUnderItsKeyAlone) {
+  const TemporaryFolder folder;
+  const Store store(folder.path());
+  EXPECT_FALSE(store.find("surface", "key: 1\n"));
+  const Artifact made = commit_two_files(store, "key: 1\n");
+
+  const std::optional<Artifact> found = store.find("surface", "key: 1\n");
+  ASSERT_TRUE(found);
+  EXPECT_EQ(found->contents(), made.contents());
+  ASSERT_EQ(found->files.size(), 2u);
+  EXPECT_EQ(found->files[0].name, "more/surface.json");
+  EXPECT_EQ(read_text(found->folder / "surface.vtp"), "triangles");
+  EXPECT_EQ(read_text(found->folder / "key.txt"), "key: 1\n");
+  EXPECT_FALSE(store.find("surface", "key: 2\n"));
+  EXPECT_FALSE(store.find("wall", "key: 1\n"));
+}
+
+TEST(Store, TakesADamagedArtifactForAbsentAndMakesItAgain) {
+  const auto damage = std::vector<std::function<void(const fs::path&)>>{
+      [](const fs::path& file) { overwrite(file, "triangle"); },   // truncated
+      [](const fs::path& file) { overwrite(file, "triangleS"); },  // same size, other bytes
+      [](const fs::path& file) { fs::remove(file); },
+      [](const fs::path& file) { fs::remove(file.parent_path() / "manifest.json"); },
+  };
+  for (std::size_t k = 0; k < damage.size(); ++k) {
+    SCOPED_TRACE(k);
+    const TemporaryFolder folder;
+    const Store store(folder.path());
+    damage[k](commit_two_files(store, "key: 1\n").folder / "surface.vtp");
+    EXPECT_FALSE(store.find("surface", "key: 1\n"));
+    commit_two_files(store, "key: 1\n");
+    ASSERT_TRUE(store.find("surface", "key: 1\n"));
+    EXPECT_EQ(read_text(store.find("surface", "key: 1\n")->folder / "surface.vtp"), "triangles");
+  }
+}
+
+TEST(Store, TakesAManifestCutAtAnyByteForAbsent) {
+  const TemporaryFolder folder;
+  const Store store(folder.path());
+  const fs::path manifest = commit_two_files(store, "key: 1\n").folder / "manifest.json";
+  const std::string whole = read_text(manifest);
+  ASSERT_GT(whole.size(), 100u);
+  for (std::size_t length = 0; length < whole.size(); ++length) {
+    overwrite(manifest, whole.substr(0, length));
+    ASSERT_FALSE(store.find("surface", "key: 1\n")) << "cut to " << length << " bytes";
+  }
+  overwrite(manifest, whole);
+  EXPECT_TRUE(store.find("surface", "key: 1\n"));
+}
+
+TEST(Store, LeavesNothingBehindWhenMakingFails) {
+  const TemporaryFolder folder;
+  const Store store(folder.path());
+  EXPECT_THROW(store.commit("surface", "key: 1\n",
+                            [](const fs::path& place) {
+                              write_text("half", place / "surface.vtp");
+                              throw Error("no");
+                            }),
+               Error);
+  EXPECT_FALSE(store.find("surface", "key: 1\n"));
+  EXPECT_TRUE(fs::is_empty(folder / "surface"));
+}
+
+TEST(Store, LetsOneAtATimeMakeAnArtifact) {
+  const TemporaryFolder folder;
+  const Store store(folder.path());
+  const auto give_up = [] { return true; };
+  {
+    const std::optional<StoreLock> held = store.lock("surface", "key: 1\n");
+    ASSERT_TRUE(held);
+    EXPECT_FALSE(store.lock("surface", "key: 1\n", give_up));
+    EXPECT_TRUE(store.lock("surface", "key: 2\n", give_up));
+  }
+  EXPECT_TRUE(store.lock("surface", "key: 1\n", give_up));
+}
+
+TEST(Store, ContentsIgnoreTimes) {
+  const TemporaryFolder folder;
+  const Store store(folder.path());
+  const auto commit = [&](const std::string& key, const std::string& time) {
+    return store.commit("trials", key, [&](const fs::path& place) {
+      write_text("forces", place / "trials" / "0000.json");
+      write_text(time, place / kTimingFile);
+    });
+  };
+  EXPECT_EQ(commit("key: 1\n", "1 s").contents(), commit("key: 2\n", "2 s").contents());
+}
+
+TEST(Publish, ReplacesItsOwnFilesAndTouchesNoOthers) {
+  const TemporaryFolder folder;
+  const Store store(folder / "cache");
+  const auto commit = [&](const std::string& key, const std::vector<std::string>& names) {
+    return store.commit("trials", key, [&](const fs::path& place) {
+      for (const std::string& name : names) write_text(key, place / name);
+    });
+  };
+  const fs::path out = folder / "out";
+  write_text("mine", out / "notes.txt");
+  publish({commit("key: 1\n", {"0.json", "1.json"})}, out);
+  EXPECT_EQ(read_text(out / "1.json"), "key: 1\n");
+
+  publish({commit("key: 2\n", {"0.json"})}, out);
+  EXPECT_EQ(read_text(out / "0.json"), "key: 2\n");
+  EXPECT_FALSE(fs::exists(out / "1.json"));
+  EXPECT_EQ(read_text(out / "notes.txt"), "mine");
+}
+
+// Runs the tube case with one value changed and returns the stages that were not cached.
+class StageKeys : public testing::Test {
+ protected:
+  void SetUp() override { write_tube_case(folder_.path()); }
+
+  RunResult run(const std::vector<std::string>& changes, bool dry = false) {
+    const Case given = read_case(folder_ / "case.json", changes);
+    RunOptions options;
+    options.cache = folder_ / "cache";
+    options.dry_run = dry;
+    return run_stages(given, options);
+  }
+  static std::vector<std::string> not_cached(const RunResult& result) {
+    std::vector<std::string> names;
+    for (const StageOutcome& outcome : result.stages) {
+      if (outcome.state != StageState::kCached) names.push_back(outcome.stage);
+    }
+    return names;
+  }
+
+  TemporaryFolder folder_;
+  const std::vector<std::string> all_ = {"surface", "centerline", "wall", "trials", "report"};
+};
+
+TEST_F(StageKeys, ASecondRunRunsNoStage) {
+  EXPECT_EQ(not_cached(run({})), all_);
+  EXPECT_TRUE(not_cached(run({})).empty());
+}
+
+TEST_F(StageKeys, AChangeRerunsWhatReadsItAndNoMore) {
+  using Names = std::vector<std::string>;
+  run({});
+  EXPECT_EQ(not_cached(run({"wall.thickness_mm=2"})), (Names{"wall", "trials", "report"}));
+  EXPECT_EQ(not_cached(run({"wires=[\"amplatz-stiff\"]"})), (Names{"trials", "report"}));
+  EXPECT_EQ(not_cached(run({"ranking.weights.margin=1"})), (Names{"report"}));
+  EXPECT_EQ(not_cached(run({"target.point_mm=[0,0,26]"})),
+            (Names{"centerline", "trials", "report"}));
+}
+
+TEST_F(StageKeys, AStageThatComesOutTheSameStopsTheCascade) {
+  run({});
+  // The same surface in another file: read anew, and nothing after it but the report, which names
+  // its digest.
+  const std::string stl = read_text(folder_ / "tube.stl");
+  write_text("solid renamed" + stl.substr(stl.find('\n')), folder_ / "tube.stl");
+  EXPECT_EQ(not_cached(run({})), (std::vector<std::string>{"surface", "report"}));
+}
+
+TEST_F(StageKeys, ADryRunSaysWhatWouldRunAndWhyAndRunsNothing) {
+  run({});
+  const RunResult dry = run({"wall.thickness_mm=2"}, /*dry=*/true);
+  EXPECT_EQ(not_cached(dry), (std::vector<std::string>{"wall", "trials", "report"}));
+  EXPECT_EQ(dry.stages[2].reasons,
+            std::vector<std::string>{"parameter wall.thickness_mm: 1.0 -> 2.0"});
+  ASSERT_EQ(dry.stages[3].reasons.size(), 1u);
+  EXPECT_EQ(dry.stages[3].reasons[0].substr(0, 12), "input wall: ");
+  EXPECT_EQ(not_cached(run({"wall.thickness_mm=2"}, /*dry=*/true)), not_cached(dry));
+}
+
+TEST_F(StageKeys, ADamagedArtifactIsMadeAgainWithTheSameContents) {
+  const RunResult first = run({});
+  overwrite(first.artifacts[2].folder / "wall.vtu", "");
+  const RunResult second = run({});
+  EXPECT_EQ(not_cached(second), std::vector<std::string>{"wall"});
+  EXPECT_EQ(second.artifacts[2].contents(), first.artifacts[2].contents());
+}
+
+TEST_F(StageKeys, AnInterruptedRunGoesOnFromItsFinishedTrials) {
+  const Case given = read_case(folder_ / "case.json");
+  RunOptions options;
+  options.cache = folder_ / "cache";
+  options.work.threads = 1;
+  int finished = 0;
+  options.work.progress = [&](int, int) { ++finished; };
+  options.work.cancelled = [&] { return finished == 1; };
+  EXPECT_THROW(run_stages(given, options), Interrupted);
+  ASSERT_EQ(finished, 1);
+
+  options.work.cancelled = {};
+  std::vector<int> counts;
+  options.work.progress = [&](int done, int total) {
+    counts.push_back(done);
+    EXPECT_EQ(total, 2);
+  };
+  EXPECT_EQ(not_cached(run_stages(given, options)), (std::vector<std::string>{"trials", "report"}));
+  EXPECT_EQ(counts, std::vector<int>{2});
+}
+
+}  // namespace
+}  // namespace wireplan::pipeline

@@ -1,0 +1,138 @@
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "plan/metrics.h"
+
+namespace wireplan::plan {
+namespace {
+
+using simulate::Outcome;
+using simulate::Push;
+using simulate::TrialResult;
+
+/// A path along +z from 0 to 100 mm in one segment.
+Centerline straight_path() {
+  Centerline path;
+  path.points.resize(3, 2);
+  path.points.col(0) = Vec3::Zero();
+  path.points.col(1) = Vec3(0.0, 0.0, 100.0);
+  return path;
+}
+
+Study study_with_goal_at(const Vec3& point) {
+  Study study;
+  study.goal = {.point = point, .radius = 4.0};
+  return study;
+}
+
+Push push_at(double insertion, double total_force) {
+  Push push;
+  push.insertion = insertion;
+  push.total_contact_force = total_force;
+  return push;
+}
+
+TEST(PushMetrics, ImpulseOfALinearForceIsExactOnUnevenPushes) {
+  // f = 0.02 s N: the trapezoidal rule is exact for it, impulse 0.02 * 30^2 / 2.
+  std::vector<Push> pushes;
+  for (const double s : {1.0, 2.5, 7.0, 7.0, 18.0, 30.0}) pushes.push_back(push_at(s, 0.02 * s));
+  const Metrics metrics = compute_push_metrics(pushes);
+  EXPECT_NEAR(metrics.force_impulse, 9.0, 1e-14);       // rounding
+  EXPECT_NEAR(metrics.mean_contact_force, 0.3, 1e-15);  // impulse over 30 mm
+}
+
+TEST(PushMetrics, ImpulseConvergesWithTheSquareOfThePush) {
+  // f = sin(pi s / L): the impulse over L is 2 L / pi.
+  const double length = 40.0, exact = 2.0 * length / kPi;
+  double last_error = 0.0;
+  for (const int count : {20, 40, 80}) {
+    std::vector<Push> pushes;
+    for (int k = 1; k <= count; ++k) {
+      pushes.push_back(push_at(length * k / count, std::sin(kPi * k / count)));
+    }
+    const double error = std::abs(compute_push_metrics(pushes).force_impulse - exact);
+    ASSERT_GT(error, 0.0);
+    if (last_error > 0.0) {
+      EXPECT_NEAR(last_error / error, 4.0, 0.02);  // the next term is (pi / 20)^2 / 60 of this one
+    }
+    last_error = error;
+  }
+}
+
+TEST(PushMetrics, PeaksAreOverAllPushesAndIterationsAreSummed) {
+  Push early = push_at(1.0, 0.4), late = push_at(2.0, 0.1);
+  early.tip_force = 0.3;
+  early.peak_contact_force = 0.2;
+  early.push_force = -0.7;  // the introducer holds the wire back
+  early.max_penetration = 0.01;
+  early.residual = 2e-7;
+  early.iterations = 5;
+  late.tip_force = 0.1;
+  late.peak_contact_force = 0.25;
+  late.push_force = 0.5;
+  late.peak_curvature = 0.05;
+  late.residual = 1e-7;
+  late.iterations = 3;
+  const Metrics metrics = compute_push_metrics({early, late});
+  EXPECT_EQ(metrics.insertion, 2.0);
+  EXPECT_EQ(metrics.peak_tip_force, 0.3);
+  EXPECT_EQ(metrics.peak_contact_force, 0.25);
+  EXPECT_EQ(metrics.peak_push_force, 0.7);
+  EXPECT_EQ(metrics.peak_curvature, 0.05);
+  EXPECT_EQ(metrics.max_penetration, 0.01);
+  EXPECT_EQ(metrics.residual, 2e-7);
+  EXPECT_EQ(metrics.iterations, 8);
+}
+
+TEST(PushMetrics, RefusesPushesThatGoBackwards) {
+  EXPECT_THROW(compute_push_metrics({push_at(2.0, 0.0), push_at(1.0, 0.0)}), LogicError);
+}
+
+TEST(Metrics, DeviationIsTheMeanDistanceToTheSegmentsAndTheirEnds) {
+  // Beside the middle of the long segment 3 mm, past its end 5 mm, on it 0.
+  TrialResult trial;
+  trial.nodes.resize(3, 3);
+  trial.nodes.col(0) = Vec3(3.0, 0.0, 50.0);
+  trial.nodes.col(1) = Vec3(0.0, 0.0, 20.0);
+  trial.nodes.col(2) = Vec3(0.0, 3.0, 104.0);
+  const Metrics metrics = compute_metrics(trial, study_with_goal_at(Vec3::Zero()), straight_path());
+  EXPECT_NEAR(metrics.centerline_deviation, 8.0 / 3.0, 1e-14);  // rounding
+}
+
+TEST(Metrics, DeviationAllowsForRepeatedPathPoints) {
+  Centerline path = straight_path();
+  path.points.conservativeResize(3, 3);
+  path.points.col(2) = path.points.col(1);
+  TrialResult trial;
+  trial.nodes = Vec3(3.0, 0.0, 104.0);
+  const Metrics metrics = compute_metrics(trial, study_with_goal_at(Vec3::Zero()), path);
+  EXPECT_NEAR(metrics.centerline_deviation, 5.0, 1e-14);  // rounding
+}
+
+TEST(Metrics, TipDistanceIsThatOfTheLastNode) {
+  TrialResult trial;
+  trial.outcome = Outcome::kReached;
+  trial.nodes.resize(3, 2);
+  trial.nodes.col(0) = Vec3::Zero();
+  trial.nodes.col(1) = Vec3(0.0, 0.0, 97.0);
+  const Metrics metrics =
+      compute_metrics(trial, study_with_goal_at(Vec3(0.0, 0.0, 100.0)), straight_path());
+  EXPECT_TRUE(metrics.reached);
+  EXPECT_NEAR(metrics.tip_to_target, 3.0, 1e-14);  // rounding
+}
+
+TEST(Metrics, ATrialWithoutAPushLiesAtTheAccessFreeOfForce) {
+  Study study = study_with_goal_at(Vec3(0.0, 0.0, 100.0));
+  study.access = Vec3(0.0, 0.0, 40.0);
+  const Metrics metrics = compute_metrics(TrialResult{}, study, straight_path());
+  EXPECT_FALSE(metrics.reached);
+  EXPECT_NEAR(metrics.tip_to_target, 60.0, 1e-14);  // rounding
+  EXPECT_EQ(metrics.insertion, 0.0);
+  EXPECT_EQ(metrics.force_impulse, 0.0);
+  EXPECT_EQ(metrics.mean_contact_force, 0.0);
+  EXPECT_EQ(metrics.centerline_deviation, 0.0);
+}
+
+}  // namespace
+}  // namespace wireplan::plan

@@ -1,0 +1,346 @@
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <random>
+
+#include "plan/ranking.h"
+
+namespace wireplan::plan {
+namespace {
+
+using simulate::Outcome;
+
+/// Trials made by hand: only what ranking reads.
+struct Bench {
+  Study study;
+  std::vector<Candidate> candidates;
+  std::vector<simulate::TrialResult> trials;
+  std::vector<Metrics> metrics;
+  std::vector<std::optional<NumericalError>> errors;
+  Limits limits;
+  Weights weights;
+
+  explicit Bench(int wires = 2) {
+    for (int k = 0; k < wires; ++k) {
+      simulate::Wire wire;
+      wire.name = "wire-" + std::to_string(k);
+      study.wires.push_back(wire);
+    }
+    study.goal.radius = 4.0;
+  }
+
+  Metrics& add(int wire, double tip_to_target, double peak_force,
+               Outcome outcome = Outcome::kReached) {
+    candidates.push_back({.wire = wire});
+    simulate::TrialResult trial;
+    trial.outcome = outcome;
+    trials.push_back(trial);
+    Metrics m;
+    m.reached = outcome == Outcome::kReached;
+    m.insertion = 120.0;
+    m.tip_to_target = tip_to_target;
+    m.peak_contact_force = peak_force;
+    metrics.push_back(m);
+    return metrics.back();
+  }
+
+  Ranking ranked() const {
+    return rank(study, candidates, trials, metrics, limits, weights, errors);
+  }
+};
+
+std::vector<int> order_of(const Ranking& ranking) {
+  std::vector<int> order;
+  for (const RankedPlan& plan : ranking.plans) order.push_back(plan.trial);
+  return order;
+}
+
+TEST(Score, FollowsItsFormulas) {
+  Metrics m;
+  m.tip_to_target = 1.0;
+  m.peak_contact_force = 0.1;
+  m.mean_contact_force = 0.3;
+  m.peak_tip_force = 0.3;
+  const Score score = compute_score(m, {.radius = 4.0}, Limits{}, Weights{});
+  EXPECT_DOUBLE_EQ(score.reach, 0.25);
+  EXPECT_DOUBLE_EQ(score.peak_force, 0.25);  // 0.1 / (0.1 + 0.3)
+  EXPECT_DOUBLE_EQ(score.mean_force, 0.5);   // at the scale
+  EXPECT_DOUBLE_EQ(score.margin, 0.2);       // 0.3 of 1.5 N used up
+  EXPECT_DOUBLE_EQ(score.total, (0.25 + 0.25 + 0.5 * 0.5 + 0.5 * 0.2) / 3.0);
+}
+
+TEST(Score, StaysWithinZeroAndOneForAnyMetrics) {
+  std::mt19937_64 generator(7);
+  const auto magnitude = [&] { return std::pow(10.0, double(generator() % 1000) / 100.0 - 5.0); };
+  for (int k = 0; k < 200; ++k) {
+    Metrics m;
+    m.tip_to_target = magnitude();
+    m.peak_contact_force = magnitude();
+    m.mean_contact_force = magnitude();
+    m.peak_tip_force = magnitude();
+    const Score score = compute_score(m, {.radius = 4.0}, Limits{}, Weights{});
+    for (const double c :
+         {score.total, score.reach, score.peak_force, score.mean_force, score.margin}) {
+      EXPECT_GE(c, 0.0);
+      EXPECT_LE(c, 1.0);
+    }
+  }
+}
+
+TEST(Score, ErrorIsTheFirstOrderChangeOfTheScore) {
+  Metrics m;
+  m.tip_to_target = 1.0;
+  m.peak_contact_force = 0.5;
+  m.mean_contact_force = 1.5;
+  m.peak_tip_force = 0.3;
+  const NumericalError error{
+      .tip = 1e-5, .peak_force = 2e-5, .mean_force = 3e-5, .tip_force = 4e-5};
+  Metrics worse = m;
+  worse.tip_to_target += error.tip;
+  worse.peak_contact_force += error.peak_force;
+  worse.mean_contact_force += error.mean_force;
+  worse.peak_tip_force += error.tip_force;
+  const simulate::Goal goal{.radius = 4.0};
+  const double change = compute_score(worse, goal, Limits{}, Weights{}).total -
+                        compute_score(m, goal, Limits{}, Weights{}).total;
+  ASSERT_GT(change, 1e-6);
+  // The next order is a share of about (2e-5 N) / (0.3 N) of it.
+  EXPECT_NEAR(compute_score_error(m, error, goal, Limits{}, Weights{}), change, 1e-4 * change);
+}
+
+TEST(Rank, OrdersByScoreAndThenByCandidate) {
+  Bench bench;
+  bench.add(0, 2.0, 0.4);
+  bench.add(0, 1.0, 0.2);
+  bench.add(1, 2.0, 0.4);
+  bench.add(1, 1.0, 0.1);
+  EXPECT_EQ(order_of(bench.ranked()), (std::vector<int>{3, 1, 0, 2}));
+}
+
+TEST(Rank, TheScoreOfAPlanDoesNotDependOnTheOthers) {
+  Bench alone, crowd;
+  alone.add(0, 2.0, 0.4);
+  crowd.add(0, 2.0, 0.4);
+  crowd.add(1, 0.1, 0.01);
+  crowd.add(1, 3.9, 9.0);
+  const Ranking ranking = crowd.ranked();
+  const auto same = std::find_if(ranking.plans.begin(), ranking.plans.end(),
+                                 [](const RankedPlan& plan) { return plan.trial == 0; });
+  ASSERT_NE(same, ranking.plans.end());
+  EXPECT_EQ(same->score.total, alone.ranked().plans.front().score.total);
+}
+
+TEST(Rank, FollowsTheWeights) {
+  Bench bench;
+  bench.add(0, 0.5, 0.8);  // near and hard
+  bench.add(1, 3.0, 0.1);  // far and soft
+  bench.weights = {.reach = 1.0, .peak_force = 0.0, .mean_force = 0.0, .margin = 0.0};
+  EXPECT_EQ(order_of(bench.ranked()), (std::vector<int>{0, 1}));
+  bench.weights = {.reach = 0.0, .peak_force = 2.0, .mean_force = 0.0, .margin = 0.0};
+  EXPECT_EQ(order_of(bench.ranked()), (std::vector<int>{1, 0}));
+  bench.weights = {.reach = 0.0, .peak_force = 0.0, .mean_force = 0.0, .margin = 0.0};
+  EXPECT_THROW(bench.ranked(), LogicError);
+}
+
+TEST(Rank, ExcludesEveryTrialThatIsNoPlanWithItsReason) {
+  Bench bench;
+  bench.add(0, 12.34, 0.2, Outcome::kMissed);
+  bench.trials.back().pushes.resize(1);
+  bench.trials.back().pushes.front().tip = Vec3(0.0, 0.0, 5.0);  // it passed the goal
+  bench.add(0, 50.0, 0.2, Outcome::kStuck);
+  bench.add(0, 60.0, 0.2, Outcome::kLeftLumen);
+  bench.add(0, 70.0, 0.2, Outcome::kNotConverged);
+  bench.trials.back().reason = "no equilibrium after 200 iterations";
+  bench.add(0, 80.0, 0.0, Outcome::kFailed);
+  bench.trials.back().reason = "internal error: out of paper";
+  bench.add(0, 1.0, 0.2).peak_tip_force = 1.9;
+  bench.add(0, 1.0, 0.2).max_penetration = 0.42;
+  bench.add(1, 1.0, 0.2);  // the only plan
+
+  const Ranking ranking = bench.ranked();
+  EXPECT_EQ(order_of(ranking), std::vector<int>{7});
+  const std::vector<std::string> reasons = {
+      "missed: tip ended 12.3 mm from the target and came no nearer than 5.0 mm, expected within "
+      "4 mm",
+      "stuck at 120.0 mm of wire, tip 50.0 mm from the target",
+      "left the lumen at 120.0 mm of wire, tip 60.0 mm from the target",
+      "did not converge at 120.0 mm of wire, tip 70.0 mm from the target: "
+      "no equilibrium after 200 iterations",
+      "internal error: out of paper",
+      "tip force 1.9 N over the limit of 1.5 N",
+      "left the lumen: wire 0.42 mm past the wall, over the limit of 0.3 mm"};
+  ASSERT_EQ(ranking.excluded.size(), reasons.size());
+  for (std::size_t k = 0; k < reasons.size(); ++k) {
+    EXPECT_EQ(ranking.excluded[k].trial, static_cast<int>(k));
+    EXPECT_EQ(ranking.excluded[k].reason, reasons[k]);
+  }
+}
+
+TEST(Rank, NamesBothLimitsWhereBothAreBroken) {
+  Bench bench;
+  Metrics& m = bench.add(0, 1.0, 0.2);
+  m.peak_tip_force = 1.501;
+  m.max_penetration = 0.42;
+  ASSERT_EQ(bench.ranked().excluded.size(), 1u);
+  EXPECT_EQ(bench.ranked().excluded.front().reason,
+            "tip force 1.501 N over the limit of 1.5 N; left the lumen: wire 0.42 mm past the "
+            "wall, over the limit of 0.3 mm");
+}
+
+TEST(Rank, RanksATipForceOverTheWarningLevelWithAWarning) {
+  Bench bench(1);
+  bench.add(0, 1.0, 0.2).peak_tip_force = 0.42;
+  const Ranking ranking = bench.ranked();
+  ASSERT_EQ(ranking.plans.size(), 1u);
+  EXPECT_EQ(ranking.plans.front().sentence,
+            "reaches the target 1.0 mm from its centre with at most 0.20 N on the wall; warning: "
+            "tip force 0.42 N over the warning level of 0.3 N");
+}
+
+TEST(Rank, SaysWhyThePlansStandWhereTheyDo) {
+  Bench bench;
+  bench.add(0, 1.2, 0.21);
+  bench.add(0, 1.3, 0.21);
+  bench.add(1, 1.2, 0.323);
+  bench.add(1, 3.9, 0.7);
+  bench.errors.assign(4, NumericalError{});  // exact: nothing is tied
+  const Ranking ranking = bench.ranked();
+  ASSERT_EQ(order_of(ranking), (std::vector<int>{0, 1, 2, 3}));
+  EXPECT_EQ(ranking.plans[0].sentence,
+            "reaches the target 1.2 mm from its centre with at most 0.21 N on the wall, 35 % less "
+            "than the next wire (wire-1)");
+  EXPECT_EQ(ranking.plans[1].sentence,
+            "reaches the target 1.3 mm from its centre with at most 0.21 N on the wall, as much as "
+            "the first plan; behind it mostly by its distance from the centre");
+  EXPECT_EQ(ranking.plans[2].sentence,
+            "reaches the target 1.2 mm from its centre with at most 0.32 N on the wall, 54 % more "
+            "than the first plan; behind it mostly by its peak contact force");
+  EXPECT_EQ(ranking.plans[3].sentence,
+            "reaches the target 3.9 mm from its centre with at most 0.70 N on the wall, 3.3 times "
+            "as much as the first plan; behind it mostly by its distance from the centre");
+}
+
+TEST(Rank, ComparesPlansThatDoNotTouchTheWall) {
+  Bench bench;
+  bench.add(0, 1.0, 0.0);
+  bench.add(1, 2.0, 0.0);
+  const Ranking ranking = bench.ranked();
+  EXPECT_EQ(ranking.plans.front().sentence,
+            "reaches the target 1.0 mm from its centre with at most 0.0000 N on the wall, as much "
+            "as the next wire (wire-1)");
+}
+
+TEST(Rank, SaysThatNoOtherWireHasAPlan) {
+  Bench bench;
+  bench.add(0, 1.0, 0.2);
+  bench.add(1, 9.0, 0.2, Outcome::kMissed);
+  EXPECT_NE(bench.ranked().plans.front().sentence.find("; no other wire has a plan"),
+            std::string::npos);
+}
+
+TEST(Rank, TiesPlansThatTheErrorsCannotTellApart) {
+  Bench bench;
+  bench.add(0, 1.0, 0.2);
+  bench.add(0, 1.1, 0.2);  // 0.1 mm further: the score differs by 0.1 / 4 / 3
+  bench.add(1, 3.0, 0.2);
+  bench.errors.assign(3, NumericalError{.tip = 0.04});
+  Ranking ranking = bench.ranked();
+  for (const RankedPlan& plan : ranking.plans) EXPECT_TRUE(plan.tied_with.empty());
+
+  bench.errors.assign(3, NumericalError{.tip = 0.06});
+  ranking = bench.ranked();
+  EXPECT_EQ(ranking.plans[0].tied_with, std::vector<int>{1});
+  EXPECT_EQ(ranking.plans[1].tied_with, std::vector<int>{0});
+  EXPECT_TRUE(ranking.plans[2].tied_with.empty());
+  EXPECT_NE(ranking.plans[1].sentence.find("the error estimate cannot tell the two apart"),
+            std::string::npos);
+}
+
+TEST(Rank, TiesPlansOfEqualScoreEvenWithoutError) {
+  Bench bench;
+  bench.add(0, 1.0, 0.2);
+  bench.add(1, 1.0, 0.2);
+  bench.errors.assign(2, NumericalError{});
+  EXPECT_EQ(bench.ranked().plans[0].tied_with, std::vector<int>{1});
+}
+
+TEST(Rank, AssumesAnErrorWhereNoneIsKnownAndDoesNotReportIt) {
+  Bench bench;
+  bench.add(0, 1.0, 0.2);
+  bench.add(0, 2.0, 0.2);
+  bench.errors = {std::nullopt, NumericalError{.position = 0.01}};
+  const Ranking ranking = bench.ranked();
+  EXPECT_FALSE(ranking.plans[0].position_error.has_value());
+  EXPECT_GT(ranking.plans[0].score_error, ranking.plans[1].score_error);
+  EXPECT_EQ(ranking.plans[1].position_error, std::optional<double>(0.01));
+}
+
+TEST(Rank, SummarisesEachWireOverTheTrialsThatReached) {
+  Bench bench(3);
+  bench.add(0, 1.0, 0.4);
+  bench.add(0, 1.0, 0.2);
+  bench.add(0, 9.0, 5.0, Outcome::kMissed);  // not counted
+  bench.add(1, 1.0, 0.3);
+  bench.add(1, 1.0, 0.5);
+  bench.add(1, 1.0, 0.9).peak_tip_force = 2.0;  // reached, but is no plan
+  bench.add(2, 9.0, 0.1, Outcome::kStuck);
+  const std::vector<WireSummary> wires = bench.ranked().wires;
+  ASSERT_EQ(wires.size(), 3u);
+  EXPECT_EQ(wires[0].trials, 3);
+  EXPECT_EQ(wires[0].reached, 2);
+  EXPECT_EQ(wires[0].best_trial, std::optional<int>(1));
+  EXPECT_DOUBLE_EQ(wires[0].median_peak_force, 0.3);
+  EXPECT_DOUBLE_EQ(wires[0].worst_peak_force, 0.4);
+  EXPECT_EQ(wires[1].reached, 3);
+  EXPECT_EQ(wires[1].best_trial, std::optional<int>(3));
+  EXPECT_DOUBLE_EQ(wires[1].median_peak_force, 0.5);
+  EXPECT_DOUBLE_EQ(wires[1].worst_peak_force, 0.9);
+  EXPECT_EQ(wires[2].reached, 0);
+  EXPECT_FALSE(wires[2].best_trial.has_value());
+  EXPECT_EQ(wires[2].worst_peak_force, 0.0);
+}
+
+TEST(Rank, ParetoFrontIsWhatNoOtherPlanBeats) {
+  // Against the definition, on coarse random values so that there are equals.
+  std::mt19937_64 generator(11);
+  Bench bench(1);
+  for (int k = 0; k < 60; ++k) {
+    const double distance = 0.25 * double(generator() % 16), force = 0.1 * double(generator() % 12);
+    bench.add(0, distance, force, k % 7 == 0 ? Outcome::kStuck : Outcome::kReached);
+  }
+  std::vector<int> expected;
+  for (const RankedPlan& a : bench.ranked().plans) {
+    bool beaten = false;
+    for (const RankedPlan& b : bench.ranked().plans) {
+      const Metrics &m = bench.metrics[a.trial], &n = bench.metrics[b.trial];
+      const bool no_worse =
+          n.peak_contact_force <= m.peak_contact_force && n.tip_to_target <= m.tip_to_target;
+      const bool better =
+          n.peak_contact_force < m.peak_contact_force || n.tip_to_target < m.tip_to_target;
+      beaten = beaten || (no_worse && better);
+    }
+    if (!beaten) expected.push_back(a.trial);
+  }
+  std::vector<int> front = bench.ranked().pareto;
+  ASSERT_GT(front.size(), 1u);
+  for (std::size_t k = 1; k < front.size(); ++k) {
+    EXPECT_LE(bench.metrics[front[k - 1]].peak_contact_force,
+              bench.metrics[front[k]].peak_contact_force);
+  }
+  std::sort(front.begin(), front.end());
+  std::sort(expected.begin(), expected.end());
+  EXPECT_EQ(front, expected);
+}
+
+TEST(Rank, IsEmptyWhereNoTrialIsAPlan) {
+  Bench bench;
+  bench.add(0, 9.0, 0.2, Outcome::kMissed);
+  const Ranking ranking = bench.ranked();
+  EXPECT_TRUE(ranking.plans.empty());
+  EXPECT_TRUE(ranking.pareto.empty());
+  EXPECT_EQ(ranking.excluded.size(), 1u);
+}
+
+}  // namespace
+}  // namespace wireplan::plan

@@ -1,0 +1,240 @@
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <functional>
+
+#include "plan/refine.h"
+#include "tests/shapes.h"
+
+namespace wireplan::plan {
+namespace {
+
+using simulate::Outcome;
+
+constexpr double kLength = 40.0;  // of the wires made by hand                          [mm]
+
+/// A wire along x with its tip at x = 0, displaced sideways by `offset` (h, distance from the tip).
+RefinedRun run_of(double h, const std::function<double(double h, double s)>& offset, double force) {
+  RefinedRun run;
+  run.element_length = h;
+  run.trial.outcome = Outcome::kMissed;
+  const int edges = static_cast<int>(std::lround(kLength / h));
+  run.trial.nodes.resize(3, edges + 1);
+  for (int k = 0; k <= edges; ++k) {
+    const double s = kLength - h * k;
+    run.trial.nodes.col(k) = Vec3(-s, offset(h, s), 0.0);
+  }
+  simulate::Push push;
+  push.insertion = kLength;
+  push.iterations = 7;
+  push.peak_contact_force = push.total_contact_force = push.tip_force = force;
+  run.trial.pushes = {push};
+  return run;
+}
+
+/// Runs at 2, 1 and 0.5 mm whose error is `size` h^order: sideways [mm], and of a force of 1 N.
+std::vector<RefinedRun> runs_of_order(double order, double size) {
+  std::vector<RefinedRun> runs;
+  for (const double h : {2.0, 1.0, 0.5}) {
+    runs.push_back(run_of(
+        h, [&](double step, double) { return size * std::pow(step, order); },
+        1.0 + size * std::pow(h, order)));
+  }
+  return runs;
+}
+
+TEST(ShapeDistance, IsTheDistanceBetweenParallelWires) {
+  const auto a = run_of(
+      2.0, [](double, double) { return 0.0; }, 0.0);
+  const auto b = run_of(
+      0.5, [](double, double) { return 0.3; }, 0.0);
+  EXPECT_NEAR(shape_distance(a.trial.nodes, b.trial.nodes), 0.3, 1e-15);
+  EXPECT_NEAR(shape_distance(b.trial.nodes, a.trial.nodes), 0.3, 1e-15);
+}
+
+TEST(ShapeDistance, IsZeroForTheSameLineCutAnew) {
+  // A wire with a corner, in edges of 2 mm and of 0.5 mm; the corner is a node of both.
+  const auto corner = [](double, double s) { return s > 20.0 ? 0.5 * (s - 20.0) : 0.0; };
+  const auto a = run_of(2.0, corner, 0.0), b = run_of(0.5, corner, 0.0);
+  EXPECT_LT(shape_distance(a.trial.nodes, b.trial.nodes), 1e-13);  // rounding of 40 sums
+}
+
+TEST(ShapeDistance, ComparesAsFarAsBothReach) {
+  // The fine wire misses the 10 mm next to the introducer, where the coarse one strays.
+  const auto a = run_of(
+      2.0, [](double, double s) { return s > 31.0 ? 5.0 : 0.0; }, 0.0);
+  const auto b = run_of(
+      0.5, [](double, double) { return 0.0; }, 0.0);
+  EXPECT_LT(shape_distance(a.trial.nodes, b.trial.nodes.rightCols(61)), 1e-13);
+}
+
+TEST(EstimateError, IsExactForErrorsOfSecondOrder) {
+  const Refinement result = estimate_error(4, kLength, runs_of_order(2.0, 0.03));
+  EXPECT_EQ(result.trial, 4);
+  EXPECT_EQ(result.reason, "");
+  ASSERT_TRUE(result.observed_order.has_value());
+  EXPECT_NEAR(*result.observed_order, 2.0, 1e-12);  // rounding
+  ASSERT_TRUE(result.error.has_value());
+  EXPECT_NEAR(result.error->position, 0.03, 1e-13);
+  EXPECT_NEAR(result.error->tip, 0.03, 1e-13);
+  EXPECT_NEAR(result.error->peak_force, 0.03, 1e-13);
+  EXPECT_NEAR(result.error->tip_force, 0.03, 1e-13);
+  EXPECT_NEAR(result.error->mean_force, 0.015, 1e-13);  // from rest: half the last force
+
+  ASSERT_EQ(result.rows.size(), 3u);
+  for (const NumericsRow& row : result.rows) {
+    const double error = 0.03 * row.element_length * row.element_length;
+    ASSERT_TRUE(row.position_error.has_value());
+    EXPECT_NEAR(*row.position_error, error, 1e-12);
+    EXPECT_NEAR(row.peak_force, 1.0 + error, 1e-15);
+    EXPECT_EQ(row.iterations, 7);
+  }
+  EXPECT_EQ(result.cpu_seconds.size(), 3u);
+}
+
+TEST(EstimateError, FollowsALowerOrder) {
+  const Refinement result = estimate_error(0, kLength, runs_of_order(1.0, 0.03));
+  EXPECT_NEAR(result.observed_order.value(), 1.0, 1e-12);
+  EXPECT_NEAR(result.error.value().position, 0.03, 1e-13);
+}
+
+TEST(EstimateError, DoesNotTrustAHigherOrderThanTheRodHas) {
+  // Fourth order: the change is (1 - 1/16) 0.03 mm, of which second order makes 4/3.
+  const Refinement result = estimate_error(0, kLength, runs_of_order(4.0, 0.03));
+  EXPECT_NEAR(result.observed_order.value(), 4.0, 1e-9);
+  EXPECT_NEAR(result.error.value().position, 4.0 / 3.0 * 15.0 / 16.0 * 0.03, 1e-13);
+}
+
+TEST(EstimateError, StaysFiniteWhereTheRunsDoNotConverge) {
+  // Changes that grow: from 2h to h by 0.01 mm, from h to h/2 by 0.05 mm.
+  const auto offset = [](double h, double) { return h == 2.0 ? 0.01 : h == 1.0 ? 0.0 : 0.05; };
+  const Refinement result = estimate_error(
+      0, kLength, {run_of(2.0, offset, 1.0), run_of(1.0, offset, 1.0), run_of(0.5, offset, 1.0)});
+  EXPECT_LT(result.observed_order.value(), 0.0);
+  const double half_order = std::sqrt(2.0) / (std::sqrt(2.0) - 1.0);
+  EXPECT_NEAR(result.error.value().position, 0.05 * half_order, 1e-13);
+}
+
+TEST(EstimateError, HasNoOrderWhereNothingChanges) {
+  const Refinement result = estimate_error(0, kLength, runs_of_order(2.0, 0.0));
+  EXPECT_FALSE(result.observed_order.has_value());
+  EXPECT_EQ(result.error.value().position, 0.0);
+}
+
+TEST(EstimateError, HasNoErrorWithoutTheFineRun) {
+  auto runs = runs_of_order(2.0, 0.03);
+  runs[2].trial.outcome = Outcome::kNotConverged;
+  runs[2].trial.pushes.back().insertion = 31.5;
+  runs[2].trial.reason = "no equilibrium";
+  const Refinement result = estimate_error(0, kLength, runs);
+  EXPECT_FALSE(result.error.has_value());
+  EXPECT_FALSE(result.observed_order.has_value());
+  EXPECT_EQ(result.reason,
+            "with elements of 0.5 mm the wire came to 31.5 mm of 40 mm: no equilibrium");
+  ASSERT_EQ(result.rows.size(), 2u);  // the longest can still be compared, the study's cannot
+  EXPECT_TRUE(result.rows[0].position_error.has_value());
+  EXPECT_FALSE(result.rows[1].position_error.has_value());
+  EXPECT_EQ(result.cpu_seconds.size(), 2u);
+}
+
+TEST(EstimateError, NeedsNoCoarseRunForTheError) {
+  auto runs = runs_of_order(2.0, 0.03);
+  runs[0].trial = simulate::TrialResult{};
+  const Refinement result = estimate_error(0, kLength, runs);
+  EXPECT_NEAR(result.error.value().position, 0.03, 1e-13);
+  EXPECT_FALSE(result.observed_order.has_value());
+  EXPECT_EQ(result.rows.size(), 2u);
+  EXPECT_NE(result.reason.find("with elements of 2 mm"), std::string::npos);
+}
+
+TEST(ErrorsByTrial, PutsEachErrorIntoTheSlotOfItsTrial) {
+  Refinement known, unknown;
+  known.trial = 2;
+  known.error = NumericalError{.position = 0.1};
+  unknown.trial = 0;
+  const auto errors = errors_by_trial({known, unknown}, 4);
+  ASSERT_EQ(errors.size(), 4u);
+  EXPECT_FALSE(errors[0].has_value());
+  EXPECT_FALSE(errors[1].has_value());
+  EXPECT_EQ(errors[2].value().position, 0.1);
+}
+
+TEST(EstimateError, TellsTheTipFromTheRestOfTheWire) {
+  // The wire is wrong in its middle alone.
+  std::vector<RefinedRun> runs;
+  for (const double h : {2.0, 1.0, 0.5}) {
+    runs.push_back(run_of(
+        h, [](double step, double s) { return 0.03 * step * step * std::sin(kPi * s / kLength); },
+        1.0));
+  }
+  const Refinement result = estimate_error(0, kLength, runs);
+  EXPECT_NEAR(result.error.value().position, 0.03, 1e-4);  // the slope lengthens the coarse wire
+  EXPECT_LT(result.error.value().tip, 1e-15);
+}
+
+/// A study with real trials: askew into a straight tube, where the wire lies against the wall.
+struct TubeStudy {
+  Study study;
+  std::vector<Candidate> candidates;
+  std::vector<Metrics> metrics;
+  Ranking ranking;
+  simulate::Lumen lumen{shapes::straight_tube(4.0, 50.0, 2.0)};
+
+  TubeStudy() {
+    study.wires = {
+        {.name = "soft", .radius = 0.4, .sections = {{.length = 60.0, .bending_stiffness = 50.0}}}};
+    study.inclinations = {15.0 * kRadPerDeg};
+    study.azimuths = {0.0, 1.0};
+    study.rolls = {0.0};
+    study.access = Vec3(0.0, 0.0, 5.0);
+    study.goal = {.point = Vec3(0.0, 0.0, 30.0), .radius = 4.5};
+    study.insertion.length = 35.0;
+
+    Centerline path;
+    path.points.resize(3, 2);
+    path.points << 0.0, 0.0, 0.0, 0.0, 5.0, 30.0;
+    candidates = list_candidates(study);
+    const BatchResult batch = run_batch(study, candidates, lumen, {.threads = 2});
+    for (const auto& trial : batch.trials) metrics.push_back(compute_metrics(trial, study, path));
+    ranking = rank(study, candidates, batch.trials, metrics, {.tip_force_fail = 5.0}, {});
+  }
+
+  std::vector<Refinement> refined(int threads) const {
+    return refine_plans(study, candidates, metrics, ranking, lumen,
+                        {.plans = 3, .batch = {.threads = threads}});
+  }
+};
+
+TEST(RefinePlans, EstimatesASmallErrorOfAWireAgainstTheWall) {
+  const TubeStudy tube;
+  ASSERT_EQ(tube.ranking.plans.size(), 2u);
+  const auto refinements = tube.refined(2);
+  ASSERT_EQ(refinements.size(), 2u);  // asked for three, there are two
+  for (std::size_t k = 0; k < refinements.size(); ++k) {
+    const Refinement& r = refinements[k];
+    EXPECT_EQ(r.trial, tube.ranking.plans[k].trial);
+    ASSERT_TRUE(r.error.has_value()) << r.reason;
+    EXPECT_GT(r.error->position, 0.0);
+    EXPECT_LT(r.error->position, 1.0);  // an element's length: coarser would be no answer
+    ASSERT_EQ(r.rows.size(), 3u);
+    EXPECT_LT(r.rows[2].position_error.value(), r.rows[1].position_error.value());
+    EXPECT_GT(r.rows[1].peak_force, 1e-3);  // it does press on the wall
+    for (const double seconds : r.cpu_seconds) EXPECT_GT(seconds, 0.0);
+  }
+}
+
+TEST(RefinePlans, GivesTheSameAtAnyThreadCount) {
+  const TubeStudy tube;
+  const auto serial = tube.refined(1), parallel = tube.refined(3);
+  ASSERT_EQ(serial.size(), parallel.size());
+  ASSERT_FALSE(serial.empty());
+  for (std::size_t k = 0; k < serial.size(); ++k) {
+    ASSERT_TRUE(serial[k].error.has_value()) << serial[k].reason;
+    EXPECT_EQ(serial[k].error->position, parallel[k].error->position);
+    EXPECT_EQ(serial[k].error->peak_force, parallel[k].error->peak_force);
+    EXPECT_EQ(serial[k].observed_order, parallel[k].observed_order);
+  }
+}
+
+}  // namespace
+}  // namespace wireplan::plan

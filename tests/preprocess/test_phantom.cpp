@@ -1,0 +1,279 @@
+#include <gtest/gtest.h>
+#include <omp.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+#include "preprocess/phantom.h"
+
+namespace wireplan::preprocess {
+namespace {
+
+constexpr double kLumenHu = 350.0, kFatHu = -100.0;
+
+/// Fat that fills the grid, which lies between skin and muscle of a huge body.
+PhantomSpec make_fat(const std::array<int, 3>& size, double spacing) {
+  PhantomSpec spec;
+  spec.grid.size = size;
+  spec.grid.spacing = Vec3::Constant(spacing);
+  spec.grid.origin = -0.5 * spacing * Vec3(size[0] - 1, size[1] - 1, size[2] - 1);
+  spec.body_center = Vec3(-300.0, 0.0, 0.0);
+  spec.body_semi_axes = Vec3::Constant(500.0);
+  spec.fat_mm = 400.0;
+  spec.blur_mm = 0.0;
+  spec.noise_hu = 0.0;
+  return spec;
+}
+
+PhantomTube make_tube(const std::string& name, const std::vector<Vec3>& points,
+                      const std::vector<double>& radius) {
+  PhantomTube tube;
+  tube.name = name;
+  tube.hu = kLumenHu;
+  tube.points.resize(3, points.size());
+  for (std::size_t i = 0; i < points.size(); ++i) tube.points.col(i) = points[i];
+  tube.radius = Eigen::VectorXd::Map(radius.data(), radius.size());
+  return tube;
+}
+
+/// A capsule of length 20 and radius 5 that slants through a box of 40 mm.
+PhantomSpec make_capsule(double spacing) {
+  const int voxels = static_cast<int>(40.0 / spacing);
+  PhantomSpec spec = make_fat({voxels, voxels, voxels}, spacing);
+  const Vec3 half = 10.0 * Vec3(0.48, 0.6, 0.64);
+  spec.tubes = {make_tube("capsule", {-half, half}, {5.0, 5.0})};
+  return spec;
+}
+
+double voxel_volume(const Grid& grid) { return grid.spacing.prod(); }
+
+/// Volume [mm^3] that the lumen's HU stand for, partial voxels included.
+double volume_by_mass(const Image& image) {
+  double mass = 0.0;
+  for (const float hu : image.values) mass += (hu - kFatHu) / (kLumenHu - kFatHu);
+  return mass * voxel_volume(image.grid);
+}
+
+double volume_by_count(const Mask& mask) {
+  return voxel_volume(mask.grid) * std::accumulate(mask.labels.begin(), mask.labels.end(), 0.0);
+}
+
+Vec3 center_of(const Grid& grid, std::size_t voxel) {
+  const int v = static_cast<int>(voxel), row = grid.size[0], slice = row * grid.size[1];
+  return grid.lps_from_ijk(Vec3(v % row, v / row % grid.size[1], v / slice));
+}
+
+TEST(Phantom, VolumeOfATubeIsThatOfACapsule) {
+  const double exact = kPi * 25.0 * 20.0 + 4.0 / 3.0 * kPi * 125.0;  // 2094 mm^3
+  const Phantom phantom = make_phantom(make_capsule(1.0));
+  // About 940 voxels are crossed; sampled 27 times each, the sum errs by a few of 1/27 voxel each.
+  EXPECT_NEAR(volume_by_mass(phantom.image), exact, 0.003 * exact);
+  // Voxels counted whole: an error of a good half voxel for each, half of them cancelling at
+  // random.
+  EXPECT_NEAR(volume_by_count(phantom.lumen), exact, 0.01 * exact);
+}
+
+TEST(Phantom, PartialVolumeConvergesWithFinerSampling) {
+  const double exact = kPi * 25.0 * 20.0 + 4.0 / 3.0 * kPi * 125.0;
+  PhantomSpec spec = make_capsule(2.0);
+  spec.supersampling = 8;
+  // 512 samples in each of the 240 voxels that are crossed.
+  EXPECT_NEAR(volume_by_mass(make_phantom(spec).image), exact, 0.001 * exact);
+}
+
+TEST(Phantom, ABallInAVoxelCornerIsSeenAtOneEighth) {
+  PhantomSpec spec = make_fat({4, 4, 4}, 2.0);  // voxel corner at the origin
+  spec.organs = {{.name = "octants",
+                  .hu = kLumenHu,
+                  .center = Vec3::Zero(),
+                  .semi_axes = Vec3::Constant(1.0)}};
+  spec.supersampling = 16;
+  const Phantom phantom = make_phantom(spec);
+  const double filled = kPi / 6.0 / 8.0;  // an octant of the unit ball in a voxel of 8 mm^3
+  const double hu = phantom.image.values[phantom.image.grid.index(1, 2, 1)];
+  EXPECT_NEAR((hu - kFatHu) / (kLumenHu - kFatHu), filled, 0.02 * filled);  // 4096 samples
+  EXPECT_FLOAT_EQ(phantom.image.values[phantom.image.grid.index(0, 2, 1)], kFatHu);
+}
+
+TEST(Phantom, BlurKeepsTheMassAndTheOrderAcrossAnEdge) {
+  PhantomSpec spec = make_capsule(1.0);
+  const double sharp = volume_by_mass(make_phantom(spec).image);
+  spec.blur_mm = 0.8;
+  const Image blurred = make_phantom(spec).image;
+  EXPECT_NEAR(volume_by_mass(blurred), sharp, 1e-4 * sharp);  // single precision
+
+  // Along a ray from the middle outward the value never rises, and falls from lumen to fat.
+  spec.tubes = {make_tube("along z", {{0, 0, -40}, {0, 0, 40}}, {6.0, 6.0})};
+  const Image tube = make_phantom(spec).image;
+  const int middle = tube.grid.size[0] / 2;
+  for (int i = middle; i + 1 < tube.grid.size[0]; ++i) {
+    EXPECT_GE(tube.values[tube.grid.index(i, middle, middle)] + 1e-3F,
+              tube.values[tube.grid.index(i + 1, middle, middle)]);
+  }
+  EXPECT_NEAR(tube.values[tube.grid.index(middle, middle, middle)], kLumenHu, 0.01);
+  EXPECT_NEAR(tube.values[tube.grid.index(tube.grid.size[0] - 1, middle, middle)], kFatHu, 0.01);
+}
+
+TEST(Phantom, NoiseHasTheSigmaThatWasAskedForWithAndWithoutBlur) {
+  for (const double blur_mm : {0.0, 0.7}) {
+    SCOPED_TRACE(blur_mm);
+    PhantomSpec spec = make_fat({48, 48, 48}, 0.9);
+    spec.noise_hu = 22.0;
+    spec.blur_mm = blur_mm;
+    const Phantom phantom = make_phantom(spec);
+    double sum = 0.0, squares = 0.0, neighbours = 0.0, count = 0.0;
+    for (int k = 4; k < 44; ++k) {  // away from the border, where the blur sees less
+      for (int j = 4; j < 44; ++j) {
+        for (int i = 4; i < 44; ++i) {
+          const auto noise = [&](int di) {
+            return phantom.image.values[phantom.image.grid.index(i + di, j, k)] - kFatHu;
+          };
+          sum += noise(0);
+          squares += noise(0) * noise(0);
+          neighbours += noise(0) * noise(1);
+          count += 1.0;
+        }
+      }
+    }
+    // 64 000 samples, of which blur leaves about a tenth independent: sigma to 1 % (one deviation).
+    EXPECT_NEAR(sum / count, 0.0, 1.0);
+    EXPECT_NEAR(std::sqrt(squares / count), 22.0, 0.03 * 22.0);
+    // Neighbours: exp(-(spacing / 2 sigma)^2) for a Gaussian point spread, 0.66; none without.
+    const double correlation = blur_mm > 0.0 ? std::exp(-0.25 * std::pow(0.9 / blur_mm, 2)) : 0.0;
+    EXPECT_NEAR(neighbours / squares, correlation, 0.03);
+  }
+}
+
+TEST(Phantom, SameBytesForAnyThreadsAndOthersForAnotherSeed) {
+  PhantomSpec spec = make_capsule(1.0);
+  spec.blur_mm = 0.6;
+  spec.noise_hu = 20.0;
+  const int threads = omp_get_max_threads();
+  omp_set_num_threads(1);
+  const Phantom one = make_phantom(spec);
+  omp_set_num_threads(2);
+  const Phantom two = make_phantom(spec);
+  omp_set_num_threads(3);
+  const Phantom three = make_phantom(spec);
+  omp_set_num_threads(threads);
+  EXPECT_EQ(one.image.values, two.image.values);
+  EXPECT_EQ(one.image.values, three.image.values);
+  EXPECT_EQ(one.lumen.labels, two.lumen.labels);
+  spec.seed = 2;
+  EXPECT_NE(one.image.values, make_phantom(spec).image.values);
+}
+
+TEST(Phantom, AxisPassesItsControlPointsEvenlySpaced) {
+  const PhantomTube tube =
+      make_tube("bend", {{0, 0, 0}, {10, 0, 0}, {17, 7, 0}, {17, 17, 3}}, {3.0, 5.0, 4.0, 2.0});
+  const Centerline axis = phantom_axis(tube);
+  for (Eigen::Index c = 0; c < tube.points.cols(); ++c) {
+    Eigen::Index nearest = 0;
+    const double gap =
+        (axis.points.colwise() - tube.points.col(c)).colwise().norm().minCoeff(&nearest);
+    EXPECT_LE(gap, 0.26);                                     // half of the spacing
+    EXPECT_NEAR(axis.radius(nearest), tube.radius(c), 0.06);  // largest slope 0.2 per mm
+  }
+  for (Eigen::Index i = 0; i + 1 < axis.points.cols(); ++i) {
+    const double step = (axis.points.col(i + 1) - axis.points.col(i)).norm();
+    EXPECT_LE(step, 0.5 + 1e-9);
+    EXPECT_NEAR(step, axis.arc_length(i + 1) - axis.arc_length(i), 1e-3);  // chord against arc
+  }
+}
+
+TEST(Phantom, MaskIsTheBallsAlongTheTrueAxis) {
+  PhantomSpec spec = make_fat({50, 50, 60}, 0.8);
+  PhantomTube vein = make_tube("vein", {{-15, 0, -20}, {-15, 0, 20}}, {3.0, 3.0});
+  vein.kind = PhantomTubeKind::kVein;
+  spec.tubes = {
+      make_tube("artery", {{6, 0, -60}, {6, 4, -5}, {2, -4, 8}, {4, 0, 19}}, {5.0, 5.0, 3.0, 4.0}),
+      vein};
+  spec.tubes[0].wall_mm = 1.0;
+  const Phantom phantom = make_phantom(spec);
+  ASSERT_EQ(phantom.names, std::vector<std::string>{"artery"});
+  const Centerline& axis = phantom.centerlines[0];
+  ASSERT_GT(axis.points.cols(), 80);
+  EXPECT_GT(axis.points.row(2).minCoeff(), -24.1);  // clipped to the volume, half of 60 x 0.8
+  EXPECT_EQ(axis.arc_length(0), 0.0);
+  int inside = 0;
+  for (std::size_t voxel = 0; voxel < phantom.lumen.labels.size(); ++voxel) {
+    const Vec3 p = center_of(phantom.lumen.grid, voxel);
+    if (p.z() < -18.0) continue;  // where balls from below the volume count too
+    const double depth =
+        (axis.radius.transpose() - (axis.points.colwise() - p).colwise().norm()).maxCoeff();
+    if (std::abs(depth) < 0.02) continue;  // the axis is sampled
+    EXPECT_EQ(phantom.lumen.labels[voxel] == 1, depth > 0.0) << p.transpose();
+    inside += phantom.lumen.labels[voxel];
+  }
+  EXPECT_GT(inside, 3000);
+}
+
+TEST(Phantom, CalciumLiesInTheLumenOnTheWallWhereItWasAskedFor) {
+  PhantomSpec spec = make_fat({40, 40, 60}, 0.6);
+  spec.tubes = {make_tube("aorta", {{0, 0, -30}, {0, 0, 30}}, {8.0, 8.0})};
+  spec.tubes[0].wall_mm = 1.0;
+  // The tube runs up: 90 degrees right-handed from anterior (-y) is to the left (+x).
+  spec.calcium = {{.tube = "aorta",
+                   .at = 0.6,
+                   .angle_deg = 90.0,
+                   .length_mm = 10.0,
+                   .width_deg = 60.0,
+                   .thickness_mm = 2.0,
+                   .hu = 900.0}};
+  const Phantom phantom = make_phantom(spec);
+  int count = 0;
+  for (std::size_t voxel = 0; voxel < phantom.image.values.size(); ++voxel) {
+    if (phantom.image.values[voxel] < 899.0) continue;  // voxels of calcium alone
+    ++count;
+    const Vec3 p = center_of(phantom.image.grid, voxel);
+    EXPECT_LT(p.head<2>().norm(), 8.0);
+    EXPECT_GT(p.head<2>().norm(), 6.0);
+    EXPECT_LT(std::abs(std::atan2(p.y(), p.x())), 30.0 * kRadPerDeg);
+    EXPECT_LT(std::abs(p.z() - 6.0), 5.0);
+    EXPECT_EQ(phantom.lumen.labels[voxel], 0);
+  }
+  EXPECT_GT(count, 50);
+  // Volume of the lens t (1 - u^2 - v^2) over its ellipse: pi/2 t a b, with a 5 mm and b 30 degrees
+  // of the radius at mean depth.
+  PhantomSpec clean = spec;
+  clean.calcium.clear();
+  const double missing =
+      volume_by_count(make_phantom(clean).lumen) - volume_by_count(phantom.lumen);
+  const double lens = 0.5 * kPi * 2.0 * 5.0 * (kPi / 6.0 * (8.0 - 2.0 / 3.0));
+  EXPECT_NEAR(missing, lens, 0.05 * lens);  // 280 voxels, counted whole
+}
+
+TEST(Phantom, LaterPaintHidesEarlierAndWallsNeverCloseABranch) {
+  PhantomSpec spec = make_fat({60, 60, 40}, 0.7);
+  spec.vertebrae = {{.center = {0, 12, 0}, .semi_axes = {10, 7, 9}}};
+  spec.tubes = {make_tube("trunk", {{0, 0, -30}, {0, 0, 30}}, {5.0, 5.0}),
+                make_tube("branch", {{0, 0, 0}, {18, 0, 0}}, {2.5, 2.5})};
+  for (PhantomTube& tube : spec.tubes) tube.wall_mm = 1.0;
+  const Phantom phantom = make_phantom(spec);
+  const auto hu = [&](const Vec3& p) {
+    const Vec3 ijk = phantom.image.grid.ijk_from_lps(p).array().round();
+    return phantom.image.values[phantom.image.grid.index(
+        static_cast<int>(ijk.x()), static_cast<int>(ijk.y()), static_cast<int>(ijk.z()))];
+  };
+  for (double x = 0.0; x < 18.0; x += 0.5) EXPECT_EQ(hu({x, 0, 0}), kLumenHu) << x;
+  EXPECT_EQ(hu({0, 12, 0}), 230.0F);          // spongy core
+  EXPECT_NEAR(hu({0, 18.4, 0}), 700.0, 1.0);  // its shell behind
+  // The wall touches the bone: between lumen (5 mm) and shell (6 mm) lies nothing else.
+  EXPECT_GT(hu({0, 5.6, 0}), spec.tissue_hu - 1.0);
+}
+
+TEST(Phantom, RefusesImpossibleSpecs) {
+  PhantomSpec spec = make_capsule(2.0);
+  spec.calcium = {{.tube = "no such tube"}};
+  EXPECT_THROW(make_phantom(spec), LogicError);
+  spec = make_capsule(2.0);
+  spec.tubes[0].radius(0) = 0.0;
+  EXPECT_THROW(make_phantom(spec), LogicError);
+  spec = make_capsule(2.0);
+  spec.tubes[0].points.col(1) = spec.tubes[0].points.col(0);
+  EXPECT_THROW(make_phantom(spec), LogicError);
+}
+
+}  // namespace
+}  // namespace wireplan::preprocess

@@ -1,0 +1,370 @@
+#include <gtest/gtest.h>
+
+#include <Eigen/Geometry>
+#include <array>
+#include <cmath>
+#include <cstdlib>
+#include <limits>
+#include <random>
+#include <string>
+
+#include "preprocess/segment.h"
+
+namespace wireplan::preprocess {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr float kTissue = 40.0F, kLumen = 300.0F;
+
+/// A volume with the HU that the function gives for each voxel's centre [mm].
+template <typename Hu>
+Image volume(const Grid& grid, Hu hu) {
+  Image image{.grid = grid, .values = std::vector<float>(grid.voxels())};
+  for (int k = 0; k < grid.size[2]; ++k) {
+    for (int j = 0; j < grid.size[1]; ++j) {
+      for (int i = 0; i < grid.size[0]; ++i) {
+        image.values[grid.index(i, j, k)] = hu(grid.lps_from_ijk(Vec3(i, j, k)));
+      }
+    }
+  }
+  return image;
+}
+
+/// Noise of the given sigma [HU]: the sum of 12 uniforms, near enough to a Gaussian.
+void add_noise(Image& image, double sigma) {
+  std::mt19937_64 random(7);
+  for (float& value : image.values) {
+    double sum = -6.0;
+    for (int n = 0; n < 12; ++n) {
+      sum += static_cast<double>(random() >> 11) * 0x1.0p-53;
+    }
+    value += static_cast<float>(sigma * sum);
+  }
+}
+
+/// Distance from the z axis [mm].
+double from_axis(const Vec3& p) { return std::hypot(p.x(), p.y()); }
+
+float tube(const Vec3& p, double radius) { return from_axis(p) < radius ? kLumen : kTissue; }
+
+/// 30 x 30 x 40 mm round the z axis, from z = 0.
+Grid ct_grid() {
+  return {.size = {43, 43, 51}, .spacing = Vec3(0.7, 0.7, 0.8), .origin = Vec3(-14.7, -14.7, 0)};
+}
+
+SegmentOptions options(double smoothing = 0.0, double neck = 0.0) {
+  return {.lower_hu = 170.0,
+          .upper_hu = 480.0,
+          .seeds = {Vec3(0, 0, 20)},
+          .smoothing_mm = smoothing,
+          .neck_opening_mm = neck};
+}
+
+/// Overlap of the mask with the voxels for which `truth(point)` holds: 2 |A and B| / (|A| + |B|).
+template <typename Truth>
+double dice(const Mask& mask, Truth truth) {
+  double both = 0.0, sum = 0.0;
+  for (int k = 0; k < mask.grid.size[2]; ++k) {
+    for (int j = 0; j < mask.grid.size[1]; ++j) {
+      for (int i = 0; i < mask.grid.size[0]; ++i) {
+        const bool a = mask.labels[mask.grid.index(i, j, k)] != 0;
+        const bool b = truth(mask.grid.lps_from_ijk(Vec3(i, j, k)));
+        both += a && b ? 2.0 : 0.0;
+        sum += (a ? 1.0 : 0.0) + (b ? 1.0 : 0.0);
+      }
+    }
+  }
+  return both / sum;
+}
+
+std::string error_of(const Image& image, const SegmentOptions& settings) {
+  try {
+    segment(image, settings);
+  } catch (const Error& error) {
+    return error.what();
+  }
+  ADD_FAILURE() << "no Error was thrown";
+  return {};
+}
+
+bool has(const std::string& text, const std::string& part) {
+  return text.find(part) != std::string::npos;
+}
+
+// ---- what is found ------------------------------------------------------------------------------
+
+TEST(Segment, TubeIsFoundVoxelByVoxel) {
+  const Image image = volume(ct_grid(), [](const Vec3& p) { return tube(p, 5.0); });
+  const Segmentation found = segment(image, options());
+  EXPECT_EQ(dice(found.mask, [](const Vec3& p) { return from_axis(p) < 5.0; }), 1.0);
+  EXPECT_EQ(found.mask.grid.size, image.grid.size);
+  // 51 slices of 0.8 mm; 160 voxels per slice count the circle's area to about 1 %
+  EXPECT_NEAR(found.statistics.volume_mm3, kPi * 25.0 * 51 * 0.8, 0.02 * kPi * 25.0 * 51 * 0.8);
+  EXPECT_EQ(found.statistics.mean_hu, kLumen);
+  EXPECT_TRUE(found.statistics.touches_border);
+}
+
+TEST(Segment, NoisyTubeIsFoundAfterSmoothing) {
+  Image image = volume(ct_grid(), [](const Vec3& p) { return tube(p, 5.0); });
+  add_noise(image, 50.0);
+  const Segmentation found = segment(image, options(0.8));
+  // of the voxels, 18 % lie within half a voxel of the edge; noise turns few of them
+  EXPECT_GT(dice(found.mask, [](const Vec3& p) { return from_axis(p) < 5.0; }), 0.97);
+  EXPECT_NEAR(found.statistics.mean_hu, kLumen, 10.0);  // tissue at the edge
+}
+
+TEST(Segment, SmoothingMovesAStepAsTheGaussianPredicts) {
+  // Half the volume is bright. A band that starts where a Gaussian edge has 84.13 % of the step
+  // begins one sigma inside, whatever the voxel's size along the axis.
+  const double sigma = 2.4;
+  SegmentOptions settings = options(sigma);
+  settings.lower_hu = kTissue + 0.8413 * (kLumen - kTissue);
+  for (int axis = 0; axis < 3; ++axis) {
+    SCOPED_TRACE(axis);
+    Grid grid{.size = {40, 40, 40}, .spacing = Vec3(0.5, 0.6, 0.8)};
+    grid.origin = -19.5 * grid.spacing;  // the step lies between two voxels
+    const Image image =
+        volume(grid, [&](const Vec3& p) { return p[axis] > 0.0 ? kLumen : kTissue; });
+    settings.seeds = {7.0 * Vec3::Unit(axis)};
+    const Segmentation found = segment(image, settings);
+    const Vec3 extent = 40.0 * grid.spacing;
+    const double depth =
+        found.statistics.volume_mm3 / (extent.prod() / extent[axis]);  // of the bright part [mm]
+    // whole voxels are counted
+    EXPECT_NEAR(0.5 * extent[axis] - depth, sigma, 0.51 * grid.spacing[axis]);
+  }
+}
+
+TEST(Segment, AnswerMovesWithTheGrid) {
+  const Image image = volume(ct_grid(), [](const Vec3& p) { return tube(p, 5.0); });
+  const Mask straight = segment(image, options(0.8, 1.5)).mask;
+  // left-handed and oblique: the same values on a grid placed elsewhere
+  Image turned = image;
+  turned.grid.direction = Eigen::AngleAxisd(0.4, Vec3(3, 1, 2).normalized()).toRotationMatrix() *
+                          Vec3(1, 1, -1).asDiagonal();
+  turned.grid.origin = Vec3(100, -200, 50);
+  SegmentOptions settings = options(0.8, 1.5);
+  settings.seeds = {turned.grid.lps_from_ijk(image.grid.ijk_from_lps(settings.seeds[0]))};
+  EXPECT_EQ(segment(turned, settings).mask.labels, straight.labels);
+}
+
+TEST(Segment, SeedsInSeparateVesselsFindBoth) {
+  const auto inside = [](const Vec3& p) { return std::abs(std::abs(p.x()) - 8.0) < 3.0; };
+  const Image image =
+      volume(ct_grid(), [&](const Vec3& p) { return inside(p) ? kLumen : kTissue; });
+  SegmentOptions settings = options();
+  settings.seeds = {Vec3(-8, 0, 20), Vec3(8, 0, 20)};
+  EXPECT_EQ(dice(segment(image, settings).mask, inside), 1.0);
+  settings.seeds.pop_back();
+  EXPECT_EQ(
+      dice(segment(image, settings).mask, [&](const Vec3& p) { return inside(p) && p.x() < 0.0; }),
+      1.0);
+}
+
+TEST(Segment, VesselBeyondAGapThatSmoothingBridgesIsFound) {
+  // Half way up, one slice lies below the band. The band alone stops there, so the part of the
+  // volume that is worked on has to grow.
+  const Image image = volume(ct_grid(), [](const Vec3& p) {
+    return std::abs(p.z() - 8.0) < 0.3 && from_axis(p) < 4.0 ? 150.0F : tube(p, 4.0);
+  });
+  const Mask mask = segment(image, options(0.8)).mask;
+  EXPECT_TRUE(contains(mask, Vec3(0, 0, 8)));
+  EXPECT_TRUE(contains(mask, Vec3(0, 0, 0)));
+  EXPECT_TRUE(contains(mask, Vec3(0, 0, 40)));
+  EXPECT_FALSE(contains(segment(image, options()).mask, Vec3(0, 0, 4)));
+}
+
+TEST(Segment, EnclosedCalciumIsFilledAndCalciumOnTheWallIsNot) {
+  const Vec3 enclosed(0, 0, 10), on_wall(6, 0, 25);
+  const Image image = volume(ct_grid(), [&](const Vec3& p) {
+    const bool calcium = (p - enclosed).norm() < 2.0 || (p - on_wall).norm() < 2.0;
+    return calcium ? 900.0F : tube(p, 6.0);
+  });
+  for (const double neck : {0.0, 1.5}) {
+    const Segmentation found = segment(image, options(0.0, neck));
+    EXPECT_TRUE(contains(found.mask, enclosed));
+    EXPECT_FALSE(contains(found.mask, on_wall));
+  }
+}
+
+// ---- leaks --------------------------------------------------------------------------------------
+
+/// A tube of radius 5 mm, a bone as bright beside it, and a bridge of radius 1.4 mm between them.
+Image tube_with_bone() {
+  Grid grid = ct_grid();
+  grid.size[0] = 72;  // to x = 35
+  return volume(grid, [](const Vec3& p) {
+    const bool bone = p.x() > 8.0 && p.x() < 28.0 && std::abs(p.z() - 20.0) < 15.0;
+    const bool bridge = p.x() > 0.0 && p.x() < 9.0 && std::hypot(p.y(), p.z() - 20.0) < 1.4;
+    return bone || bridge ? kLumen : tube(p, 5.0);
+  });
+}
+
+TEST(Segment, LeakThroughANeckIsCutByTheOpening) {
+  Image image = tube_with_bone();
+  add_noise(image, 30.0);
+  const Vec3 in_bone(15, 0, 20);
+  EXPECT_TRUE(contains(segment(image, options(0.6)).mask, in_bone));
+
+  const Segmentation cut = segment(image, options(0.6, 2.0));
+  EXPECT_FALSE(contains(cut.mask, in_bone));
+  EXPECT_GT(cut.statistics.removed_by_opening_mm3, 10000.0);  // the bone has 18 000 mm3
+  // the stub of the bridge and voxels at the edge
+  EXPECT_GT(dice(cut.mask, [](const Vec3& p) { return from_axis(p) < 5.0; }), 0.96);
+}
+
+TEST(Segment, OpeningLeavesASmoothTubeAlmostAsItIs) {
+  const Image image = volume(ct_grid(), [](const Vec3& p) { return tube(p, 5.0); });
+  for (const double neck : {1.0, 2.0, 3.0}) {
+    SCOPED_TRACE(neck);
+    const Segmentation opened = segment(image, options(0.0, neck));
+    EXPECT_LT(opened.statistics.removed_by_opening_mm3, 0.01 * opened.statistics.volume_mm3);
+  }
+}
+
+TEST(Segment, OpeningCutsVesselsThinnerThanTwiceItself) {
+  // a trunk of radius 5 mm with a branch of radius 1.5 mm along x
+  const Image image = volume(ct_grid(), [](const Vec3& p) {
+    return p.x() > 0.0 && std::hypot(p.y(), p.z() - 20.0) < 1.5 ? kLumen : tube(p, 5.0);
+  });
+  const Vec3 branch(12, 0, 20);
+  EXPECT_TRUE(contains(segment(image, options(0.0, 1.0)).mask, branch));
+  EXPECT_FALSE(contains(segment(image, options(0.0, 2.2)).mask, branch));
+
+  SegmentOptions settings = options(0.0, 2.2);
+  settings.seeds = {branch};
+  const std::string error = error_of(image, settings);
+  EXPECT_TRUE(has(error, "seed (12.0, 0.0, 20.0) mm") && has(error, "lower neck_opening_mm"))
+      << error;
+  // nothing in the volume is that wide
+  settings.neck_opening_mm = 8.0;
+  EXPECT_TRUE(has(error_of(image, settings), "lower neck_opening_mm"));
+}
+
+// ---- seeds --------------------------------------------------------------------------------------
+
+TEST(SegmentSeed, OutsideTheVolumeIsAnErrorWithItsBounds) {
+  const Image image = volume(ct_grid(), [](const Vec3& p) { return tube(p, 5.0); });
+  SegmentOptions settings = options();
+  settings.seeds = {Vec3(0, 0, 90)};
+  const std::string error = error_of(image, settings);
+  EXPECT_TRUE(has(error, "seed (0.0, 0.0, 90.0) mm lies outside the volume")) << error;
+  EXPECT_TRUE(has(error, "(-14.7, -14.7, 0.0) to (14.7, 14.7, 40.0) mm in LPS")) << error;
+}
+
+TEST(SegmentSeed, GivenInRasIsRecognised) {
+  Grid grid = ct_grid();
+  grid.origin.x() += 100.0;
+  const Image image = volume(grid, [](const Vec3&) { return kLumen; });
+  SegmentOptions settings = options();
+  settings.seeds = {Vec3(-100, 0, 20)};
+  EXPECT_TRUE(has(error_of(image, settings), "negate x and y")) << error_of(image, settings);
+}
+
+TEST(SegmentSeed, OutsideTheBandTellsTheValueAndWhatItMayBe) {
+  struct Place {
+    float hu;
+    std::string words;
+  };
+  for (const Place& place :
+       {Place{-1000.0F, "air"}, Place{-80.0F, "fat"}, Place{45.0F, "without contrast"},
+        Place{150.0F, "lower lower_hu"}, Place{900.0F, "bone, calcium or metal"}}) {
+    SCOPED_TRACE(place.hu);
+    const Image image = volume(ct_grid(), [&](const Vec3&) { return place.hu; });
+    for (const double smoothing : {0.0, 0.8}) {
+      const std::string error = error_of(image, options(smoothing));
+      EXPECT_TRUE(has(error, "seed (0.0, 0.0, 20.0) mm")) << error;
+      EXPECT_TRUE(has(error, "170 to 480 HU")) << error;
+      EXPECT_TRUE(has(error, std::to_string(static_cast<int>(place.hu)) + " HU")) << error;
+      EXPECT_TRUE(has(error, place.words)) << error;
+    }
+  }
+}
+
+TEST(SegmentSeed, OnANoisyVoxelCountsAfterSmoothing) {
+  Image image = volume(ct_grid(), [](const Vec3& p) { return tube(p, 5.0); });
+  image.values[image.grid.index(21, 21, 25)] = 60.0F;
+  SegmentOptions settings = options();
+  EXPECT_TRUE(has(error_of(image, settings), "60 HU (mean of its neighbourhood 291)"))
+      << error_of(image, settings);
+  settings.smoothing_mm = 0.8;
+  EXPECT_TRUE(contains(segment(image, settings).mask, settings.seeds[0]));
+}
+
+TEST(Segment, BandAndSeedsAreThePipelinesToGive) {
+  const Image image = volume(ct_grid(), [](const Vec3& p) { return tube(p, 5.0); });
+  EXPECT_THROW(segment(image, {.seeds = {Vec3(0, 0, 20)}}), LogicError);
+  EXPECT_THROW(segment(image, {.lower_hu = 170.0, .upper_hu = 480.0, .seeds = {}}), LogicError);
+}
+
+// ---- questions to a mask ------------------------------------------------------------------------
+
+TEST(MaskPoint, ContainsAndDistanceTakeTheNearestVoxel) {
+  Mask mask{.grid = {.size = {5, 5, 5}, .spacing = Vec3(1, 1, 2), .origin = Vec3(10, 20, 30)},
+            .labels = std::vector<std::uint8_t>(125)};
+  EXPECT_EQ(compute_distance(mask, Vec3::Zero()), std::numeric_limits<double>::infinity());
+  mask.labels[mask.grid.index(1, 2, 3)] = 1;
+  const Vec3 center(11, 22, 36);
+  EXPECT_TRUE(contains(mask, center + Vec3(0.49, -0.49, 0.99)));
+  EXPECT_FALSE(contains(mask, center + Vec3(0.51, 0, 0)));
+  EXPECT_FALSE(contains(mask, center + Vec3(0, 0, -1.01)));
+  EXPECT_FALSE(contains(mask, Vec3(1e9, 22, 36)));
+  EXPECT_FALSE(contains(mask, Vec3::Constant(std::nan(""))));
+  EXPECT_NEAR(compute_distance(mask, center + Vec3(3, -4, 12)), 13.0, 1e-12);
+}
+
+// ---- real data ----------------------------------------------------------------------------------
+
+/// Folder of the real inputs: WIREPLAN_DATA, else beside the checkout.
+fs::path data_folder() {
+  const char* folder = std::getenv("WIREPLAN_DATA");
+  return folder != nullptr ? fs::path(folder) : fs::path(WIREPLAN_SOURCE_DIR) / "../shared/data";
+}
+
+TEST(RealSegment, MraAortaIsOnePieceFromIliacsToRenals) {
+  const fs::path path = data_folder() / "mra-aorta-iliac-vmtk/aorta.mha";
+  if (!fs::exists(path)) {
+    GTEST_SKIP() << "real data not found; set WIREPLAN_DATA";
+  }
+  const Segmentation found =
+      segment(read_image(path),
+              {.lower_hu = 700.0, .upper_hu = 3000.0, .seeds = {Vec3(-189.8, -28.1, 46.5)}});
+  for (const Vec3& point : {Vec3(-189.8, -28.1, 46.5), Vec3(-274.2, -29.0, 42.0),
+                            Vec3(-181.9, -227.6, 19.5), Vec3(-254.0, -228.5, 28.5)}) {
+    EXPECT_TRUE(contains(found.mask, point)) << point.transpose();
+  }
+  EXPECT_NEAR(found.statistics.volume_mm3, 78000.0, 500.0);  // the README's figure, rounded
+}
+
+TEST(RealSegment, CtAbdomenAortaIsFreeOfVeinAndBone) {
+  const fs::path path = data_folder() / "ct-abdomen-dicom/PATIENT_DICOM";
+  if (!fs::exists(path)) {
+    GTEST_SKIP() << "real data not found; set WIREPLAN_DATA";
+  }
+  const Image image = read_image(path);
+  SegmentOptions settings{.lower_hu = 160.0,
+                          .upper_hu = 300.0,
+                          .seeds = {Vec3(146.5, 130.5, 32.0)},
+                          .smoothing_mm = 0.8,
+                          .neck_opening_mm = 2.0};
+  const Segmentation found = segment(image, settings);
+  const Vec3 iliac(139.7, 130.5, 19.2), other_iliac(149.9, 136.8, 19.2), renal(157.9, 140.8, 115.2);
+  EXPECT_TRUE(contains(found.mask, iliac));
+  EXPECT_TRUE(contains(found.mask, other_iliac));
+  EXPECT_TRUE(contains(found.mask, renal));
+  EXPECT_GT(found.statistics.removed_by_opening_mm3, 100000.0);  // veins, kidneys
+  // slice by slice no more than an aorta of 8 mm radius, no less than two iliacs of 3 mm
+  const Grid& grid = found.mask.grid;
+  for (int k = 0; k < grid.size[2]; ++k) {
+    double area = 0.0;
+    for (std::size_t n = grid.index(0, 0, k); n < grid.index(0, 0, k + 1); ++n) {
+      area += found.mask.labels[n] * grid.spacing[0] * grid.spacing[1];
+    }
+    EXPECT_GT(area, 2 * kPi * 3.0 * 3.0) << "slice " << k;
+    EXPECT_LT(area, kPi * 8.5 * 8.5) << "slice " << k;
+  }
+}
+
+}  // namespace
+}  // namespace wireplan::preprocess

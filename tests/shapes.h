@@ -1,0 +1,215 @@
+#pragma once
+/// Closed triangle surfaces made in code, for tests and benchmarks. All are one piece, manifold and
+/// oriented outward. Vertices lie on the smooth shape, so a faceted tube or sphere is the inscribed
+/// one: its volume is short by a part that falls with edge^2.
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+#include "preprocess/vessel.h"
+
+namespace wireplan::shapes {
+
+/// A circle of vertices: center + radius (cos a u + sin a v) at `sides` even angles from `phase`.
+struct Ring {
+  Vec3 center = Vec3::Zero(), u = Vec3::UnitX(), v = Vec3::UnitY();  // mm; unit vectors
+  double radius = 1.0;                                               // [mm]
+  int sides = 6;
+  double phase = 0.0;  // of the first vertex, in steps of 2 pi / sides
+};
+
+/// Skin over rings from one closing point to another; each ring turns counter-clockwise seen from
+/// the end. Neighbouring rings may differ in their number of sides.
+inline Surface skin(const Vec3& start, const std::vector<Ring>& rings, const Vec3& end) {
+  std::vector<Vec3> vertices = {start};
+  std::vector<Eigen::Vector3i> triangles;
+  std::vector<int> first;
+  for (const Ring& ring : rings) {
+    first.push_back(static_cast<int>(vertices.size()));
+    for (int k = 0; k < ring.sides; ++k) {
+      const double angle = 2.0 * kPi * (k + ring.phase) / ring.sides;
+      vertices.push_back(ring.center +
+                         ring.radius * (std::cos(angle) * ring.u + std::sin(angle) * ring.v));
+    }
+  }
+  const int last = static_cast<int>(vertices.size());
+  vertices.push_back(end);
+  const auto at = [&](std::size_t r, int k) { return first[r] + k % rings[r].sides; };
+
+  // A fan at either end, and between two rings always the step that lags behind in angle.
+  for (int k = 0; k < rings.front().sides; ++k) {
+    triangles.emplace_back(0, at(0, k + 1), at(0, k));
+  }
+  for (std::size_t r = 0; r + 1 < rings.size(); ++r) {
+    const Ring &a = rings[r], &b = rings[r + 1];
+    for (int i = 0, j = 0; i < a.sides || j < b.sides;) {
+      const double next_a = (i + 1 + a.phase) / a.sides, next_b = (j + 1 + b.phase) / b.sides;
+      if (j == b.sides || (i < a.sides && next_a <= next_b)) {
+        triangles.emplace_back(at(r, i), at(r, i + 1), at(r + 1, j));
+        ++i;
+      } else {
+        triangles.emplace_back(at(r, i), at(r + 1, j + 1), at(r + 1, j));
+        ++j;
+      }
+    }
+  }
+  for (int k = 0; k < rings.back().sides; ++k) {
+    triangles.emplace_back(at(rings.size() - 1, k), at(rings.size() - 1, k + 1), last);
+  }
+
+  Surface surface;
+  surface.vertices.resize(3, static_cast<Eigen::Index>(vertices.size()));
+  for (std::size_t k = 0; k < vertices.size(); ++k) {
+    surface.vertices.col(static_cast<Eigen::Index>(k)) = vertices[k];
+  }
+  surface.triangles.resize(3, static_cast<Eigen::Index>(triangles.size()));
+  for (std::size_t k = 0; k < triangles.size(); ++k) {
+    surface.triangles.col(static_cast<Eigen::Index>(k)) = triangles[k];
+  }
+  return surface;
+}
+
+/// Tube round a polyline (3, n >= 2) with a radius [mm] at each of its points and flat caps at both
+/// ends. One ring per point: the spacing of the points is the edge length along the tube.
+inline Surface tube(const Eigen::Matrix3Xd& axis, const Eigen::VectorXd& radius, int sides) {
+  const Eigen::Index n = axis.cols();
+  expects(n >= 2 && radius.size() == n && sides >= 3);
+
+  // Rings square to the mean direction at each point, the frame carried along without turning.
+  std::vector<Ring> rings;
+  Vec3 u = Vec3::Zero();
+  for (Eigen::Index k = 0; k < n; ++k) {
+    Vec3 tangent = Vec3::Zero();
+    if (k > 0) tangent += (axis.col(k) - axis.col(k - 1)).normalized();
+    if (k + 1 < n) tangent += (axis.col(k + 1) - axis.col(k)).normalized();
+    tangent.normalize();
+    if (k == 0) u = std::abs(tangent.x()) < 0.9 ? Vec3::UnitX() : Vec3::UnitY();
+    u = (u - u.dot(tangent) * tangent).normalized();
+    rings.push_back({.center = axis.col(k),
+                     .u = u,
+                     .v = tangent.cross(u),
+                     .radius = radius(k),
+                     .sides = sides,
+                     .phase = k % 2 == 0 ? 0.0 : 0.5});
+  }
+
+  // Caps of concentric rings, about as fine as the rim.
+  const auto cap = [&](const Ring& rim) {
+    std::vector<Ring> inner;
+    const int steps = std::max(1, static_cast<int>(std::lround(sides / (2.0 * kPi))));
+    for (int k = 1; k < steps; ++k) {
+      Ring ring = rim;
+      ring.radius = rim.radius * k / steps;
+      ring.sides = std::max(5, static_cast<int>(std::lround(double(sides) * k / steps)));
+      inner.push_back(ring);
+    }
+    return inner;
+  };
+  std::vector<Ring> all = cap(rings.front());
+  all.insert(all.end(), rings.begin(), rings.end());
+  const std::vector<Ring> end_cap = cap(rings.back());
+  all.insert(all.end(), end_cap.rbegin(), end_cap.rend());
+  return skin(axis.col(0), all, axis.col(n - 1));
+}
+
+/// Polyline that enters along +z from the origin for `lead_in`, bends toward +x by `angle` [rad] on
+/// an arc of `bend_radius`, and goes on straight for `lead_out`; points about `step` apart.   [mm]
+inline Eigen::Matrix3Xd bend_axis(double bend_radius, double angle, double lead_in, double lead_out,
+                                  double step) {
+  std::vector<Vec3> points = {Vec3::Zero()};
+  const auto pieces = [&](double length) {
+    return std::max(1, static_cast<int>(std::lround(length / step)));
+  };
+  const Vec3 toward(std::sin(angle), 0.0, std::cos(angle));
+  const Vec3 arc_end(bend_radius * (1.0 - std::cos(angle)), 0.0,
+                     lead_in + bend_radius * std::sin(angle));
+  if (lead_in > 0.0) {
+    const int count = pieces(lead_in);
+    for (int k = 1; k <= count; ++k) points.emplace_back(0.0, 0.0, lead_in * k / count);
+  }
+  if (angle > 0.0) {
+    const int count = pieces(bend_radius * angle);
+    for (int k = 1; k <= count; ++k) {
+      const double turned = angle * k / count;
+      points.emplace_back(bend_radius * (1.0 - std::cos(turned)), 0.0,
+                          lead_in + bend_radius * std::sin(turned));
+    }
+  }
+  if (lead_out > 0.0) {
+    const int count = pieces(lead_out);
+    for (int k = 1; k <= count; ++k) points.push_back(arc_end + toward * (lead_out * k / count));
+  }
+  Eigen::Matrix3Xd axis(3, static_cast<Eigen::Index>(points.size()));
+  for (std::size_t k = 0; k < points.size(); ++k)
+    axis.col(static_cast<Eigen::Index>(k)) = points[k];
+  return axis;
+}
+
+/// Tube of one radius round `bend_axis`, edges about `edge` long.
+inline Surface bend_tube(double radius, double bend_radius, double angle, double lead_in,
+                         double lead_out, double edge) {
+  expects(radius < bend_radius);
+  const double spacing = edge * std::sqrt(0.75);  // rows of even-sided triangles
+  const Eigen::Matrix3Xd axis = bend_axis(bend_radius, angle, lead_in, lead_out, spacing);
+  const int sides = std::max(6, static_cast<int>(std::ceil(2.0 * kPi * radius / edge)));
+  return tube(axis, Eigen::VectorXd::Constant(axis.cols(), radius), sides);
+}
+
+/// Tube along +z from z = 0 to z = length, edges about `edge` long.
+inline Surface straight_tube(double radius, double length, double edge) {
+  const int rows = std::max(1, static_cast<int>(std::lround(length / (edge * std::sqrt(0.75)))));
+  Eigen::Matrix3Xd axis = Eigen::Matrix3Xd::Zero(3, rows + 1);
+  axis.row(2) = Eigen::RowVectorXd::LinSpaced(rows + 1, 0.0, length);
+  const int sides = std::max(6, static_cast<int>(std::ceil(2.0 * kPi * radius / edge)));
+  return tube(axis, Eigen::VectorXd::Constant(rows + 1, radius), sides);
+}
+
+/// Sphere of circles of latitude, edges about `edge` long.
+inline Surface sphere(const Vec3& center, double radius, double edge) {
+  const int rows =
+      std::max(3, static_cast<int>(std::lround(kPi * radius / (edge * std::sqrt(0.75)))));
+  std::vector<Ring> rings;
+  for (int k = 1; k < rows; ++k) {
+    const double polar = kPi * k / rows, across = radius * std::sin(polar);
+    const int sides = std::max(5, static_cast<int>(std::lround(2.0 * kPi * across / edge)));
+    rings.push_back({.center = center - radius * std::cos(polar) * Vec3::UnitZ(),
+                     .radius = across,
+                     .sides = sides,
+                     .phase = k % 2 == 0 ? 0.0 : 0.5});
+  }
+  return skin(center - radius * Vec3::UnitZ(), rings, center + radius * Vec3::UnitZ());
+}
+
+/// Box of 8 vertices and 12 triangles.
+inline Surface box(const Vec3& low, const Vec3& high) {
+  Surface surface;
+  surface.vertices.resize(3, 8);
+  for (int k = 0; k < 8; ++k) {
+    surface.vertices.col(k) = Vec3((k & 1) ? high.x() : low.x(), (k & 2) ? high.y() : low.y(),
+                                   (k & 4) ? high.z() : low.z());
+  }
+  surface.triangles.resize(3, 12);
+  surface.triangles.transpose() << 0, 2, 1, 1, 2, 3, 4, 5, 6, 5, 7, 6, 0, 1, 4, 1, 5, 4,  //
+      2, 6, 3, 3, 6, 7, 0, 4, 2, 2, 4, 6, 1, 3, 5, 3, 7, 5;
+  return surface;
+}
+
+/// Both surfaces in one, unjoined.
+inline Surface joined(const Surface& a, const Surface& b) {
+  Surface both;
+  both.vertices.resize(3, a.vertices.cols() + b.vertices.cols());
+  both.vertices << a.vertices, b.vertices;
+  both.triangles.resize(3, a.triangles.cols() + b.triangles.cols());
+  both.triangles << a.triangles,
+      (b.triangles.array() + static_cast<int>(a.vertices.cols())).matrix();
+  return both;
+}
+
+/// The same surface inside out.
+inline Surface inside_out(Surface surface) {
+  surface.triangles.row(1).swap(surface.triangles.row(2));
+  return surface;
+}
+
+}  // namespace wireplan::shapes
