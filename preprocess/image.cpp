@@ -13,6 +13,8 @@
 #include <string>
 #include <system_error>
 
+#include "gdcmReader.h"
+#include "gdcmTrace.h"
 #include "itkGDCMImageIO.h"
 #include "itkMetaDataObject.h"
 #include "itkMetaImageIO.h"
@@ -38,6 +40,14 @@ auto call_itk(const fs::path& path, const std::string& problem, Call call) {
   } catch (const std::exception&) {
     throw Error(path.string() + ": " + problem);
   }
+}
+
+/// ITK and GDCM print warnings that may quote a header; what matters of them becomes an Error.
+void silence_libraries() {
+  itk::Object::GlobalWarningDisplayOff();
+  gdcm::Trace::DebugOff();
+  gdcm::Trace::WarningOff();
+  gdcm::Trace::ErrorOff();
 }
 
 std::string lower_case(std::string text) {
@@ -461,6 +471,49 @@ Grid stack(Series& slices, const fs::path& folder) {
   return grid;
 }
 
+/// True where the fragments of compressed pixels that start at `at` are all there (DICOM part 5,
+/// A.4: items of tag FFFE,E000 and a length, closed by the tag FFFE,E0DD).
+bool fragments_are_whole(std::ifstream& file, std::uintmax_t at, std::uintmax_t size) {
+  while (at + 8 <= size) {
+    std::array<unsigned char, 8> item{};  // little endian
+    file.seekg(static_cast<std::streamoff>(at));
+    file.read(reinterpret_cast<char*>(item.data()), item.size());
+    if (item[2] == 0xDD) {
+      return true;
+    }
+    at += 8 + item[4] + 256ULL * (item[5] + 256ULL * (item[6] + 256ULL * item[7]));
+  }
+  return false;
+}
+
+/// GDCM fills up pixels that are cut short with zeros, so their size is compared with the file's.
+void require_whole_dicom(itk::GDCMImageIO& io) {
+  const fs::path path = io.GetFileName();
+  const gdcm::Tag pixels(0x7fe0, 0x0010);
+  gdcm::Reader reader;
+  reader.SetFileName(path.c_str());
+  const bool found = reader.ReadUpToTag(pixels, {pixels});
+  const gdcm::TransferSyntax syntax = reader.GetFile().GetHeader().GetDataSetTransferSyntax();
+  if (syntax == gdcm::TransferSyntax::DeflatedExplicitVRLittleEndian) {
+    return;  // positions are those of the inflated file, and zlib notices
+  }
+
+  // what lies between where the pixels start and the end of the file
+  const std::uintmax_t at = reader.GetStreamCurrentPosition(), size = fs::file_size(path);
+  bool whole = found && at >= 4 && at <= size;
+  if (whole && syntax.IsEncapsulated()) {
+    std::ifstream file(path, std::ios::binary);
+    whole = fragments_are_whole(file, at, size);
+  } else if (whole) {
+    const double bits = std::strtod(dicom_value(io, "0028|0100").c_str(), nullptr);
+    whole = static_cast<double>(size - at) >=
+            bits / 8.0 * static_cast<double>(io.GetImageSizeInPixels());
+  }
+  if (!whole) {
+    throw Error(path.string() + ": " + damaged("DICOM"));
+  }
+}
+
 Image read_dicom_folder(const fs::path& folder) {
   std::vector<Series> all = find_series(folder);
   if (all.empty()) {
@@ -473,6 +526,7 @@ Image read_dicom_folder(const fs::path& folder) {
   }
   Series& slices = all.front();
   if (slices.size() == 1 && slices.front().grid.size[2] > 1) {
+    require_whole_dicom(*slices.front().io);
     return read_volume(*slices.front().io, folder);  // all frames in one file
   }
   Image image;
@@ -480,6 +534,7 @@ Image read_dicom_folder(const fs::path& folder) {
   require_scalar_volume(*slices.front().io, image.grid, folder);
   image.values.reserve(image.grid.voxels());
   for (const Slice& slice : slices) {
+    require_whole_dicom(*slice.io);
     append_voxels(*slice.io, folder, image.values);
   }
   if (image.values.size() != image.grid.voxels()) {
@@ -523,7 +578,7 @@ Image read_image(const fs::path& path) {
   if (!fs::exists(path, unknown)) {
     throw Error(path.string() + ": no such file or folder; " + kFormats);
   }
-  itk::Object::GlobalWarningDisplayOff();
+  silence_libraries();
   Image image;
   if (fs::is_directory(path, unknown)) {
     image = call_itk(path, damaged("DICOM"), [&] { return read_dicom_folder(path); });
@@ -555,7 +610,7 @@ Mask read_mask(const fs::path& path) {
   if (!fs::is_regular_file(path)) {
     throw Error(path.string() + ": no such file, expected a mask (8 bit image of 0 and 1)");
   }
-  itk::Object::GlobalWarningDisplayOff();
+  silence_libraries();
   const FileFormat format = open_file(path);
   Mask mask;
   mask.grid = header_grid(*format.io, path);

@@ -267,6 +267,7 @@ struct DicomSlice {
   Mat3 direction = Mat3::Identity();
   double slope = 1.0, intercept = 0.0;
   std::int16_t first_value = 0;  // of 3 columns x 2 rows, each voxel one more than the last
+  bool compressed = false;       // run lengths
 };
 
 template <typename T>
@@ -307,6 +308,36 @@ std::string decimals(const Eigen::VectorXd& values) {
   return text.str();
 }
 
+/// 16 bit voxels as run lengths: high bytes, then low ones, each as one literal run (DICOM part 5,
+/// annex G), in the only fragment after an empty offset table (A.4).
+std::string compressed_pixels(const std::string& voxels) {
+  const std::size_t count = voxels.size() / 2, segment = (count + 2) / 2 * 2;
+  std::string fragment;
+  for (const std::size_t word : {std::size_t{2}, std::size_t{64}, 64 + segment}) {
+    append(fragment, static_cast<std::uint32_t>(word));
+  }
+  fragment.resize(64);
+  for (const std::size_t byte : {1, 0}) {
+    fragment += static_cast<char>(count - 1);
+    for (std::size_t n = 0; n < count; ++n) {
+      fragment += voxels[2 * n + byte];
+    }
+    fragment.resize(64 + segment * (2 - byte));
+  }
+
+  std::string bytes;
+  const auto item = [&](std::uint16_t number, const std::string& value) {
+    append(bytes, std::uint16_t{0xfffe});
+    append(bytes, number);
+    append(bytes, static_cast<std::uint32_t>(value.size()));
+    bytes += value;
+  };
+  item(0xe000, "");
+  item(0xe000, fragment);
+  item(0xe0dd, "");
+  return bytes;
+}
+
 std::string dicom(const DicomSlice& slice) {
   const std::string ct = "1.2.840.10008.5.1.4.1.1.2";
   const std::string instance = slice.series + "." + std::to_string(slice.first_value);
@@ -314,7 +345,7 @@ std::string dicom(const DicomSlice& slice) {
   element(meta, 2, 0x01, "OB", std::string("\0\1", 2));
   element(meta, 2, 0x02, "UI", ct);
   element(meta, 2, 0x03, "UI", instance);
-  element(meta, 2, 0x10, "UI", "1.2.840.10008.1.2.1");
+  element(meta, 2, 0x10, "UI", slice.compressed ? "1.2.840.10008.1.2.5" : "1.2.840.10008.1.2.1");
   std::string length;
   append(length, static_cast<std::uint32_t>(meta.size()));
   std::string bytes = std::string(128, '\0') + "DICM";
@@ -346,6 +377,11 @@ std::string dicom(const DicomSlice& slice) {
   std::string voxels;
   for (std::int16_t n = 0; n < 6; ++n) {
     append(voxels, static_cast<std::int16_t>(slice.first_value + n));
+  }
+  if (slice.compressed) {
+    element(bytes, 0x7fe0, 0x10, "OB", "");
+    bytes.replace(bytes.size() - 4, 4, "\xff\xff\xff\xff");  // length: up to the end mark
+    return bytes + compressed_pixels(voxels);
   }
   element(bytes, 0x7fe0, 0x10, "OW", voxels);
   return bytes;
@@ -428,6 +464,24 @@ TEST_F(DicomFolder, TiltedGantryIsAnError) {
     write(std::to_string(n), dicom({.position = Vec3(0, 0.5 * n, 1.5 * n)}));
   }
   EXPECT_TRUE(has(read_error(folder_), "tilted gantry")) << read_error(folder_);
+}
+
+TEST_F(DicomFolder, SliceCutShortIsAnErrorThatNamesIt) {
+  for (const bool compressed : {false, true}) {
+    SCOPED_TRACE(compressed);
+    const std::string whole =
+        dicom({.position = Vec3(0, 0, 1), .first_value = 300, .compressed = compressed});
+    write("a", dicom({.position = Vec3(0, 0, 0)}));
+    write("b", whole);
+    EXPECT_EQ(read_image(folder_).values.back(), 305.0F);
+    for (const std::size_t lost : {1, 6, 12}) {  // all 12 bytes of voxels, or of the compressed end
+      SCOPED_TRACE(lost);
+      const fs::path path = write("b", whole.substr(0, whole.size() - lost));
+      const std::string error = read_error(folder_);
+      EXPECT_TRUE(has(error, path.string()) && has(error, "cut short")) << error;
+      EXPECT_FALSE(has(error, "DOE")) << error;
+    }
+  }
 }
 
 TEST_F(DicomFolder, SingleFileOrSliceAsksForTheSeries) {
