@@ -269,6 +269,8 @@ void read_limits(JsonReader& root, plan::Limits& limit) {
       limits.number("tip_force_fail_n", limit.tip_force_fail, force, "given in mN or gf?");
   limit.penetration_fail = limits.number("penetration_fail_mm", limit.penetration_fail,
                                          {.min = 0.0, .max = 5.0, .open_min = true});
+  limit.off_path_fail = limits.number("off_path_fail_mm", limit.off_path_fail,
+                                      {.min = 0.0, .max = 1000.0, .open_min = true});
   limits.finish();
   if (root.problems().count() == problems_before && limit.tip_force_warn > limit.tip_force_fail) {
     root.problems().add("limits.tip_force_warn_n", Json(limit.tip_force_warn).dump(),
@@ -440,7 +442,8 @@ Json case_parameters(const Case& input) {
                        {"record_every_mm", study.insertion.record_every}};
   json["limits"] = {{"tip_force_warn_n", input.limits.tip_force_warn},
                     {"tip_force_fail_n", input.limits.tip_force_fail},
-                    {"penetration_fail_mm", input.limits.penetration_fail}};
+                    {"penetration_fail_mm", input.limits.penetration_fail},
+                    {"off_path_fail_mm", input.limits.off_path_fail}};
   json["ranking"] = {{"weights",
                       {{"reach", input.weights.reach},
                        {"peak_force", input.weights.peak_force},

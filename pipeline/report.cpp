@@ -147,6 +147,7 @@ Json trial_json(const ReportInput& input, std::size_t k) {
   row.put_optional("peak_wall_displacement_mm", {}, kRigidWall);
   row.put_number("peak_curvature_per_mm", m.peak_curvature, ended);
   row.put_number("centerline_deviation_mm", m.centerline_deviation, ended);
+  row.put_number("off_path_mm", m.off_path, ended);
   row.put_number("max_penetration_mm", m.max_penetration, ended);
   row.put_number("residual_n", m.residual, ended);
   const plan::Refinement* refined = find_refinement(input, static_cast<int>(k));

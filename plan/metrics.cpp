@@ -7,28 +7,24 @@
 namespace wireplan::plan {
 namespace {
 
-double squared_distance_to_segment(const Vec3& p, const Vec3& a, const Vec3& b) {
-  const Vec3 ab = b - a;
-  const double length_squared = ab.squaredNorm();
-  if (length_squared == 0.0) return (p - a).squaredNorm();
-  const double t = std::clamp((p - a).dot(ab) / length_squared, 0.0, 1.0);
-  return (p - a - t * ab).squaredNorm();
-}
+/// Distance of a point from the path's axis, and from the balls inscribed along it (0 inside one).
+struct PathDistance {
+  double axis = 0.0, lumen = 0.0;  //                                                       [mm]
+};
 
-double distance_to_path(const Vec3& p, const Centerline& path) {
-  double squared = (p - path.points.col(0)).squaredNorm();
+PathDistance distance_to_path(const Vec3& p, const Centerline& path) {
+  PathDistance nearest{(p - path.points.col(0)).norm(), 0.0};
+  nearest.lumen = std::max(0.0, nearest.axis - path.radius[0]);
   for (Eigen::Index k = 1; k < path.points.cols(); ++k) {
-    squared = std::min(squared,
-                       squared_distance_to_segment(p, path.points.col(k - 1), path.points.col(k)));
+    const Vec3 a = path.points.col(k - 1), ab = path.points.col(k) - path.points.col(k - 1);
+    const double squared = ab.squaredNorm();
+    const double t = squared == 0.0 ? 0.0 : std::clamp((p - a).dot(ab) / squared, 0.0, 1.0);
+    const double axis = (p - a - t * ab).norm();
+    const double radius = (1.0 - t) * path.radius[k - 1] + t * path.radius[k];
+    nearest.axis = std::min(nearest.axis, axis);
+    nearest.lumen = std::min(nearest.lumen, std::max(0.0, axis - radius));
   }
-  return std::sqrt(squared);
-}
-
-double mean_distance_to_path(const Eigen::Matrix3Xd& nodes, const Centerline& path) {
-  if (nodes.cols() == 0) return 0.0;
-  double sum = 0.0;
-  for (Eigen::Index k = 0; k < nodes.cols(); ++k) sum += distance_to_path(nodes.col(k), path);
-  return sum / static_cast<double>(nodes.cols());
+  return nearest;
 }
 
 /// Where the tip ended: of the final shape, else of the last push, else still at the access.
@@ -65,11 +61,15 @@ Metrics compute_push_metrics(const std::vector<simulate::Push>& pushes) {
 
 Metrics compute_metrics(const simulate::TrialResult& trial, const Study& study,
                         const Centerline& path) {
-  expects(path.points.cols() > 0);
+  expects(path.points.cols() > 0 && path.radius.size() == path.points.cols());
   Metrics metrics = compute_push_metrics(trial.pushes);
   metrics.reached = trial.outcome == simulate::Outcome::kReached;
   metrics.tip_to_target = (final_tip(trial, study) - study.goal.point).norm();
-  metrics.centerline_deviation = mean_distance_to_path(trial.nodes, path);
+  for (Eigen::Index k = 0; k < trial.nodes.cols(); ++k) {
+    const PathDistance distance = distance_to_path(trial.nodes.col(k), path);
+    metrics.centerline_deviation += distance.axis / static_cast<double>(trial.nodes.cols());
+    metrics.off_path = std::max(metrics.off_path, distance.lumen);
+  }
   return metrics;
 }
 

@@ -16,6 +16,8 @@ struct Metrics {
   double peak_push_force = 0.0;       // largest size, pushed or held back                 [N]
   double peak_curvature = 0.0;        //                                                   [1/mm]
   double centerline_deviation = 0.0;  // mean distance of the final wire from the path     [mm]
+  double off_path = 0.0;              // furthest part of the final wire from the path's lumen, by
+                                      // the path's inscribed radius                       [mm]
   double max_penetration = 0.0;       // wire surface past the wall, over the insertion    [mm]
   double residual = 0.0;              // largest over the pushes                           [N]
   long iterations = 0;                // of all pushes together

@@ -64,6 +64,12 @@ std::string broken_limits(const Metrics& metrics, const Limits& limits) {
     reason = "tip force " + four_digits(metrics.peak_tip_force) + " N over the limit of " +
              four_digits(limits.tip_force_fail) + " N";
   }
+  if (metrics.off_path > limits.off_path_fail) {
+    if (!reason.empty()) reason += "; ";
+    reason += "came another way: wire " + one_decimal(metrics.off_path) +
+              " mm outside the lumen of the path, over the limit of " +
+              four_digits(limits.off_path_fail) + " mm";
+  }
   if (metrics.max_penetration > limits.penetration_fail) {
     if (!reason.empty()) reason += "; ";
     reason += "left the lumen: wire " + four_digits(metrics.max_penetration) +

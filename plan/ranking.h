@@ -12,6 +12,7 @@ namespace wireplan::plan {
 struct Limits {
   double tip_force_warn = 0.3;    // references B3                                          [N]
   double tip_force_fail = 1.5;    // references B3                                          [N]
+  double off_path_fail = 10.0;    // a wire further from the path's lumen came another way   [mm]
   double penetration_fail = 0.3;  // a wire further past the wall has left the lumen        [mm]
 };
 

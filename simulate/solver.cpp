@@ -204,13 +204,9 @@ double add_contact(const Problem& problem, const RodState& state, int i, double&
                    Sink& sink) {
   const Rod& rod = *problem.rod;
   const double near = rod.radius + problem.contact.smoothing;
-  if constexpr (!Sink::kHessian) {
-    distance = problem.lumen->distance(state.x.col(i));
-    if (distance >= near) return 0.0;
-  }
-  const WallSample wall = problem.lumen->sample(state.x.col(i));
-  distance = wall.distance;
+  distance = problem.lumen->distance(state.x.col(i));
   if (distance >= near) return 0.0;
+  const WallSample wall = problem.lumen->sample(state.x.col(i));
   const ContactLaw::Value law = problem.contact.at(distance - rod.radius);
   const double share = rod.share[i];
   sink.gradient(i, share * law.slope * wall.gradient);

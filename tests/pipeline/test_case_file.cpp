@@ -8,6 +8,7 @@
 #include <fstream>
 #include <functional>
 #include <limits>
+#include <map>
 #include <set>
 #include <string>
 
@@ -118,8 +119,10 @@ Json full_case(Json json) {
   json["insertion"] = {{"length_mm", 250},         {"step_mm", 2},
                        {"element_length_mm", 0.5}, {"residual_tolerance_n", 1e-5},
                        {"max_iterations", 50},     {"record_every_mm", 10}};
-  json["limits"] = {
-      {"tip_force_warn_n", 0.2}, {"tip_force_fail_n", 1}, {"penetration_fail_mm", 0.5}};
+  json["limits"] = {{"tip_force_warn_n", 0.2},
+                    {"tip_force_fail_n", 1},
+                    {"penetration_fail_mm", 0.5},
+                    {"off_path_fail_mm", 20}};
   json["ranking"]["weights"] = {{"reach", 2}, {"peak_force", 3}, {"mean_force", 0}, {"margin", 1}};
   return json;
 }
@@ -556,18 +559,24 @@ TEST(Catalogue, ShaftStiffnessIsThatOfTheMeasuredModulus) {
   EXPECT_EQ(found, 7);
 }
 
-TEST(Catalogue, AngledTipTurnsByFortyFiveDegrees) {
-  double angle = 0.0;
-  int curved = 0;
+TEST(Catalogue, CurvedTipsTurnByTheAngleThatTheyAreNamedFor) {
+  const std::map<std::string, double> expected = {{"glidewire-angled", 45.0},
+                                                  {"amplatz-stiff-angled", 86.0},
+                                                  {"amplatz-super-stiff-angled", 86.0},
+                                                  {"amplatz-stiff-hook", 115.0},
+                                                  {"amplatz-super-stiff-hook", 115.0}};
+  std::size_t curved = 0;
   for (const CatalogueWire& entry : catalogue()) {
-    curved += !entry.wire.straight();
-    if (entry.wire.name != "glidewire-angled") continue;
+    if (entry.wire.straight()) continue;
+    ++curved;
+    double angle = 0.0;
     for (const simulate::Section& section : entry.wire.sections) {
       angle += section.length * section.rest_curvature;
     }
+    ASSERT_TRUE(expected.count(entry.wire.name)) << entry.wire.name;
+    EXPECT_NEAR(angle / kRadPerDeg, expected.at(entry.wire.name), 0.5);  // radii of 2 digits
   }
-  EXPECT_EQ(curved, 1);
-  EXPECT_NEAR(angle / kRadPerDeg, 45.0, 0.1);  // the radius is given to 0.1 mm
+  EXPECT_EQ(curved, expected.size());
 }
 
 TEST(Catalogue, SchemaNamesTheSameWires) {

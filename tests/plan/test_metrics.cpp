@@ -17,6 +17,7 @@ Centerline straight_path() {
   path.points.resize(3, 2);
   path.points.col(0) = Vec3::Zero();
   path.points.col(1) = Vec3(0.0, 0.0, 100.0);
+  path.radius = Eigen::Vector2d(3.0, 5.0);
   return path;
 }
 
@@ -104,10 +105,22 @@ TEST(Metrics, DeviationAllowsForRepeatedPathPoints) {
   Centerline path = straight_path();
   path.points.conservativeResize(3, 3);
   path.points.col(2) = path.points.col(1);
+  path.radius = Eigen::Vector3d(3.0, 5.0, 5.0);
   TrialResult trial;
   trial.nodes = Vec3(3.0, 0.0, 104.0);
   const Metrics metrics = compute_metrics(trial, study_with_goal_at(Vec3::Zero()), path);
   EXPECT_NEAR(metrics.centerline_deviation, 5.0, 1e-14);  // rounding
+}
+
+TEST(Metrics, OffPathIsTheFurthestPartOutsideTheBallsAlongThePath) {
+  // The lumen's radius grows from 3 to 5 mm along the path.
+  TrialResult trial;
+  trial.nodes.resize(3, 3);
+  trial.nodes.col(0) = Vec3(3.9, 0.0, 50.0);   // inside the 4 mm there
+  trial.nodes.col(1) = Vec3(0.0, 10.0, 50.0);  // 6 mm outside
+  trial.nodes.col(2) = Vec3(0.0, 0.0, 107.0);  // 2 mm past the last ball
+  const Metrics metrics = compute_metrics(trial, study_with_goal_at(Vec3::Zero()), straight_path());
+  EXPECT_NEAR(metrics.off_path, 6.0, 1e-14);  // rounding
 }
 
 TEST(Metrics, TipDistanceIsThatOfTheLastNode) {

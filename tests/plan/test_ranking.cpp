@@ -156,10 +156,11 @@ TEST(Rank, ExcludesEveryTrialThatIsNoPlanWithItsReason) {
   bench.trials.back().reason = "internal error: out of paper";
   bench.add(0, 1.0, 0.2).peak_tip_force = 1.9;
   bench.add(0, 1.0, 0.2).max_penetration = 0.42;
+  bench.add(0, 1.0, 0.2).off_path = 44.26;
   bench.add(1, 1.0, 0.2);  // the only plan
 
   const Ranking ranking = bench.ranked();
-  EXPECT_EQ(order_of(ranking), std::vector<int>{7});
+  EXPECT_EQ(order_of(ranking), std::vector<int>{8});
   const std::vector<std::string> reasons = {
       "missed: tip ended 12.3 mm from the target and came no nearer than 5.0 mm, expected within "
       "4 mm",
@@ -169,7 +170,8 @@ TEST(Rank, ExcludesEveryTrialThatIsNoPlanWithItsReason) {
       "no equilibrium after 200 iterations",
       "internal error: out of paper",
       "tip force 1.9 N over the limit of 1.5 N",
-      "left the lumen: wire 0.42 mm past the wall, over the limit of 0.3 mm"};
+      "left the lumen: wire 0.42 mm past the wall, over the limit of 0.3 mm",
+      "came another way: wire 44.3 mm outside the lumen of the path, over the limit of 10 mm"};
   ASSERT_EQ(ranking.excluded.size(), reasons.size());
   for (std::size_t k = 0; k < reasons.size(); ++k) {
     EXPECT_EQ(ranking.excluded[k].trial, static_cast<int>(k));

@@ -193,6 +193,7 @@ struct TubeStudy {
     Centerline path;
     path.points.resize(3, 2);
     path.points << 0.0, 0.0, 0.0, 0.0, 5.0, 30.0;
+    path.radius = Eigen::Vector2d(4.0, 4.0);
     candidates = list_candidates(study);
     const BatchResult batch = run_batch(study, candidates, lumen, {.threads = 2});
     for (const auto& trial : batch.trials) metrics.push_back(compute_metrics(trial, study, path));
