@@ -5,6 +5,7 @@
 #include <unistd.h>
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <array>
 #include <atomic>
 #include <chrono>
@@ -111,7 +112,14 @@ std::string stage_line(const StageOutcome& outcome, bool with_reasons) {
   std::string line = format("%-10s  %-9s", outcome.stage.c_str(), state_name(outcome.state));
   if (outcome.state != StageState::kWouldRun) line += format("  %7.2f s", outcome.seconds);
   if (with_reasons) {
-    for (const std::string& reason : outcome.reasons) line += "\n            " + reason;
+    constexpr std::size_t kShown = 6;  // a changed wire alone brings dozens
+    const std::size_t count = outcome.reasons.size();
+    for (std::size_t k = 0; k < std::min(kShown, count); ++k) {
+      line += "\n            " + outcome.reasons[k];
+    }
+    if (count > kShown) {
+      line += "\n            and " + std::to_string(count - kShown) + " differences more";
+    }
   }
   return line;
 }
