@@ -5,7 +5,6 @@
 /// (reports).
 #include <Eigen/Core>
 #include <numbers>
-#include <source_location>
 #include <stdexcept>
 #include <string>
 
@@ -27,12 +26,13 @@ class LogicError : public std::logic_error {
   using std::logic_error::logic_error;
 };
 
-/// Checks a precondition, in every build.
-inline void expects(bool condition,
-                    const std::source_location& where = std::source_location::current()) {
+/// Checks a precondition, in every build. The defaults tell where the call stands, by builtins of
+/// GCC and Clang: std::source_location needs Clang 16.
+inline void expects(bool condition, const char* file = __builtin_FILE(),
+                    int line = __builtin_LINE(), const char* function = __builtin_FUNCTION()) {
   if (!condition) {
-    throw LogicError(std::string(where.file_name()) + ":" + std::to_string(where.line()) + ": " +
-                     where.function_name() + ": precondition violated");
+    throw LogicError(std::string(file) + ":" + std::to_string(line) + ": " + function +
+                     ": precondition violated");
   }
 }
 

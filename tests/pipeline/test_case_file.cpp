@@ -560,11 +560,10 @@ TEST(Catalogue, ShaftStiffnessIsThatOfTheMeasuredModulus) {
 }
 
 TEST(Catalogue, CurvedTipsTurnByTheAngleThatTheyAreNamedFor) {
-  const std::map<std::string, double> expected = {{"glidewire-angled", 45.0},
-                                                  {"amplatz-stiff-angled", 86.0},
-                                                  {"amplatz-super-stiff-angled", 86.0},
-                                                  {"amplatz-stiff-hook", 115.0},
-                                                  {"amplatz-super-stiff-hook", 115.0}};
+  const std::map<std::string, double> expected = {
+      {"glidewire-angled", 45.0},           {"amplatz-stiff-angled", 86.0},
+      {"amplatz-super-stiff-angled", 86.0}, {"amplatz-stiff-hook", 115.0},
+      {"amplatz-super-stiff-hook", 115.0},  {"amplatz-super-stiff-curved", 57.0}};
   std::size_t curved = 0;
   for (const CatalogueWire& entry : catalogue()) {
     if (entry.wire.straight()) continue;

@@ -108,17 +108,6 @@ TEST_F(CommandLine, RunsACaseAndTheSecondTimeDoesNothing) {
   EXPECT_EQ(read_text(results / "report.json"), report);
 }
 
-TEST_F(CommandLine, SegmentsAVolumeAndPlansInIt) {
-  write_two_tubes(folder_ / "ct.nrrd");
-  write_json(volume_case(case_), folder_ / "case.json");
-  const Answer answer = call("run case.json -o results");
-  ASSERT_EQ(answer.code, 0) << answer.log;
-  EXPECT_TRUE(fs::exists(folder_ / "results" / "mask.nrrd"));
-  const Json report = read_json(folder_ / "results" / "report.json", "wireplan.report/1");
-  // One tube of radius 6 and length 36: 4072 mm^3, of which voxels keep all but some per cent.
-  EXPECT_NEAR(report.at("vessel").at("volume_mm3").get<double>(), 4072.0, 300.0);
-}
-
 TEST_F(CommandLine, ExitsWithOneWhereNoPlanReaches) {
   const Answer answer = call("run case.json --set insertion.length_mm=12");
   EXPECT_EQ(answer.code, 1) << answer.log;
@@ -260,6 +249,19 @@ TEST_F(CommandLine, RefusesASurfaceThatIsNoneOrOpen) {
   expect_refused(case_, "tube.stl");
 }
 
+#ifdef WIREPLAN_IMAGING
+
+TEST_F(CommandLine, SegmentsAVolumeAndPlansInIt) {
+  write_two_tubes(folder_ / "ct.nrrd");
+  write_json(volume_case(case_), folder_ / "case.json");
+  const Answer answer = call("run case.json -o results");
+  ASSERT_EQ(answer.code, 0) << answer.log;
+  EXPECT_TRUE(fs::exists(folder_ / "results" / "mask.nrrd"));
+  const Json report = read_json(folder_ / "results" / "report.json", "wireplan.report/1");
+  // One tube of radius 6 and length 36: 4072 mm^3, of which voxels keep all but some per cent.
+  EXPECT_NEAR(report.at("vessel").at("volume_mm3").get<double>(), 4072.0, 300.0);
+}
+
 TEST_F(CommandLine, RefusesAVolumeThatIsNoneAndPointsThatAreNotInTheVessel) {
   const Json good = volume_case(case_);
   write_text("not an image", folder_ / "ct.nrrd");
@@ -282,6 +284,15 @@ TEST_F(CommandLine, RefusesAVolumeThatIsNoneAndPointsThatAreNotInTheVessel) {
   other["segmentation"]["seeds_mm"] = Json::array({{10, 20, 18}, {30, 20, 18}});
   expect_refused(other, "point_mm");
 }
+
+#else
+
+TEST_F(CommandLine, RefusesAVolumeWhereImagingIsNotBuiltIn) {
+  write_two_tubes(folder_ / "ct.nrrd");
+  expect_refused(volume_case(case_), "-DWIREPLAN_IMAGING=ON");
+}
+
+#endif
 
 }  // namespace
 }  // namespace wireplan::pipeline
