@@ -1,9 +1,10 @@
 #!/usr/bin/env bash
 # build.sh PRESET: installs what is missing, configures and builds a preset of CMakePresets.json
-# into build/PRESET.
+# into build/PRESET. WIREPLAN_WERROR=ON makes warnings errors: not for users, whose compiler may know
+# other ones than ours.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
-preset=${1:?usage: tests/build.sh PRESET (release, dev, tsan or tidy)}
+preset=${1:?usage: tests/build.sh PRESET (release, dev, tsan, tidy or surface-only)}
 
 bash tests/install.sh
 

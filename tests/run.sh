@@ -1,7 +1,8 @@
 #!/usr/bin/env bash
-# The whole suite: formatting, the tests in a release build, the tests under address and undefined
-# behaviour sanitizers, simulate and plan under the thread sanitizer, and cases end to end. Stops at
-# the first step that fails and names it.
+# The whole suite: formatting, the tests in a release build and in one without ITK, cases end to end,
+# simulate and plan with Clang and clang-tidy, the tests under address and undefined behaviour
+# sanitizers, simulate and plan under the thread sanitizer. Stops at the first step that fails and
+# names it.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 
@@ -21,17 +22,33 @@ step() {
   echo "== $name: ok, $((SECONDS - start)) s"
 }
 
-# clang-format's taste changes with its version; ours is Debian 12's and Ubuntu 22.04's.
+# What clang-format and clang-tidy find changes with their version; ours is Debian 12's and Ubuntu
+# 22.04's.
+is_version_14() {
+  local version
+  version=$("$1" --version)
+  [[ $version == *"version 14."* ]] && return 0
+  echo "not checked: needs $1 14, this is $version"
+  return 1
+}
+
 check_formatting() {
-  if ! clang-format --version | grep -q 'version 14\.'; then
-    echo "not checked: needs clang-format 14, this is $(clang-format --version)"
-    return 0
-  fi
+  is_version_14 clang-format || return 0
   find preprocess simulate plan pipeline tests -regex '.*\.\(h\|cpp\)' \
     -exec clang-format --dry-run -Werror {} +
 }
 
+build_tidy() {
+  is_version_14 clang-tidy || return 0
+  bash tests/build.sh tidy && run_suite tidy
+}
+
 run_suite() { ctest --preset "$1" --parallel "$(nproc)"; }
+
+# Cases start from nothing, not from what earlier runs left in the user's cache.
+case_cache=$PWD/build/case-cache
+rm -rf "$case_cache"
+run_bundled_case() { XDG_CACHE_HOME=$case_cache bash cases/demo.sh; }
 
 # A real volume, where the data lie beside the checkout.
 run_real_case() {
@@ -40,17 +57,20 @@ run_real_case() {
     echo "not run: no mra-aorta-iliac-vmtk in $data (set WIREPLAN_DATA)"
     return 0
   fi
-  build/release/pipeline/wireplan run cases/aorta-iliac-mra
+  XDG_CACHE_HOME=$case_cache build/release/pipeline/wireplan run cases/aorta-iliac-mra
 }
 
 step "install packages" bash tests/install.sh
 step "formatting" check_formatting
 step "release build" bash tests/build.sh release
 step "tests" run_suite release
-step "sanitizer build" bash tests/build.sh dev
-step "tests under address and undefined behaviour sanitizers" run_suite dev
+step "bundled case" run_bundled_case
+step "aorta-iliac-mra" run_real_case
+step "build without ITK" bash tests/build.sh surface-only
+step "tests without ITK" run_suite surface-only
+step "simulate and plan with Clang and clang-tidy" build_tidy
 step "thread sanitizer build of simulate and plan" bash tests/build.sh tsan
 step "tests under thread sanitizer" run_suite tsan
-step "bundled case" bash cases/demo.sh
-step "aorta-iliac-mra" run_real_case
+step "sanitizer build" bash tests/build.sh dev
+step "tests under address and undefined behaviour sanitizers" run_suite dev
 echo "== all steps ok, $SECONDS s"

@@ -1,4 +1,9 @@
 #include <gtest/gtest.h>
+#include <vtkIdList.h>
+#include <vtkPointData.h>
+#include <vtkPolyData.h>
+#include <vtkSmartPointer.h>
+#include <vtkXMLPolyDataReader.h>
 
 #include <algorithm>
 #include <cmath>
@@ -12,12 +17,6 @@
 #include "preprocess/centerline.h"
 #include "preprocess/surface.h"
 #include "tests/shapes.h"
-
-#include <vtkIdList.h>
-#include <vtkPointData.h>
-#include <vtkPolyData.h>
-#include <vtkSmartPointer.h>
-#include <vtkXMLPolyDataReader.h>
 
 namespace wireplan::preprocess {
 namespace {
