@@ -15,6 +15,7 @@
 #include <iostream>
 #include <memory>
 
+#include "pipeline/bench.h"
 #include "pipeline/case_file.h"
 #include "pipeline/catalogue.h"
 #include "pipeline/check.h"
@@ -349,6 +350,19 @@ int run_command(int argc, const char* const* argv) {
   phantom->add_option("-o,--output", phantom_output, "Folder for volume and truth")->required();
   phantom->footer("Example: wireplan phantom cases/abdomen/phantom.json -o cases/abdomen/data");
   phantom->callback([&] { code = make_phantom_files(spec_path, phantom_output); });
+
+  std::string bench_name, bench_output = "wireplan-out/bench";
+  BenchOptions bench_options;
+  CLI::App* bench = app.add_subcommand("bench", "Error against run time, and stability");
+  bench->add_option("NAME", bench_name, "accuracy or stability")->required();
+  bench->add_option("-o,--output", bench_output, "Folder for results [wireplan-out/bench]");
+  bench->add_flag("--quick", bench_options.quick, "A small size, under 20 s");
+  bench->footer(
+      "Writes NAME.json, NAME.csv and the plot NAME.png, and prints the table.\n"
+      "  accuracy   each method's error and time on scenes whose answer is known\n"
+      "  stability  stiff and extreme scenes: which method converges, stops or fails\n"
+      "Example: wireplan bench accuracy -o out");
+  bench->callback([&] { code = run_bench(bench_name, bench_output, bench_options); });
 
   try {
     app.parse(argc, argv);

@@ -1,6 +1,6 @@
 #pragma once
-/// The command line: run, check, status, wires, simulate, phantom (design section 3). Answers go to
-/// standard output, the log to standard error.
+/// The command line: run, check, status, wires, simulate, phantom, bench (design section 3).
+/// Answers go to standard output, the log to standard error.
 
 namespace wireplan::pipeline {
 

@@ -1,19 +1,9 @@
 #include "pipeline/picture.h"
 
-#include <vtkFreeTypeTools.h>
-#include <vtkImageData.h>
-#include <vtkNew.h>
-#include <vtkPNGWriter.h>
-#include <vtkPointData.h>
-#include <vtkTextProperty.h>
-#include <vtkUnsignedCharArray.h>
-
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstdio>
-#include <fstream>
 #include <limits>
 
 namespace wireplan::pipeline {
@@ -21,7 +11,6 @@ namespace {
 
 constexpr int kSamples = 2;  // per pixel and axis
 constexpr float kFarAway = -std::numeric_limits<float>::infinity();
-const Color kPaper(1.0F, 1.0F, 1.0F), kInk(0.15F, 0.15F, 0.15F), kGrey(0.5F, 0.5F, 0.5F);
 const Color kVessel(0.80F, 0.50F, 0.42F), kContact(0.90F, 0.05F, 0.05F);
 const Color kAccess(0.10F, 0.35F, 0.90F), kTarget(0.05F, 0.60F, 0.25F);
 
@@ -139,55 +128,6 @@ void resolve(const Panel& panel, Picture& picture, int left, int bottom) {
   }
 }
 
-void fill_box(Picture& picture, int x_0, int y_0, int width, int height, const Color& color) {
-  for (int y = std::max(0, y_0); y < std::min(picture.height, y_0 + height); ++y) {
-    for (int x = std::max(0, x_0); x < std::min(picture.width, x_0 + width); ++x) {
-      const std::size_t pixel = static_cast<std::size_t>(y) * picture.width + x;
-      for (int k = 0; k < 3; ++k) {
-        picture.rgb[3 * pixel + k] = static_cast<std::uint8_t>(std::lround(255.0F * color[k]));
-      }
-    }
-  }
-}
-
-enum class Align { kLeft, kCenter, kRight };
-
-/// Text in VTK's built-in font with its middle at row `y`. Text that cannot be set is left out.
-void draw_text(Picture& picture, const std::string& text, int x, int y, int size, Align align,
-               const Color& color = kInk) {
-  vtkNew<vtkTextProperty> property;
-  property->SetFontFamilyToArial();
-  property->SetFontSize(size);
-  property->SetColor(color.x(), color.y(), color.z());
-  vtkNew<vtkImageData> image;
-  std::array<int, 2> dims{};
-  constexpr int kDotsPerInch = 72;  // so that one point is one pixel
-  if (text.empty() || !vtkFreeTypeTools::GetInstance()->RenderString(property, text, kDotsPerInch,
-                                                                     image, dims.data())) {
-    return;
-  }
-  // Blend the rendered RGBA over the picture.
-  vtkUnsignedCharArray* bytes =
-      vtkUnsignedCharArray::SafeDownCast(image->GetPointData()->GetScalars());
-  if (bytes == nullptr || bytes->GetNumberOfComponents() != 4) return;
-  const int image_width = image->GetDimensions()[0];
-  const int shift = align == Align::kLeft ? 0 : align == Align::kCenter ? dims[0] / 2 : dims[0];
-  for (int row = 0; row < dims[1]; ++row) {
-    for (int column = 0; column < dims[0]; ++column) {
-      const int px = x - shift + column, py = y - dims[1] / 2 + row;
-      if (px < 0 || px >= picture.width || py < 0 || py >= picture.height) continue;
-      const vtkIdType source = 4 * (static_cast<vtkIdType>(row) * image_width + column);
-      const int opacity = bytes->GetValue(source + 3);
-      const std::size_t pixel = static_cast<std::size_t>(py) * picture.width + px;
-      for (int k = 0; k < 3; ++k) {
-        std::uint8_t& target = picture.rgb[3 * pixel + k];
-        target = static_cast<std::uint8_t>(
-            (opacity * bytes->GetValue(source + k) + (255 - opacity) * target + 127) / 255);
-      }
-    }
-  }
-}
-
 /// The side of the patient that a direction along an axis points to, as a word or its letter.
 std::string side_name(const Vec3& direction) {
   static const std::array<std::array<const char*, 2>, 3> kNames{
@@ -248,12 +188,6 @@ double round_length(double limit) {
     if (factor * power <= limit) return factor * power;
   }
   return power;
-}
-
-std::string format(const char* pattern, double value) {
-  std::array<char, 64> text{};
-  std::snprintf(text.data(), text.size(), pattern, value);
-  return text.data();
 }
 
 double largest_force(const std::vector<PictureWire>& wires) {
@@ -393,9 +327,7 @@ Picture draw_picture(const Surface& vessel, const std::vector<PictureWire>& wire
   }
 
   // Two panels between the title above and the legend below; one scale fits both.
-  Picture picture{size.width, size.height, {}};
-  picture.rgb.resize(3UL * size.width * size.height);
-  fill_box(picture, 0, 0, size.width, size.height, kPaper);
+  Picture picture = blank_picture(size.width, size.height);
   const int line = std::max(10, size.width / 40);
   const int legend_rows = (static_cast<int>(wires.size()) + 4) / 2;
   const int bottom = line * (2 + legend_rows), width = size.width / 2;
@@ -426,28 +358,7 @@ Picture draw_picture(const Surface& vessel, const std::vector<PictureWire>& wire
 
 void write_picture(const Surface& vessel, const std::vector<PictureWire>& wires,
                    const PictureMarks& marks, const std::filesystem::path& png) {
-  const Picture picture = draw_picture(vessel, wires, marks);
-  vtkNew<vtkImageData> image;
-  image->SetDimensions(picture.width, picture.height, 1);
-  image->AllocateScalars(VTK_UNSIGNED_CHAR, 3);
-  std::copy(picture.rgb.begin(), picture.rgb.end(),
-            static_cast<std::uint8_t*>(image->GetScalarPointer()));
-
-  // VTK only warns about a file it cannot open, so the file is written to memory first.
-  vtkNew<vtkPNGWriter> writer;
-  writer->SetInputData(image);
-  writer->WriteToMemoryOn();
-  writer->Write();
-  vtkUnsignedCharArray* bytes = writer->GetResult();
-  expects(bytes != nullptr);
-  std::ofstream file(png, std::ios::binary);
-  file.write(reinterpret_cast<const char*>(bytes->GetPointer(0)), bytes->GetNumberOfValues());
-  file.close();
-  if (!file) {
-    throw Error(png.string() +
-                ": cannot write the picture; expected a folder that exists, may be "
-                "written to and has space left");
-  }
+  write_png(draw_picture(vessel, wires, marks), png);
 }
 
 }  // namespace wireplan::pipeline

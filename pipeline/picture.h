@@ -7,16 +7,14 @@
 /// has X11 OpenGL windows alone (no EGL, no OSMesa), and without a display these end the process.
 /// Here no display, driver or font is needed, and the same scene gives the same bytes at any
 /// thread count. VTK still sets the text and writes the file.
-#include <cstdint>
 #include <filesystem>
 #include <string>
 #include <vector>
 
+#include "pipeline/canvas.h"
 #include "preprocess/vessel.h"
 
 namespace wireplan::pipeline {
-
-using Color = Eigen::Vector3f;  // red, green, blue in [0, 1]
 
 /// Color of the k-th wire of a picture; they repeat after six.
 Color wire_color(int k);
@@ -38,12 +36,6 @@ struct PictureMarks {
 
 struct PictureSize {
   int width = 1200, height = 1600;  // at least 200 each                                  [px]
-};
-
-/// Rows from the bottom up, pixels from left to right, three bytes (red, green, blue) each.
-struct Picture {
-  int width = 0, height = 0;
-  std::vector<std::uint8_t> rgb;
 };
 
 /// Draws the scene. Surface and wires may be empty; all coordinates are expected to be finite.

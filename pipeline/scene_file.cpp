@@ -1,5 +1,6 @@
 #include "pipeline/scene_file.h"
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 
@@ -40,6 +41,7 @@ struct SectionInput {
   double radius = 0.0;               // [mm]
   double bend_coefficient = 0.0;     // k_b; 0 where EI is given                          [N/m]
   double stretch_coefficient = 0.0;  // k_s; 0 where EA is given                          [N/m^3]
+  double element_length = 0.0;       // 0: as the wire's number of elements gives         [mm]
 };
 
 SectionInput read_section(JsonReader& reader) {
@@ -60,27 +62,55 @@ SectionInput read_section(JsonReader& reader) {
   section.mass_per_length = reader.number("mass_kg_per_m", 0.0, kFromZero) * kTonnePerMmFromKgPerM;
   section.rest_curvature =
       reader.number("rest_curvature_per_mm", 0.0, {.min = 0.0, .max = 2.0}, "given in 1/m?");
+  if (reader.has("element_length_mm")) {
+    input.element_length = reader.number("element_length_mm", std::nullopt, kAboveZero);
+  }
   input.radius =
       reader.number("radius_mm", std::nullopt, {.min = 0.001, .max = 10.0}, "given in m?");
   reader.finish();
   return input;
 }
 
-struct WireInput {
-  simulate::Wire wire;
-  int elements = 0;
-  double edge_length = 0.0;  // [mm]
-};
+constexpr int kMaxElements = 20000;
 
-WireInput read_wire_of_scene(JsonReader& root) {
+/// How finely each section is cut. What has no length of its own is as long as `elements` say.
+void read_elements(JsonReader& reader, const std::vector<SectionInput>& sections,
+                   simulate::Scene& scene) {
+  const auto has_length = [](const SectionInput& input) { return input.element_length > 0.0; };
+  const bool all = !sections.empty() && std::all_of(sections.begin(), sections.end(), has_length);
+  if (!all) {
+    scene.elements = reader.integer("elements", std::nullopt, 2, kMaxElements);
+  } else if (reader.has("elements")) {
+    reader.problems().add(reader.path_of("elements"), "given", "no such key",
+                          "every section has an element_length_mm");
+  }
+  if (std::none_of(sections.begin(), sections.end(), has_length)) return;
+  double count = 0.0;
+  for (std::size_t k = 0; k < sections.size(); ++k) {
+    scene.element_length.push_back(sections[k].element_length);
+    count += sections[k].section.length / simulate::edge_length(scene, k);
+  }
+  if (!(count > 1.5 && count < kMaxElements + 0.5)) {
+    reader.problems().add(reader.path_of("sections"), "of " + Json(count).dump() + " elements",
+                          "2 to " + std::to_string(kMaxElements), "change element_length_mm");
+  }
+}
+
+/// The wire and how it is cut and twisted, in an otherwise empty scene.
+simulate::Scene read_wire_of_scene(JsonReader& root) {
   JsonReader reader = root.object("wire", true);
-  WireInput input;
-  input.wire.name = reader.text("name", "wire");
-  input.elements = reader.integer("elements", std::nullopt, 2, 20000);
+  simulate::Scene scene;
+  scene.wire.name = reader.text("name", "wire");
+  const std::string twist = reader.choice("twist", "auto", {"auto", "coupled", "decoupled"});
+  scene.twist = twist == "coupled"     ? simulate::Twist::kCoupled
+                : twist == "decoupled" ? simulate::Twist::kDecoupled
+                                       : simulate::Twist::kAuto;
   std::vector<SectionInput> sections;
   for (JsonReader& section : reader.objects("sections", true)) {
     sections.push_back(read_section(section));
+    scene.wire.sections.push_back(sections.back().section);
   }
+  read_elements(reader, sections, scene);
   reader.finish();
 
   // One wire has one radius here.
@@ -90,24 +120,24 @@ WireInput read_wire_of_scene(JsonReader& root) {
                           "a changing radius is not in this version");
     break;
   }
-  if (!sections.empty()) input.wire.radius = sections.front().radius;
+  if (!sections.empty()) scene.wire.radius = sections.front().radius;
 
   // The paper's coefficients are those of edges of one length.
-  double length = 0.0;
-  for (const SectionInput& section : sections) length += section.section.length;
-  input.edge_length = length / input.elements;
-  for (SectionInput& section : sections) {
-    if (section.bend_coefficient > 0.0) {
-      section.section.bending_stiffness =
-          bending_stiffness_from_paper(section.bend_coefficient, input.edge_length);
+  for (std::size_t k = 0; k < sections.size(); ++k) {
+    simulate::Section& section = scene.wire.sections[k];
+    const double l = simulate::edge_length(scene, k);
+    if (sections[k].bend_coefficient > 0.0) {
+      section.bending_stiffness = bending_stiffness_from_paper(sections[k].bend_coefficient, l);
     }
-    if (section.stretch_coefficient > 0.0) {
-      section.section.axial_stiffness =
-          axial_stiffness_from_paper(section.stretch_coefficient, input.edge_length);
+    if (sections[k].stretch_coefficient > 0.0) {
+      section.axial_stiffness = axial_stiffness_from_paper(sections[k].stretch_coefficient, l);
     }
-    input.wire.sections.push_back(section.section);
   }
-  return input;
+  if (scene.twist == simulate::Twist::kDecoupled && !scene.wire.straight()) {
+    root.problems().add("wire.twist", "\"decoupled\"", "\"coupled\" or \"auto\"",
+                        "a wire with rest_curvature_per_mm bends and twists together");
+  }
+  return scene;
 }
 
 simulate::Support read_support(JsonReader& reader) {
@@ -122,7 +152,7 @@ simulate::Support read_support(JsonReader& reader) {
                                     : SupportKind::kGuided;
   support.point = reader.point("point_mm", std::nullopt);
   support.direction = reader.direction("direction", Vec3(Vec3::UnitX()));
-  support.roll = reader.number("roll_deg", 0.0, {.min = -360.0, .max = 360.0}) * kRadPerDeg;
+  support.roll = reader.number("roll_deg", 0.0, {.min = -36000.0, .max = 36000.0}) * kRadPerDeg;
   reader.finish();
   return support;
 }
@@ -153,47 +183,138 @@ simulate::Loads read_loads(JsonReader& root) {
   simulate::Loads loads;
   loads.gravity = reader.point("gravity_m_per_s2", Vec3(Vec3::Zero())) * kMmPerM;
   loads.tip_force = reader.point("tip_force_n", Vec3(Vec3::Zero()));
-  if (!reader.point("tip_moment_n_mm", Vec3(Vec3::Zero())).isZero(0.0)) {
-    reader.problems().add("loads.tip_moment_n_mm", reader.raw("tip_moment_n_mm").dump(),
-                          "[0, 0, 0]", "a moment on the tip is not in this version");
-  }
+  loads.tip_moment = reader.point("tip_moment_n_mm", Vec3(Vec3::Zero()));
+  loads.tip_torque = reader.number("tip_torque_n_mm", 0.0, {});
   reader.finish();
   return loads;
 }
 
 simulate::SolverOptions read_solver(JsonReader& root) {
+  using simulate::Method;
   JsonReader reader = root.object("solver", false);
-  const Json& method = reader.raw("method");
-  const std::vector<std::string> later = {"conjugate_gradient", "explicit", "semi_implicit"};
-  if (std::find(later.begin(), later.end(), method) != later.end()) {
-    reader.problems().add("solver.method", method.dump(), "\"newton\"",
-                          "the paper's own methods are not in this version");
-  } else {
-    reader.choice("method", "newton", {"newton"});
-  }
-  for (const char* key : {"time_step_s", "duration_s", "damping_per_s"}) {
-    refuse(reader, key, "methods that run in time are");
-  }
   simulate::SolverOptions options;
+  const std::string method = reader.choice(
+      "method", "newton", {"newton", "conjugate_gradient", "explicit", "semi_implicit"});
+  options.method = method == "conjugate_gradient" ? Method::kConjugateGradient
+                   : method == "explicit"         ? Method::kExplicitEuler
+                   : method == "semi_implicit"    ? Method::kSemiImplicitEuler
+                                                  : Method::kNewton;
   options.residual_tolerance =
       reader.number("residual_tolerance_n", options.residual_tolerance, {.min = 1e-14, .max = 1.0});
   options.max_iterations = reader.integer("max_iterations", options.max_iterations, 1, 10000000);
   options.load_steps = reader.integer("load_steps", options.load_steps, 1, 100000);
+  options.time_step = reader.number("time_step_s", options.time_step, kAboveZero);
+  options.duration = reader.number("duration_s", options.duration, kAboveZero);
+  options.damping = reader.number("damping_per_s", options.damping, kFromZero);
+
+  // Keys of other methods.
+  const auto refuse_key = [&](const char* key, const std::string& why) {
+    if (!reader.has(key)) return;
+    reader.problems().add(reader.path_of(key), "given", "no such key with this method", why);
+  };
+  if (options.method == Method::kNewton) {
+    const std::string why = "newton takes no time steps; choose another solver.method";
+    refuse_key("time_step_s", why);
+    refuse_key("duration_s", why);
+    refuse_key("damping_per_s", why);
+  } else if (options.load_steps != 1) {
+    refuse_key("load_steps", "loads act in full from the first time step");
+  }
+  if (options.method == Method::kConjugateGradient) {
+    refuse_key("damping_per_s", "its viscosity is the time step");
+  }
+  if (options.method != Method::kNewton && options.duration > 1e9 * options.time_step) {
+    reader.problems().add(reader.path_of("duration_s"), Json(options.duration).dump(),
+                          "at most 1e9 time steps, " + Json(1e9 * options.time_step).dump() + " s");
+  }
   reader.finish();
   return options;
 }
 
-simulate::Scene read_bench(JsonReader& root, const WireInput& wire) {
-  simulate::Scene scene;
-  scene.wire = wire.wire;
-  scene.elements = wire.elements;
-  const std::size_t problems_before = root.problems().count();
+/// Loads that the wire, its supports and its twist can carry.
+void check_loads(const simulate::Scene& scene, Problems& problems) {
+  const auto massless = [](const simulate::Section& s) { return s.mass_per_length == 0.0; };
+  const std::vector<simulate::Section>& sections = scene.wire.sections;
+  if (!scene.loads.gravity.isZero(0.0) && std::all_of(sections.begin(), sections.end(), massless)) {
+    problems.add("loads.gravity_m_per_s2", "not 0", "a wire with a mass",
+                 "give mass_kg_per_m in wire.sections");
+  }
+  const simulate::Support *proximal = nullptr, *distal = nullptr;
+  for (const simulate::Support& support : scene.supports) {
+    (support.at == simulate::WireEnd::kProximal ? proximal : distal) = &support;
+  }
+  const auto directed = [](const simulate::Support* support) {
+    return support != nullptr && support->kind != simulate::SupportKind::kPinned;
+  };
+  const Vec3& moment = scene.loads.tip_moment;
+  if (scene.wire.straight() && moment.cross(proximal->direction).norm() <= 1e-9 * moment.norm() &&
+      !moment.isZero(0.0)) {
+    problems.add("loads.tip_moment_n_mm", "along the wire", "an axis across it",
+                 "for torsion turn the roll_deg of a support, or give tip_torque_n_mm and "
+                 "\"twist\": \"decoupled\"");
+  }
+  const bool decoupled = scene.twist == simulate::Twist::kDecoupled;
+  if (scene.loads.tip_torque != 0.0 && !decoupled) {
+    problems.add("loads.tip_torque_n_mm", Json(scene.loads.tip_torque).dump(), "0",
+                 "it needs \"decoupled\" in wire.twist; or turn the roll_deg of a support");
+  } else if (scene.loads.tip_torque != 0.0 && directed(distal)) {
+    problems.add("loads.tip_torque_n_mm", Json(scene.loads.tip_torque).dump(), "0",
+                 "the distal support holds the roll already");
+  }
+  if (decoupled && !directed(proximal)) {
+    problems.add("wire.twist", "\"decoupled\"", "a clamped or guided proximal end",
+                 "a pinned one does not hold the roll that the chain starts from");
+  }
+
+  // A table that the ends lie on.
+  if (!scene.plane) return;
+  for (const simulate::Support& support : scene.supports) {
+    const bool out = std::abs(scene.plane->dot(support.point - proximal->point)) > 1e-6 ||
+                     (directed(&support) && std::abs(scene.plane->dot(support.direction)) > 1e-6);
+    if (!out) continue;
+    problems.add("plane_normal", to_json(*scene.plane).dump(), "a plane that the supports lie in",
+                 "give a normal square to their directions and to the line between their points");
+    break;
+  }
+}
+
+/// What methods other than Newton's cannot do.
+void check_method(const simulate::Scene& scene, Problems& problems) {
+  using simulate::Method;
+  const Method method = scene.solver.method;
+  if (method == Method::kNewton) return;
+  const std::string remedy = "with this solver.method; choose newton";
+  if (scene.twist == simulate::Twist::kCoupled) {
+    problems.add("wire.twist", "\"coupled\"", "\"auto\" or \"decoupled\"", remedy);
+  }
+  if (!scene.wire.straight()) {
+    problems.add("wire.sections", "with rest_curvature_per_mm", "a wire straight at rest", remedy);
+  }
+  if (!scene.loads.tip_moment.isZero(0.0)) {
+    problems.add("loads.tip_moment_n_mm", to_json(scene.loads.tip_moment).dump(), "[0, 0, 0]",
+                 remedy);
+  }
+  if (scene.plane) problems.add("plane_normal", "given", "no such key", remedy);
+  if (method == Method::kConjugateGradient) return;
+  for (std::size_t k = 0; k < scene.wire.sections.size(); ++k) {
+    if (scene.wire.sections[k].mass_per_length > 0.0) continue;
+    problems.add("wire.sections[" + std::to_string(k) + "].mass_kg_per_m", "0", "a number above 0",
+                 "the Euler schemes move masses");
+  }
+}
+
+simulate::Scene read_bench(JsonReader& root, simulate::Scene scene) {
   for (JsonReader& support : root.objects("supports", true)) {
     scene.supports.push_back(read_support(support));
   }
-  if (root.problems().count() == problems_before) check_supports(scene.supports, root.problems());
+  if (root.problems().empty()) check_supports(scene.supports, root.problems());
   scene.loads = read_loads(root);
+  if (root.has("plane_normal")) scene.plane = root.direction("plane_normal", std::nullopt);
   scene.solver = read_solver(root);
+  if (root.problems().empty()) {
+    check_loads(scene, root.problems());
+    check_method(scene, root.problems());
+  }
   return scene;
 }
 
@@ -222,14 +343,25 @@ simulate::Goal read_goal(JsonReader& root, const simulate::Introducer& introduce
   return goal;
 }
 
-InsertionScene read_insertion_scene(JsonReader& root, const WireInput& wire,
+InsertionScene read_insertion_scene(JsonReader& root, const simulate::Scene& wire,
                                     const std::filesystem::path& folder) {
   InsertionScene scene;
   scene.wire = wire.wire;
+  if (!wire.element_length.empty()) {
+    root.problems().add("wire.sections", "with element_length_mm", "elements alone",
+                        "unequal elements in a vessel are not in this version");
+  }
+  if (wire.twist != simulate::Twist::kAuto) {
+    root.problems().add("wire.twist", "given", "\"auto\"",
+                        "in a vessel the twist of curved wires is coupled, and that of straight "
+                        "ones has no effect");
+  }
   scene.vessel = read_vessel(root, folder);
   refuse(root, "supports", "supports beside the introducer are");
+  refuse(root, "plane_normal", "tables in a vessel are");
   const simulate::Loads loads = read_loads(root);
-  if (!loads.gravity.isZero(0.0) || !loads.tip_force.isZero(0.0)) {
+  if (!loads.gravity.isZero(0.0) || !loads.tip_force.isZero(0.0) || !loads.tip_moment.isZero(0.0) ||
+      loads.tip_torque != 0.0) {
     root.problems().add("loads", root.raw("loads").dump(), "none but 0",
                         "loads on a wire in a vessel are not in this version");
   }
@@ -250,7 +382,11 @@ InsertionScene read_insertion_scene(JsonReader& root, const WireInput& wire,
 
   // How finely.
   const simulate::SolverOptions solver = read_solver(root);
-  scene.options.element_length = wire.edge_length;
+  if (solver.method != simulate::Method::kNewton) {
+    root.problems().add("solver.method", "not \"newton\"", "\"newton\"",
+                        "the paper's own methods work on the bench alone in this version");
+  }
+  scene.options.element_length = wire.wire.length() / wire.elements;
   scene.options.residual_tolerance = solver.residual_tolerance;
   scene.options.max_iterations = solver.max_iterations;
   scene.goal = read_goal(root, scene.introducer);
@@ -262,9 +398,17 @@ InsertionScene read_insertion_scene(JsonReader& root, const WireInput& wire,
 constexpr const char* kNotFinite = "the solver left no finite number here";
 
 /// Adds the value, or null and the reason where it is not finite.
-void put(Json& object, const std::string& key, double value) {
+void put(Json& object, const std::string& key, double value, const char* reason = kNotFinite) {
   object[key] = std::isfinite(value) ? Json(value) : Json();
-  if (!std::isfinite(value)) object[key + "_reason"] = kNotFinite;
+  if (!std::isfinite(value)) object[key + "_reason"] = reason;
+}
+
+/// The same for angles; `reason` tells why there are none.
+void put_angles(Json& object, const std::string& key, const Eigen::VectorXd& angles,
+                const char* reason) {
+  const bool given = angles.size() > 0 && angles.allFinite();
+  object[key] = given ? Json(std::vector<double>(angles.begin(), angles.end())) : Json();
+  if (!given) object[key + "_reason"] = angles.size() == 0 ? reason : kNotFinite;
 }
 
 template <typename Matrix>
@@ -279,7 +423,8 @@ Json energy_json(const simulate::SceneResult& result) {
   put(json, "bend", result.energy.bend);
   put(json, "twist", result.energy.twist);
   put(json, "gravity", result.gravity_energy);
-  put(json, "tip_force", result.energy.load - result.gravity_energy);
+  put(json, "tip_force", result.energy.load - result.gravity_energy - result.moment_energy);
+  put(json, "tip_moment", result.moment_energy);
   put(json, "contact", result.energy.contact);
   json["wall"] = 0.0;  // a bench has none
   put(json, "total", result.energy.total());
@@ -342,7 +487,7 @@ SceneFile read_scene(const std::filesystem::path& path) {
   Problems problems(path.string());
   JsonReader root(file, "", problems);
   root.text("schema", std::nullopt);
-  const WireInput wire = read_wire_of_scene(root);
+  const simulate::Scene wire = read_wire_of_scene(root);
   JsonReader output = root.object("output", false);
   const double every = output.number("every_mm", simulate::InsertionOptions().record_every,
                                      {.min = 0.001, .max = 1e4});
@@ -365,18 +510,17 @@ Json result_json(const simulate::SceneResult& result) {
   if (!result.reason.empty()) json["reason"] = result.reason;
   json["terms"] = result.terms;
   put_points(json, "nodes_mm", result.nodes);
-  json["twist_rad"] = nullptr;
-  if (result.twist.size() == 0) {
-    json["twist_rad_reason"] = "the wire is straight at rest, so no twist was solved for";
-  } else if (!result.twist.allFinite()) {
-    json["twist_rad_reason"] = kNotFinite;
-  } else {
-    json["twist_rad"] = std::vector<double>(result.twist.begin(), result.twist.end());
-  }
+  put_angles(json, "twist_rad", result.twist,
+             "the wire is straight at rest, so no twist was solved for");
+  put_angles(json, "roll_rad", result.roll, "only decoupled twist gives it");
   json["energy_n_mm"] = energy_json(result);
   put(json, "residual_n", result.residual);
   json["iterations"] = result.iterations;
   json["steps"] = result.steps;
+  put(json, "simulated_time_s", result.time);
+  put(json, "critical_time_step_s", result.critical_time_step,
+      "the method is stable at any time step");
+  put(json, "worst_energy_rise_n_mm", result.worst_energy_rise);
   put(json, "cpu_time_s", result.cpu_time_s);
   json["reactions"] = Json::array();
   for (const simulate::Reaction& reaction : result.reactions) {

@@ -53,22 +53,26 @@ Average average_over(const Wire& wire, double a, double b) {
 
 }  // namespace
 
-Rod build_rod(const Wire& wire, double length, int elements) {
-  expects(elements >= 2 && length > 0.0 && length <= wire.length() * (1.0 + 1e-9));
-  expects(wire.radius > 0.0);
+Rod build_rod(const Wire& wire, const Eigen::VectorXd& edge_lengths, bool twisted) {
+  const int elements = static_cast<int>(edge_lengths.size());
+  expects(elements >= 2 && edge_lengths.minCoeff() > 0.0 && wire.radius > 0.0);
+  expects(edge_lengths.sum() <= wire.length() * (1.0 + 1e-9));
   const int n = elements + 1;
-  const double l = length / elements;
   Rod rod;
   rod.radius = wire.radius;
-  rod.rest_length = Eigen::VectorXd::Constant(elements, l);
+  rod.twisted = twisted;
+  rod.rest_length = edge_lengths;
   rod.stretch.resize(elements);
   rod.bend = rod.twist = rod.rest_angle = rod.share = rod.mass = Eigen::VectorXd::Zero(n);
-  rod.tip_distance.resize(n);
+  rod.tip_distance = Eigen::VectorXd::Zero(n);
+  for (int i = elements - 1; i >= 0; --i) {
+    rod.tip_distance[i] = rod.tip_distance[i + 1] + edge_lengths[i];
+  }
 
   // Edges, and half of each edge's length and mass to its nodes.
   for (int i = 0; i < elements; ++i) {
-    const double a = l * (elements - 1 - i), b = l * (elements - i);
-    const Average edge = average_over(wire, a, b);
+    const double l = edge_lengths[i];
+    const Average edge = average_over(wire, rod.tip_distance[i + 1], rod.tip_distance[i]);
     rod.stretch[i] = edge.EA;
     for (const int node : {i, i + 1}) {
       rod.share[node] += 0.5 * l;
@@ -78,16 +82,25 @@ Rod build_rod(const Wire& wire, double length, int elements) {
     if (i == elements - 1) rod.distal_bend = edge.EI / (0.5 * l);
   }
   // Interior nodes: from the middle of one edge to the middle of the next.
-  for (int i = 0; i < n; ++i) rod.tip_distance[i] = l * (n - 1 - i);
   for (int i = 1; i + 1 < n; ++i) {
     const double c = rod.tip_distance[i];
-    const Average node = average_over(wire, c - 0.5 * l, c + 0.5 * l);
-    rod.bend[i] = node.EI / l;
-    rod.twist[i] = node.GJ / l;
+    const Average node =
+        average_over(wire, c - 0.5 * edge_lengths[i], c + 0.5 * edge_lengths[i - 1]);
+    rod.bend[i] = node.EI / rod.share[i];
+    // Twist reaches to the ends: their edges carry the roll that is held there, not that of their
+    // middles. Without the two half edges a held roll would be first order.
+    const double a = i == n - 2 ? 0.0 : c - 0.5 * edge_lengths[i];
+    const double b = i == 1 ? rod.tip_distance[0] : c + 0.5 * edge_lengths[i - 1];
+    rod.twist[i] = average_over(wire, a, b).GJ / (b - a);
     rod.rest_angle[i] = node.rest_angle;
     rod.twisted = rod.twisted || node.rest_angle != 0.0;
   }
   return rod;
+}
+
+Rod build_rod(const Wire& wire, double length, int elements) {
+  expects(elements >= 2 && length > 0.0);
+  return build_rod(wire, Eigen::VectorXd::Constant(elements, length / elements));
 }
 
 Vec3 reference_normal(const Vec3& axis) {
@@ -115,6 +128,22 @@ RodState straight_state(const Rod& rod, const Vec3& point, const Vec3& direction
   state.theta = Eigen::VectorXd::Constant(n - 1, roll);
   state.director = reference_normal(direction).replicate(1, n - 1);
   state.reference_twist = Eigen::VectorXd::Zero(n);
+  return state;
+}
+
+RodState rest_state(const Rod& rod, const Vec3& point, const Vec3& direction, double roll) {
+  RodState state = straight_state(rod, point, direction, roll);
+  const Vec3 d = state.director.col(0);
+  const Vec3 toward = std::cos(roll) * d + std::sin(roll) * direction.cross(d);
+  const Vec3 axis = direction.cross(toward);
+  double angle = 0.0;
+  for (int i = 0; i + 1 < rod.nodes(); ++i) {
+    angle += rod.rest_angle[i];
+    // In the plane of the curve the directors turn with the edges: there is no twist.
+    const Eigen::AngleAxisd turn(angle, axis);
+    state.x.col(i + 1) = state.x.col(i) + rod.rest_length[i] * (turn * direction);
+    state.director.col(i) = turn * d;
+  }
   return state;
 }
 

@@ -37,7 +37,7 @@ struct Rod {
   Eigen::VectorXd rest_length;   // (n-1)  l                                              [mm]
   Eigen::VectorXd stretch;       // (n-1)  EA                                             [N]
   Eigen::VectorXd bend;          // (n)    EI over the node's share of length             [N mm]
-  Eigen::VectorXd twist;         // (n)    GJ over the node's share of length             [N mm]
+  Eigen::VectorXd twist;         // (n)    GJ over the same, up to the wire's ends        [N mm]
   Eigen::VectorXd rest_angle;    // (n)    turning angle at rest                          [rad]
   Eigen::VectorXd share;         // (n)    length that the node stands for                [mm]
   Eigen::VectorXd mass;          // (n)                                                   [t]
@@ -50,9 +50,13 @@ struct Rod {
   int nodes() const { return static_cast<int>(share.size()); }
 };
 
-/// The distal `length` of the wire in `elements` equal edges. EI at a node between two edges is
-/// that of springs in series; so are EA and GJ along an edge that spans sections. Expects 0 <
-/// length <= the wire's length and at least 2 elements.
+/// The distal part of the wire in edges of the given lengths, proximal to distal. EI at a node
+/// between two edges is that of springs in series; so are EA and GJ along an edge that spans
+/// sections. `twisted` asks for twist even where the wire is straight. Expects at least 2 edges,
+/// all longer than 0, together no longer than the wire.
+Rod build_rod(const Wire& wire, const Eigen::VectorXd& edge_lengths, bool twisted = false);
+
+/// The same in `elements` equal edges over `length`.
 Rod build_rod(const Wire& wire, double length, int elements);
 
 /// Where the wire is. One per trial, never shared.
@@ -61,11 +65,16 @@ struct RodState {
   Eigen::VectorXd theta;            // (n-1)   reference to material director, per edge   [rad]
   Eigen::Matrix3Xd director;        // (3, n-1) reference director, normal to the edge    [-]
   Eigen::VectorXd reference_twist;  // (n)     of the reference directors, at nodes       [rad]
+  double tip_angle = 0.0;  // of the last edge about a moment's axis, all turns counted [rad]
 };
 
 /// The wire straight from `point` along the unit `direction`, its material director turned by
 /// `roll` from reference_normal(direction). A curved tip bends toward its material director.
 RodState straight_state(const Rod& rod, const Vec3& point, const Vec3& direction, double roll);
+
+/// The wire unloaded, in its rest shape: as straight_state, but each node turns by its rest angle
+/// toward the material director, all in one plane.
+RodState rest_state(const Rod& rod, const Vec3& point, const Vec3& direction, double roll);
 
 /// The direction that roll and azimuth count from: the patient's anterior (-y) made normal to the
 /// axis; superior (+z) where the axis runs within 10 degrees of it. Unit.

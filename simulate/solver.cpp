@@ -4,6 +4,9 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
+
+#include "simulate/quartic.h"
 
 namespace wireplan::simulate {
 
@@ -218,6 +221,49 @@ double add_contact(const Problem& problem, const RodState& state, int i, double&
   return share * law.energy;
 }
 
+/// Angle of the last edge about the moment's axis, counted on from that of the last accepted state.
+double tip_angle(const TipMoment& moment, const RodState& state, const Vec3& edge) {
+  const Vec3 zero = reference_normal(moment.axis);
+  const double angle = std::atan2(edge.dot(moment.axis.cross(zero)), edge.dot(zero));
+  return state.tip_angle + std::remainder(angle - state.tip_angle, 2.0 * kPi);
+}
+
+Vec3 last_edge(const RodState& state) {
+  return state.x.rightCols<1>() - state.x.col(state.x.cols() - 2);
+}
+
+/// The moment on the last edge: W = -size * angle about the axis.
+template <class Sink>
+double add_tip_moment(const Problem& problem, const RodState& state, Sink& sink) {
+  const TipMoment& moment = *problem.tip_moment;
+  const int n = problem.rod->nodes();
+  const Vec3 e = last_edge(state);
+  const Vec3 flat = e - e.dot(moment.axis) * moment.axis;
+  const Vec3 around = moment.axis.cross(flat);  // d angle / d e = around / |flat|^2
+  const double squared = flat.squaredNorm();
+  const Vec3 g = (moment.size / squared) * around;
+  sink.gradient(n - 2, g);
+  sink.gradient(n - 1, -g);
+  if constexpr (Sink::kHessian) {
+    const Mat3 H = (moment.size / (squared * squared)) * symmetric_product(flat, around);
+    sink.hessian(n - 2, n - 2, H);
+    sink.hessian(n - 1, n - 1, H);
+    sink.hessian(n - 1, n - 2, -H);
+  }
+  return -moment.size * tip_angle(moment, state, e);
+}
+
+/// Spring that holds node i to the plane through node 0.
+template <class Sink>
+double add_plane(const Problem& problem, const RodState& state, int i, Sink& sink) {
+  const Vec3& normal = *problem.plane;
+  const double k = problem.rod->stretch[0] / problem.rod->rest_length[0];
+  const double height = normal.dot(state.x.col(i) - state.x.col(0));
+  sink.gradient(i, k * height * normal);
+  if constexpr (Sink::kHessian) sink.hessian(i, i, k * normal * normal.transpose());
+  return 0.5 * k * height * height;
+}
+
 /// All elements that touch a free node. `distances` (n) is written where there is a lumen.
 template <class Sink>
 Energy assemble(const Problem& problem, const RodState& state, std::vector<double>* distances,
@@ -252,6 +298,12 @@ Energy assemble(const Problem& problem, const RodState& state, std::vector<doubl
       energy.load -= f.dot(state.x.col(i));
     }
   }
+  if (problem.plane) {
+    for (int i = std::max(1, problem.first); i < problem.last; ++i) {
+      energy.contact += add_plane(problem, state, i, sink);
+    }
+  }
+  if (problem.tip_moment) energy.load += add_tip_moment(problem, state, sink);
   if (problem.lumen != nullptr) {
     double distance = 0.0;
     for (int i = problem.first; i < problem.last; ++i) {
@@ -385,13 +437,7 @@ void apply_supports(const Problem& problem, Eigen::VectorXd& g, BlockBand<D>& H)
 
 // ---------------------------------------------------------------- line search
 
-/// Energy along a step, a1 s + a2 s^2 + a3 s^3 + a4 s^4: exact for stretch, bend and loads, paper
-/// Eq. (22).
-struct Quartic {
-  double a1 = 0.0, a2 = 0.0, a3 = 0.0, a4 = 0.0;
-  double at(double s) const { return s * (a1 + s * (a2 + s * (a3 + s * a4))); }
-};
-
+/// Energy along a step as far as it is a polynomial: all but contact, twist and moments.
 template <int D>
 Quartic elastic_along(const Problem& problem, const RodState& state, const Eigen::VectorXd& step) {
   const Rod& rod = *problem.rod;
@@ -435,44 +481,6 @@ Quartic elastic_along(const Problem& problem, const RodState& state, const Eigen
     for (int i = problem.first; i < problem.last; ++i) q.a1 -= problem.load->col(i).dot(move(i));
   }
   return q;
-}
-
-/// The lowest point of a quartic that falls at 0, within (0, cap], paper Eq. (23).
-double lowest_point(const Quartic& q, double cap) {
-  // Real roots of the derivative, by Cardano's formula on the depressed cubic.
-  std::array<double, 3> roots{};
-  int count = 0;
-  const double a = 4.0 * q.a4, b = 3.0 * q.a3, c = 2.0 * q.a2, d = q.a1;
-  const double scale = std::abs(b) + std::abs(c) + std::abs(d);
-  if (std::abs(a) > 1e-14 * scale) {
-    const double shift = -b / (3.0 * a);
-    const double p = (3.0 * a * c - b * b) / (3.0 * a * a);
-    const double r = (2.0 * b * b * b - 9.0 * a * b * c + 27.0 * a * a * d) / (27.0 * a * a * a);
-    const double discriminant = 0.25 * r * r + p * p * p / 27.0;
-    if (discriminant > 0.0) {
-      const double root = std::sqrt(discriminant);
-      const double u = std::cbrt(-0.5 * r - std::copysign(root, r));
-      roots[count++] = shift + (u == 0.0 ? 0.0 : u - p / (3.0 * u));
-    } else {
-      const double radius = 2.0 * std::sqrt(-p / 3.0);
-      const double angle =
-          radius == 0.0 ? 0.0 : std::acos(std::clamp(3.0 * r / (p * radius), -1.0, 1.0)) / 3.0;
-      for (int k = 0; k < 3; ++k)
-        roots[count++] = shift + radius * std::cos(angle - 2.0 * kPi * k / 3.0);
-    }
-  } else if (c > 0.0) {
-    roots[count++] = -d / c;
-  }
-  double best = std::isfinite(cap) ? cap : 1.0;
-  for (int k = 0; k < count; ++k) {
-    double s = roots[k];
-    for (int polish = 0; polish < 2; ++polish) {
-      const double second = c + s * (2.0 * b + 3.0 * a * s);
-      if (second != 0.0) s -= (d + s * (c + s * (b + a * s))) / second;
-    }
-    if (s > 0.0 && s <= cap && q.at(s) < q.at(best)) best = s;
-  }
-  return best;
 }
 
 /// Largest part of the step that no node can cross the wall with: a node may go as far as it is
@@ -549,6 +557,7 @@ NewtonResult Statics::solve_with(BlockBand<D>& hessian, BlockBand<D>& untouched,
   distances_.resize(static_cast<std::size_t>(n));
   constexpr double kSmallestShift = 1e-7;  // [N/mm]
   const bool bounded = problem.lumen != nullptr, twisted = D == 4;
+  const bool polynomial = !bounded && !twisted && !problem.tip_moment && !problem.plane;
 
   const auto derivatives_at = [&](const RodState& where) {
     gradient_.setZero();
@@ -573,6 +582,10 @@ NewtonResult Statics::solve_with(BlockBand<D>& hessian, BlockBand<D>& untouched,
   };
 
   NewtonResult result;
+  constexpr double kEpsilon = std::numeric_limits<double>::epsilon();
+  const double extent = state.x.cwiseAbs().maxCoeff();
+  result.rounding_floor = 8.0 * kEpsilon * extent *
+                          problem.rod->stretch.cwiseQuotient(problem.rod->rest_length).maxCoeff();
   double shift = 0.0;  // of the Hessian's diagonal
   trial_ = state;
   result.energy = derivatives_at(state);
@@ -599,6 +612,11 @@ NewtonResult Statics::solve_with(BlockBand<D>& hessian, BlockBand<D>& untouched,
     step_ = -gradient_;
     hessian.solve(step_);
     const double slope = gradient_.dot(step_);
+    if (step_.cwiseAbs().maxCoeff() < 64.0 * kEpsilon * extent &&
+        result.residual <= result.rounding_floor) {
+      result.converged = true;
+      return result;
+    }
 
     // 2. Full step, edges turned rather than lengthened; most steps end here.
     double cap = std::numeric_limits<double>::infinity();
@@ -632,7 +650,7 @@ NewtonResult Statics::solve_with(BlockBand<D>& hessian, BlockBand<D>& untouched,
     double length = 0.0;
     if (!accepted) {
       Quartic along = elastic_along<D>(problem, state, step_);
-      if (bounded || twisted) {
+      if (!polynomial) {
         const double second = std::max(0.0, -slope - shift * step_.squaredNorm() - 2.0 * along.a2);
         along.a1 = slope;
         along.a2 += 0.5 * second;
@@ -653,6 +671,10 @@ NewtonResult Statics::solve_with(BlockBand<D>& hessian, BlockBand<D>& untouched,
     }
     if (!accepted) return result;
     std::swap(state, trial_);
+    if (problem.tip_moment) {
+      state.tip_angle = tip_angle(*problem.tip_moment, state, last_edge(state));
+      trial_.tip_angle = state.tip_angle;
+    }
     if constexpr (D == 4) {
       trial_.director = state.director;
       trial_.reference_twist = state.reference_twist;

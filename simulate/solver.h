@@ -21,6 +21,14 @@ struct EndSupport {
   std::optional<Vec3> tangent;
 };
 
+/// A moment on the distal edge about a fixed axis: it does work on the angle of the edge, seen
+/// along the axis. In a plane normal to the axis this is the dead moment of textbooks. Has no value
+/// where the edge lies along the axis.
+struct TipMoment {
+  Vec3 axis = Vec3::UnitZ();  // unit
+  double size = 0.0;          //                                                         [N mm]
+};
+
 /// What is in equilibrium. Nodes first..last-1 are free, apart from what the end supports hold;
 /// nodes before and after are where they are, and their edges' theta too. Terms that are absent
 /// cost nothing.
@@ -29,6 +37,10 @@ struct Problem {
   int first = 0, last = 0;
   EndSupport proximal, distal;             // of nodes 0 and n-1, where those are free
   const Eigen::Matrix3Xd* load = nullptr;  // (3, n) dead forces on the nodes                [N]
+  std::optional<TipMoment> tip_moment;
+  std::optional<Vec3>
+      plane;  // unit normal of a table on which the wire lies: every node is held to the
+              // plane through node 0, by springs as stiff as the wire's stretch
   const Lumen* lumen = nullptr;
   ContactLaw contact;
 };
@@ -39,10 +51,13 @@ struct NewtonOptions {
 };
 
 struct NewtonResult {
-  bool converged = false;
-  double residual = 0.0;           //                                              [N]
-  double energy = 0.0;             // all terms                                    [N mm]
+  bool converged = false;  // to the tolerance, or to what rounding allows (see rounding_floor)
+  double residual = 0.0;   //                                              [N]
+  double energy = 0.0;     // all terms                                    [N mm]
   double worst_energy_rise = 0.0;  // over accepted steps; 0 unless rounding       [N mm]
+  double rounding_floor =
+      0.0;  // residual that 64 bit numbers leave in the stiffest edge: 8 eps EA/l |x|;
+            // a tolerance below it is met once steps fall below rounding  [N]
   int iterations = 0;
 };
 

@@ -595,6 +595,19 @@ Json cantilever() {
   return Json::parse(file);
 }
 
+Json motion(const std::string& method) {
+  Json json = cantilever();
+  json["solver"] = {{"method", method}, {"residual_tolerance_n", 1e-6}};
+  return json;
+}
+
+Json decoupled() {
+  Json json = cantilever();
+  json["wire"]["twist"] = "decoupled";
+  json["loads"]["tip_torque_n_mm"] = 0.01;
+  return json;
+}
+
 Json pushed_wire() {
   Json json = cantilever();
   json.erase("supports");
@@ -642,6 +655,103 @@ TEST_F(CaseFile, PaperCoefficientsGiveTheSameWire) {
   EXPECT_NEAR(file.bench->wire.sections[0].bending_stiffness, 0.8, 1e-12);
 }
 
+TEST_F(CaseFile, PaperCoefficientsOfASectionAreThoseOfItsOwnElements) {
+  // 10 mm of tip in 5 edges of 2 mm, asked for as 2.4; 30 mm of shaft in 30 edges of 1 mm.
+  Json json = cantilever();
+  json["wire"]["elements"] = 40;
+  Json tip = json["wire"]["sections"][0], shaft = tip;
+  tip["length_mm"] = 10;
+  tip["element_length_mm"] = 2.4;
+  tip.erase("bending_stiffness_n_mm2");
+  tip["bend_coefficient_n_per_m"] = 100;
+  shaft["length_mm"] = 30;
+  shaft.erase("axial_stiffness_n");
+  shaft["stretch_coefficient_n_per_m3"] = 8e10;
+  json["wire"]["sections"] = {tip, shaft};
+  const simulate::Scene scene = *read_scene(write("scene.json", json.dump())).bench;
+  EXPECT_NEAR(scene.wire.sections[0].bending_stiffness, 0.8, 1e-12);
+  EXPECT_NEAR(scene.wire.sections[1].axial_stiffness, 160.0, 1e-10);
+  const Eigen::VectorXd lengths = simulate::edge_lengths(scene);
+  ASSERT_EQ(lengths.size(), 35);
+  EXPECT_DOUBLE_EQ(lengths[0], 1.0);
+  EXPECT_DOUBLE_EQ(lengths[34], 2.0);
+
+  // With a length in every section the number of elements is not asked for.
+  json["wire"].erase("elements");
+  expect_mentions(scene_problem(json), {"wire.elements is missing"});
+  json["wire"]["sections"][1]["element_length_mm"] = 1;
+  EXPECT_EQ(scene_problem(json), "");
+  json["wire"]["sections"][1]["element_length_mm"] = 0.001;
+  expect_mentions(scene_problem(json), {"wire.sections is of", "2 to 20000"});
+}
+
+TEST_F(CaseFile, MethodsTwistAndTableOfABenchAreRead) {
+  Json json = motion("semi_implicit");
+  json["solver"].update(
+      {{"time_step_s", 2e-5}, {"duration_s", 0.5}, {"damping_per_s", 20}, {"max_iterations", 7}});
+  json["supports"][0]["roll_deg"] = 9720;  // 27 turns
+  simulate::Scene scene = *read_scene(write("scene.json", json.dump())).bench;
+  EXPECT_EQ(scene.solver.method, simulate::Method::kSemiImplicitEuler);
+  EXPECT_EQ(scene.solver.time_step, 2e-5);
+  EXPECT_EQ(scene.solver.duration, 0.5);
+  EXPECT_EQ(scene.solver.damping, 20.0);
+  EXPECT_NEAR(scene.supports[0].roll, 54.0 * kPi, 1e-10);
+  EXPECT_EQ(scene.twist, simulate::Twist::kAuto);
+  EXPECT_FALSE(scene.plane);
+  const std::map<std::string, simulate::Method> methods = {
+      {"newton", simulate::Method::kNewton},
+      {"conjugate_gradient", simulate::Method::kConjugateGradient},
+      {"explicit", simulate::Method::kExplicitEuler}};
+  for (const auto& [name, method] : methods) {
+    EXPECT_EQ(read_scene(write("scene.json", motion(name).dump())).bench->solver.method, method);
+  }
+
+  scene = *read_scene(write("scene.json", decoupled().dump())).bench;
+  EXPECT_EQ(scene.twist, simulate::Twist::kDecoupled);
+  EXPECT_EQ(scene.loads.tip_torque, 0.01);
+  json = cantilever();
+  json["wire"]["twist"] = "coupled";
+  json["loads"]["tip_moment_n_mm"] = {0, 0, 2};
+  json["plane_normal"] = {0, 0, 3};
+  scene = *read_scene(write("scene.json", json.dump())).bench;
+  EXPECT_EQ(scene.twist, simulate::Twist::kCoupled);
+  EXPECT_EQ(scene.loads.tip_moment, Vec3(0, 0, 2));
+  ASSERT_TRUE(scene.plane);
+  EXPECT_EQ(*scene.plane, Vec3(0, 0, 1));
+}
+
+TEST_F(CaseFile, ResultsOfBenchesFromFileToFile) {
+  // Newton: no time steps. Explicit Euler: unstable, with its limit. Decoupled: rolls.
+  const auto result_of = [this](const Json& json) {
+    const SceneFile file = read_scene(write("scene.json", json.dump()));
+    write_json(result_json(simulate::run_scene(*file.bench)), folder_ / "result.json");
+    return read_json(folder_ / "result.json", "wireplan.result/1");
+  };
+  const Json newton = result_of(cantilever());
+  EXPECT_EQ(newton.at("outcome"), "converged");
+  EXPECT_TRUE(newton.at("critical_time_step_s").is_null());
+  EXPECT_TRUE(newton.at("critical_time_step_s_reason").is_string());
+  EXPECT_EQ(newton.at("simulated_time_s"), 0.0);
+  Json json = motion("explicit");
+  json["solver"]["damping_per_s"] = 2000;
+  const Json unstable = result_of(json);
+  EXPECT_EQ(unstable.at("outcome"), "unstable");
+  EXPECT_NEAR(unstable.at("critical_time_step_s").get<double>(), 1.25e-6, 0.01e-6);
+  EXPECT_TRUE(unstable.at("reason").is_string());
+  EXPECT_EQ(unstable.at("nodes_mm").size(), 21u);
+  const Json twisted = result_of(decoupled());
+  EXPECT_EQ(twisted.at("terms"),
+            Json({"stretch", "bend", "decoupled_twist", "gravity", "tip_torque"}));
+  EXPECT_NEAR(twisted.at("roll_rad")[20].get<double>(), 0.01 * 40.0 / 0.62, 1e-12);
+  EXPECT_EQ(twisted.at("nodes_mm"), newton.at("nodes_mm"));
+  json = cantilever();
+  json["loads"] = {{"tip_moment_n_mm", {0, 0, 0.02}}};
+  const Json bent = result_of(json);
+  EXPECT_EQ(bent.at("terms"), Json({"stretch", "bend", "tip_moment"}));
+  EXPECT_NEAR(bent.at("energy_n_mm").at("tip_moment").get<double>(), -0.02, 0.05 * 0.02);
+  EXPECT_NEAR(bent.at("energy_n_mm").at("tip_force").get<double>(), 0.0, 1e-15);
+}
+
 TEST_F(CaseFile, InsertionSceneBecomesATrial) {
   const SceneFile file = read_scene(write("scene.json", pushed_wire().dump()));
   EXPECT_FALSE(file.bench);
@@ -666,11 +776,53 @@ TEST_F(CaseFile, ScenesSayWhatIsWrongOrNotInThisVersion) {
     std::vector<std::string> told;
   };
   const std::vector<Mistake> mistakes = {
-      {cantilever(), "/solver/method", "explicit", {"solver.method is \"explicit\"", "version"}},
       {cantilever(), "/solver/method", "newtn", {"solver.method is \"newtn\"", "\"newton\""}},
-      {cantilever(), "/solver/damping_per_s", 1, {"solver.damping_per_s is given", "version"}},
-      {cantilever(), "/loads/tip_moment_n_mm", {0, 0, 1}, {"loads.tip_moment_n_mm", "version"}},
-      {cantilever(), "/supports/0/roll_deg", 500, {"supports[0].roll_deg is 500", "to 360"}},
+      {cantilever(), "/solver/damping_per_s", 1, {"solver.damping_per_s is given", "newton"}},
+      {cantilever(), "/solver/time_step_s", 1, {"solver.time_step_s is given", "newton"}},
+      {motion("explicit"), "/solver/time_step_s", 0, {"solver.time_step_s is 0", "above 0"}},
+      {motion("explicit"), "/solver/duration_s", 1e7, {"solver.duration_s", "1e9 time steps"}},
+      {motion("explicit"), "/solver/load_steps", 2, {"solver.load_steps is given", "in full"}},
+      {motion("explicit"),
+       "/wire/sections/0/mass_kg_per_m",
+       0,
+       {"loads.gravity_m_per_s2", "mass_kg_per_m is 0", "above 0"}},
+      {motion("semi_implicit"), "/wire/twist", "coupled", {"wire.twist is \"coupled\"", "newton"}},
+      {motion("conjugate_gradient"),
+       "/solver/damping_per_s",
+       1,
+       {"solver.damping_per_s is given", "time step"}},
+      {motion("conjugate_gradient"),
+       "/loads/tip_moment_n_mm",
+       {0, 0, 1},
+       {"loads.tip_moment_n_mm is [0.0,0.0,1.0]", "newton"}},
+      {motion("conjugate_gradient"),
+       "/wire/sections/0/rest_curvature_per_mm",
+       0.01,
+       {"wire.sections is with rest_curvature_per_mm", "newton"}},
+      {motion("conjugate_gradient"),
+       "/plane_normal",
+       {0, 0, 1},
+       {"plane_normal is given", "newton"}},
+      {cantilever(), "/plane_normal", {1, 0, 1}, {"plane_normal", "supports lie in"}},
+      {cantilever(), "/loads/tip_moment_n_mm", {1, 0, 0}, {"along the wire", "roll_deg"}},
+      {cantilever(), "/loads/tip_torque_n_mm", 1, {"loads.tip_torque_n_mm is 1", "decoupled"}},
+      {cantilever(), "/wire/twist", "both", {"wire.twist is \"both\"", "\"decoupled\""}},
+      {decoupled(),
+       "/wire/sections/0/rest_curvature_per_mm",
+       0.01,
+       {"wire.twist is \"decoupled\"", "bends and twists together"}},
+      {decoupled(),
+       "/supports/1",
+       {{"at", "distal"}, {"kind", "clamped"}, {"point_mm", {30, 0, 0}}},
+       {"loads.tip_torque_n_mm", "holds the roll already"}},
+      {cantilever(),
+       "/wire/sections/0/element_length_mm",
+       1,
+       {"wire.elements is given", "element_length_mm"}},
+      {pushed_wire(), "/solver/method", "explicit", {"solver.method", "bench alone"}},
+      {pushed_wire(), "/wire/twist", "decoupled", {"wire.twist", "\"auto\""}},
+      {pushed_wire(), "/plane_normal", {0, 0, 1}, {"plane_normal is given", "version"}},
+      {cantilever(), "/supports/0/roll_deg", 50000, {"supports[0].roll_deg is 50000", "to 36000"}},
       {cantilever(), "/supports/0/direction", {0, 0, 0}, {"supports[0].direction", "not all 0"}},
       {cantilever(), "/supports/0/kind", "pinned", {"not enough to hold the wire"}},
       {cantilever(), "/supports/0/at", "distal", {"without one at the proximal end"}},

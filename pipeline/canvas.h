@@ -1,0 +1,43 @@
+#pragma once
+/// What pictures and plots share: a raster with boxes, lines and text, and the PNG file. For use in
+/// this folder. VTK sets the text and writes the file; no display is needed (see picture.h).
+#include <Eigen/Core>
+#include <cstdint>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+namespace wireplan::pipeline {
+
+using Color = Eigen::Vector3f;  // red, green, blue in [0, 1]
+
+inline const Color kPaper(1.0F, 1.0F, 1.0F), kInk(0.15F, 0.15F, 0.15F), kGrey(0.5F, 0.5F, 0.5F);
+
+/// Rows from the bottom up, pixels from left to right, three bytes (red, green, blue) each.
+struct Picture {
+  int width = 0, height = 0;
+  std::vector<std::uint8_t> rgb;
+};
+
+/// All paper.
+Picture blank_picture(int width, int height);
+
+void fill_box(Picture& picture, int x_0, int y_0, int width, int height, const Color& color);
+
+/// A smooth line `width` pixels wide with round ends; a dot where `a` and `b` are equal.
+void draw_line(Picture& picture, const Eigen::Vector2d& a, const Eigen::Vector2d& b, double width,
+               const Color& color);
+
+enum class Align { kLeft, kCenter, kRight };
+
+/// Text in VTK's built-in font with its middle at row `y`. Text that cannot be set is left out.
+void draw_text(Picture& picture, const std::string& text, int x, int y, int size, Align align,
+               const Color& color = kInk);
+
+/// One number in the manner of printf, e.g. "%g mm".
+std::string format(const char* pattern, double value);
+
+/// Throws `Error` where the file cannot be written.
+void write_png(const Picture& picture, const std::filesystem::path& png);
+
+}  // namespace wireplan::pipeline

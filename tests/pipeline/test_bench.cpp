@@ -1,0 +1,170 @@
+// `wireplan bench`: what it writes, and what its quick sizes must show.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstdlib>
+#include <map>
+
+#include "pipeline/bench.h"
+#include "pipeline/bench_report.h"
+#include "tests/pipeline/small_case.h"
+
+namespace wireplan::pipeline {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// A bench in its quick size, and what it said.
+struct QuickRun {
+  explicit QuickRun(const std::string& name) {
+    testing::internal::CaptureStdout();
+    const int code = run_bench(name, folder.path(), {.quick = true});
+    text = testing::internal::GetCapturedStdout();
+    EXPECT_EQ(code, 0);
+    result = read_json(folder / (name + ".json"), kBenchSchema);
+  }
+  TemporaryFolder folder;
+  std::string text;
+  Json result;
+};
+
+/// The fields of one line of CSV.
+std::vector<std::string> fields_of(const std::string& line) {
+  std::vector<std::string> fields(1);
+  bool quoted = false;
+  for (std::size_t k = 0; k < line.size(); ++k) {
+    if (line[k] == '"' && quoted && line[k + 1] == '"') {
+      fields.back() += line[++k];
+    } else if (line[k] == '"') {
+      quoted = !quoted;
+    } else if (line[k] == ',' && !quoted) {
+      fields.emplace_back();
+    } else {
+      fields.back() += line[k];
+    }
+  }
+  return fields;
+}
+
+void expect_same_rows(const Json& rows, const fs::path& csv_file) {
+  std::istringstream csv(read_text(csv_file));
+  std::string line;
+  ASSERT_TRUE(std::getline(csv, line));
+  const std::vector<std::string> keys = fields_of(line);
+  for (const Json& row : rows) {
+    ASSERT_TRUE(std::getline(csv, line));
+    const std::vector<std::string> fields = fields_of(line);
+    ASSERT_EQ(fields.size(), row.size());
+    std::size_t k = 0;
+    for (const auto& [key, value] : row.items()) {
+      EXPECT_EQ(keys[k], key);
+      const std::string text = value.is_null()     ? ""
+                               : value.is_string() ? value.get<std::string>()
+                                                   : value.dump();
+      EXPECT_EQ(fields[k++], text) << key;
+    }
+  }
+  EXPECT_FALSE(std::getline(csv, line));
+}
+
+/// With the JSON Schema library of Python. False where there is none.
+bool expect_valid(const fs::path& document) {
+  const std::string python = "/usr/bin/python3 -W ignore";
+  if (std::system((python + " -c 'import jsonschema' 2> /dev/null").c_str()) != 0) return false;
+  const fs::path schema = fs::path(WIREPLAN_SOURCE_DIR) / "pipeline/schemas/bench.schema.json";
+  const std::string command =
+      python + " -m jsonschema -i '" + document.string() + "' '" + schema.string() + "'";
+  EXPECT_EQ(std::system(command.c_str()), 0);
+  return true;
+}
+
+TEST(Bench, WritesOneResultAsTextTableJsonAndPlot) {
+  bool validated = true;
+  for (const std::string name : {"accuracy", "stability"}) {
+    SCOPED_TRACE(name);
+    const QuickRun run(name);
+    EXPECT_NE(run.text.find("method"), std::string::npos);
+    EXPECT_NE(run.text.find((run.folder / name).string()), std::string::npos);
+    expect_same_rows(run.result.at("rows"), run.folder / (name + ".csv"));
+    const fs::path plot = run.folder / (name + ".png");
+    EXPECT_EQ(read_text(plot).substr(1, 3), "PNG");
+    EXPECT_GT(fs::file_size(plot), 10'000u);  // a plot, not a blank sheet
+    validated = expect_valid(run.folder / (name + ".json")) && validated;
+  }
+  if (!validated) GTEST_SKIP() << "python3 has no jsonschema (package python3-jsonschema)";
+}
+
+/// Error of one method at its tightest tolerance, by the number of elements.
+std::map<int, double> errors_of(const Json& rows, const std::string& scene,
+                                const std::string& method) {
+  std::map<int, double> errors;
+  for (const Json& row : rows) {  // tolerances fall, so the last one stays
+    if (row.at("scene") == scene && row.at("method") == method) {
+      errors[row.at("elements")] = row.at("error_percent_of_length");
+    }
+  }
+  return errors;
+}
+
+TEST(Bench, ErrorFallsWithTheSquareOfTheElementLength) {
+  const QuickRun accuracy("accuracy");
+  const Json& rows = accuracy.result.at("rows");
+  for (const std::string scene : {"heavy_cantilever", "tip_load", "roll_up", "bend_45"}) {
+    SCOPED_TRACE(scene);
+    const std::map<int, double> errors = errors_of(rows, scene, "newton");
+    ASSERT_EQ(errors.size(), 4u);
+    // From 40 to 80 elements; the fourth-order part still shows.
+    EXPECT_NEAR(std::log2(errors.at(40) / errors.at(80)), 2.0, 0.1);
+    const std::map<int, double> better = errors_of(rows, scene, "newton_richardson");
+    EXPECT_LT(better.at(80), 0.1 * errors.at(80));
+    EXPECT_LT(better.at(20), 0.1);  // 0.1 % at the paper's 20 elements
+  }
+  for (const std::string method : {"conjugate_gradient", "explicit", "semi_implicit"}) {
+    EXPECT_FALSE(errors_of(rows, "heavy_cantilever", method).empty()) << method;
+  }
+  const Json& table = accuracy.result.at("results").at("table_1");
+  EXPECT_EQ(table.at("explicit_ms").size(), 1u);
+  EXPECT_GT(table.at("ratio"), 10.0);  // a thousand times fewer steps; the time is not the test's
+
+  // The answers agree with published ones, which have four or five digits and, for the last two of
+  // the three, a wire that does not stretch: up to 6e-5 of 78 mm and 3e-5 of 40 mm.
+  int checked = 0;
+  for (const Json& scene : accuracy.result.at("description").at("scenes")) {
+    if (!scene.contains("distance_from_second_source_mm")) continue;
+    EXPECT_LT(scene.at("distance_from_second_source_mm"), 5e-3) << scene.at("name");
+    ++checked;
+  }
+  EXPECT_EQ(checked, 3);
+}
+
+TEST(Bench, ExplicitMethodsBreakWhereNewtonDoesNot) {
+  const QuickRun stability("stability");
+  std::map<std::string, int> rows, unstable;
+  for (const Json& row : stability.result.at("rows")) {
+    EXPECT_NE(row.at("verdict"), "failed") << row.dump();
+    ++rows[row.at("method")];
+    if (row.at("outcome") == "unstable") ++unstable[row.at("method")];
+  }
+  EXPECT_GE(rows["newton"], 40);
+  EXPECT_GE(rows["conjugate_gradient"], 30);
+  EXPECT_EQ(unstable["newton"], 0);
+  EXPECT_EQ(unstable["conjugate_gradient"], 0);
+  EXPECT_GT(unstable["explicit"], 10);
+  EXPECT_GT(unstable["semi_implicit"], 10);
+  const Json& lower =
+      stability.result.at("results").at("scenes_where_another_method_ends_lower_than_newton");
+  EXPECT_TRUE(lower.empty()) << lower.dump();
+}
+
+TEST(Bench, UnknownNameIsToldWithTheKnownOnes) {
+  const TemporaryFolder folder;
+  try {
+    run_bench("speed", folder.path(), {});
+    FAIL() << "no error";
+  } catch (const Error& error) {
+    EXPECT_EQ(std::string(error.what()), "bench: NAME is 'speed', expected accuracy or stability");
+  }
+}
+
+}  // namespace
+}  // namespace wireplan::pipeline
