@@ -584,8 +584,11 @@ NewtonResult Statics::solve_with(BlockBand<D>& hessian, BlockBand<D>& untouched,
   NewtonResult result;
   constexpr double kEpsilon = std::numeric_limits<double>::epsilon();
   const double extent = state.x.cwiseAbs().maxCoeff();
+  const Rod& rod = *problem.rod;
+  const double shortest = rod.rest_length.minCoeff();
   result.rounding_floor = 8.0 * kEpsilon * extent *
-                          problem.rod->stretch.cwiseQuotient(problem.rod->rest_length).maxCoeff();
+                          (rod.stretch.cwiseQuotient(rod.rest_length).maxCoeff() +
+                           4.0 * rod.bend.maxCoeff() / (shortest * shortest));
   double shift = 0.0;  // of the Hessian's diagonal
   trial_ = state;
   result.energy = derivatives_at(state);

@@ -34,9 +34,11 @@ log=$(mktemp)
 trap 'rm -f "$log"' EXIT
 apt() {
   "${as_root[@]}" env DEBIAN_FRONTEND=noninteractive \
-    apt-get -q -y -o Acquire::Retries=3 -o Dpkg::Use-Pty=0 "$@" </dev/null >>"$log" 2>&1
+    apt-get -q -y -o Acquire::Retries=3 -o DPkg::Lock::Timeout=300 -o Dpkg::Use-Pty=0 "$@" \
+    </dev/null >>"$log" 2>&1
 }
-if ! { apt update && apt install --no-install-recommends "${missing[@]}"; }; then
+apt update || true  # a broken source that has none of our packages does not matter
+if ! apt install --no-install-recommends "${missing[@]}"; then
   tail -n 30 "$log" >&2
   echo "install: apt-get failed (see above); expected network access and Debian 12, Ubuntu 22.04" \
     "or later" >&2

@@ -28,7 +28,9 @@ Json run_to_report(const fs::path& case_file, const fs::path& cache, int threads
 // With the JSON Schema library of Python: -1 where there is none.
 int validate(const fs::path& document, const fs::path& schema) {
   const std::string python = "/usr/bin/python3";
-  if (std::system((python + " -c 'import jsonschema' 2> /dev/null").c_str()) != 0) return -1;
+  const std::string probe =
+      python + " -c 'from jsonschema import Draft202012Validator' 2> /dev/null";
+  if (std::system(probe.c_str()) != 0) return -1;
   const std::string program =
       "import json, sys, jsonschema\n"
       "schema, document = (json.load(open(p)) for p in sys.argv[1:])\n"
