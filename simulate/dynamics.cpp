@@ -63,14 +63,6 @@ class Chain {
   Array stretch_, strain_, mass_, half_;  // one row: EA l/8, |v|^2 - 1, mass, EA/2
 };
 
-Mat3 free_directions(const EndSupport& support) {
-  const Mat3 along = support.axis * support.axis.transpose();
-  Mat3 P = Mat3::Zero();
-  if (!support.hold_along) P += along;
-  if (!support.hold_across) P += Mat3::Identity() - along;
-  return P;
-}
-
 Chain::Chain(const Problem& problem, const RodState& state)
     : nodes_(problem.rod->nodes()),
       row_(nodes_ + 1),

@@ -394,15 +394,6 @@ struct BandSink {
 
 // ---------------------------------------------------------------- supports
 
-/// Projector on what an end support leaves free at its node.
-Mat3 free_directions(const EndSupport& support) {
-  const Mat3 along = support.axis * support.axis.transpose();
-  Mat3 P = Mat3::Zero();
-  if (!support.hold_along) P += along;
-  if (!support.hold_across) P += Mat3::Identity() - along;
-  return P;
-}
-
 /// Takes what a support holds out of the system: rows and columns of block k are projected and the
 /// held directions get a unit pivot.
 template <int D>
@@ -543,6 +534,14 @@ void turn_edges(const Problem& problem, const RodState& state, const Eigen::Vect
 }
 
 }  // namespace
+
+Mat3 free_directions(const EndSupport& support) {
+  const Mat3 along = support.axis * support.axis.transpose();
+  Mat3 P = Mat3::Zero();
+  if (!support.hold_along) P += along;
+  if (!support.hold_across) P += Mat3::Identity() - along;
+  return P;
+}
 
 // ---------------------------------------------------------------- Newton
 

@@ -21,6 +21,9 @@ struct EndSupport {
   std::optional<Vec3> tangent;
 };
 
+/// Projector on the motions that an end support leaves to its node.
+Mat3 free_directions(const EndSupport& support);
+
 /// A moment on the distal edge about a fixed axis: it does work on the angle of the edge, seen
 /// along the axis. In a plane normal to the axis this is the dead moment of textbooks. Has no value
 /// where the edge lies along the axis.

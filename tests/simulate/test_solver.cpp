@@ -7,19 +7,10 @@
 #include "simulate/scene.h"
 #include "simulate/solver.h"
 #include "tests/shapes.h"
+#include "tests/simulate/paper_wire.h"
 
 namespace wireplan::simulate {
 namespace {
-
-// The paper's wire, of 40 mm: k_b = 100 N/m and k_s = 1e10 N/m^3 at 2 mm elements, 0.2 g each.
-Wire paper_wire() {
-  return {.name = "paper",
-          .radius = 0.4,
-          .sections = {{.length = 40.0,
-                        .bending_stiffness = 0.8,
-                        .axial_stiffness = 160.0,
-                        .mass_per_length = 0.1 * kTonnePerMmFromKgPerM}}};
-}
 
 Scene heavy_cantilever(int elements) {
   Scene scene;
