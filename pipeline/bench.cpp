@@ -8,6 +8,7 @@
 #include "pipeline/bench_report.h"
 #include "pipeline/commands.h"
 #include "pipeline/report.h"
+#include "preprocess/vessel_io.h"
 
 namespace wireplan::pipeline {
 namespace {
@@ -96,12 +97,19 @@ double median(std::vector<double> values) {
 
 int run_bench(const std::string& name, const std::filesystem::path& folder,
               const BenchOptions& options) {
-  if (name != "accuracy" && name != "stability") {
-    throw Error("bench: NAME is '" + name + "', expected accuracy or stability");
+  const auto make_report = name == "accuracy"     ? bench_accuracy
+                           : name == "stability"  ? bench_stability
+                           : name == "throughput" ? bench_throughput
+                                                  : nullptr;
+  if (make_report == nullptr) {
+    throw Error("bench: NAME is '" + name + "', expected accuracy, stability or throughput");
+  }
+  if (make_report != bench_throughput && !options.case_path.empty()) {
+    throw Error("bench: --case is '" + options.case_path +
+                "', expected none: accuracy and stability have scenes of their own");
   }
   std::filesystem::create_directories(folder);
-  const BenchReport report =
-      name == "accuracy" ? bench_accuracy(options) : bench_stability(options);
+  const BenchReport report = make_report(options);
 
   Json file;
   file["schema"] = kBenchSchema;
@@ -114,6 +122,9 @@ int run_bench(const std::string& name, const std::filesystem::path& folder,
   write_json(file, folder / (name + ".json"));
   write_csv(report.rows, folder / (name + ".csv"));
   write_png(report.plot, folder / (name + ".png"));
+  for (const BenchSurface& vessel : report.surfaces) {
+    preprocess::write_surface(vessel.surface, folder / (vessel.name + ".vtp"));
+  }
   std::cout << report.text << "\n"
             << "files: " << (folder / name).string() << ".json, .csv, .png\n";
   return kDone;

@@ -1,17 +1,23 @@
 #pragma once
-/// `wireplan bench NAME`: error against run time, and stability (design section 8). Every bench
-/// writes NAME.json, NAME.csv and NAME.png into its folder and prints what it found.
+/// `wireplan bench NAME`: error against run time, stability and throughput (design section 8).
+/// Every bench writes NAME.json, NAME.csv and NAME.png into its folder and prints what it found.
 #include <filesystem>
 #include <string>
+#include <vector>
 
 namespace wireplan::pipeline {
 
 struct BenchOptions {
   bool quick = false;  // a small size, under 20 s
+  /// Throughput alone: a case whose vessel takes the place of the one made in code, with values of
+  /// it to change ("surface.edge_length_mm=2"), and the store of its stages; empty: the default.
+  std::string case_path = {};
+  std::vector<std::string> overrides = {};
+  std::filesystem::path cache = {};
 };
 
-/// Names: "accuracy", "stability". Returns the exit code, kDone. Throws Error for another name and
-/// where a file cannot be written.
+/// Names: "accuracy", "stability", "throughput". Returns the exit code, kDone. Throws Error for
+/// another name and where a file cannot be written.
 int run_bench(const std::string& name, const std::filesystem::path& folder,
               const BenchOptions& options);
 

@@ -14,6 +14,7 @@ namespace {
 
 using simulate::EndSupport;
 using simulate::MotionOptions;
+using simulate::MotionOutcome;
 using simulate::MotionResult;
 using simulate::NewtonResult;
 using simulate::Problem;
@@ -48,11 +49,8 @@ struct Model {
   Model(const AccuracyScene& scene, int elements)
       : rod(build_rod(scene.wire, scene.wire.length(), elements)),
         load(scene.gravity * rod.mass.transpose()) {
-    // The first edge of a curved wire is a chord: the clamp holds it to the tangent at its middle.
-    // The wire bends toward +y.
-    const double chord = 0.5 * scene.wire.sections.front().rest_curvature * rod.rest_length[0];
-    const Vec3 along(std::cos(chord), std::sin(chord), 0.0);
-    start = rest_state(rod, Vec3::Zero(), along, kPi);
+    const Vec3 along = Vec3::UnitX();
+    start = rest_state(rod, Vec3::Zero(), along, kPi);  // a curved wire bends toward +y
     load.rightCols<1>() += scene.tip_force;
     problem.rod = &rod;
     problem.last = rod.nodes();
@@ -229,18 +227,27 @@ struct Solve {
   double milliseconds = 0.0;  // of the solver alone
   long iterations = 0;
   double residual = 0.0;  // [N]
+  std::string outcome;    // "converged" to the tolerance, "not_converged" or "unstable"
 };
 
-/// One row: a method at one size and tolerance, and the times of its solves.
+/// One row: a method at one size and tolerance, the iterations or steps that it may take, and the
+/// times of its solves.
 struct Contender {
   const AccuracyScene* scene;
   std::string method;
   int elements;
   double tolerance;
+  long step_limit;
   std::function<Solve()> solve;
   Solve last{};
+  int solves = 0;
   std::vector<double> times{};
 
+  /// The first solve warms up and counts for slow ones alone.
+  void solve_once(double enough_ms) {
+    last = solve();
+    if (++solves > 1 || last.milliseconds > 5.0 * enough_ms) times.push_back(last.milliseconds);
+  }
   /// Until `enough_ms` and 5 solves, or ten times as long.
   bool wants_more(double enough_ms) const {
     double sum = 0.0;
@@ -249,22 +256,19 @@ struct Contender {
   }
 };
 
-/// Times all contenders in turn, round by round, until each has enough. The first round warms up
-/// and counts for slow ones alone.
+/// Times all contenders in turn, round by round, until each has enough.
 void measure(std::vector<Contender>& contenders, double enough_ms) {
   bool more = true;
-  for (bool warm = false; more; warm = true) {
+  while (more) {
     more = false;
     for (Contender& contender : contenders) {
-      if (warm && !contender.wants_more(enough_ms)) continue;
-      contender.last = contender.solve();
-      if (warm || contender.last.milliseconds > 5.0 * enough_ms) {
-        contender.times.push_back(contender.last.milliseconds);
-      }
+      if (contender.wants_more(enough_ms)) contender.solve_once(enough_ms);
       more = more || contender.wants_more(enough_ms);
     }
   }
 }
+
+double enough_ms(bool quick) { return quick ? 2.0 : 20.0; }
 
 double error_percent(const AccuracyScene& scene, const Vec3& tip) {
   return 100.0 * (tip - scene.tip).norm() / scene.wire.length();
@@ -276,6 +280,8 @@ Json row_of(const Contender& contender) {
   row["method"] = contender.method;
   row["elements"] = contender.elements;
   row["residual_tolerance_n"] = clean(contender.tolerance);
+  row["step_limit"] = contender.step_limit;
+  row["outcome"] = contender.last.outcome;
   row["error_percent_of_length"] = error_percent(*contender.scene, contender.last.tip);
   row["solve_ms"] = median(contender.times);
   row["iterations"] = contender.last.iterations;
@@ -285,20 +291,26 @@ Json row_of(const Contender& contender) {
 
 // ---------------------------------------------------------------- methods
 
+constexpr int kNewtonIterations = 200;
+
 Solve solve_newton(const Model& model, Statics& statics, RodState& state, double tolerance) {
   state = model.start;
   const double begin = thread_milliseconds();
-  const NewtonResult result =
-      statics.solve(model.problem, state, {.residual_tolerance = tolerance});
-  return {state.x.rightCols<1>(), thread_milliseconds() - begin, result.iterations,
-          result.residual};
+  const NewtonResult result = statics.solve(
+      model.problem, state, {.residual_tolerance = tolerance, .max_iterations = kNewtonIterations});
+  return {state.x.rightCols<1>(), thread_milliseconds() - begin, result.iterations, result.residual,
+          result.converged ? "converged" : "not_converged"};
 }
 
 Contender newton(const AccuracyScene& scene, int elements, double tolerance) {
   const auto model = std::make_shared<Model>(scene, elements);
   const auto statics = std::make_shared<Statics>();
   const auto state = std::make_shared<RodState>();
-  return {&scene, "newton", elements, tolerance,
+  return {&scene,
+          "newton",
+          elements,
+          tolerance,
+          kNewtonIterations,
           [=] { return solve_newton(*model, *statics, *state, tolerance); }};
 }
 
@@ -308,11 +320,12 @@ Contender newton_richardson(const AccuracyScene& scene, int elements, double tol
   const auto coarse = std::make_shared<Model>(scene, elements / 2);
   const auto statics = std::make_shared<Statics>();
   const auto state = std::make_shared<RodState>();
-  return {&scene, "newton_richardson", elements, tolerance, [=] {
+  return {&scene, "newton_richardson", elements, tolerance, 2 * kNewtonIterations, [=] {
             const Solve a = solve_newton(*coarse, *statics, *state, tolerance);
             const Solve b = solve_newton(*fine, *statics, *state, tolerance);
             return Solve{extrapolate(a.tip, b.tip), a.milliseconds + b.milliseconds,
-                         a.iterations + b.iterations, std::max(a.residual, b.residual)};
+                         a.iterations + b.iterations, std::max(a.residual, b.residual),
+                         a.outcome == "converged" ? b.outcome : a.outcome};
           }};
 }
 
@@ -322,36 +335,53 @@ Solve solve_motion(Motion run, const Model& model, const MotionOptions& options)
   RodState state = model.start;
   const double begin = thread_milliseconds();
   const MotionResult result = run(model.problem, state, options);
-  return {state.x.rightCols<1>(), thread_milliseconds() - begin, result.steps, result.residual};
+  const double milliseconds = thread_milliseconds() - begin;
+  return {state.x.rightCols<1>(), milliseconds, result.steps, result.residual,
+          result.outcome == MotionOutcome::kConverged  ? "converged"
+          : result.outcome == MotionOutcome::kFinished ? "not_converged"
+                                                       : "unstable"};
 }
 
-/// A method that steps through time: to the tolerance, or for as many steps as fit into
-/// `budget_ms` by the time that a short run takes.
-Contender motion(const AccuracyScene& scene, const std::string& name, Motion run, int elements,
-                 double tolerance, MotionOptions options, double budget_ms) {
+/// A method that steps through time, to ever tighter tolerances (parts of the load). The steps of a
+/// run are limited, and where they are not enough for a tolerance, no tighter one is tried. What
+/// the first run reaches within a hundredth and a tenth of them is shown too.
+void add_motion(const AccuracyScene& scene, const std::string& name, Motion run, int elements,
+                bool quick, MotionOptions options, std::vector<Contender>& list) {
+  const std::vector<double> parts =
+      quick ? std::vector<double>{1e-3} : std::vector<double>{1e-3, 1e-4, 1e-5, 1e-6};
+  // Steps in inverse proportion to what one costs, about 10 ns per element: 1.5 s, quick 0.03 s.
+  const long step_limit = (quick ? 3'000'000 : 150'000'000) / elements;
   const auto model = std::make_shared<Model>(scene, elements);
-  constexpr double kTrialSteps = 2000.0;
-  options.duration = kTrialSteps * options.time_step;
-  const Solve trial = solve_motion(run, *model, options);
-  const double steps = budget_ms / std::max(1e-6, trial.milliseconds) * kTrialSteps;
-  options.duration = std::max(steps, kTrialSteps) * options.time_step;
-  options.residual_tolerance = tolerance;
-  return {&scene, name, elements, tolerance, [=] { return solve_motion(run, *model, options); }};
+  const auto converges = [&](double part, long steps) {
+    options.residual_tolerance = part * load_of(scene);
+    options.duration = static_cast<double>(steps) * options.time_step;
+    Contender row{&scene,   name,
+                  elements, options.residual_tolerance,
+                  steps,    [=] { return solve_motion(run, *model, options); }};
+    row.solve_once(enough_ms(quick));
+    list.push_back(row);
+    return row.last.outcome == "converged";
+  };
+  const double first = parts.front();
+  if (!converges(first, step_limit / 100) && !converges(first, step_limit / 10) &&
+      !converges(first, step_limit)) {
+    return;
+  }
+  for (std::size_t k = 1; k < parts.size(); ++k) {
+    if (!converges(parts[k], step_limit)) return;
+  }
 }
 
 /// Damping of the Euler schemes, twice the lowest frequency of the hanging wire, about 25/s.
 constexpr double kDamping = 50.0;  // [1/s]
 
-/// An Euler scheme at half of its critical step.
-Contender euler(const AccuracyScene& scene, const std::string& name, Motion run, int elements,
-                double tolerance, double budget_ms) {
+/// Half of the critical step of an Euler scheme.
+double half_critical_step(const AccuracyScene& scene, Motion run, int elements) {
   const Model model(scene, elements);
   RodState state = model.start;
-  const MotionResult probe =
-      run(model.problem, state, {.time_step = 1e-12, .duration = 1e-12, .damping = kDamping});
-  const double step = 0.5 * probe.critical_time_step;
-  return motion(scene, name, run, elements, tolerance, {.time_step = step, .damping = kDamping},
-                budget_ms);
+  return 0.5 *
+         run(model.problem, state, {.time_step = 1e-12, .duration = 1e-12, .damping = kDamping})
+             .critical_time_step;
 }
 
 std::vector<Contender> contenders_of(const AccuracyScene& scene, bool quick) {
@@ -366,22 +396,15 @@ std::vector<Contender> contenders_of(const AccuracyScene& scene, bool quick) {
     }
   }
   if (!scene.forces_alone()) return list;
-  const std::vector<double> parts =
-      quick ? std::vector<double>{1e-3} : std::vector<double>{1e-3, 1e-4, 1e-5, 1e-6};
   for (const int elements : sizes) {
-    if (elements > (quick ? 20 : 160)) continue;
-    for (const double part : parts) {
-      list.push_back(motion(scene, "conjugate_gradient", simulate::run_conjugate_gradient, elements,
-                            part * load, {.time_step = 1e-3}, quick ? 100.0 : 1500.0));
-    }
-    if (elements > (quick ? 10 : 40)) continue;
-    for (const double part : parts) {
-      const double budget = quick ? 100.0 : 2500.0;
-      list.push_back(
-          euler(scene, "explicit", simulate::run_explicit_euler, elements, part * load, budget));
-      list.push_back(euler(scene, "semi_implicit", simulate::run_semi_implicit_euler, elements,
-                           part * load, budget));
-    }
+    add_motion(scene, "conjugate_gradient", simulate::run_conjugate_gradient, elements, quick,
+               {.time_step = 1e-3}, list);
+    const auto add_euler = [&](const char* name, Motion run) {
+      const double step = half_critical_step(scene, run, elements);
+      add_motion(scene, name, run, elements, quick, {.time_step = step, .damping = kDamping}, list);
+    };
+    add_euler("explicit", simulate::run_explicit_euler);
+    add_euler("semi_implicit", simulate::run_semi_implicit_euler);
   }
   return list;
 }
@@ -454,13 +477,13 @@ std::string table_1_text(const Json& table) {
 
 // ---------------------------------------------------------------- what came out
 
-/// Per scene and method, the fastest row within each of some errors.
+/// Per scene and method, the fastest converged row within each of some errors.
 std::vector<Json> fastest_rows(const std::vector<Json>& rows) {
   std::vector<Json> best;
   for (const double bound : {1.0, 0.1, 0.01}) {
     std::vector<Json> found;
     for (const Json& row : rows) {
-      if (row.at("error_percent_of_length") > bound) continue;
+      if (row.at("outcome") != "converged" || row.at("error_percent_of_length") > bound) continue;
       const auto same = std::find_if(found.begin(), found.end(), [&](const Json& other) {
         return other.at("scene") == row.at("scene") && other.at("method") == row.at("method");
       });
@@ -481,24 +504,29 @@ std::vector<Json> fastest_rows(const std::vector<Json>& rows) {
 const std::vector<std::string> kMethods = {"newton", "newton_richardson", "conjugate_gradient",
                                            "explicit", "semi_implicit"};
 
+/// A line per method through what converged, and a dot for each run that was stopped before.
 Picture plot_of(const std::vector<AccuracyScene>& scenes, const std::vector<Json>& rows) {
-  const std::vector<LegendEntry> legend = {{kMethods[0], Color(0.05F, 0.10F, 0.65F)},
-                                           {kMethods[1], Color(0.00F, 0.60F, 0.55F)},
-                                           {kMethods[2], Color(0.75F, 0.10F, 0.55F)},
-                                           {kMethods[3], Color(0.85F, 0.45F, 0.00F)},
-                                           {kMethods[4], Color(0.45F, 0.45F, 0.45F)}};
+  const std::vector<LegendEntry> legend = {
+      {kMethods[0], Color(0.05F, 0.10F, 0.65F)}, {kMethods[1], Color(0.00F, 0.60F, 0.55F)},
+      {kMethods[2], Color(0.75F, 0.10F, 0.55F)}, {kMethods[3], Color(0.85F, 0.45F, 0.00F)},
+      {kMethods[4], Color(0.45F, 0.45F, 0.45F)}, {"stopped before", Color(0.80F, 0.75F, 0.60F)}};
+  const std::size_t stopped = kMethods.size();
   constexpr double kLeastError = 1e-7;  // [%] shown
   std::vector<FrontPlot> plots;
   for (const AccuracyScene& scene : scenes) {
     FrontPlot plot{scene.name, "time of one solve [ms]", "error of the tip [% of the length]", {}};
-    for (std::size_t k = 0; k < kMethods.size(); ++k) {
-      FrontLine line{k, {}};
-      for (const Json& row : rows) {
-        if (row.at("scene") != scene.name || row.at("method") != kMethods[k]) continue;
-        const double error = row.at("error_percent_of_length");
-        line.points.emplace_back(row.at("solve_ms").get<double>(), std::max(kLeastError, error));
+    for (std::size_t k = 0; k < kMethods.size(); ++k) plot.lines.push_back({k, {}});
+    for (const Json& row : rows) {
+      if (row.at("scene") != scene.name) continue;
+      const Eigen::Vector2d point(
+          row.at("solve_ms").get<double>(),
+          std::max(kLeastError, row.at("error_percent_of_length").get<double>()));
+      if (row.at("outcome") == "converged") {
+        const auto method = std::find(kMethods.begin(), kMethods.end(), row.at("method"));
+        plot.lines[static_cast<std::size_t>(method - kMethods.begin())].points.push_back(point);
+      } else {
+        plot.lines.push_back({stopped, {point}});  // by itself, so that no line joins it
       }
-      plot.lines.push_back(line);
     }
     plots.push_back(plot);
   }
@@ -526,9 +554,14 @@ Json describe(const std::vector<AccuracyScene>& scenes) {
         {"semi_implicit", "Euler at half of the critical step, damping 50/s, to the tolerance"}}},
       {"time",
        "solver only, one thread's CPU time, median of at least 20 ms and 5 solves (quick: 2 ms; "
-       "slow ones: ten times as long) after a warm-up, all rows of a scene in turn; stepping "
-       "methods end at a budget "
-       "of time where the tolerance is not met before"}};
+       "slow ones: ten times as long) after a warm-up, all rows of a scene in turn; of the Euler "
+       "schemes it includes finding the critical step"},
+      {"outcome",
+       "converged: to residual_tolerance_n, or newton to what rounding leaves. not_converged: "
+       "step_limit iterations or time steps "
+       "were not enough; the error is what they reach, and no tighter tolerance was tried. "
+       "step_limit is 1.5e8 (quick: 3e6) over the elements for the methods that step, and at the "
+       "first tolerance a hundredth and a tenth of it too"}};
 }
 
 }  // namespace
@@ -539,7 +572,7 @@ BenchReport bench_accuracy(const BenchOptions& options) {
   report.description = describe(scenes);
   for (const AccuracyScene& scene : scenes) {
     std::vector<Contender> contenders = contenders_of(scene, options.quick);
-    measure(contenders, options.quick ? 2.0 : 20.0);
+    measure(contenders, enough_ms(options.quick));
     std::stable_sort(contenders.begin(), contenders.end(), [](const auto& a, const auto& b) {
       const auto place = [](const Contender& c) {
         return std::find(kMethods.begin(), kMethods.end(), c.method);

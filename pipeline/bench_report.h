@@ -6,10 +6,17 @@
 #include "pipeline/bench.h"
 #include "pipeline/canvas.h"
 #include "pipeline/json_reader.h"
+#include "preprocess/vessel.h"
 
 namespace wireplan::pipeline {
 
 inline constexpr const char* kBenchSchema = "wireplan.bench/1";
+
+/// A vessel that was benched, written to NAME.vtp.
+struct BenchSurface {
+  std::string name;
+  Surface surface;
+};
 
 struct BenchReport {
   Json description;        // scenes, methods, what the columns mean: the same on every machine
@@ -17,10 +24,12 @@ struct BenchReport {
   Json results;            // what the rows come to
   std::string text;        // for standard output
   Picture plot;
+  std::vector<BenchSurface> surfaces = {};
 };
 
 BenchReport bench_accuracy(const BenchOptions& options);
 BenchReport bench_stability(const BenchOptions& options);
+BenchReport bench_throughput(const BenchOptions& options);
 
 /// Rows as a table for people: columns aligned, numbers with 4 digits.
 std::string table_text(const std::vector<Json>& rows);

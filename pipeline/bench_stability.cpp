@@ -16,7 +16,6 @@ namespace wireplan::pipeline {
 namespace {
 
 using simulate::EndSupport;
-using simulate::Lumen;
 using simulate::MotionOptions;
 using simulate::MotionOutcome;
 using simulate::MotionResult;
@@ -389,7 +388,7 @@ Finding run_motion(const StaticScene& scene, const MotionMethod& method, double 
 
 struct ContactScene {
   const BenchWall* wall;
-  const Lumen* lumen;
+  const simulate::VesselModel* vessel;
   std::string entry;  // "axis", "along_wall", "into_wall"
   double EI;          // [N mm^2]
 };
@@ -410,7 +409,7 @@ Finding run_contact(const ContactScene& scene) {
   }
   const simulate::InsertionOptions options{.length = 55.0};
   const TrialResult result = run_trial(
-      wire, introducer, {.point = Vec3(0.0, 0.0, 53.0), .radius = 3.0}, *scene.lumen, options);
+      wire, introducer, {.point = Vec3(0.0, 0.0, 53.0), .radius = 3.0}, *scene.vessel, options);
 
   Finding finding;
   finding.outcome = simulate::outcome_name(result.outcome);
@@ -435,7 +434,7 @@ Finding run_contact(const ContactScene& scene) {
   // smooth wall follows the triangles.
   for (const Vec3& node : result.nodes.colwise()) {
     if (named || is_inside(scene.wall->surface, node)) continue;
-    if (penetration + scene.lumen->max_deviation() < kWireRadius) {
+    if (penetration + scene.vessel->lumen.max_deviation() < kWireRadius) {
       fail(finding, "a node is outside, which the penetration of " +
                         format("%.3g mm does not tell", penetration));
     }
@@ -504,12 +503,12 @@ void run_contact_scenes(int stride, std::vector<Json>& rows) {
   const std::vector<BenchWall> walls = make_bench_walls();
   int count = 0;
   for (const BenchWall& wall : walls) {
-    std::optional<Lumen> lumen;
+    std::optional<simulate::VesselModel> vessel;
     for (const char* entry : {"axis", "along_wall", "into_wall"}) {
       for (const double EI : {1.0, 50.0, 1000.0, 1e5}) {
         if (count++ % stride != 0) continue;
-        if (!lumen) lumen.emplace(wall.surface);
-        const ContactScene scene{&wall, &*lumen, entry, EI};
+        if (!vessel) vessel.emplace(wall.surface);
+        const ContactScene scene{&wall, &*vessel, entry, EI};
         rows.push_back(row_of(scene, wall.name + "-" + entry + "-" + format("%g", EI),
                               guarded([&] { return run_contact(scene); })));
       }
@@ -536,7 +535,7 @@ std::vector<Json> summary_of(const std::vector<Json>& rows) {
     entry["rows"] = count("method", method);
     for (const std::string& verdict : kVerdicts) entry[verdict] = count("verdict", verdict);
     for (const char* outcome : {"converged", "finished", "not_converged", "unstable", "reached",
-                                "missed", "stuck", "left_lumen"}) {
+                                "missed", "stuck", "prolapsed", "left_lumen"}) {
       entry[outcome] = count("outcome", outcome);
     }
     summary.push_back(entry);

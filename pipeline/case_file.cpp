@@ -14,6 +14,7 @@ namespace {
 
 constexpr const char* kSchema = "wireplan.case/1";
 constexpr std::string_view kDataVariable = "${WIREPLAN_DATA}";
+constexpr double kFriction = 0.04;  // of a hydrophilic wire, references A3
 
 std::filesystem::path find_case_file(const std::filesystem::path& path) {
   if (!std::filesystem::is_directory(path)) return path;
@@ -238,6 +239,8 @@ void read_insertion(JsonReader& root, plan::Study& study) {
   insertion.step = reader.number("step_mm", insertion.step, {.min = 0.01, .max = 20.0});
   insertion.element_length =
       reader.number("element_length_mm", insertion.element_length, {.min = 0.05, .max = 20.0});
+  insertion.contact_spacing =
+      reader.number("contact_spacing_mm", insertion.contact_spacing, {.min = 0.05, .max = 20.0});
   insertion.residual_tolerance = reader.number("residual_tolerance_n", insertion.residual_tolerance,
                                                {.min = 1e-12, .max = 1e-2});
   insertion.max_iterations = reader.integer("max_iterations", insertion.max_iterations, 1, 100000);
@@ -366,29 +369,23 @@ void refuse(JsonReader& reader, const std::string& key, const std::string& what)
                         what + " not in this version; delete the key");
 }
 
-void expect_zero(JsonReader& reader, const std::string& key, const std::string& what) {
-  const Json& value = reader.raw(key);
-  if (!reader.has(key) || (value.is_number() && value == 0)) return;
-  reader.problems().add(reader.path_of(key), value.dump(), "0",
-                        what + " not in this version; put 0 or delete the key");
+WallInput read_wall(JsonReader& reader, const std::string& model) {
+  WallInput wall;
+  wall.elastic = reader.choice("model", model, {"elastic", "rigid"}) == "elastic";
+  preprocess::WallOptions& extrusion = wall.extrusion;
+  extrusion.thickness_mm = reader.number("thickness_mm", extrusion.thickness_mm,
+                                         {.min = 0.1, .max = 10.0}, "given in m?");
+  extrusion.young_modulus = reader.number("young_modulus_kpa", 0.0, {.min = 0.0, .max = 1e5},
+                                          "given in Pa? 0 chooses it") *
+                            kMpaPerKpa;
+  extrusion.poisson_ratio =
+      reader.number("poisson_ratio", extrusion.poisson_ratio, {.min = 0.0, .max = 0.49});
+  return wall;
 }
 
-preprocess::WallOptions read_wall(JsonReader& reader) {
-  preprocess::WallOptions wall;
-  if (reader.raw("model") == "elastic") {
-    reader.problems().add(reader.path_of("model"), "\"elastic\"", "\"rigid\"",
-                          "the yielding wall is not in this version");
-  } else {
-    reader.choice("model", "rigid", {"rigid"});
-  }
-  wall.thickness_mm =
-      reader.number("thickness_mm", wall.thickness_mm, {.min = 0.1, .max = 10.0}, "given in m?");
-  wall.young_modulus = reader.number("young_modulus_kpa", 0.0, {.min = 0.0, .max = 1e5},
-                                     "given in Pa? 0 chooses it") *
-                       kMpaPerKpa;
-  wall.poisson_ratio =
-      reader.number("poisson_ratio", wall.poisson_ratio, {.min = 0.0, .max = 0.49});
-  return wall;
+double read_friction(JsonReader& reader, double fallback) {
+  return reader.number("friction", fallback, {.min = 0.0, .max = 1.0},
+                       "Coulomb's coefficient: 0.04 hydrophilic, 0.12 PTFE, 0.25 bare");
 }
 
 Case read_case(const std::filesystem::path& path, const std::vector<std::string>& overrides) {
@@ -405,13 +402,13 @@ Case read_case(const std::filesystem::path& path, const std::vector<std::string>
   read_inputs(root, input);
   read_segmentation(root, input);
   JsonReader wall = root.object("wall", false);
-  input.wall = read_wall(wall);
+  input.wall = read_wall(wall, "elastic");
   wall.finish();
   input.study.wires = read_wires(root);
   read_insertion(root, input.study);
   read_limits(root, input.limits);
   read_weights(root, input.weights);
-  expect_zero(root, "friction", "friction is");
+  input.study.insertion.friction = read_friction(root, kFriction);
   refuse(root, "robustness", "perturbed repeats are");
   root.finish();
   problems.throw_if_any();
@@ -422,10 +419,10 @@ Json case_parameters(const Case& input) {
   const plan::Study& study = input.study;
   Json json = {{"schema", kSchema}, {"name", input.name}};
   json.update(input_json(input));
-  json["wall"] = {{"model", "rigid"},
-                  {"thickness_mm", input.wall.thickness_mm},
-                  {"young_modulus_kpa", clean(input.wall.young_modulus / kMpaPerKpa)},
-                  {"poisson_ratio", input.wall.poisson_ratio}};
+  json["wall"] = {{"model", input.wall.elastic ? "elastic" : "rigid"},
+                  {"thickness_mm", input.wall.extrusion.thickness_mm},
+                  {"young_modulus_kpa", clean(input.wall.extrusion.young_modulus / kMpaPerKpa)},
+                  {"poisson_ratio", input.wall.extrusion.poisson_ratio}};
   json["access"] = {{"point_mm", to_json(study.access)},
                     {"inclination_deg", degrees(study.inclinations)},
                     {"azimuth_deg", degrees(study.azimuths)}};
@@ -433,10 +430,11 @@ Json case_parameters(const Case& input) {
   json["wires"] = Json::array();
   for (const simulate::Wire& wire : study.wires) json["wires"].push_back(wire_json(wire));
   json["tip_roll_deg"] = degrees(study.rolls);
-  json["friction"] = 0;
+  json["friction"] = study.insertion.friction;
   json["insertion"] = {{"length_mm", study.insertion.length},
                        {"step_mm", study.insertion.step},
                        {"element_length_mm", study.insertion.element_length},
+                       {"contact_spacing_mm", study.insertion.contact_spacing},
                        {"residual_tolerance_n", study.insertion.residual_tolerance},
                        {"max_iterations", study.insertion.max_iterations},
                        {"record_every_mm", study.insertion.record_every}};

@@ -36,6 +36,12 @@ struct SegmentationInput {
   double smoothing_mm = 0.0, neck_opening_mm = 0.0;
 };
 
+/// The vessel's wall. A rigid one has the other values too: the wall's files are made of them.
+struct WallInput {
+  bool elastic = true;
+  preprocess::WallOptions extrusion;  // young_modulus 0: chosen by the wall stage
+};
+
 struct Case {
   std::filesystem::path file;  // the case file itself
   std::string name;
@@ -43,7 +49,7 @@ struct Case {
   std::optional<SurfaceInput> surface_input;
   SegmentationInput segmentation;  // of a volume
   preprocess::SurfaceOptions surface;
-  preprocess::WallOptions wall;  // young_modulus 0: chosen by the wall stage
+  WallInput wall;
   /// Its tangent is found later, from the centerline. insertion.length 0: chosen from the path's
   /// length by the trials stage, 1.25 times it and 20 mm more.
   plan::Study study;
@@ -69,10 +75,11 @@ SurfaceInput read_surface_input(JsonReader& reader, const std::filesystem::path&
 /// Adds a problem where the key is given: a part of the design that this version does not have.
 void refuse(JsonReader& reader, const std::string& key, const std::string& what);
 
-/// A number that this version knows only as 0, also its default.
-void expect_zero(JsonReader& reader, const std::string& key, const std::string& what);
+/// Reads {"model", "thickness_mm", "young_modulus_kpa", "poisson_ratio"} of the wall; `model` is
+/// "elastic" or "rigid" and stands where the file gives none.
+WallInput read_wall(JsonReader& reader, const std::string& model);
 
-/// Reads {"model", "thickness_mm", "young_modulus_kpa", "poisson_ratio"} of the wall.
-preprocess::WallOptions read_wall(JsonReader& reader);
+/// Reads a coefficient of friction between wire and wall.
+double read_friction(JsonReader& reader, double fallback);
 
 }  // namespace wireplan::pipeline

@@ -21,10 +21,8 @@
 #include "pipeline/check.h"
 #include "pipeline/phantom_file.h"
 #include "pipeline/report.h"
-#include "pipeline/scene_file.h"
+#include "pipeline/scene_run.h"
 #include "pipeline/stages.h"
-#include "preprocess/surface.h"
-#include "preprocess/vessel_io.h"
 
 namespace wireplan::pipeline {
 namespace {
@@ -225,47 +223,13 @@ int print_wires() {
   return kDone;
 }
 
-int simulate_bench(const simulate::Scene& scene, const fs::path& output) {
-  const simulate::SceneResult result = simulate::run_scene(scene);
-  fs::create_directories(output);
-  write_json(result_json(result), output / "result.json");
-  preprocess::write_polyline(result.nodes, {}, output / "wire.vtp");
-  const Vec3 tip = result.nodes.col(result.nodes.cols() - 1);
-  std::cout << outcome_name(result.outcome)
-            << format(": tip (%.4f, %.4f, %.4f) mm, residual %.2g N, %d iterations\n", tip.x(),
-                      tip.y(), tip.z(), result.residual, result.iterations);
-  return result.outcome == simulate::SceneOutcome::kConverged ? kDone : kNoPlan;
-}
-
-int simulate_insertion(const InsertionScene& scene, const fs::path& output) {
-  const Surface surface =
-      preprocess::read_surface(scene.vessel.path, scene.vessel.unit, scene.vessel.frame);
-  preprocess::require_sound(preprocess::check_surface(surface), scene.vessel.path.string());
-  const simulate::TrialResult result = simulate::run_trial(scene.wire, scene.introducer, scene.goal,
-                                                           simulate::Lumen(surface), scene.options);
-  fs::create_directories(output);
-  write_json(result_json(result, scene.options.record_every), output / "result.json");
-  preprocess::write_polyline(result.nodes, {}, output / "wire.vtp");
-  std::cout << outcome_name(result.outcome);
-  if (!result.pushes.empty()) {
-    const simulate::Push& last = result.pushes.back();
-    std::cout << format(": %.1f mm in, tip (%.4f, %.4f, %.4f) mm, residual %.2g N", last.insertion,
-                        last.tip.x(), last.tip.y(), last.tip.z(), last.residual);
-  }
-  std::cout << (result.reason.empty() ? "" : "; " + result.reason) << "\n";
-  const bool solved = result.outcome != simulate::Outcome::kNotConverged &&
-                      result.outcome != simulate::Outcome::kFailed;
-  return solved ? kDone : kNoPlan;
-}
-
 int simulate_file(const std::string& path, const std::string& given_output) {
   const SceneFile scene = read_scene(path);
-  const fs::path output = given_output.empty() ? fs::path("wireplan-out") / fs::path(path).stem()
-                                               : fs::path(given_output);
-  const int code = scene.bench ? simulate_bench(*scene.bench, output)
-                               : simulate_insertion(*scene.insertion, output);
-  std::cout << "result: " << (output / "result.json").string() << "\n";
-  return code;
+  const fs::path output =
+      given_output.empty() ? fs::path("wireplan-out") / scene.name : fs::path(given_output);
+  const SceneAnswer answer = run_scene_file(scene, output);
+  std::cout << answer.line << "\nresult: " << (output / "result.json").string() << "\n";
+  return answer.solved ? kDone : kNoPlan;
 }
 
 int make_phantom_files(const std::string& path, const std::string& output) {
@@ -335,11 +299,14 @@ int run_command(int argc, const char* const* argv) {
   wires->callback([&] { code = print_wires(); });
 
   std::string scene_path, scene_output;
-  CLI::App* simulate = app.add_subcommand("simulate", "One wire, its supports and loads");
+  CLI::App* simulate = app.add_subcommand("simulate", "One wire, its supports, loads and vessel");
   simulate->add_option("SCENE", scene_path, "Scene file")->required();
-  simulate->add_option("-o,--output", scene_output, "Results [wireplan-out/SCENE NAME]");
+  simulate->add_option("-o,--output", scene_output,
+                       "Results [wireplan-out/NAME OF SCENE OR FOLDER]");
   simulate->footer(
-      "Writes result.json and wire.vtp. Exits 1 where no equilibrium was found.\n"
+      "Writes result.json, wire.vtp and wire.png; of an insertion the shapes on the way\n"
+      "(shapes.pvd), in a vessel the forces on its wall (forces.vtu). Exits 1 where no\n"
+      "equilibrium was found.\n"
       "Example: wireplan simulate cases/cantilever/scene.json -o out");
   simulate->callback([&] { code = simulate_file(scene_path, scene_output); });
 

@@ -155,9 +155,11 @@ Box scene_box(const Surface& vessel, const std::vector<PictureWire>& wires,
   for (const PictureWire& wire : wires) {
     for (const Vec3& p : wire.nodes.colwise()) box.include(p);
   }
-  box.include(marks.access);
-  box.include(marks.target.array() - marks.target_radius);
-  box.include(marks.target.array() + marks.target_radius);
+  if (marks.access) box.include(*marks.access);
+  if (marks.target) {
+    box.include(marks.target->array() - marks.target_radius);
+    box.include(marks.target->array() + marks.target_radius);
+  }
   return box;
 }
 
@@ -169,7 +171,8 @@ std::array<Mat3, 2> choose_views(const Box& box, const PictureMarks& marks) {
   const Vec3 extent = box.high - box.low;
   if (extent.head<2>().maxCoeff() > extent.z()) extent.head<2>().maxCoeff(&longest);
   Vec3 up = Vec3::Unit(longest);
-  if (longest != 2 && marks.target[longest] < marks.access[longest]) up = -up;
+  const bool both = marks.access && marks.target;
+  if (longest != 2 && both && (*marks.target)[longest] < (*marks.access)[longest]) up = -up;
   static const std::array<std::array<Vec3, 2>, 3> kTowardViewer{{{-Vec3::UnitY(), Vec3::UnitZ()},
                                                                  {Vec3::UnitZ(), Vec3::UnitX()},
                                                                  {-Vec3::UnitY(), Vec3::UnitX()}}};
@@ -238,8 +241,12 @@ void draw_wire(Panel& panel, const Projection& project, const PictureWire& wire,
 /// Balls at access and target, and a ring of the target's radius that faces the viewer.
 void draw_marks(Panel& panel, const Projection& project, const PictureMarks& marks) {
   const double ball = 5.0 * kSamples;
-  const Vec3 access = project(marks.access), target = project(marks.target);
-  draw_bar(panel, access, access, ball, kAccess);
+  if (marks.access) {
+    const Vec3 access = project(*marks.access);
+    draw_bar(panel, access, access, ball, kAccess);
+  }
+  if (!marks.target) return;
+  const Vec3 target = project(*marks.target);
   draw_bar(panel, target, target, ball, kTarget);
   constexpr int kSides = 64;
   const double radius = std::max(marks.target_radius * project.scale, 2.0 * ball);
@@ -283,8 +290,8 @@ void draw_legend(Picture& picture, const std::vector<PictureWire>& wires, const 
   if (const double force = largest_force(wires); force > 0.0) {
     entries.emplace_back(format("wall contact, largest %.3g N", force), kContact);
   }
-  entries.emplace_back("access", kAccess);
-  entries.emplace_back("target", kTarget);
+  if (marks.access) entries.emplace_back("access", kAccess);
+  if (marks.target) entries.emplace_back("target", kTarget);
   const int rows = static_cast<int>(entries.size() + 1) / 2;
   for (std::size_t k = 0; k < entries.size(); ++k) {
     const int x = left + static_cast<int>(k % 2) * picture.width / 2;

@@ -8,6 +8,7 @@
 /// Here no display, driver or font is needed, and the same scene gives the same bytes at any
 /// thread count. VTK still sets the text and writes the file.
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -29,16 +30,16 @@ struct PictureWire {
 
 struct PictureMarks {
   std::string title;
-  Vec3 access = Vec3::Zero();  // blue ball                                              [mm]
-  Vec3 target = Vec3::Zero();  // green ball in a ring of the target's radius            [mm]
-  double target_radius = 4.0;  //                                                        [mm]
+  std::optional<Vec3> access = {};  // blue ball                                         [mm]
+  std::optional<Vec3> target = {};  // green ball in a ring of the target's radius       [mm]
+  double target_radius = 4.0;       //                                                        [mm]
 };
 
 struct PictureSize {
   int width = 1200, height = 1600;  // at least 200 each                                  [px]
 };
 
-/// Draws the scene. Surface and wires may be empty; all coordinates are expected to be finite.
+/// Draws the scene. Surface or wires may be empty; all coordinates are expected to be finite.
 Picture draw_picture(const Surface& vessel, const std::vector<PictureWire>& wires,
                      const PictureMarks& marks, const PictureSize& size = {});
 

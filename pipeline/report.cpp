@@ -13,14 +13,28 @@ namespace {
 constexpr const char* kStatement =
     "Research use only. Not a medical device. Not for diagnosis or treatment decisions.";
 
-constexpr const char* kRigidWall = "the wall is rigid in this version";
+constexpr const char* kRigidWall = "the wall is rigid";
 constexpr const char* kNoRepeats = "no perturbed repeats are run in this version";
 
-Json limits_of_validity() {
+bool is_rigid(const ReportInput& input) {
+  return input.parameters.at("wall").at("model") == "rigid";
+}
+
+Json limits_of_validity(const ReportInput& input) {
+  const char* friction =
+      input.study.insertion.friction == 0.0
+          ? "Frictionless: push forces are lower bounds."
+          : "One coefficient of friction stands for every wire and all of the wall; it is taken "
+            "from the case, not measured.";
+  const char* wall =
+      is_rigid(input)
+          ? "The wall is rigid: contact forces are those of a vessel that does not give way, upper "
+            "bounds, and the wall's stiffness is reported but does not act."
+          : "The wall yields by linear theory, as a layer on a fixed outside; where it moves by "
+            "more than 0.2 of the vessel's radius, the trial is flagged beyond_linear_theory.";
   return {
-      "Friction between wire and wall is left out: push forces are lower bounds.",
-      "The wall is rigid: contact forces are those of a vessel that does not give way, and the "
-      "wall's stiffness is reported but does not act.",
+      friction,
+      wall,
       "Quasi-static: every push ends in equilibrium; no inertia, no blood flow, no breathing or "
       "heart motion.",
       "Wire stiffness is that of the catalogue or the case, not measured on the wire at hand; "
@@ -67,6 +81,14 @@ Json provenance_json(const ReportInput& input) {
   Json warnings = Json::array();
   for (const Json& figures : input.figures) {
     for (const Json& warning : figures.at("warnings")) warnings.push_back(warning);
+  }
+  const auto flagged =
+      std::count_if(input.metrics.begin(), input.metrics.end(),
+                    [](const plan::Metrics& m) { return m.wall_motion.beyond_linear_theory(); });
+  if (flagged > 0) {
+    warnings.push_back("trials: " + std::to_string(flagged) + " of " +
+                       std::to_string(input.metrics.size()) +
+                       " moved the wall beyond linear theory: see wall_motion of each");
   }
   std::vector<std::string> terms;
   for (const simulate::TrialResult& trial : input.trials) {
@@ -116,7 +138,9 @@ Json vessel_json(const ReportInput& input) {
   for (const char* key : {"volume_mm3", "area_mm2", "triangles", "euler_number"}) {
     row.put(key, surface.at(key));
   }
+  row.put("openings", surface.at("openings"));
   row.put("tetrahedra", wall.at("tetrahedra"));
+  row.put("wall_model", input.parameters.at("wall").at("model"));
   row.put("wall_thickness_mm", wall.at("thickness_mm"));
   row.put("wall_young_modulus_kpa", wall.at("young_modulus_kpa"));
   row.put("wall_stiffness_kpa_per_mm", wall.at("normal_stiffness_kpa_per_mm"));
@@ -124,6 +148,25 @@ Json vessel_json(const ReportInput& input) {
   put_figures(row, "segmentation", input.figures, "segment");
   row.put("branches", Json::array({branch.finish()}));
   return row.finish();
+}
+
+void put_wall_motion(Row& row, const ReportInput& input, const plan::Metrics& m,
+                     const std::string& ended) {
+  if (is_rigid(input)) {
+    for (const char* key : {"peak_wall_displacement_mm", "beyond_linear_theory", "wall_motion"}) {
+      row.put_optional(key, {}, kRigidWall);
+    }
+    return;
+  }
+  row.put_number("peak_wall_displacement_mm", m.peak_wall_displacement, ended);
+  row.put("beyond_linear_theory", m.wall_motion.beyond_linear_theory());
+  if (m.wall_motion.displacement > 0.0) {
+    row.put("wall_motion", {{"displacement_mm", m.wall_motion.displacement},
+                            {"radius_mm", m.wall_motion.radius},
+                            {"point_mm", to_json(m.wall_motion.point)}});
+  } else {
+    row.put_optional("wall_motion", {}, "the wire did not move the wall");
+  }
 }
 
 Json trial_json(const ReportInput& input, std::size_t k) {
@@ -144,7 +187,10 @@ Json trial_json(const ReportInput& input, std::size_t k) {
   row.put_number("mean_contact_force_n", m.mean_contact_force, ended);
   row.put_number("force_impulse_n_mm", m.force_impulse, ended);
   row.put_number("peak_push_force_n", m.peak_push_force, ended);
-  row.put_optional("peak_wall_displacement_mm", {}, kRigidWall);
+  row.put_number("push_work_n_mm", m.push_work, ended);
+  row.put_number("friction_work_n_mm", m.friction_work, ended);
+  row.put_number("energy_released_n_mm", m.energy_released, ended);
+  put_wall_motion(row, input, m, ended);
   row.put_number("peak_curvature_per_mm", m.peak_curvature, ended);
   row.put_number("centerline_deviation_mm", m.centerline_deviation, ended);
   row.put_number("off_path_mm", m.off_path, ended);
@@ -237,7 +283,38 @@ Json numerics_json(const ReportInput& input) {
           {"rows_time", "cpu_s of each row stands in timing.numerics"}};
 }
 
+// The files beside report.json that people look at.
+Json artifacts_json(const ReportInput& input) {
+  Json files = Json::array();
+  const auto add = [&](const std::string& file, const char* content) {
+    files.push_back({{"file", file}, {"content", content}});
+  };
+  if (input.figures.contains("segment")) add("mask.nrrd", "segmented lumen");
+  add("surface.vtp", "inner surface of the vessel");
+  add("centerline.vtp", "path from access to target, with its radius");
+  add("wall.vtu", "tetrahedra of the wall");
+  add("forces.vtu",
+      "the wall with the largest normal force that each triangle took in any trial (peak_force_n) "
+      "and in the best plan (peak_force_best_plan_n)");
+  add("plans.png", "best plan of each wire, or its closest attempt");
+  for (std::size_t k = 1; k <= std::min(kPlansShown, input.ranking.plans.size()); ++k) {
+    add("trials/plan-" + std::to_string(k) + ".pvd",
+        "insertion of a plan, by rank, as a time series");
+  }
+  return files;
+}
+
 }  // namespace
+
+Json openings_json(const std::vector<simulate::Opening>& openings) {
+  Json list = Json::array();
+  for (const simulate::Opening& opening : openings) {
+    list.push_back({{"center_mm", to_json(opening.center)},
+                    {"radius_mm", opening.radius},
+                    {"normal", to_json(opening.normal)}});
+  }
+  return list;
+}
 
 Json build_report(const ReportInput& input) {
   expects(input.trials.size() == input.candidates.size() &&
@@ -259,9 +336,10 @@ Json build_report(const ReportInput& input) {
   report["schema"] = kReportSchema;
   report["name"] = input.name;
   report["statement"] = kStatement;
-  report["limits"] = limits_of_validity();
+  report["limits"] = limits_of_validity(input);
   report["outcome"] = ranking.empty() ? "no plan reaches the target" : "ranked";
   report["provenance"] = provenance_json(input);
+  report["artifacts"] = artifacts_json(input);
   report["vessel"] = vessel_json(input);
   report["ranking"] = std::move(ranking);
   report["excluded"] = std::move(excluded);

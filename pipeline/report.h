@@ -7,10 +7,14 @@
 #include "pipeline/json_reader.h"
 #include "plan/ranking.h"
 #include "plan/refine.h"
+#include "simulate/openings.h"
 
 namespace wireplan::pipeline {
 
 inline constexpr const char* kReportSchema = "wireplan.report/1";
+
+/// The best so many plans are written as files for viewers too.
+inline constexpr std::size_t kPlansShown = 5;
 
 struct ReportInput {
   std::string name;                      // of the case
@@ -20,7 +24,7 @@ struct ReportInput {
   Json figures;                          // per stage name, what its figures.json holds
   plan::Study study;                     // as the trials used it
   std::vector<plan::Candidate> candidates;
-  std::vector<simulate::TrialResult> trials;
+  std::vector<simulate::TrialResult> trials;  // outcome, reason and terms; the rest may be empty
   std::vector<plan::Metrics> metrics;
   plan::Ranking ranking;
   std::vector<plan::Refinement> refinements;
@@ -28,6 +32,9 @@ struct ReportInput {
 };
 
 Json build_report(const ReportInput& input);
+
+/// The vessel's openings as reports and results tell them.
+Json openings_json(const std::vector<simulate::Opening>& openings);
 
 /// Version, revision, compiler, build type and library versions of this program.
 Json build_info();

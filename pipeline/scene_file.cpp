@@ -44,6 +44,19 @@ struct SectionInput {
   double element_length = 0.0;       // 0: as the wire's number of elements gives         [mm]
 };
 
+/// A strip has no stiffnesses of a round rod to fall back on.
+void check_strip(JsonReader& reader, const SectionInput& input) {
+  const auto refuse_default = [&](const char* key, double value) {
+    if (value > 0.0) return;
+    reader.problems().add(reader.path_of(key), reader.has(key) ? "0" : "missing",
+                          "a number above 0",
+                          "with bending_stiffness_2_n_mm2 the wire is a strip, and there is no "
+                          "solid round rod to take it from");
+  };
+  refuse_default(kStretch.value, input.section.axial_stiffness + input.stretch_coefficient);
+  refuse_default("twist_stiffness_n_mm2", input.section.twist_stiffness);
+}
+
 SectionInput read_section(JsonReader& reader) {
   SectionInput input;
   simulate::Section& section = input.section;
@@ -59,6 +72,11 @@ SectionInput read_section(JsonReader& reader) {
         reader.number(raw ? kStretch.coefficient : kStretch.value, std::nullopt, kFromZero);
   }
   section.twist_stiffness = reader.number("twist_stiffness_n_mm2", 0.0, kFromZero);
+  if (reader.has("bending_stiffness_2_n_mm2")) {
+    section.bending_stiffness_2 =
+        reader.number("bending_stiffness_2_n_mm2", std::nullopt, kAboveZero);
+    check_strip(reader, input);
+  }
   section.mass_per_length = reader.number("mass_kg_per_m", 0.0, kFromZero) * kTonnePerMmFromKgPerM;
   section.rest_curvature =
       reader.number("rest_curvature_per_mm", 0.0, {.min = 0.0, .max = 2.0}, "given in 1/m?");
@@ -69,6 +87,13 @@ SectionInput read_section(JsonReader& reader) {
       reader.number("radius_mm", std::nullopt, {.min = 0.001, .max = 10.0}, "given in m?");
   reader.finish();
   return input;
+}
+
+/// Of the file, or of the folder where the file is scene.json.
+std::string scene_name(const std::filesystem::path& file) {
+  const std::filesystem::path absolute = std::filesystem::absolute(file).lexically_normal();
+  return file.filename() == "scene.json" ? absolute.parent_path().filename().string()
+                                         : file.stem().string();
 }
 
 constexpr int kMaxElements = 20000;
@@ -133,9 +158,11 @@ simulate::Scene read_wire_of_scene(JsonReader& root) {
       section.axial_stiffness = axial_stiffness_from_paper(sections[k].stretch_coefficient, l);
     }
   }
-  if (scene.twist == simulate::Twist::kDecoupled && !scene.wire.straight()) {
+  if (scene.twist == simulate::Twist::kDecoupled &&
+      !(scene.wire.straight() && scene.wire.round())) {
     root.problems().add("wire.twist", "\"decoupled\"", "\"coupled\" or \"auto\"",
-                        "a wire with rest_curvature_per_mm bends and twists together");
+                        "a wire with rest_curvature_per_mm or bending_stiffness_2_n_mm2 bends and "
+                        "twists together");
   }
   return scene;
 }
@@ -290,6 +317,10 @@ void check_method(const simulate::Scene& scene, Problems& problems) {
   if (!scene.wire.straight()) {
     problems.add("wire.sections", "with rest_curvature_per_mm", "a wire straight at rest", remedy);
   }
+  if (!scene.wire.round()) {
+    problems.add("wire.sections", "with bending_stiffness_2_n_mm2", "a wire as stiff all ways",
+                 remedy);
+  }
   if (!scene.loads.tip_moment.isZero(0.0)) {
     problems.add("loads.tip_moment_n_mm", to_json(scene.loads.tip_moment).dump(), "[0, 0, 0]",
                  remedy);
@@ -303,7 +334,22 @@ void check_method(const simulate::Scene& scene, Problems& problems) {
   }
 }
 
-simulate::Scene read_bench(JsonReader& root, simulate::Scene scene) {
+/// Where the wire lies in a vessel.
+void add_vessel(const SceneVessel& vessel, simulate::Scene& scene, Problems& problems) {
+  scene.contact.friction = vessel.friction;
+  scene.contact.spacing = vessel.contact_spacing;
+  if (scene.solver.method != simulate::Method::kNewton) {
+    problems.add("solver.method", "not \"newton\"", "\"newton\"",
+                 "the paper's own methods know no vessel in this version");
+  }
+  if (scene.twist == simulate::Twist::kDecoupled) {
+    problems.add("wire.twist", "\"decoupled\"", "\"coupled\" or \"auto\"",
+                 "beside a vessel the paper's chain is not in this version");
+  }
+}
+
+simulate::Scene read_bench(JsonReader& root, simulate::Scene scene,
+                           const std::optional<SceneVessel>& vessel) {
   for (JsonReader& support : root.objects("supports", true)) {
     scene.supports.push_back(read_support(support));
   }
@@ -311,6 +357,7 @@ simulate::Scene read_bench(JsonReader& root, simulate::Scene scene) {
   scene.loads = read_loads(root);
   if (root.has("plane_normal")) scene.plane = root.direction("plane_normal", std::nullopt);
   scene.solver = read_solver(root);
+  if (vessel) add_vessel(*vessel, scene, root.problems());
   if (root.problems().empty()) {
     check_loads(scene, root.problems());
     check_method(scene, root.problems());
@@ -318,17 +365,20 @@ simulate::Scene read_bench(JsonReader& root, simulate::Scene scene) {
   return scene;
 }
 
-SurfaceInput read_vessel(JsonReader& root, const std::filesystem::path& folder) {
+SceneVessel read_vessel(JsonReader& root, const std::filesystem::path& folder) {
+  SceneVessel vessel;
   JsonReader reader = root.object("vessel", true);
   JsonReader surface = reader.object("surface", true);
-  const SurfaceInput input = read_surface_input(surface, folder);
+  vessel.surface = read_surface_input(surface, folder);
   surface.finish();
   JsonReader wall = reader.object("wall", false);
-  read_wall(wall);  // checked; a rigid wall has no parameters
+  vessel.wall = read_wall(wall, "rigid");
   wall.finish();
-  expect_zero(reader, "friction", "friction is");
+  vessel.friction = read_friction(reader, vessel.friction);
+  vessel.contact_spacing =
+      reader.number("contact_spacing_mm", vessel.contact_spacing, {.min = 0.01, .max = 20.0});
   reader.finish();
-  return input;
+  return vessel;
 }
 
 /// The target of a scene, which need not have one.
@@ -344,19 +394,14 @@ simulate::Goal read_goal(JsonReader& root, const simulate::Introducer& introduce
 }
 
 InsertionScene read_insertion_scene(JsonReader& root, const simulate::Scene& wire,
-                                    const std::filesystem::path& folder) {
+                                    const SceneVessel& vessel) {
   InsertionScene scene;
   scene.wire = wire.wire;
-  if (!wire.element_length.empty()) {
-    root.problems().add("wire.sections", "with element_length_mm", "elements alone",
-                        "unequal elements in a vessel are not in this version");
-  }
   if (wire.twist != simulate::Twist::kAuto) {
     root.problems().add("wire.twist", "given", "\"auto\"",
                         "in a vessel the twist of curved wires is coupled, and that of straight "
                         "ones has no effect");
   }
-  scene.vessel = read_vessel(root, folder);
   refuse(root, "supports", "supports beside the introducer are");
   refuse(root, "plane_normal", "tables in a vessel are");
   const simulate::Loads loads = read_loads(root);
@@ -387,8 +432,12 @@ InsertionScene read_insertion_scene(JsonReader& root, const simulate::Scene& wir
                         "the paper's own methods work on the bench alone in this version");
   }
   scene.options.element_length = wire.wire.length() / wire.elements;
+  scene.options.section_element_length = wire.element_length;
+  scene.options.contact_spacing = vessel.contact_spacing;
+  scene.options.friction = vessel.friction;
   scene.options.residual_tolerance = solver.residual_tolerance;
   scene.options.max_iterations = solver.max_iterations;
+  scene.has_target = root.has("target");
   scene.goal = read_goal(root, scene.introducer);
   return scene;
 }
@@ -426,7 +475,7 @@ Json energy_json(const simulate::SceneResult& result) {
   put(json, "tip_force", result.energy.load - result.gravity_energy - result.moment_energy);
   put(json, "tip_moment", result.moment_energy);
   put(json, "contact", result.energy.contact);
-  json["wall"] = 0.0;  // a bench has none
+  put(json, "wall", result.energy.wall);
   put(json, "total", result.energy.total());
   return json;
 }
@@ -438,23 +487,55 @@ Json reaction_json(const simulate::Reaction& reaction) {
   return json;
 }
 
-Json contact_json(const simulate::NodeContact& contact) {
-  Json json = {{"node", contact.node}};
+Json contact_json(const simulate::WireContact& contact) {
+  Json json = {{"node", contact.node}, {"part", contact.part}};
+  if (contact.triangle >= 0) {
+    json["triangle"] = contact.triangle;
+  } else {
+    json["triangle"] = nullptr;
+    json["triangle_reason"] = "none lies within reach of the point";
+  }
   put_points(json, "point_mm", contact.point);
-  put_points(json, "force_n", contact.force);
-  put(json, "normal_force_n", contact.force.norm());
+  put_points(json, "normal_force_n", contact.normal_force);
+  put_points(json, "friction_force_n", contact.friction_force);
   put(json, "penetration_mm", contact.penetration);
+  put(json, "wall_displacement_mm", contact.wall_displacement);
   return json;
+}
+
+Json contacts_json(const std::vector<simulate::WireContact>& contacts) {
+  Json rows = Json::array();
+  for (const simulate::WireContact& contact : contacts) rows.push_back(contact_json(contact));
+  return rows;
+}
+
+/// Of an insertion: the sum alone is known.
+Json energy_json(const simulate::Push& push) {
+  Json json = Json::object();
+  for (const char* term : {"stretch", "bend", "twist", "contact", "wall"}) {
+    put(json, term, std::nan(""), "an insertion gives the sum of its terms alone");
+  }
+  put(json, "total", push.stored_energy);
+  return json;
+}
+
+void put_work(Json& json, const simulate::Push& push) {
+  put(json, "push_work_n_mm", push.push_work);
+  put(json, "stored_energy_n_mm", push.stored_energy);
+  put(json, "friction_work_n_mm", push.friction_work);
+  put(json, "energy_released_n_mm", push.push_work - push.stored_energy - push.friction_work);
 }
 
 /// One row per `every_mm` of insertion, and one for the last push.
 Json history_json(const std::vector<simulate::Push>& pushes, double every_mm) {
   Json rows = Json::array();
-  double next = every_mm, peak = 0.0, peak_tip = 0.0;
+  double next = every_mm, peak = 0.0, peak_tip = 0.0, penetration = 0.0, displacement = 0.0;
   for (std::size_t i = 0; i < pushes.size(); ++i) {
     const simulate::Push& push = pushes[i];
     peak = std::max(peak, push.peak_contact_force);
     peak_tip = std::max(peak_tip, push.tip_force);
+    penetration = std::max(penetration, push.max_penetration);
+    displacement = std::max(displacement, push.wall_displacement);
     if (push.insertion < next && i + 1 < pushes.size()) continue;
     Json row;
     put(row, "insertion_mm", push.insertion);
@@ -462,8 +543,15 @@ Json history_json(const std::vector<simulate::Push>& pushes, double every_mm) {
     put_points(row, "tip_mm", push.tip);
     put(row, "peak_tip_force_n", peak_tip);
     put(row, "peak_contact_force_n", peak);
+    put(row, "total_contact_force_n", push.total_contact_force);
+    put(row, "friction_force_n", push.friction_force);
+    put(row, "max_penetration_mm", penetration);
+    put(row, "wall_displacement_mm", displacement);
+    put_work(row, push);
+    put(row, "residual_n", push.residual);
+    row["iterations"] = push.iterations;
     rows.push_back(row);
-    peak = peak_tip = 0.0;
+    peak = peak_tip = penetration = displacement = 0.0;
     while (next <= push.insertion) next += every_mm;
   }
   return rows;
@@ -482,7 +570,9 @@ double bending_stiffness_from_paper(double bend_coefficient, double edge_length)
 }
 
 SceneFile read_scene(const std::filesystem::path& path) {
-  SceneFile scene{.file = path, .bench = std::nullopt, .insertion = std::nullopt};
+  SceneFile scene;
+  scene.file = path;
+  scene.name = scene_name(path);
   const Json file = read_json(path, kSceneSchema);
   Problems problems(path.string());
   JsonReader root(file, "", problems);
@@ -493,19 +583,22 @@ SceneFile read_scene(const std::filesystem::path& path) {
                                      {.min = 0.001, .max = 1e4});
   output.finish();
 
-  // A bench, or an insertion: the vessel and the insertion belong together.
-  if (root.has("vessel") || root.has("insertion")) {
-    scene.insertion = read_insertion_scene(root, wire, path.parent_path());
+  // An insertion has a vessel; a bench may have one.
+  const bool inserted = root.has("insertion");
+  if (inserted || root.has("vessel")) scene.vessel = read_vessel(root, path.parent_path());
+  if (inserted) {
+    scene.insertion = read_insertion_scene(root, wire, *scene.vessel);
     scene.insertion->options.record_every = every;
   } else {
-    scene.bench = read_bench(root, wire);
+    scene.bench = read_bench(root, wire, scene.vessel);
   }
   root.finish();
   problems.throw_if_any();
   return scene;
 }
 
-Json result_json(const simulate::SceneResult& result) {
+Json result_json(const simulate::SceneResult& result,
+                 const std::vector<simulate::WireContact>& contacts) {
   Json json = {{"schema", kResultSchema}, {"outcome", simulate::outcome_name(result.outcome)}};
   if (!result.reason.empty()) json["reason"] = result.reason;
   json["terms"] = result.terms;
@@ -526,29 +619,34 @@ Json result_json(const simulate::SceneResult& result) {
   for (const simulate::Reaction& reaction : result.reactions) {
     json["reactions"].push_back(reaction_json(reaction));
   }
+  json["contacts"] = contacts_json(contacts);
+  put(json, "friction_work_n_mm", result.friction_work);
   return json;
 }
 
-Json result_json(const simulate::TrialResult& result, double every_mm) {
+Json result_json(const simulate::TrialResult& result, double every_mm, double cpu_time_s) {
   Json json = {{"schema", kResultSchema}, {"outcome", simulate::outcome_name(result.outcome)}};
   if (!result.reason.empty()) json["reason"] = result.reason;
   json["terms"] = result.terms;
   put_points(json, "nodes_mm", result.nodes);
   long iterations = 0;
-  double residual = 0.0, penetration = 0.0;
+  double residual = 0.0, penetration = 0.0, displacement = 0.0;
   for (const simulate::Push& push : result.pushes) {
     iterations += push.iterations;
     residual = std::max(residual, push.residual);
     penetration = std::max(penetration, push.max_penetration);
+    displacement = std::max(displacement, push.wall_displacement);
   }
+  const simulate::Push last = result.pushes.empty() ? simulate::Push() : result.pushes.back();
+  json["energy_n_mm"] = energy_json(last);
+  put_work(json, last);
   put(json, "residual_n", residual);
   json["iterations"] = iterations;
   json["steps"] = result.pushes.size();
-  json["contacts"] = Json::array();
-  for (const simulate::NodeContact& contact : result.contacts) {
-    json["contacts"].push_back(contact_json(contact));
-  }
+  put(json, "cpu_time_s", cpu_time_s);
+  json["contacts"] = contacts_json(result.contacts);
   put(json, "max_penetration_mm", penetration);
+  put(json, "max_wall_displacement_mm", displacement);
   json["history"] = history_json(result.pushes, every_mm);
   return json;
 }

@@ -27,8 +27,6 @@ namespace fs = std::filesystem;
 constexpr double kTangentSpan = 10.0;
 // Wire that is brought along where the case leaves it open: a wire does not keep to the middle.
 constexpr double kInsertionFactor = 1.25, kInsertionExtra = 20.0;
-// The best plans are also written as files for viewers.
-constexpr std::size_t kPlansShown = 5;
 // Spacing of the control points that Slicer draws a curve through.
 constexpr double kMarkupSpacing = 2.0;
 
@@ -108,20 +106,27 @@ std::vector<int> list_unfinished(std::size_t count, const fs::path& folder) {
   return ids;
 }
 
-// A plan's insertion as a time series over the insertion [mm], and its final wire for Slicer.
-void write_plan(const simulate::TrialResult& trial, const std::string& name,
-                const fs::path& folder) {
-  fs::create_directories(folder / name);
-  std::vector<fs::path> files;
-  std::vector<double> insertions;
-  for (const simulate::Shape& shape : trial.shapes) {
-    const std::vector<double> force(shape.contact_force.begin(), shape.contact_force.end());
-    files.push_back(folder / name / (std::to_string(files.size()) + ".vtp"));
-    insertions.push_back(shape.insertion);
-    preprocess::write_polyline(shape.nodes, {{"contact_force_n", force}}, files.back());
+// Largest force on each triangle, over trials.
+class ForceMap {
+ public:
+  explicit ForceMap(Eigen::Index triangles) : force_(static_cast<std::size_t>(triangles), 0.0) {}
+  void add(const simulate::TrialResult& trial) {
+    for (const simulate::TriangleForce& peak : trial.peak_forces) {
+      double& force = force_.at(static_cast<std::size_t>(peak.triangle));
+      force = std::max(force, peak.force);
+    }
   }
-  preprocess::write_time_series(files, insertions, folder / (name + ".pvd"));
-  write_markups(trial.nodes, name, folder / (name + ".mrk.json"));
+  const std::vector<double>& values() const { return force_; }
+
+ private:
+  std::vector<double> force_;  // [N]
+};
+
+simulate::TrialResult read_trial(const Workspace& work, std::size_t id) {
+  std::optional<simulate::TrialResult> trial =
+      find_trial(work.artifact("trials").folder / trial_file_name(static_cast<int>(id)));
+  expects(trial.has_value());
+  return std::move(*trial);
 }
 
 // All of the report that the stages before it tell.
@@ -194,27 +199,45 @@ const preprocess::Image& Workspace::image() {
 #endif
 }
 
-const Vessel& Workspace::vessel() {
-  if (!vessel_) {
-    vessel_ = Vessel{preprocess::read_surface_artifact(artifact("surface").folder / "surface.vtp"),
-                     preprocess::read_centerline(artifact("centerline").folder / "centerline.vtp"),
-                     preprocess::read_wall(artifact("wall").folder / "wall.vtu")};
-    expects(vessel_->wall.apexes.cols() == vessel_->surface.triangles.cols());
+const Surface& Workspace::surface() {
+  if (!surface_) {
+    surface_ = preprocess::read_surface_artifact(artifact("surface").folder / "surface.vtp");
   }
-  return *vessel_;
+  return *surface_;
 }
 
-const simulate::Lumen& Workspace::lumen() {
-  if (!lumen_) lumen_ = std::make_unique<simulate::Lumen>(vessel().surface);
-  return *lumen_;
+const Centerline& Workspace::path() {
+  if (!path_) {
+    path_ = preprocess::read_centerline(artifact("centerline").folder / "centerline.vtp");
+  }
+  return *path_;
+}
+
+const Wall& Workspace::wall() {
+  if (!wall_) {
+    wall_ = preprocess::read_wall(artifact("wall").folder / "wall.vtu");
+    expects(wall_->apexes.cols() == surface().triangles.cols());
+  }
+  return *wall_;
+}
+
+const simulate::VesselModel& Workspace::model() {
+  if (!model_) {
+    const simulate::LumenOptions options{.openings = simulate::find_openings(surface())};
+    model_ = given_.wall.elastic
+                 ? std::make_unique<simulate::VesselModel>(surface(), wall(), options)
+                 : std::make_unique<simulate::VesselModel>(surface(), options);
+  }
+  return *model_;
 }
 
 const plan::Study& Workspace::study() {
   if (!study_) {
-    const Centerline& path = vessel().path;
     study_ = given_.study;
-    study_->tangent = preprocess::start_tangent(path, kTangentSpan);
-    if (study_->insertion.length == 0.0) study_->insertion.length = choose_insertion(path, *study_);
+    study_->tangent = preprocess::start_tangent(path(), kTangentSpan);
+    if (study_->insertion.length == 0.0) {
+      study_->insertion.length = choose_insertion(path(), *study_);
+    }
   }
   return *study_;
 }
@@ -297,6 +320,7 @@ void make_surface(Workspace& work, const fs::path& folder) {
   figures["euler_number"] = check.euler_number;
   figures["mean_edge_mm"] = check.mean_edge_mm;
   figures["min_angle_deg"] = check.min_angle_deg;
+  figures["openings"] = openings_json(simulate::find_openings(surface));
   if (check.euler_number != 2) {
     figures["warnings"].push_back("surface: it has " +
                                   std::to_string((2 - check.euler_number) / 2) +
@@ -333,7 +357,7 @@ void make_centerline(Workspace& work, const fs::path& folder) {
 void make_wall(Workspace& work, const fs::path& folder) {
   const Surface surface =
       preprocess::read_surface_artifact(work.artifact("surface").folder / "surface.vtp");
-  const preprocess::WallOptions& options = work.given().wall;
+  const preprocess::WallOptions& options = work.given().wall.extrusion;
   const preprocess::ExtrudedWall extruded = preprocess::extrude_wall(surface, options);
   preprocess::write_wall(surface, extruded.wall, folder / "wall.vtu");
 
@@ -352,9 +376,10 @@ void make_wall(Workspace& work, const fs::path& folder) {
 }
 
 void make_trials(Workspace& work, const fs::path& folder) {
-  const plan::Study& study = work.study();
+  plan::Study study = work.study();
+  study.insertion.record_every = study.insertion.length;  // shapes on the way are not kept
   const std::vector<plan::Candidate> candidates = plan::list_candidates(study);
-  const simulate::Lumen& lumen = work.lumen();
+  const simulate::VesselModel& vessel = work.model();
 
   // Each trial is kept as soon as it is finished, so that a run goes on where it was stopped.
   fs::create_directories(work.unfinished / "trials");
@@ -373,7 +398,7 @@ void make_trials(Workspace& work, const fs::path& folder) {
         const double start = plan::thread_cpu_seconds();
         const int id = ids[static_cast<std::size_t>(slot)];
         const plan::Candidate& candidate = candidates[static_cast<std::size_t>(id)];
-        const simulate::TrialResult trial = plan::run_candidate(study, candidate, lumen);
+        const simulate::TrialResult trial = plan::run_candidate(study, candidate, vessel);
         write_trial(id, study, candidate, trial, work.unfinished / trial_file_name(id));
         cpu_seconds[static_cast<std::size_t>(slot)] = plan::thread_cpu_seconds() - start;
       },
@@ -385,9 +410,16 @@ void make_trials(Workspace& work, const fs::path& folder) {
   figures["trials"] = total;
   figures["tangent"] = to_json(study.tangent);
   figures["insertion_length_mm"] = study.insertion.length;
-  figures["lumen_grid_mm"] = lumen.grid_spacing();
-  figures["lumen_max_deviation_mm"] = lumen.max_deviation();
-  figures["lumen_mean_deviation_mm"] = lumen.mean_deviation();
+  figures["lumen_grid_mm"] = vessel.lumen.grid_spacing();
+  figures["lumen_max_deviation_mm"] = vessel.lumen.max_deviation();
+  figures["lumen_mean_deviation_mm"] = vessel.lumen.mean_deviation();
+  if (study.insertion.friction == 0.0) {
+    figures["warnings"].push_back("trials: frictionless (friction is 0): " +
+                                  std::string("push forces are lower bounds"));
+  }
+  if (!work.given().wall.elastic) {
+    figures["warnings"].push_back("trials: rigid wall: contact forces are upper bounds");
+  }
   write_figures(figures, folder);
   double cpu_sum = 0.0;
   for (const double seconds : cpu_seconds) cpu_sum += seconds;
@@ -398,20 +430,21 @@ void make_trials(Workspace& work, const fs::path& folder) {
 namespace {
 
 /// The best plan of each wire in the vessel, or its closest attempt where it has none.
-void write_overview(const ReportInput& report, const Surface& vessel, const fs::path& png) {
+void write_overview(Workspace& work, const ReportInput& report, const fs::path& png) {
   std::vector<PictureWire> wires;
   for (std::size_t w = 0; w < report.study.wires.size(); ++w) {
     std::optional<std::size_t> shown;
     for (std::size_t id = 0; id < report.trials.size(); ++id) {
-      if (report.candidates[id].wire != static_cast<int>(w) || report.trials[id].nodes.cols() < 2)
-        continue;
+      if (report.candidates[id].wire != static_cast<int>(w)) continue;
+      if (report.metrics[id].insertion <= 0.0) continue;
       if (!shown || report.metrics[id].tip_to_target < report.metrics[*shown].tip_to_target)
         shown = id;
     }
     const std::optional<int> best = report.ranking.wires[w].best_trial;
     if (best) shown = static_cast<std::size_t>(*best);
     if (!shown) continue;
-    const simulate::TrialResult& trial = report.trials[*shown];
+    const simulate::TrialResult trial = read_trial(work, *shown);
+    if (trial.nodes.cols() < 2) continue;
     wires.push_back(
         {.name = report.study.wires[w].name + ": " +
                  (best ? "best plan" : "no plan, " + std::string(outcome_name(trial.outcome))),
@@ -420,7 +453,7 @@ void write_overview(const ReportInput& report, const Surface& vessel, const fs::
          .radius = report.study.wires[w].radius,
          .color = wire_color(static_cast<int>(wires.size()))});
   }
-  write_picture(vessel, wires,
+  write_picture(work.surface(), wires,
                 {.title = report.name,
                  .access = report.study.access,
                  .target = report.study.goal.point,
@@ -433,17 +466,19 @@ void write_overview(const ReportInput& report, const Surface& vessel, const fs::
 void make_report(Workspace& work, const fs::path& folder) {
   const auto start = std::chrono::steady_clock::now();
   const plan::Study& study = work.study();
-  const fs::path trials_folder = work.artifact("trials").folder;
 
-  // Read the trials and measure them.
+  // Measure the trials one by one; of each only how it ended is kept.
   ReportInput report = describe_run(work);
   const std::vector<plan::Candidate>& candidates = report.candidates;
+  ForceMap all_forces(work.surface().triangles.cols());
   for (std::size_t id = 0; id < candidates.size(); ++id) {
-    std::optional<simulate::TrialResult> trial =
-        find_trial(trials_folder / trial_file_name(static_cast<int>(id)));
-    expects(trial.has_value());
-    report.metrics.push_back(plan::compute_metrics(*trial, study, work.vessel().path));
-    report.trials.push_back(std::move(*trial));
+    const simulate::TrialResult trial = read_trial(work, id);
+    report.metrics.push_back(plan::compute_metrics(trial, study, work.path()));
+    all_forces.add(trial);
+    simulate::TrialResult& end = report.trials.emplace_back();
+    end.outcome = trial.outcome;
+    end.reason = trial.reason;
+    end.terms = trial.terms;
   }
 
   // Rank, find the errors of the best by refining them, and rank again with these.
@@ -456,23 +491,35 @@ void make_report(Workspace& work, const fs::path& folder) {
   const plan::BatchOptions batch{
       .threads = work.options().threads, .progress = {}, .cancelled = work.options().cancelled};
   report.refinements = plan::refine_plans(study, candidates, report.metrics, report.ranking,
-                                          work.lumen(), {.batch = batch});
+                                          work.model(), {.batch = batch});
   report.ranking =
       rank(plan::errors_by_trial(report.refinements, static_cast<int>(candidates.size())));
 
+  // The largest forces on the wall.
+  std::vector<preprocess::NamedArray> forces = {{"peak_force_n", all_forces.values()}};
+  if (!report.ranking.plans.empty()) {
+    ForceMap best(work.surface().triangles.cols());
+    best.add(read_trial(work, static_cast<std::size_t>(report.ranking.plans.front().trial)));
+    forces.push_back({"peak_force_best_plan_n", best.values()});
+  }
+  preprocess::write_wall(work.surface(), work.wall(), folder / "forces.vtu", forces);
+
   // Repeat the best for their shapes on the way.
+  const simulate::VesselModel& vessel = work.model();
   const std::size_t shown = std::min(kPlansShown, report.ranking.plans.size());
   plan::for_each_slot(
       static_cast<int>(shown),
       [&](int slot) {
         const int id = report.ranking.plans[static_cast<std::size_t>(slot)].trial;
         const plan::Candidate& candidate = candidates[static_cast<std::size_t>(id)];
-        write_plan(plan::run_candidate(study, candidate, work.lumen()),
-                   "plan-" + std::to_string(slot + 1), folder / "trials");
+        const simulate::TrialResult trial = plan::run_candidate(study, candidate, vessel);
+        const std::string name = "plan-" + std::to_string(slot + 1);
+        write_shapes(trial, name, folder / "trials");
+        write_markups(trial.nodes, name, folder / "trials" / (name + ".mrk.json"));
       },
       batch);
   if (work.options().cancelled && work.options().cancelled()) throw Interrupted();
-  write_overview(report, work.vessel().surface, folder / "plans.png");
+  write_overview(work, report, folder / "plans.png");
   report.timing = timing_json(work, report.refinements);
   report.timing["report_s"] =
       std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();

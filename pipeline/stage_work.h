@@ -12,7 +12,8 @@
 #include "pipeline/json_reader.h"
 #include "pipeline/store.h"
 #include "preprocess/image.h"
-#include "simulate/contact.h"
+#include "simulate/openings.h"
+#include "simulate/vessel_model.h"
 
 namespace wireplan::pipeline {
 
@@ -45,8 +46,11 @@ class Workspace {
 
   const preprocess::Image& image();
   void drop_image() { image_.reset(); }
-  const Vessel& vessel();
-  const simulate::Lumen& lumen();
+  const Surface& surface();
+  const Centerline& path();  // access to target
+  const Wall& wall();
+  /// The vessel as the trials feel it: with the wall only where it yields.
+  const simulate::VesselModel& model();
   /// The case's study with what the centerline tells: the tangent at the access, and the insertion
   /// length where the case leaves it open.
   const plan::Study& study();
@@ -61,9 +65,11 @@ class Workspace {
   WorkOptions options_;
   std::map<std::string, Artifact> artifacts_;
   std::optional<preprocess::Image> image_;
-  std::optional<Vessel> vessel_;
+  std::optional<Surface> surface_;
+  std::optional<Centerline> path_;
+  std::optional<Wall> wall_;
   std::optional<plan::Study> study_;
-  std::unique_ptr<simulate::Lumen> lumen_;
+  std::unique_ptr<const simulate::VesselModel> model_;
 };
 
 /// Each fills `folder` with the artifact of its stage. All but the report write figures.json,

@@ -111,11 +111,13 @@ std::vector<Stage> stages_of(const Case& given) {
                       .parameters = {"/segmentation"},
                       .make = make_segment});
     stages.push_back({.name = "surface",
+                      .version = 2,
                       .after = {"segment"},
                       .parameters = {"/surface/edge_length_mm"},
                       .make = make_surface});
   } else {
     stages.push_back({.name = "surface",
+                      .version = 2,
                       .reads_input = true,
                       .parameters = {"/surface/unit", "/surface/frame", "/surface/edge_length_mm"},
                       .make = make_surface});
@@ -125,12 +127,20 @@ std::vector<Stage> stages_of(const Case& given) {
                     .parameters = {"/access/point_mm", "/target/point_mm"},
                     .make = make_centerline});
   stages.push_back(
-      {.name = "wall", .after = {"surface"}, .parameters = {"/wall"}, .make = make_wall});
-  stages.push_back({.name = "trials",
-                    .after = {"surface", "centerline", "wall"},
-                    .parameters = {"/access", "/target", "/wires", "/tip_roll_deg", "/insertion"},
-                    .make = make_trials});
+      {.name = "wall",
+       .after = {"surface"},
+       .parameters = {"/wall/thickness_mm", "/wall/young_modulus_kpa", "/wall/poisson_ratio"},
+       .make = make_wall});
+  Stage trials{.name = "trials",
+               .version = 2,
+               .after = {"surface", "centerline"},
+               .parameters = {"/access", "/target", "/wires", "/tip_roll_deg", "/friction",
+                              "/wall/model", "/insertion"},
+               .make = make_trials};
+  if (given.wall.elastic) trials.after.push_back("wall");  // a rigid one does not act
+  stages.push_back(trials);
   Stage report{.name = "report",
+               .version = 2,
                .reads_input = true,
                .after = {},
                .parameters = {""},

@@ -11,30 +11,44 @@
 #include <utility>
 
 #include "pipeline/json_reader.h"
+#include "preprocess/vessel_io.h"
 
 namespace wireplan::pipeline {
 namespace {
 
-using simulate::NodeContact;
 using simulate::Outcome;
 using simulate::Push;
 using simulate::TrialResult;
+using simulate::TriangleForce;
+using simulate::WireContact;
 
-constexpr const char* kSchema = "wireplan.trial/1";
+constexpr const char* kSchema = "wireplan.trial/2";
 
-constexpr std::array kOutcomes = {Outcome::kReached,   Outcome::kMissed,       Outcome::kStuck,
-                                  Outcome::kLeftLumen, Outcome::kNotConverged, Outcome::kFailed};
+constexpr std::array kOutcomes = {
+    Outcome::kReached,     Outcome::kMissed,    Outcome::kStuck,        Outcome::kProlapsed,
+    Outcome::kLeftOpening, Outcome::kLeftLumen, Outcome::kNotConverged, Outcome::kFailed};
 
 // The numbers of a push, each a column of the file.
-constexpr std::array<std::pair<const char*, double Push::*>, 8> kColumns = {{
+constexpr std::array<std::pair<const char*, double Push::*>, 13> kColumns = {{
     {"insertion_mm", &Push::insertion},
     {"push_force_n", &Push::push_force},
     {"tip_force_n", &Push::tip_force},
     {"peak_contact_force_n", &Push::peak_contact_force},
     {"total_contact_force_n", &Push::total_contact_force},
+    {"friction_force_n", &Push::friction_force},
     {"max_penetration_mm", &Push::max_penetration},
+    {"wall_displacement_mm", &Push::wall_displacement},
     {"peak_curvature_per_mm", &Push::peak_curvature},
+    {"push_work_n_mm", &Push::push_work},
+    {"stored_energy_n_mm", &Push::stored_energy},
+    {"friction_work_n_mm", &Push::friction_work},
     {"residual_n", &Push::residual},
+}};
+
+// Its points, columns too.
+constexpr std::array<std::pair<const char*, Vec3 Push::*>, 2> kPointColumns = {{
+    {"tip_mm", &Push::tip},
+    {"wall_displacement_point_mm", &Push::wall_displacement_point},
 }};
 
 // A number of a trial that failed may not be finite: null, with the trial's reason beside it.
@@ -56,12 +70,13 @@ Json pushes_to_json(const std::vector<Push>& pushes) {
     for (const Push& push : pushes) column.push_back(push.*member);
     columns[name] = std::move(column);
   }
-  Json tips = Json::array(), iterations = Json::array();
-  for (const Push& push : pushes) {
-    tips.push_back(to_json(push.tip));
-    iterations.push_back(push.iterations);
+  for (const auto& [name, member] : kPointColumns) {
+    Json column = Json::array();
+    for (const Push& push : pushes) column.push_back(to_json(push.*member));
+    columns[name] = std::move(column);
   }
-  columns["tip_mm"] = std::move(tips);
+  Json iterations = Json::array();
+  for (const Push& push : pushes) iterations.push_back(push.iterations);
   columns["iterations"] = std::move(iterations);
   return columns;
 }
@@ -70,30 +85,60 @@ std::vector<Push> pushes_from_json(const Json& columns) {
   std::vector<Push> pushes(columns.at("iterations").size());
   for (std::size_t k = 0; k < pushes.size(); ++k) {
     for (const auto& [name, member] : kColumns) pushes[k].*member = number(columns.at(name).at(k));
-    pushes[k].tip = point(columns.at("tip_mm").at(k));
+    for (const auto& [name, member] : kPointColumns) {
+      pushes[k].*member = point(columns.at(name).at(k));
+    }
     pushes[k].iterations = columns.at("iterations").at(k);
   }
   return pushes;
 }
 
-Json contacts_to_json(const std::vector<NodeContact>& contacts) {
+Json contacts_to_json(const std::vector<WireContact>& contacts) {
   Json rows = Json::array();
-  for (const NodeContact& contact : contacts) {
+  for (const WireContact& contact : contacts) {
     rows.push_back({{"node", contact.node},
+                    {"part", contact.part},
+                    {"triangle", contact.triangle},
                     {"point_mm", to_json(contact.point)},
-                    {"force_n", to_json(contact.force)},
-                    {"penetration_mm", contact.penetration}});
+                    {"normal_force_n", to_json(contact.normal_force)},
+                    {"friction_force_n", to_json(contact.friction_force)},
+                    {"penetration_mm", contact.penetration},
+                    {"wall_displacement_mm", contact.wall_displacement}});
   }
   return rows;
 }
 
-std::vector<NodeContact> contacts_from_json(const Json& rows) {
-  std::vector<NodeContact> contacts;
+std::vector<WireContact> contacts_from_json(const Json& rows) {
+  std::vector<WireContact> contacts;
   for (const Json& row : rows) {
-    contacts.push_back({row.at("node"), point(row.at("point_mm")), point(row.at("force_n")),
-                        number(row.at("penetration_mm"))});
+    contacts.push_back({.node = row.at("node"),
+                        .part = number(row.at("part")),
+                        .triangle = row.at("triangle"),
+                        .point = point(row.at("point_mm")),
+                        .normal_force = point(row.at("normal_force_n")),
+                        .friction_force = point(row.at("friction_force_n")),
+                        .penetration = number(row.at("penetration_mm")),
+                        .wall_displacement = number(row.at("wall_displacement_mm"))});
   }
   return contacts;
+}
+
+// Two columns: triangles of surface.vtp and their forces.
+Json peaks_to_json(const std::vector<TriangleForce>& peaks) {
+  Json triangles = Json::array(), forces = Json::array();
+  for (const TriangleForce& peak : peaks) {
+    triangles.push_back(peak.triangle);
+    forces.push_back(peak.force);
+  }
+  return {{"triangle", std::move(triangles)}, {"force_n", std::move(forces)}};
+}
+
+std::vector<TriangleForce> peaks_from_json(const Json& columns) {
+  std::vector<TriangleForce> peaks(columns.at("triangle").size());
+  for (std::size_t k = 0; k < peaks.size(); ++k) {
+    peaks[k] = {columns.at("triangle").at(k), number(columns.at("force_n").at(k))};
+  }
+  return peaks;
 }
 
 // One key of the root per line: compact, and still to be read and compared by eye. Renamed into
@@ -139,6 +184,7 @@ void write_trial(int id, const plan::Study& study, const plan::Candidate& candid
   file["pushes"] = pushes_to_json(trial.pushes);
   file["nodes_mm"] = to_json(trial.nodes);
   file["contacts"] = contacts_to_json(trial.contacts);
+  file["peak_forces"] = peaks_to_json(trial.peak_forces);
   write_lines(file, path);
 }
 
@@ -157,7 +203,22 @@ std::optional<TrialResult> find_trial(const std::filesystem::path& path) {
     trial.nodes.col(static_cast<Eigen::Index>(k)) = point(nodes[k]);
   }
   trial.contacts = contacts_from_json(file.at("contacts"));
+  trial.peak_forces = peaks_from_json(file.at("peak_forces"));
   return trial;
+}
+
+void write_shapes(const TrialResult& trial, const std::string& name,
+                  const std::filesystem::path& folder) {
+  std::filesystem::create_directories(folder / name);
+  std::vector<std::filesystem::path> files;
+  std::vector<double> insertions;
+  for (const simulate::Shape& shape : trial.shapes) {
+    const std::vector<double> force(shape.contact_force.begin(), shape.contact_force.end());
+    files.push_back(folder / name / (std::to_string(files.size()) + ".vtp"));
+    insertions.push_back(shape.insertion);
+    preprocess::write_polyline(shape.nodes, {{"contact_force_n", force}}, files.back());
+  }
+  preprocess::write_time_series(files, insertions, folder / (name + ".pvd"));
 }
 
 }  // namespace wireplan::pipeline

@@ -1,7 +1,7 @@
 #pragma once
 /// One trial <-> trials/NNNN.json: what was tried, how it ended, every push as columns, the final
-/// shape and its contacts. The shapes on the way are not kept: a trial is deterministic and is
-/// repeated for the few plans whose pictures are wanted.
+/// shape, its contacts and the largest force on each triangle. The shapes on the way are not kept:
+/// a trial is deterministic and is repeated for the few plans whose pictures are wanted.
 #include <filesystem>
 #include <optional>
 #include <string>
@@ -19,5 +19,10 @@ void write_trial(int id, const plan::Study& study, const plan::Candidate& candid
 /// Reads what write_trial wrote, bit for bit but for `shapes`, which is empty. Nothing where the
 /// file is absent or cut.
 std::optional<simulate::TrialResult> find_trial(const std::filesystem::path& path);
+
+/// The shapes on the way as FOLDER/NAME/K.vtp, with the contact force at each node, and
+/// FOLDER/NAME.pvd, a time series over the insertion [mm] that ParaView plays.
+void write_shapes(const simulate::TrialResult& trial, const std::string& name,
+                  const std::filesystem::path& folder);
 
 }  // namespace wireplan::pipeline

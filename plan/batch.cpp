@@ -20,12 +20,23 @@ namespace {
 bool is_finite(const simulate::TrialResult& trial) {
   const auto push_is_finite = [](const simulate::Push& push) {
     const double sum = push.insertion + push.push_force + push.tip.sum() + push.tip_force +
-                       push.peak_contact_force + push.total_contact_force + push.max_penetration +
-                       push.peak_curvature + push.residual;
+                       push.peak_contact_force + push.total_contact_force + push.friction_force +
+                       push.max_penetration + push.wall_displacement +
+                       push.wall_displacement_point.sum() + push.peak_curvature + push.push_work +
+                       push.stored_energy + push.friction_work + push.residual;
     return std::isfinite(sum);
   };
+  const auto contact_is_finite = [](const simulate::WireContact& contact) {
+    const Vec3 sum = contact.point + contact.normal_force + contact.friction_force;
+    return std::isfinite(sum.sum() + contact.penetration + contact.wall_displacement);
+  };
+  const auto force_is_finite = [](const simulate::TriangleForce& peak) {
+    return std::isfinite(peak.force);
+  };
   return trial.nodes.allFinite() &&
-         std::all_of(trial.pushes.begin(), trial.pushes.end(), push_is_finite);
+         std::all_of(trial.pushes.begin(), trial.pushes.end(), push_is_finite) &&
+         std::all_of(trial.contacts.begin(), trial.contacts.end(), contact_is_finite) &&
+         std::all_of(trial.peak_forces.begin(), trial.peak_forces.end(), force_is_finite);
 }
 
 }  // namespace
@@ -76,12 +87,12 @@ std::vector<bool> for_each_slot(int count, const std::function<void(int slot)>& 
 }
 
 simulate::TrialResult run_candidate(const Study& study, const Candidate& candidate,
-                                    const simulate::Lumen& lumen) {
+                                    const simulate::VesselModel& vessel) {
   try {
     expects(candidate.wire >= 0 && candidate.wire < std::ssize(study.wires));
     simulate::TrialResult trial =
         simulate::run_trial(study.wires[candidate.wire], make_introducer(study, candidate),
-                            study.goal, lumen, study.insertion);
+                            study.goal, vessel, study.insertion);
     if (!is_finite(trial)) throw LogicError("the trial has a number that is not finite");
     return trial;
   } catch (const std::exception& exception) {
@@ -93,7 +104,7 @@ simulate::TrialResult run_candidate(const Study& study, const Candidate& candida
 }
 
 BatchResult run_batch(const Study& study, const std::vector<Candidate>& candidates,
-                      const simulate::Lumen& lumen, const BatchOptions& options) {
+                      const simulate::VesselModel& vessel, const BatchOptions& options) {
   // A slot that is never run keeps this.
   simulate::TrialResult left_out;
   left_out.outcome = simulate::Outcome::kFailed;
@@ -104,7 +115,7 @@ BatchResult run_batch(const Study& study, const std::vector<Candidate>& candidat
   result.cpu_seconds.assign(candidates.size(), 0.0);
   const auto run_slot = [&](int slot) {
     const double start = thread_cpu_seconds();
-    result.trials[slot] = run_candidate(study, candidates[slot], lumen);
+    result.trials[slot] = run_candidate(study, candidates[slot], vessel);
     result.cpu_seconds[slot] = thread_cpu_seconds() - start;
   };
   result.finished = for_each_slot(static_cast<int>(candidates.size()), run_slot, options);

@@ -25,12 +25,12 @@ struct BatchResult {
 /// message as its reason; it never ends the batch. After a cancel the trials under way are
 /// finished, and those left out are Outcome::kFailed with the reason "not run: cancelled".
 BatchResult run_batch(const Study& study, const std::vector<Candidate>& candidates,
-                      const simulate::Lumen& lumen, const BatchOptions& options);
+                      const simulate::VesselModel& vessel, const BatchOptions& options);
 
 /// One trial of the batch: what it throws, or a number that is not finite, becomes
 /// Outcome::kFailed.
 simulate::TrialResult run_candidate(const Study& study, const Candidate& candidate,
-                                    const simulate::Lumen& lumen);
+                                    const simulate::VesselModel& vessel);
 
 /// The parallel driver below run_batch: calls work(slot) once for each slot in [0, count), in no
 /// promised order; slots must write to places of their own. Returns which slots were finished: all,

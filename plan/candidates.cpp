@@ -43,7 +43,8 @@ std::vector<Candidate> list_candidates(const Study& study) {
 
   std::vector<Candidate> candidates;
   for (int wire = 0; wire < std::ssize(study.wires); ++wire) {
-    const std::size_t roll_count = study.wires[wire].straight() ? 1 : rolls.size();
+    const bool symmetric = study.wires[wire].straight() && study.wires[wire].round();
+    const std::size_t roll_count = symmetric ? 1 : rolls.size();
     for (const double inclination : inclinations) {
       const std::size_t azimuth_count = same_angle(inclination, 0.0) ? 1 : azimuths.size();
       for (std::size_t a = 0; a < azimuth_count; ++a) {

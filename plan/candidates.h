@@ -23,8 +23,8 @@ struct Candidate {
 };
 
 /// All combinations, wires outermost, roll innermost. What cannot differ is listed once: at
-/// inclination 0 only the first azimuth, for a straight wire only the first roll, and an angle that
-/// repeats an earlier one (0 and 360 deg) not again. Expects at least one of each.
+/// inclination 0 only the first azimuth, for a straight round wire only the first roll, and an
+/// angle that repeats an earlier one (0 and 360 deg) not again. Expects at least one of each.
 std::vector<Candidate> list_candidates(const Study& study);
 
 /// Unit direction of the introducer, into the vessel: `tangent` tilted by `inclination` toward the

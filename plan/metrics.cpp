@@ -10,10 +10,11 @@ namespace {
 /// Distance of a point from the path's axis, and from the balls inscribed along it (0 inside one).
 struct PathDistance {
   double axis = 0.0, lumen = 0.0;  //                                                       [mm]
+  double radius = 0.0;             // of the path at the nearest point of its axis          [mm]
 };
 
 PathDistance distance_to_path(const Vec3& p, const Centerline& path) {
-  PathDistance nearest{(p - path.points.col(0)).norm(), 0.0};
+  PathDistance nearest{(p - path.points.col(0)).norm(), 0.0, path.radius[0]};
   nearest.lumen = std::max(0.0, nearest.axis - path.radius[0]);
   for (Eigen::Index k = 1; k < path.points.cols(); ++k) {
     const Vec3 a = path.points.col(k - 1), ab = path.points.col(k) - path.points.col(k - 1);
@@ -21,7 +22,10 @@ PathDistance distance_to_path(const Vec3& p, const Centerline& path) {
     const double t = squared == 0.0 ? 0.0 : std::clamp((p - a).dot(ab) / squared, 0.0, 1.0);
     const double axis = (p - a - t * ab).norm();
     const double radius = (1.0 - t) * path.radius[k - 1] + t * path.radius[k];
-    nearest.axis = std::min(nearest.axis, axis);
+    if (axis < nearest.axis) {
+      nearest.axis = axis;
+      nearest.radius = radius;
+    }
     nearest.lumen = std::min(nearest.lumen, std::max(0.0, axis - radius));
   }
   return nearest;
@@ -31,6 +35,20 @@ PathDistance distance_to_path(const Vec3& p, const Centerline& path) {
 Vec3 final_tip(const simulate::TrialResult& trial, const Study& study) {
   if (trial.nodes.cols() > 0) return trial.nodes.rightCols<1>();
   return trial.pushes.empty() ? study.access : trial.pushes.back().tip;
+}
+
+WallMotion find_wall_motion(const std::vector<simulate::Push>& pushes, const Centerline& path) {
+  WallMotion worst;
+  for (const simulate::Push& push : pushes) {
+    if (push.wall_displacement <= 0.0) continue;
+    const double radius = distance_to_path(push.wall_displacement_point, path).radius;
+    if (worst.displacement > 0.0 &&
+        push.wall_displacement * worst.radius <= worst.displacement * radius) {
+      continue;
+    }
+    worst = {push.wall_displacement, radius, push.wall_displacement_point};
+  }
+  return worst;
 }
 
 }  // namespace
@@ -50,8 +68,16 @@ Metrics compute_push_metrics(const std::vector<simulate::Push>& pushes) {
     metrics.peak_push_force = std::max(metrics.peak_push_force, std::abs(push.push_force));
     metrics.peak_curvature = std::max(metrics.peak_curvature, push.peak_curvature);
     metrics.max_penetration = std::max(metrics.max_penetration, push.max_penetration);
+    metrics.peak_wall_displacement =
+        std::max(metrics.peak_wall_displacement, push.wall_displacement);
     metrics.residual = std::max(metrics.residual, push.residual);
     metrics.iterations += push.iterations;
+  }
+  if (!pushes.empty()) {
+    const simulate::Push& last = pushes.back();
+    metrics.push_work = last.push_work;
+    metrics.friction_work = last.friction_work;
+    metrics.energy_released = last.push_work - last.stored_energy - last.friction_work;
   }
   if (metrics.insertion > 0.0) {
     metrics.mean_contact_force = metrics.force_impulse / metrics.insertion;
@@ -65,6 +91,12 @@ Metrics compute_metrics(const simulate::TrialResult& trial, const Study& study,
   Metrics metrics = compute_push_metrics(trial.pushes);
   metrics.reached = trial.outcome == simulate::Outcome::kReached;
   metrics.tip_to_target = (final_tip(trial, study) - study.goal.point).norm();
+  metrics.nearest_to_target = metrics.tip_to_target;
+  for (const simulate::Push& push : trial.pushes) {
+    metrics.nearest_to_target =
+        std::min(metrics.nearest_to_target, (push.tip - study.goal.point).norm());
+  }
+  metrics.wall_motion = find_wall_motion(trial.pushes, path);
   for (Eigen::Index k = 0; k < trial.nodes.cols(); ++k) {
     const PathDistance distance = distance_to_path(trial.nodes.col(k), path);
     metrics.centerline_deviation += distance.axis / static_cast<double>(trial.nodes.cols());

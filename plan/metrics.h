@@ -5,22 +5,40 @@
 
 namespace wireplan::plan {
 
+/// Linear theory of the wall ends where it moves by more than this part of the vessel's radius.
+inline constexpr double kLinearWallPart = 0.2;
+
+/// Where the wall moved furthest for its vessel's size.
+struct WallMotion {
+  double displacement = 0.0;  //                                                           [mm]
+  double radius = 0.0;        // of the path at its nearest point                          [mm]
+  Vec3 point = Vec3::Zero();  //                                                           [mm]
+  bool beyond_linear_theory() const { return displacement > kLinearWallPart * radius; }
+};
+
 struct Metrics {
   bool reached = false;
-  double insertion = 0.0;             // wire in the body at the end of the trial          [mm]
-  double tip_to_target = 0.0;         // distance at the end                               [mm]
-  double peak_tip_force = 0.0;        // over the insertion                                [N]
-  double peak_contact_force = 0.0;    // largest single contact                            [N]
-  double mean_contact_force = 0.0;    // all contacts together, mean over the insertion    [N]
-  double force_impulse = 0.0;         // integral of all contacts' force over insertion    [N mm]
-  double peak_push_force = 0.0;       // largest size, pushed or held back                 [N]
-  double peak_curvature = 0.0;        //                                                   [1/mm]
-  double centerline_deviation = 0.0;  // mean distance of the final wire from the path     [mm]
-  double off_path = 0.0;              // furthest part of the final wire from the path's lumen, by
-                                      // the path's inscribed radius                       [mm]
-  double max_penetration = 0.0;       // wire surface past the wall, over the insertion    [mm]
-  double residual = 0.0;              // largest over the pushes                           [N]
-  long iterations = 0;                // of all pushes together
+  double insertion = 0.0;               // wire in the body at the end of the trial          [mm]
+  double tip_to_target = 0.0;           // distance at the end                               [mm]
+  double nearest_to_target = 0.0;       // smallest distance after any push                  [mm]
+  double peak_tip_force = 0.0;          // over the insertion                                [N]
+  double peak_contact_force = 0.0;      // largest single contact                            [N]
+  double mean_contact_force = 0.0;      // all contacts together, mean over the insertion    [N]
+  double force_impulse = 0.0;           // integral of all contacts' force over insertion    [N mm]
+  double peak_push_force = 0.0;         // largest size, pushed or held back                 [N]
+  double peak_curvature = 0.0;          //                                                   [1/mm]
+  double centerline_deviation = 0.0;    // mean distance of the final wire from the path     [mm]
+  double off_path = 0.0;                // furthest part of the final wire from the path's lumen, by
+                                        // the path's inscribed radius                       [mm]
+  double max_penetration = 0.0;         // wire surface past the wall, over the insertion    [mm]
+  double peak_wall_displacement = 0.0;  // over the insertion                              [mm]
+  WallMotion wall_motion;               // largest displacement / radius over the insertion
+  double push_work = 0.0;               // of the hand                                     [N mm]
+  double friction_work = 0.0;           // turned into heat                                [N mm]
+  double energy_released = 0.0;  // work that is neither stored nor heat of friction at the end:
+                                 // what the wire gave off in jumps                        [N mm]
+  double residual = 0.0;         // largest over the pushes                           [N]
+  long iterations = 0;           // of all pushes together
 };
 
 /// All of the trial's numbers. Without a push the wire counts as lying at the access, free of
@@ -29,10 +47,10 @@ struct Metrics {
 Metrics compute_metrics(const simulate::TrialResult& trial, const Study& study,
                         const Centerline& path);
 
-/// The part that the pushes alone tell: insertion, forces, curvature, penetration, residual and
-/// iterations. The impulse is the integral of the total contact force by the trapezoidal rule, from
-/// rest (no force at insertion 0) through the pushes; the mean is the impulse over the insertion.
-/// Expects pushes in order of insertion.
+/// The part that the pushes alone tell: insertion, forces, curvature, penetration, displacement,
+/// work, residual and iterations. The impulse is the integral of the total contact force by the
+/// trapezoidal rule, from rest (no force at insertion 0) through the pushes; the mean is the
+/// impulse over the insertion. Expects pushes in order of insertion.
 Metrics compute_push_metrics(const std::vector<simulate::Push>& pushes);
 
 }  // namespace wireplan::plan

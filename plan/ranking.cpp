@@ -79,16 +79,6 @@ std::string broken_limits(const Metrics& metrics, const Limits& limits) {
   return reason;
 }
 
-/// Smallest distance of the tip from the target after any push.
-double nearest_distance(const simulate::TrialResult& trial, const Study& study,
-                        const Metrics& metrics) {
-  double nearest = metrics.tip_to_target;
-  for (const simulate::Push& push : trial.pushes) {
-    nearest = std::min(nearest, (push.tip - study.goal.point).norm());
-  }
-  return nearest;
-}
-
 /// Why the trial is no plan; empty if it is one.
 std::string exclusion_reason(const simulate::TrialResult& trial, const Metrics& metrics,
                              const Study& study, const Limits& limits) {
@@ -101,10 +91,14 @@ std::string exclusion_reason(const simulate::TrialResult& trial, const Metrics& 
     case Outcome::kMissed:
       return "missed: tip ended " + one_decimal(metrics.tip_to_target) +
              " mm from the target and came no nearer than " +
-             one_decimal(nearest_distance(trial, study, metrics)) + " mm, expected within " +
+             one_decimal(metrics.nearest_to_target) + " mm, expected within " +
              four_digits(study.goal.radius) + " mm";
     case Outcome::kStuck:
       return with_reason("stuck " + place, trial);
+    case Outcome::kProlapsed:
+      return with_reason("prolapsed " + place, trial);
+    case Outcome::kLeftOpening:
+      return with_reason("left the vessel " + place, trial);
     case Outcome::kLeftLumen:
       return with_reason("left the lumen " + place, trial);
     case Outcome::kNotConverged:
@@ -190,6 +184,23 @@ std::string compare_with_first(const RankedPlan& plan, const RankedPlan& first,
   return text;
 }
 
+/// What a reader must know of a plan that is ranked all the same.
+std::string warnings_of(const Metrics& m, const Limits& limits) {
+  std::string text;
+  if (m.peak_tip_force > limits.tip_force_warn) {
+    text += "; warning: tip force " + four_digits(m.peak_tip_force) +
+            " N over the warning level of " + four_digits(limits.tip_force_warn) + " N";
+  }
+  if (m.wall_motion.beyond_linear_theory()) {
+    const Vec3& p = m.wall_motion.point;
+    text += "; warning: the wall moved " + two_digits(m.wall_motion.displacement) + " mm at (" +
+            one_decimal(p.x()) + ", " + one_decimal(p.y()) + ", " + one_decimal(p.z()) +
+            ") mm where the vessel's radius is " + two_digits(m.wall_motion.radius) +
+            " mm, beyond linear theory (" + two_digits(kLinearWallPart) + " of it)";
+  }
+  return text;
+}
+
 void write_sentences(Ranking& ranking, const Study& study, const std::vector<Candidate>& candidates,
                      const std::vector<Metrics>& metrics, const Limits& limits,
                      const Weights& weights) {
@@ -202,10 +213,7 @@ void write_sentences(Ranking& ranking, const Study& study, const std::vector<Can
     plan.sentence += plan.trial == first.trial
                          ? compare_with_next_wire(ranking.plans, study, candidates, metrics)
                          : compare_with_first(plan, first, metrics, weights);
-    if (m.peak_tip_force > limits.tip_force_warn) {
-      plan.sentence += "; warning: tip force " + four_digits(m.peak_tip_force) +
-                       " N over the warning level of " + four_digits(limits.tip_force_warn) + " N";
-    }
+    plan.sentence += warnings_of(m, limits);
   }
 }
 

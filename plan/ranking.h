@@ -8,7 +8,8 @@
 
 namespace wireplan::plan {
 
-/// Beyond these a trial is excluded; beyond `tip_force_warn` its sentence warns.
+/// Beyond these a trial is excluded; beyond `tip_force_warn`, or where the wall moved beyond linear
+/// theory (metrics.h), its sentence warns.
 struct Limits {
   double tip_force_warn = 0.3;    // references B3                                          [N]
   double tip_force_fail = 1.5;    // references B3                                          [N]
@@ -92,8 +93,8 @@ struct Ranking {
 };
 
 /// Orders by score, then by index of the candidate. `errors` holds what refining has found, per
-/// trial; empty if nothing was refined. Expects one trial and one Metrics per candidate, and
-/// positive limits.
+/// trial; empty if nothing was refined. Of a trial only its outcome and reason are looked at.
+/// Expects one trial and one Metrics per candidate, and positive limits.
 Ranking rank(const Study& study, const std::vector<Candidate>& candidates,
              const std::vector<simulate::TrialResult>& trials, const std::vector<Metrics>& metrics,
              const Limits& limits, const Weights& weights,

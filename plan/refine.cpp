@@ -1,6 +1,7 @@
 #include "plan/refine.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdio>
 
@@ -16,13 +17,16 @@ std::string in_mm(double length) {
   return text;
 }
 
-/// The study of one run: other elements, and pushed to `insertion` whether or not the tip passes
-/// the goal on the way.
-Study with_elements(const Study& study, double element_length, double insertion) {
+/// The study of one run: elements and contact points `factor` times as far apart, and pushed to
+/// `insertion` whether or not the tip passes the goal on the way.
+Study coarsened(const Study& study, double factor, double insertion) {
   Study changed = study;
-  changed.insertion.element_length = element_length;
+  changed.insertion.element_length *= factor;
+  for (double& length : changed.insertion.section_element_length) length *= factor;
+  changed.insertion.contact_spacing *= factor;
   changed.insertion.length = insertion;
-  changed.goal.radius = 1e-9;  // no push ends that near, so none ends the trial
+  changed.insertion.record_every = insertion;  // no shapes on the way
+  changed.goal.radius = 1e-9;                  // no push ends that near, so none ends the trial
   return changed;
 }
 
@@ -74,14 +78,16 @@ std::optional<double> find_order(const std::optional<Change>& coarse,
 
 std::vector<Refinement> refine_plans(const Study& study, const std::vector<Candidate>& candidates,
                                      const std::vector<Metrics>& metrics, const Ranking& ranking,
-                                     const simulate::Lumen& lumen, const RefineOptions& options) {
+                                     const simulate::VesselModel& vessel,
+                                     const RefineOptions& options) {
   expects(options.plans >= 0 && metrics.size() == candidates.size());
   const int plans = std::min(options.plans, static_cast<int>(ranking.plans.size()));
 
   // Plan by plan: 2h, h, h/2.
+  constexpr std::array kFactors = {2.0, 1.0, 0.5};
   std::vector<RefinedRun> runs;
   for (int k = 0; k < plans; ++k) {
-    for (const double factor : {2.0, 1.0, 0.5}) {
+    for (const double factor : kFactors) {
       RefinedRun& run = runs.emplace_back();
       run.element_length = factor * study.insertion.element_length;
       run.trial.reason = "not run: cancelled";
@@ -91,8 +97,8 @@ std::vector<Refinement> refine_plans(const Study& study, const std::vector<Candi
     RefinedRun& run = runs[slot];
     const int trial = ranking.plans[slot / 3].trial;
     const double start = thread_cpu_seconds();
-    run.trial = run_candidate(with_elements(study, run.element_length, metrics[trial].insertion),
-                              candidates[trial], lumen);
+    run.trial = run_candidate(coarsened(study, kFactors[slot % 3], metrics[trial].insertion),
+                              candidates[trial], vessel);
     run.cpu_seconds = thread_cpu_seconds() - start;
   };
   for_each_slot(static_cast<int>(runs.size()), run_slot, options.batch);

@@ -1,6 +1,7 @@
 #pragma once
 /// How far the best plans may be from the truth: each is run again with elements twice and half as
-/// long, which also gives the error against run time of the case at hand (design section 8).
+/// long, and contact points as far apart, which also gives the error against run time of the case
+/// at hand (design section 8).
 #include <optional>
 #include <string>
 #include <vector>
@@ -44,7 +45,8 @@ struct RefinedRun {
 /// are compared. Returns one Refinement per plan, in order of rank.
 std::vector<Refinement> refine_plans(const Study& study, const std::vector<Candidate>& candidates,
                                      const std::vector<Metrics>& metrics, const Ranking& ranking,
-                                     const simulate::Lumen& lumen, const RefineOptions& options);
+                                     const simulate::VesselModel& vessel,
+                                     const RefineOptions& options);
 
 /// Richardson's estimate from three runs to the same `insertion`, with elements of 2h, h and h/2.
 /// With d the change from one run to the next finer one, the longer elements' error is

@@ -38,6 +38,14 @@ vtkSmartPointer<vtkDoubleArray> vtk_array(const std::string& name,
   return array;
 }
 
+/// Adds arrays of `count` values each.
+void add_arrays(vtkFieldData* fields, const std::vector<NamedArray>& arrays, Eigen::Index count) {
+  for (const NamedArray& array : arrays) {
+    expects(array.values.size() == static_cast<std::size_t>(count));
+    fields->AddArray(vtk_array(array.name, Eigen::VectorXd::Map(array.values.data(), count)));
+  }
+}
+
 vtkSmartPointer<vtkPolyData> vtk_polyline(const Eigen::Matrix3Xd& points) {
   vtkNew<vtkCellArray> cells;
   cells->InsertNextCell(static_cast<int>(points.cols()));
@@ -157,11 +165,7 @@ Surface read_surface_artifact(const std::filesystem::path& path) {
 void write_polyline(const Eigen::Matrix3Xd& points, const std::vector<NamedArray>& arrays,
                     const std::filesystem::path& path) {
   const vtkSmartPointer<vtkPolyData> data = vtk_polyline(points);
-  for (const NamedArray& array : arrays) {
-    expects(array.values.size() == static_cast<std::size_t>(points.cols()));
-    data->GetPointData()->AddArray(
-        vtk_array(array.name, Eigen::VectorXd::Map(array.values.data(), points.cols())));
-  }
+  add_arrays(data->GetPointData(), arrays, points.cols());
   write_with<vtkXMLPolyDataWriter>(data, path);
 }
 
@@ -183,7 +187,8 @@ Centerline read_centerline(const std::filesystem::path& path) {
   return line;
 }
 
-void write_wall(const Surface& surface, const Wall& wall, const std::filesystem::path& path) {
+void write_wall(const Surface& surface, const Wall& wall, const std::filesystem::path& path,
+                const std::vector<NamedArray>& arrays) {
   const Eigen::Index vertices = surface.vertices.cols(), count = surface.triangles.cols();
   expects(wall.apexes.cols() == count && wall.height.size() == count);
   Eigen::Matrix3Xd points(3, vertices + count);
@@ -197,6 +202,7 @@ void write_wall(const Surface& surface, const Wall& wall, const std::filesystem:
   data->SetPoints(vtk_points(points));
   data->SetCells(VTK_TETRA, cells);
   data->GetCellData()->AddArray(vtk_array("height_mm", wall.height));
+  add_arrays(data->GetCellData(), arrays, count);
   data->GetFieldData()->AddArray(
       vtk_array("young_modulus_mpa", Eigen::VectorXd::Constant(1, wall.young_modulus)));
   data->GetFieldData()->AddArray(

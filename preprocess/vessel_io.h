@@ -18,16 +18,20 @@ Surface read_surface_artifact(const std::filesystem::path& path);
 void write_centerline(const Centerline& line, const std::filesystem::path& path);
 Centerline read_centerline(const std::filesystem::path& path);
 
-/// .vtu of tetrahedra: points are the surface's vertices, then the apexes; cell array `height_mm`,
-/// field data `young_modulus_mpa` and `poisson_ratio`.
-void write_wall(const Surface& surface, const Wall& wall, const std::filesystem::path& path);
-Wall read_wall(const std::filesystem::path& path);
-
-/// A polyline with named point arrays (3-vectors are not needed), for wires: .vtp.
+/// Values that a viewer shows on the points or cells of a file, under a name.
 struct NamedArray {
   std::string name;
-  std::vector<double> values;  // one per point
+  std::vector<double> values;  // one per point or cell
 };
+
+/// .vtu of tetrahedra, one per triangle of the surface: points are the surface's vertices, then the
+/// apexes; cell array `height_mm` and those given, field data `young_modulus_mpa` and
+/// `poisson_ratio`.
+void write_wall(const Surface& surface, const Wall& wall, const std::filesystem::path& path,
+                const std::vector<NamedArray>& arrays = {});
+Wall read_wall(const std::filesystem::path& path);
+
+/// A polyline with named point arrays, for wires: .vtp.
 void write_polyline(const Eigen::Matrix3Xd& points, const std::vector<NamedArray>& arrays,
                     const std::filesystem::path& path);
 

@@ -6,6 +6,9 @@
 #include <cmath>
 #include <limits>
 #include <map>
+#include <set>
+
+#include "simulate/triangle.h"
 
 namespace wireplan::simulate {
 
@@ -49,40 +52,12 @@ PseudoNormals compute_pseudo_normals(const Surface& surface) {
   return normals;
 }
 
-/// Offset of a point from the nearest point of a triangle, and the normal of the feature that it
-/// lies on (Ericson, "Real-Time Collision Detection", 5.1.5).
-struct NearestOnTriangle {
-  Vec3 offset;
-  const double* normal;
-};
-
-NearestOnTriangle nearest_on_triangle(const Vec3& p, const Vec3& a, const Vec3& b, const Vec3& c,
-                                      const PseudoNormals& normals, Eigen::Index f,
-                                      const Eigen::Vector3i& t) {
-  const Vec3 ab = b - a, ac = c - a, ap = p - a;
-  const double d1 = ab.dot(ap), d2 = ac.dot(ap);
-  if (d1 <= 0.0 && d2 <= 0.0) return {ap, normals.vertex.col(t[0]).data()};
-  const Vec3 bp = p - b;
-  const double d3 = ab.dot(bp), d4 = ac.dot(bp);
-  if (d3 >= 0.0 && d4 <= d3) return {bp, normals.vertex.col(t[1]).data()};
-  const double vc = d1 * d4 - d3 * d2;
-  if (vc <= 0.0 && d1 >= 0.0 && d3 <= 0.0) {
-    return {ap - (d1 / (d1 - d3)) * ab, normals.edge[f][0].data()};
-  }
-  const Vec3 cp = p - c;
-  const double d5 = ab.dot(cp), d6 = ac.dot(cp);
-  if (d6 >= 0.0 && d5 <= d6) return {cp, normals.vertex.col(t[2]).data()};
-  const double vb = d5 * d2 - d1 * d6;
-  if (vb <= 0.0 && d2 >= 0.0 && d6 <= 0.0) {
-    return {ap - (d2 / (d2 - d6)) * ac, normals.edge[f][2].data()};
-  }
-  const double va = d3 * d6 - d5 * d4;
-  if (va <= 0.0 && d4 - d3 >= 0.0 && d5 - d6 >= 0.0) {
-    const double w = (d4 - d3) / ((d4 - d3) + (d5 - d6));
-    return {bp - w * (c - b), normals.edge[f][1].data()};
-  }
-  const double inverse = 1.0 / (va + vb + vc);
-  return {ap - (vb * inverse) * ab - (vc * inverse) * ac, normals.face.col(f).data()};
+/// Normal of what a point nearest to another lies on, in triangle f with the corners t.
+Vec3 normal_of(const NearestOnTriangle& nearest, const PseudoNormals& normals, Eigen::Index f,
+               const Eigen::Vector3i& t) {
+  if (nearest.feature < 3) return normals.vertex.col(t[nearest.feature]);
+  if (nearest.feature < 6) return normals.edge[f][nearest.feature - 3];
+  return normals.face.col(f);
 }
 
 // ---------------------------------------------------------------- sparse grid of samples
@@ -98,6 +73,7 @@ struct SampleGrid {
   double spacing, limit;  // distances are cut to +-limit
   std::array<int, 3> bricks;
   std::vector<std::int32_t> slot;  // of each brick; negative: no samples there
+  std::int32_t slots = 0;          // given so far
   std::vector<double> values;      // kVolume per slot
 
   std::size_t brick_index(int i, int j, int k) const {
@@ -122,27 +98,35 @@ struct SampleGrid {
   }
 };
 
-/// Grid indices whose nodes lie within `reach` of the box of a triangle.
+/// Grid indices of the nodes in a box.
 struct NodeBox {
   std::array<int, 3> low, high;
 };
 
-NodeBox node_box(const SampleGrid& grid, const Surface& surface, Eigen::Index f, double reach) {
+NodeBox node_box(const SampleGrid& grid, const Vec3& low, const Vec3& high) {
   NodeBox box{};
   for (int d = 0; d < 3; ++d) {
-    double low = std::numeric_limits<double>::infinity(), high = -low;
-    for (int c = 0; c < 3; ++c) {
-      const double x = surface.vertices(d, surface.triangles(c, f));
-      low = std::min(low, x);
-      high = std::max(high, x);
-    }
-    box.low[d] =
-        std::max(0, static_cast<int>(std::ceil((low - reach - grid.origin[d]) / grid.spacing)));
-    box.high[d] =
-        std::min(grid.bricks[d] * SampleGrid::kSide - 1,
-                 static_cast<int>(std::floor((high + reach - grid.origin[d]) / grid.spacing)));
+    box.low[d] = std::max(0, static_cast<int>(std::ceil((low[d] - grid.origin[d]) / grid.spacing)));
+    box.high[d] = std::min(grid.bricks[d] * SampleGrid::kSide - 1,
+                           static_cast<int>(std::floor((high[d] - grid.origin[d]) / grid.spacing)));
   }
   return box;
+}
+
+/// Nodes within the grid's limit of the box of a triangle.
+NodeBox node_box(const SampleGrid& grid, const Surface& surface, Eigen::Index f) {
+  const Eigen::Vector3i t = surface.triangles.col(f);
+  const Vec3 a = surface.vertices.col(t[0]), b = surface.vertices.col(t[1]),
+             c = surface.vertices.col(t[2]);
+  return node_box(grid, a.cwiseMin(b).cwiseMin(c).array() - grid.limit,
+                  a.cwiseMax(b).cwiseMax(c).array() + grid.limit);
+}
+
+bool overlap(const NodeBox& a, const NodeBox& b) {
+  for (int d = 0; d < 3; ++d) {
+    if (a.low[d] > b.high[d] || b.low[d] > a.high[d]) return false;
+  }
+  return true;
 }
 
 /// Calls visit(slot, i, j, k) for every brick of the box.
@@ -157,43 +141,52 @@ void for_each_brick(SampleGrid& grid, const NodeBox& box, const Visit& visit) {
   }
 }
 
-/// Distances of all nodes within `limit` of the surface. Unreached nodes keep the value +infinity.
-void scatter_distances(SampleGrid& grid, const Surface& surface) {
-  const Eigen::Index m = surface.triangles.cols();
-  const double reach = grid.limit;
-  std::int32_t slots = 0;
-  for (Eigen::Index f = 0; f < m; ++f) {
-    for_each_brick(grid, node_box(grid, surface, f, reach), [&](std::int32_t& s, int, int, int) {
-      if (s < 0) s = slots++;
-    });
-  }
-  grid.values.assign(static_cast<std::size_t>(slots) * SampleGrid::kVolume,
-                     std::numeric_limits<double>::infinity());
+/// Gives samples to the bricks of a box; their values come later.
+void add_samples(SampleGrid& grid, const NodeBox& box) {
+  for_each_brick(grid, box, [&](std::int32_t& s, int, int, int) {
+    if (s < 0) s = grid.slots++;
+  });
+}
 
+/// Calls visit(value, position) for every node of the box. Expects samples in all its bricks.
+template <class Visit>
+void for_each_node(SampleGrid& grid, const NodeBox& box, const Visit& visit) {
+  for_each_brick(grid, box, [&](std::int32_t& s, int bi, int bj, int bk) {
+    double* values = grid.values.data() + static_cast<std::size_t>(s) * SampleGrid::kVolume;
+    for (int k = std::max(box.low[2], 8 * bk); k <= std::min(box.high[2], 8 * bk + 7); ++k) {
+      for (int j = std::max(box.low[1], 8 * bj); j <= std::min(box.high[1], 8 * bj + 7); ++j) {
+        for (int i = std::max(box.low[0], 8 * bi); i <= std::min(box.high[0], 8 * bi + 7); ++i) {
+          visit(values[SampleGrid::node_index(i & 7, j & 7, k & 7)],
+                Vec3(grid.origin + grid.spacing * Vec3(i, j, k)));
+        }
+      }
+    }
+  });
+}
+
+/// Takes over the distances to the triangles near the boxes at all nodes where they are shorter
+/// than what is there, and than `limit`.
+void scatter_distances(SampleGrid& grid, const Surface& surface,
+                       const std::vector<NodeBox>& boxes) {
   const PseudoNormals normals = compute_pseudo_normals(surface);
-  for (Eigen::Index f = 0; f < m; ++f) {
+  for (Eigen::Index f = 0; f < surface.triangles.cols(); ++f) {
+    const NodeBox box = node_box(grid, surface, f);
+    if (std::none_of(boxes.begin(), boxes.end(),
+                     [&](const NodeBox& other) { return overlap(box, other); })) {
+      continue;
+    }
     const Eigen::Vector3i t = surface.triangles.col(f);
     const Vec3 a = surface.vertices.col(t[0]), b = surface.vertices.col(t[1]),
                c = surface.vertices.col(t[2]);
     const Vec3 plane = normals.face.col(f);
-    const NodeBox box = node_box(grid, surface, f, reach);
-    for_each_brick(grid, box, [&](std::int32_t& s, int bi, int bj, int bk) {
-      double* values = grid.values.data() + static_cast<std::size_t>(s) * SampleGrid::kVolume;
-      for (int k = std::max(box.low[2], 8 * bk); k <= std::min(box.high[2], 8 * bk + 7); ++k) {
-        for (int j = std::max(box.low[1], 8 * bj); j <= std::min(box.high[1], 8 * bj + 7); ++j) {
-          for (int i = std::max(box.low[0], 8 * bi); i <= std::min(box.high[0], 8 * bi + 7); ++i) {
-            double& value = values[SampleGrid::node_index(i & 7, j & 7, k & 7)];
-            const Vec3 p = grid.origin + grid.spacing * Vec3(i, j, k);
-            const double bound = std::min(std::abs(value), reach);
-            if (std::abs(plane.dot(p - a)) >= bound) continue;
-            const NearestOnTriangle nearest = nearest_on_triangle(p, a, b, c, normals, f, t);
-            const double squared_distance = nearest.offset.squaredNorm();
-            if (squared_distance >= bound * bound) continue;
-            const bool outside = nearest.offset.dot(Eigen::Map<const Vec3>(nearest.normal)) > 0.0;
-            value = outside ? -std::sqrt(squared_distance) : std::sqrt(squared_distance);
-          }
-        }
-      }
+    for_each_node(grid, box, [&](double& value, const Vec3& p) {
+      const double bound = std::min(std::abs(value), grid.limit);
+      if (std::abs(plane.dot(p - a)) >= bound) return;
+      const NearestOnTriangle nearest = nearest_on_triangle(p, a, b, c);
+      const double squared_distance = nearest.offset.squaredNorm();
+      if (squared_distance >= bound * bound) return;
+      const bool outside = nearest.offset.dot(normal_of(nearest, normals, f, t)) > 0.0;
+      value = outside ? -std::sqrt(squared_distance) : std::sqrt(squared_distance);
     });
   }
 }
@@ -287,6 +280,126 @@ void spread_signs(SampleGrid& grid) {
   }
 }
 
+// ---------------------------------------------------------------- openings
+
+constexpr double kFreeLength = 8.0;  // how far the lumen goes on beyond a cap               [mm]
+
+/// The free space before an opening: a disc's worth round the cap's axis, to kFreeLength.
+struct Mouth {
+  const Opening* opening;
+  double rim_radius;    // of the farthest vertex of the cap                            [mm]
+  double flange_width;  //                                                             [mm]
+  Vec3 low, high;       // box of all that the opening changes                          [mm]
+
+  double depth(const Vec3& p) const { return opening->normal.dot(p - opening->center); }
+  double lateral(const Vec3& p) const {
+    const Vec3 offset = p - opening->center;
+    return (offset - opening->normal.dot(offset) * opening->normal).norm();
+  }
+};
+
+Mouth describe_mouth(const Surface& surface, const Opening& opening, double limit) {
+  Mouth mouth{&opening, 0.0, limit, {}, {}};
+  for (const int f : opening.triangles) {
+    for (int c = 0; c < 3; ++c) {
+      const Vec3 p = surface.vertices.col(surface.triangles(c, f));
+      mouth.rim_radius = std::max(mouth.rim_radius, mouth.lateral(p));
+    }
+  }
+  // The flange must not stand in another vessel: halfway to what rises before the plane at most.
+  for (Eigen::Index v = 0; v < surface.vertices.cols(); ++v) {
+    const Vec3 p = surface.vertices.col(v);
+    const double depth = mouth.depth(p);
+    if (depth < 0.3 * opening.radius || depth > 2.0 * limit) continue;
+    const double room = std::max(0.1, 0.5 * (mouth.lateral(p) - mouth.rim_radius));
+    mouth.flange_width = std::min(mouth.flange_width, room);
+  }
+  const double reach = mouth.rim_radius + 2.0 * limit;
+  const Vec3 end = opening.center + kFreeLength * opening.normal;
+  mouth.low = opening.center.cwiseMin(end).array() - reach;
+  mouth.high = opening.center.cwiseMax(end).array() + reach;
+  return mouth;
+}
+
+/// The surface with each cap replaced by a flange round its rim, parallel to the cap's plane, whose
+/// front is inside as the lumen is: so the distance is continuous where a wire bends round the rim.
+Surface with_flanges(const Surface& surface, const std::vector<Mouth>& mouths) {
+  std::vector<bool> is_cap(static_cast<std::size_t>(surface.triangles.cols()), false);
+  std::vector<Vec3> added;
+  std::vector<Eigen::Vector3i> triangles;
+  for (const Mouth& mouth : mouths) {
+    // Edges of the cap that no other of its triangles runs along the other way: the rim.
+    std::set<std::pair<int, int>> edges;
+    for (const int f : mouth.opening->triangles) {
+      is_cap[static_cast<std::size_t>(f)] = true;
+      for (int e = 0; e < 3; ++e) {
+        edges.emplace(surface.triangles(e, f), surface.triangles((e + 1) % 3, f));
+      }
+    }
+    std::map<int, int> outer;  // of each vertex of the rim
+    const auto outer_of = [&](int v) {
+      const auto [place, fresh] = outer.try_emplace(
+          v, static_cast<int>(surface.vertices.cols()) + static_cast<int>(added.size()));
+      if (fresh) {
+        const Vec3 p = surface.vertices.col(v), offset = p - mouth.opening->center;
+        const Vec3 across =
+            (offset - mouth.opening->normal.dot(offset) * mouth.opening->normal).normalized();
+        added.push_back(p + mouth.flange_width * across);
+      }
+      return place->second;
+    };
+    for (const auto& [a, b] : edges) {
+      if (edges.contains({b, a})) continue;
+      const int a_outer = outer_of(a), b_outer = outer_of(b);
+      triangles.emplace_back(a, b, b_outer);
+      triangles.emplace_back(a, b_outer, a_outer);
+    }
+  }
+  for (Eigen::Index f = 0; f < surface.triangles.cols(); ++f) {
+    if (!is_cap[static_cast<std::size_t>(f)]) triangles.push_back(surface.triangles.col(f));
+  }
+
+  Surface opened;
+  opened.vertices.resize(3, surface.vertices.cols() + static_cast<Eigen::Index>(added.size()));
+  opened.vertices.leftCols(surface.vertices.cols()) = surface.vertices;
+  for (std::size_t k = 0; k < added.size(); ++k) {
+    opened.vertices.col(surface.vertices.cols() + static_cast<Eigen::Index>(k)) = added[k];
+  }
+  opened.triangles.resize(3, static_cast<Eigen::Index>(triangles.size()));
+  for (std::size_t k = 0; k < triangles.size(); ++k) {
+    opened.triangles.col(static_cast<Eigen::Index>(k)) = triangles[k];
+  }
+  return opened;
+}
+
+/// Measures anew, without the caps, near the openings of a grid that holds the closed surface's
+/// distances and signs. What no wall is near keeps its sign, but before an opening it is free.
+void open_caps(SampleGrid& grid, const Surface& surface, const std::vector<Mouth>& mouths) {
+  const SampleGrid closed = grid;
+  std::vector<NodeBox> boxes;
+  for (const Mouth& mouth : mouths) boxes.push_back(node_box(grid, mouth.low, mouth.high));
+  for (const NodeBox& box : boxes) {
+    for_each_node(grid, box, [](double& value, const Vec3&) {
+      value = std::numeric_limits<double>::infinity();
+    });
+  }
+  scatter_distances(grid, with_flanges(surface, mouths), boxes);
+  for (std::size_t k = 0; k < mouths.size(); ++k) {
+    const Mouth& mouth = mouths[k];
+    for_each_node(grid, boxes[k], [&](double& value, const Vec3& p) {
+      const double depth = mouth.depth(p);
+      if (!std::isfinite(value) && depth > 0.0 && depth < kFreeLength &&
+          mouth.lateral(p) < mouth.rim_radius + mouth.flange_width) {
+        value = grid.limit;
+      }
+    });
+  }
+  for (std::size_t n = 0; n < grid.values.size(); ++n) {
+    if (!std::isfinite(grid.values[n]))
+      grid.values[n] = std::copysign(grid.limit, closed.values[n]);
+  }
+}
+
 /// Coefficients c of the cubic B-spline that takes the sampled values s at the nodes: B c = s, by
 /// c <- c + (s - B c). Three rounds: smooth parts are then interpolated to the eighth order, while
 /// kinks (the middle of a vessel) stay rounded instead of ringing.
@@ -361,26 +474,40 @@ SplineWeights spline_weights(double t) {
 }  // namespace
 
 Lumen::Lumen(const Surface& surface, const LumenOptions& options)
-    : spacing_(options.grid_spacing), band_(options.band) {
+    : spacing_(options.grid_spacing), band_(options.band), openings_(options.openings) {
   expects(surface.triangles.cols() > 0 && spacing_ > 0.0 && band_ > 0.0);
 
-  // 1. A grid round the surface with room for the band and the splines' support.
+  // 1. A grid round the surface and what is free before its openings, with room for the band and
+  // the splines' support.
   SampleGrid grid;
   grid.spacing = spacing_;
   grid.limit = band_ + 2.0 * spacing_;
-  const Vec3 low = surface.vertices.rowwise().minCoeff(),
-             high = surface.vertices.rowwise().maxCoeff();
-  const double margin = grid.limit + 2.0 * spacing_;
-  grid.origin = low.array() - margin;
+  const double margin = grid.limit + 2.0 * spacing_, brick_side = SampleGrid::kSide * spacing_;
+  const Vec3 least = surface.vertices.rowwise().minCoeff().array() - margin;
+  Vec3 low = least, high = surface.vertices.rowwise().maxCoeff().array() + margin;
+  std::vector<Mouth> mouths;
+  for (const Opening& opening : openings_) {
+    mouths.push_back(describe_mouth(surface, opening, grid.limit));
+    low = low.cwiseMin(mouths.back().low);
+    high = high.cwiseMax(mouths.back().high);
+  }
+  // Whole bricks are added, so that an opening moves no sample elsewhere.
   for (int d = 0; d < 3; ++d) {
-    const double extent = high[d] - low[d] + 2.0 * margin;
-    grid.bricks[d] = static_cast<int>(std::ceil(extent / (SampleGrid::kSide * spacing_)));
+    grid.origin[d] = least[d] - brick_side * std::ceil((least[d] - low[d]) / brick_side);
+    grid.bricks[d] = static_cast<int>(std::ceil((high[d] - grid.origin[d]) / brick_side));
   }
   grid.slot.assign(grid.brick_index(0, 0, grid.bricks[2]), SampleGrid::kUnknown);
 
-  // 2. Exact distances near the wall, signs beyond, spline coefficients.
-  scatter_distances(grid, surface);
+  // 2. Exact distances near the closed wall, signs beyond; then the openings; spline coefficients.
+  for (Eigen::Index f = 0; f < surface.triangles.cols(); ++f) {
+    add_samples(grid, node_box(grid, surface, f));
+  }
+  for (const Mouth& mouth : mouths) add_samples(grid, node_box(grid, mouth.low, mouth.high));
+  grid.values.assign(static_cast<std::size_t>(grid.slots) * SampleGrid::kVolume,
+                     std::numeric_limits<double>::infinity());
+  scatter_distances(grid, surface, {node_box(grid, low, high)});
   spread_signs(grid);
+  if (!mouths.empty()) open_caps(grid, surface, mouths);
   const std::vector<double> coefficients = spline_coefficients(grid);
 
   // 3. Bricks that carry all coefficients that their cells need, so that a look-up stays in one.
@@ -408,7 +535,12 @@ Lumen::Lumen(const Surface& surface, const LumenOptions& options)
     }
   }
 
-  // 4. How well the smooth wall follows the triangles.
+  // 4. How well the smooth wall follows the triangles, caps left out.
+  std::vector<bool> is_wall(static_cast<std::size_t>(surface.triangles.cols()), true);
+  for (const Opening& opening : openings_) {
+    for (const int f : opening.triangles) is_wall[static_cast<std::size_t>(f)] = false;
+  }
+  std::vector<bool> measured(static_cast<std::size_t>(surface.vertices.cols()), false);
   double sum = 0.0;
   Eigen::Index count = 0;
   const auto measure = [&](const Vec3& p) {
@@ -417,11 +549,17 @@ Lumen::Lumen(const Surface& surface, const LumenOptions& options)
     sum += deviation;
     ++count;
   };
-  for (Eigen::Index v = 0; v < surface.vertices.cols(); ++v) measure(surface.vertices.col(v));
   for (Eigen::Index f = 0; f < surface.triangles.cols(); ++f) {
-    const Eigen::Vector3i t = surface.triangles.col(f);
-    measure((surface.vertices.col(t[0]) + surface.vertices.col(t[1]) + surface.vertices.col(t[2])) /
-            3.0);
+    if (!is_wall[static_cast<std::size_t>(f)]) continue;
+    Vec3 centroid = Vec3::Zero();
+    for (int c = 0; c < 3; ++c) {
+      const int v = surface.triangles(c, f);
+      const Vec3 p = surface.vertices.col(v);
+      centroid += p / 3.0;
+      if (!measured[static_cast<std::size_t>(v)]) measure(p);
+      measured[static_cast<std::size_t>(v)] = true;
+    }
+    measure(centroid);
   }
   mean_deviation_ = sum / static_cast<double>(count);
 }
@@ -520,6 +658,19 @@ WallSample Lumen::sample(const Vec3& point) const {
   result.hessian << fxx, fxy, fxz, fxy, fyy, fyz, fxz, fyz, fzz;
   result.hessian *= per_mm2;
   return result;
+}
+
+std::optional<int> Lumen::passed_opening(const Vec3& tip) const {
+  constexpr double kPassed = 1.0;  // beyond the cap's plane                               [mm]
+  for (std::size_t k = 0; k < openings_.size(); ++k) {
+    const Opening& opening = openings_[k];
+    const Vec3 offset = tip - opening.center;
+    const double depth = opening.normal.dot(offset);
+    if (depth < kPassed || depth > kFreeLength) continue;
+    const double lateral = (offset - depth * opening.normal).norm();
+    if (lateral < 1.5 * opening.radius + depth) return static_cast<int>(k);
+  }
+  return std::nullopt;
 }
 
 std::size_t Lumen::memory_bytes() const {

@@ -3,15 +3,18 @@
 /// and the law that turns a gap into a force.
 #include <array>
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 #include "preprocess/vessel.h"
+#include "simulate/openings.h"
 
 namespace wireplan::simulate {
 
 struct LumenOptions {
   double grid_spacing = 0.5;  // of the distance samples                                  [mm]
   double band = 2.0;          // the field follows the wall within this distance of it    [mm]
+  std::vector<Opening> openings = {};  // of the surface: no wall there (find_openings)
 };
 
 /// Distance to the wall at a point with its derivatives; positive inside the lumen.
@@ -24,6 +27,10 @@ struct WallSample {
 /// The lumen as a wire feels it. Signed distances to the triangles, exact on the nodes of a sparse
 /// grid round the wall, interpolated by cubic B-splines (C2), so that a wire slides over facets
 /// without chatter. Beyond the band the distance is +-band, without derivatives.
+///
+/// Caps of openings are not wall. The lumen goes on through them into free space, as far as 8 mm
+/// beyond the cap's plane and 3 mm round its rim (less where another vessel is near); there the
+/// distance is that to the rim, or round it to the cap's plane, as if the vessel ended in a flange.
 class Lumen {
  public:
   /// Expects a closed surface with outward triangles.
@@ -32,10 +39,15 @@ class Lumen {
   double distance(const Vec3& point) const;
   WallSample sample(const Vec3& point) const;
 
+  const std::vector<Opening>& openings() const { return openings_; }
+  /// The opening that a wire with its tip here has left through: the tip is 1 to 8 mm beyond the
+  /// cap's plane, within a cone of 45 degrees from 1.5 radii at the cap, which covers oval ones.
+  std::optional<int> passed_opening(const Vec3& tip) const;
+
   double grid_spacing() const { return spacing_; }
   double band() const { return band_; }
-  /// Largest and mean |distance| of the field at vertices and centroids of the triangles, where the
-  /// exact answer is 0: how far the smooth wall departs from the surface [mm].
+  /// Largest and mean |distance| of the field at vertices and centroids of the wall's triangles,
+  /// where the exact answer is 0: how far the smooth wall departs from the surface [mm].
   double max_deviation() const { return max_deviation_; }
   double mean_deviation() const { return mean_deviation_; }
   std::size_t memory_bytes() const;
@@ -55,8 +67,9 @@ class Lumen {
   double spacing_ = 0.0, band_ = 0.0, max_deviation_ = 0.0, mean_deviation_ = 0.0;
   Vec3 origin_ = Vec3::Zero();             // of brick (0, 0, 0)                          [mm]
   std::array<int, 3> bricks_ = {0, 0, 0};  // along each axis
-  std::vector<std::int32_t> brick_;        // slot of each brick, or -1 outside, -2 inside
-  std::vector<float> coefficients_;        // kNodes^3 per slot, x fastest                [mm]
+  std::vector<Opening> openings_;
+  std::vector<std::int32_t> brick_;  // slot of each brick, or -1 outside, -2 inside
+  std::vector<float> coefficients_;  // kNodes^3 per slot, x fastest                [mm]
 };
 
 /// Potential of one millimetre of wire against the wall at the gap between wire surface and wall:

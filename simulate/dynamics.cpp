@@ -286,7 +286,7 @@ void Chain::copy_positions(RodState& state) const {
 long count_steps(const Problem& problem, const RodState& state, const MotionOptions& options) {
   expects(problem.rod != nullptr && problem.first >= 0 && problem.first < problem.last &&
           problem.last <= problem.rod->nodes() && state.x.cols() == problem.rod->nodes());
-  expects(!problem.rod->twisted && problem.lumen == nullptr && !problem.tip_moment &&
+  expects(!problem.rod->twisted && problem.contact == nullptr && !problem.tip_moment &&
           !problem.plane);
   expects(options.time_step > 0.0 && options.duration > 0.0 && options.damping >= 0.0 &&
           options.duration < 1e15 * options.time_step);

@@ -48,12 +48,13 @@ double add_stretch(const Problem& problem, const RodState& state, int i, Sink& s
 /// Bend at node i between its edges a and b, for unequal lengths too. With u = e_b/l_b - e_a/l_a it
 /// is W = B (cos(r) |u|^2 / 2 + 1 - cos(r)) + add_rest_bend, which for rest angle r = 0 and equal
 /// lengths is paper Eq. (10) with k_b = EI/h^3, and for an inextensible chain turning by phi is B
-/// (1 - cos(phi - r)).
+/// (1 - cos(phi - r)). Strips: see add_strip.
 template <class Sink>
 double add_bend(const Problem& problem, const RodState& state, int i, Sink& sink) {
   const Rod& rod = *problem.rod;
   const double a = 1.0 / rod.rest_length[i - 1], c = 1.0 / rod.rest_length[i], b = -(a + c);
-  const double cosine = rod.rest_angle[i] == 0.0 ? 1.0 : std::cos(rod.rest_angle[i]);
+  const bool curved = rod.twisted && rod.rest_angle[i] != 0.0;
+  const double cosine = curved ? std::cos(rod.rest_angle[i]) : 1.0;
   const double B = rod.bend[i] * cosine;
   const Vec3 u = a * state.x.col(i - 1) + b * state.x.col(i) + c * state.x.col(i + 1);
   sink.gradient(i - 1, B * a * u);
@@ -129,38 +130,163 @@ void add_edge_gradient(int i, const Vec3& g_a, const Vec3& g_b, Sink& sink) {
   sink.gradient(i + 1, g_b);
 }
 
-/// Part of the bend energy that knows which way a curved wire is curved: W = -B sin(r) u . (m_a +
-/// m_b)/2. The directors follow the edges by parallel transport: dm = -t (m . de)/|e|.
+/// A material direction across an edge, and its derivative with theta.
+struct Across {
+  Vec3 d, by_theta;
+};
+
+inline Across toward_m(const Edge& edge) { return {edge.m, edge.n}; }
+inline Across toward_n(const Edge& edge) { return {edge.n, -edge.m}; }
+
+/// The direction toward which a strip is the stiffer, see Rod::strip.
+inline Across toward_stiff(const Edge& edge, double strip) {
+  return strip > 0.0 ? toward_n(edge) : toward_m(edge);
+}
+
+/// Second derivative of u . d with the edge, for a fixed u. The directions across an edge follow it
+/// by parallel transport, which is to first order dd = -t (d . de)/|e|.
+inline Mat3 carried_hessian(const Edge& edge, const Vec3& d, const Vec3& u) {
+  const double along = u.dot(edge.t);
+  const Vec3 across = u - along * edge.t;
+  return (along * symmetric_product(edge.t, d) - 0.5 * symmetric_product(d, across)) /
+         (edge.length * edge.length);
+}
+
+/// How far the wire leans at node i toward a material direction: s = u . (d_a + d_b)/2 with u of
+/// add_bend, for an inextensible chain the sine of the turning angle toward it.
+struct Lean {
+  int i;
+  double l_a, l_b;  // rest lengths
+  Edge a, b;
+  Vec3 u;
+  Across d_a, d_b;
+  double s;
+
+  template <class Direction>
+  Lean(const Rod& rod, const RodState& state, int node, const Direction& direction)
+      : i(node),
+        l_a(rod.rest_length[node - 1]),
+        l_b(rod.rest_length[node]),
+        a(edge_at(state, node - 1)),
+        b(edge_at(state, node)),
+        u((b.length / l_b) * b.t - (a.length / l_a) * a.t),
+        d_a(direction(a)),
+        d_b(direction(b)),
+        s(0.5 * u.dot(d_a.d + d_b.d)) {}
+};
+
+/// Derivatives of W(s), given W' and W''.
+template <class Sink>
+void add_lean(const Lean& lean, double first, double second, Sink& sink) {
+  const Edge &a = lean.a, &b = lean.b;
+  const Across &d_a = lean.d_a, &d_b = lean.d_b;
+  const Vec3 sum = d_a.d + d_b.d;
+  const double ua = lean.u.dot(a.t) / a.length, ub = lean.u.dot(b.t) / b.length;
+  const Vec3 s_a = -0.5 * (sum / lean.l_a + ua * d_a.d);  // derivatives of s
+  const Vec3 s_b = 0.5 * (sum / lean.l_b - ub * d_b.d);
+  const double s_theta_a = 0.5 * lean.u.dot(d_a.by_theta);
+  const double s_theta_b = 0.5 * lean.u.dot(d_b.by_theta);
+  const int i = lean.i;
+  add_edge_gradient(i, first * s_a, first * s_b, sink);
+  sink.gradient_theta(i - 1, first * s_theta_a);
+  sink.gradient_theta(i, first * s_theta_b);
+  if constexpr (Sink::kHessian) {
+    // W' times the second derivatives of s.
+    const double c = 0.5 * first;
+    sink.hessian_theta_theta(i - 1, i - 1, -c * lean.u.dot(d_a.d));
+    sink.hessian_theta_theta(i, i, -c * lean.u.dot(d_b.d));
+    add_theta_hessian(i, i - 1, -c * (1.0 / lean.l_a + ua) * d_a.by_theta,
+                      (c / lean.l_b) * d_a.by_theta, sink);
+    add_theta_hessian(i, i, -(c / lean.l_a) * d_b.by_theta,
+                      c * (1.0 / lean.l_b - ub) * d_b.by_theta, sink);
+    const Mat3 H_aa = c * (symmetric_product(a.t, d_a.d) / (lean.l_a * a.length) +
+                           carried_hessian(a, d_a.d, lean.u));
+    const Mat3 H_bb = c * (-symmetric_product(b.t, d_b.d) / (lean.l_b * b.length) +
+                           carried_hessian(b, d_b.d, lean.u));
+    const Mat3 H_ab = (-c / (lean.l_b * a.length)) * d_a.d * a.t.transpose() +
+                      (c / (lean.l_a * b.length)) * b.t * d_b.d.transpose();
+    add_edge_hessian(i, H_aa, H_ab, H_bb, sink);
+    if (second == 0.0) return;
+
+    // W'' times the products of the first ones.
+    const Vec3 w_a = second * s_a, w_b = second * s_b;
+    add_edge_hessian(i, w_a * s_a.transpose(), w_a * s_b.transpose(), w_b * s_b.transpose(), sink);
+    add_theta_hessian(i, i - 1, s_theta_a * w_a, s_theta_a * w_b, sink);
+    add_theta_hessian(i, i, s_theta_b * w_a, s_theta_b * w_b, sink);
+    sink.hessian_theta_theta(i - 1, i - 1, second * s_theta_a * s_theta_a);
+    sink.hessian_theta_theta(i, i, second * s_theta_b * s_theta_b);
+    sink.hessian_theta_theta(i, i - 1, second * s_theta_a * s_theta_b);
+  }
+}
+
+/// Part of the bend energy that knows which way a curved wire is curved: W = -B sin(r) s, with s
+/// the lean toward m.
 template <class Sink>
 double add_rest_bend(const Problem& problem, const RodState& state, int i, Sink& sink) {
   const Rod& rod = *problem.rod;
-  const double c = 0.5 * rod.bend[i] * std::sin(rod.rest_angle[i]);
-  const double l_a = rod.rest_length[i - 1], l_b = rod.rest_length[i];
-  const Edge a = edge_at(state, i - 1), b = edge_at(state, i);
-  const Vec3 u = (b.length / l_b) * b.t - (a.length / l_a) * a.t;
-  const Vec3 sum = a.m + b.m;
-  const double ua = u.dot(a.t) / a.length, ub = u.dot(b.t) / b.length;
-  add_edge_gradient(i, c * (sum / l_a + ua * a.m), c * (-sum / l_b + ub * b.m), sink);
-  sink.gradient_theta(i - 1, -c * u.dot(a.n));
-  sink.gradient_theta(i, -c * u.dot(b.n));
-  if constexpr (Sink::kHessian) {
-    sink.hessian_theta_theta(i - 1, i - 1, c * u.dot(a.m));
-    sink.hessian_theta_theta(i, i, c * u.dot(b.m));
-    add_theta_hessian(i, i - 1, c * (1.0 / l_a + ua) * a.n, -(c / l_b) * a.n, sink);
-    add_theta_hessian(i, i, (c / l_a) * b.n, c * (-1.0 / l_b + ub) * b.n, sink);
-    // Second variation of u . m under parallel transport of m along one edge.
-    const auto second = [&u](const Edge& e) -> Mat3 {
-      const Vec3 across = u - u.dot(e.t) * e.t;
-      return (u.dot(e.t) * symmetric_product(e.t, e.m) - 0.5 * symmetric_product(e.m, across)) /
-             (e.length * e.length);
-    };
-    const Mat3 H_aa = -c * (symmetric_product(a.t, a.m) / (l_a * a.length) + second(a));
-    const Mat3 H_bb = c * (symmetric_product(b.t, b.m) / (l_b * b.length) - second(b));
-    const Mat3 H_ab = (c / (l_b * a.length)) * a.m * a.t.transpose() -
-                      (c / (l_a * b.length)) * b.t * b.m.transpose();
-    add_edge_hessian(i, H_aa, H_ab, H_bb, sink);
+  const Lean lean(rod, state, i, toward_m);
+  const double slope = -rod.bend[i] * std::sin(rod.rest_angle[i]);
+  add_lean(lean, slope, 0.0, sink);
+  return slope * lean.s;
+}
+
+/// What a strip's bend has beyond that of a round wire with its smaller EI: W = S/2 (s - s_0)^2, S
+/// the difference over the node's share of length, s the lean toward the stiffer direction and s_0
+/// the lean at rest, sin(r) toward m and 0 toward n. Bending the soft way leaves s at 0.
+template <class Sink>
+double add_strip(const Problem& problem, const RodState& state, int i, Sink& sink) {
+  const Rod& rod = *problem.rod;
+  const double strip = rod.strip[i], S = std::abs(strip);
+  const Lean lean(rod, state, i, [strip](const Edge& e) { return toward_stiff(e, strip); });
+  const double excess = lean.s - (strip > 0.0 ? 0.0 : std::sin(rod.rest_angle[i]));
+  add_lean(lean, S * excess, S, sink);
+  return 0.5 * S * excess * excess;
+}
+
+/// What rest angle and strip add to add_clamp: the same as at an interior node, between the edge
+/// and the tangent, to which the edge's directors are carried. The lean toward a direction d of the
+/// edge is then t . d for a distal tangent t and -t . d for a proximal one.
+template <class Sink>
+double add_clamp_shape(const Problem& problem, const RodState& state, int edge, const Vec3& tangent,
+                       Sink& sink) {
+  const Rod& rod = *problem.rod;
+  const bool proximal = edge == 0;
+  const double B = proximal ? rod.proximal_bend : rod.distal_bend;
+  const double strip = proximal ? rod.proximal_strip : rod.distal_strip;
+  const double r = proximal ? rod.proximal_rest_angle : rod.distal_rest_angle;
+  const Vec3 w = proximal ? Vec3(-tangent) : tangent;
+  const Edge e = edge_at(state, edge);
+  const auto add = [&](const Across& across, double first, double second) {
+    const Vec3 s_e = -(w.dot(e.t) / e.length) * across.d;
+    const double s_theta = w.dot(across.by_theta);
+    sink.gradient(edge, -first * s_e);
+    sink.gradient(edge + 1, first * s_e);
+    sink.gradient_theta(edge, first * s_theta);
+    if constexpr (Sink::kHessian) {
+      const Mat3 H = first * carried_hessian(e, across.d, w) + second * s_e * s_e.transpose();
+      sink.hessian(edge, edge, H);
+      sink.hessian(edge + 1, edge + 1, H);
+      sink.hessian(edge + 1, edge, -H);
+      const Vec3 h = second * s_theta * s_e - (first * w.dot(e.t) / e.length) * across.by_theta;
+      sink.hessian_theta(edge, edge, -h);
+      sink.hessian_theta(edge, edge + 1, h);
+      sink.hessian_theta_theta(edge, edge, second * s_theta * s_theta - first * w.dot(across.d));
+    }
+  };
+  double energy = 0.0;
+  if (r != 0.0) {
+    const double rounder = B * (std::cos(r) - 1.0), slope = -B * std::sin(r);
+    energy += add_clamp(state, edge, rod.rest_length[edge], rounder, tangent, sink) - rounder;
+    add(toward_m(e), slope, 0.0);
+    energy += slope * w.dot(e.m);
   }
-  return -c * u.dot(sum);
+  if (strip != 0.0) {
+    const Across stiff = toward_stiff(e, strip);
+    const double excess = w.dot(stiff.d) - (strip > 0.0 ? 0.0 : std::sin(r)), S = std::abs(strip);
+    add(stiff, S * excess, S);
+    energy += 0.5 * S * excess * excess;
+  }
+  return energy;
 }
 
 /// Twist at node i, W = T/2 (theta_b - theta_a + reference twist)^2; derivatives of the reference

@@ -17,17 +17,25 @@ bool Wire::straight() const {
                      [](const Section& section) { return section.rest_curvature == 0.0; });
 }
 
+bool Wire::round() const {
+  return std::all_of(sections.begin(), sections.end(),
+                     [](const Section& section) { return section.round(); });
+}
+
 namespace {
 
 /// Values of the wire averaged over the arc from a to b, counted from the tip [mm].
 struct Average {
-  double EI = 0.0, EA = 0.0, GJ = 0.0;  // springs in series: harmonic means
-  double rest_angle = 0.0, mass = 0.0;  // sums
+  double EI = 0.0, EI_2 = 0.0, EA = 0.0, GJ = 0.0;  // springs in series: harmonic means
+  double rest_angle = 0.0, mass = 0.0;              // sums
+  double weak() const { return std::min(EI, EI_2); }
+  double strip() const { return EI_2 - EI; }
+  bool has_directions() const { return rest_angle != 0.0 || strip() != 0.0; }
 };
 
 Average average_over(const Wire& wire, double a, double b) {
   Average sum;
-  double inverse_EI = 0.0, inverse_EA = 0.0, inverse_GJ = 0.0, start = 0.0;
+  double inverse_EI = 0.0, inverse_EI_2 = 0.0, inverse_EA = 0.0, inverse_GJ = 0.0, start = 0.0;
   for (std::size_t k = 0; k < wire.sections.size(); ++k) {
     const Section& section = wire.sections[k];
     const bool last = k + 1 == wire.sections.size();
@@ -40,18 +48,24 @@ Average average_over(const Wire& wire, double a, double b) {
                                                     : 4.0 * EI / (wire.radius * wire.radius);
     const double GJ = section.twist_stiffness > 0.0 ? section.twist_stiffness : EI / 1.3;
     inverse_EI += part / EI;
+    inverse_EI_2 += part / (section.round() ? EI : section.bending_stiffness_2);
     inverse_EA += part / EA;
     inverse_GJ += part / GJ;
     sum.rest_angle += part * section.rest_curvature;
     sum.mass += part * section.mass_per_length;
   }
   sum.EI = (b - a) / inverse_EI;
+  sum.EI_2 = (b - a) / inverse_EI_2;
   sum.EA = (b - a) / inverse_EA;
   sum.GJ = (b - a) / inverse_GJ;
   return sum;
 }
 
 }  // namespace
+
+double Rod::largest_bend() const {
+  return twisted ? (bend + strip.cwiseAbs()).maxCoeff() : bend.maxCoeff();
+}
 
 Rod build_rod(const Wire& wire, const Eigen::VectorXd& edge_lengths, bool twisted) {
   const int elements = static_cast<int>(edge_lengths.size());
@@ -63,7 +77,8 @@ Rod build_rod(const Wire& wire, const Eigen::VectorXd& edge_lengths, bool twiste
   rod.twisted = twisted;
   rod.rest_length = edge_lengths;
   rod.stretch.resize(elements);
-  rod.bend = rod.twist = rod.rest_angle = rod.share = rod.mass = Eigen::VectorXd::Zero(n);
+  rod.bend = rod.strip = rod.twist = rod.rest_angle = Eigen::VectorXd::Zero(n);
+  rod.share = rod.mass = Eigen::VectorXd::Zero(n);
   rod.tip_distance = Eigen::VectorXd::Zero(n);
   for (int i = elements - 1; i >= 0; --i) {
     rod.tip_distance[i] = rod.tip_distance[i + 1] + edge_lengths[i];
@@ -78,22 +93,32 @@ Rod build_rod(const Wire& wire, const Eigen::VectorXd& edge_lengths, bool twiste
       rod.share[node] += 0.5 * l;
       rod.mass[node] += 0.5 * edge.mass;
     }
-    if (i == 0) rod.proximal_bend = edge.EI / (0.5 * l);
-    if (i == elements - 1) rod.distal_bend = edge.EI / (0.5 * l);
   }
+  // Half an edge at either end, for a clamp there.
+  const double l_0 = 0.5 * edge_lengths[0], l_n = 0.5 * edge_lengths[elements - 1];
+  const Average proximal = average_over(wire, rod.tip_distance[0] - l_0, rod.tip_distance[0]);
+  const Average distal = average_over(wire, 0.0, l_n);
+  rod.proximal_bend = proximal.weak() / l_0;
+  rod.distal_bend = distal.weak() / l_n;
+  rod.proximal_strip = proximal.strip() / l_0;
+  rod.distal_strip = distal.strip() / l_n;
+  rod.proximal_rest_angle = proximal.rest_angle;
+  rod.distal_rest_angle = distal.rest_angle;
+  rod.twisted = rod.twisted || proximal.has_directions() || distal.has_directions();
   // Interior nodes: from the middle of one edge to the middle of the next.
   for (int i = 1; i + 1 < n; ++i) {
     const double c = rod.tip_distance[i];
     const Average node =
         average_over(wire, c - 0.5 * edge_lengths[i], c + 0.5 * edge_lengths[i - 1]);
-    rod.bend[i] = node.EI / rod.share[i];
+    rod.bend[i] = node.weak() / rod.share[i];
+    rod.strip[i] = node.strip() / rod.share[i];
     // Twist reaches to the ends: their edges carry the roll that is held there, not that of their
     // middles. Without the two half edges a held roll would be first order.
     const double a = i == n - 2 ? 0.0 : c - 0.5 * edge_lengths[i];
     const double b = i == 1 ? rod.tip_distance[0] : c + 0.5 * edge_lengths[i - 1];
     rod.twist[i] = average_over(wire, a, b).GJ / (b - a);
     rod.rest_angle[i] = node.rest_angle;
-    rod.twisted = rod.twisted || node.rest_angle != 0.0;
+    rod.twisted = rod.twisted || node.has_directions();
   }
   return rod;
 }
@@ -136,7 +161,7 @@ RodState rest_state(const Rod& rod, const Vec3& point, const Vec3& direction, do
   const Vec3 d = state.director.col(0);
   const Vec3 toward = std::cos(roll) * d + std::sin(roll) * direction.cross(d);
   const Vec3 axis = direction.cross(toward);
-  double angle = 0.0;
+  double angle = rod.proximal_rest_angle;
   for (int i = 0; i + 1 < rod.nodes(); ++i) {
     angle += rod.rest_angle[i];
     // In the plane of the curve the directors turn with the edges: there is no twist.

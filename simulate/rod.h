@@ -13,12 +13,17 @@ namespace wireplan::simulate {
 
 /// A stretch of wire with constant properties.
 struct Section {
-  double length = 0.0;             //                                                     [mm]
-  double bending_stiffness = 0.0;  // EI                                                  [N mm^2]
-  double axial_stiffness = 0.0;    // EA; 0: that of a solid round rod, 16 EI / d^2       [N]
-  double twist_stiffness = 0.0;    // GJ; 0: that of a solid round rod, EI / 1.3          [N mm^2]
-  double mass_per_length = 0.0;    //                                                     [t/mm]
-  double rest_curvature = 0.0;     // of the unloaded wire, 1/radius                      [1/mm]
+  double length = 0.0;               //                                                   [mm]
+  double bending_stiffness = 0.0;    // EI; of a strip: toward the material director      [N mm^2]
+  double bending_stiffness_2 = 0.0;  // EI of a strip across it; 0: the same, a round wire [N mm^2]
+  double axial_stiffness = 0.0;      // EA; 0: that of a solid round rod, 16 EI / d^2     [N]
+  double twist_stiffness = 0.0;      // GJ; 0: that of a solid round rod, EI / 1.3        [N mm^2]
+  double mass_per_length = 0.0;      //                                                   [t/mm]
+  double rest_curvature = 0.0;       // of the unloaded wire toward the material director, 1/radius
+                                     //                                                   [1/mm]
+  bool round() const {
+    return bending_stiffness_2 == 0.0 || bending_stiffness_2 == bending_stiffness;
+  }
 };
 
 /// A device: sections listed from the tip backwards.
@@ -28,7 +33,8 @@ struct Wire {
   std::vector<Section> sections;
 
   double length() const;
-  bool straight() const;  // no section has a rest curvature: its roll has no effect
+  bool straight() const;  // no section has a rest curvature
+  bool round() const;     // no section is a strip: if it is straight too, its roll has no effect
 };
 
 /// What the discretised wire is: n nodes, n-1 edges, node 0 proximal, node n-1 the tip. Built once
@@ -36,18 +42,25 @@ struct Wire {
 struct Rod {
   Eigen::VectorXd rest_length;   // (n-1)  l                                              [mm]
   Eigen::VectorXd stretch;       // (n-1)  EA                                             [N]
-  Eigen::VectorXd bend;          // (n)    EI over the node's share of length             [N mm]
+  Eigen::VectorXd bend;          // (n)    EI over the node's share of length, of a strip the
+                                 //        smaller one                                    [N mm]
+  Eigen::VectorXd strip;         // (n)    EI across the material director minus EI toward it, over
+                                 //        the same                                       [N mm]
   Eigen::VectorXd twist;         // (n)    GJ over the same, up to the wire's ends        [N mm]
   Eigen::VectorXd rest_angle;    // (n)    turning angle at rest                          [rad]
   Eigen::VectorXd share;         // (n)    length that the node stands for                [mm]
   Eigen::VectorXd mass;          // (n)                                                   [t]
   Eigen::VectorXd tip_distance;  // (n)    arc length from the tip                        [mm]
   double radius = 0.0;           //                                                       [mm]
-  double proximal_bend = 0.0;  // EI / (l/2) of the first and last edge: half a bend element, which
-  double distal_bend = 0.0;    // a clamp needs to be second order (design 7)           [N mm]
-  bool twisted = false;        // has a rest angle somewhere, so that twist matters
+  // Half a bend element, over half of the first and of the last edge: a clamp needs it to be second
+  // order (design 7).
+  double proximal_bend = 0.0, distal_bend = 0.0;              // EI / (l/2)              [N mm]
+  double proximal_strip = 0.0, distal_strip = 0.0;            // as `strip`               [N mm]
+  double proximal_rest_angle = 0.0, distal_rest_angle = 0.0;  //                          [rad]
+  bool twisted = false;  // has a rest angle or is a strip somewhere, so that twist matters
 
   int nodes() const { return static_cast<int>(share.size()); }
+  double largest_bend() const;  // of a strip, the larger one of each node               [N mm]
 };
 
 /// The distal part of the wire in edges of the given lengths, proximal to distal. EI at a node
@@ -72,8 +85,9 @@ struct RodState {
 /// `roll` from reference_normal(direction). A curved tip bends toward its material director.
 RodState straight_state(const Rod& rod, const Vec3& point, const Vec3& direction, double roll);
 
-/// The wire unloaded, in its rest shape: as straight_state, but each node turns by its rest angle
-/// toward the material director, all in one plane.
+/// The wire unloaded, in its rest shape: as straight_state, but from the end's tangent `direction`
+/// on it turns toward the material director, by half of the first edge's rest angle before that
+/// edge and by its rest angle at each node, all in one plane.
 RodState rest_state(const Rod& rod, const Vec3& point, const Vec3& direction, double roll);
 
 /// The direction that roll and azimuth count from: the patient's anterior (-y) made normal to the

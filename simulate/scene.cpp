@@ -92,11 +92,12 @@ struct Setup {
   Eigen::Matrix3Xd full_load, load;  // (3, n) at the end, and now                     [N]
   Problem problem;
   const Support* distal = nullptr;
-  Vec3 start_point = Vec3::Zero();  // of the distal node                              [mm]
-  double start_roll = 0.0;          // of the distal edge                              [rad]
-  double turned = 0.0;              // so far, of the distal support's roll            [rad]
-  double part = 0.0;                // of the loads, now
-  double moment_zero = 0.0;         // energy of the full tip moment at the start    [N mm]
+  Vec3 start_point = Vec3::Zero();     // of the distal node                              [mm]
+  double start_roll = 0.0;             // of the distal edge                              [rad]
+  double turned = 0.0;                 // so far, of the distal support's roll            [rad]
+  double part = 0.0;                   // of the loads, now
+  double moment_zero = 0.0;            // energy of the full tip moment at the start    [N mm]
+  std::optional<WallContact> contact;  // where there is a vessel
 };
 
 /// Energy of the tip moment: of the loads, what is not that of the nodal forces.
@@ -135,13 +136,26 @@ void set_up(const Scene& scene, Setup& s) {
 std::vector<std::string> name_terms(const Scene& scene, const Rod& rod) {
   std::vector<std::string> terms = {"stretch", "bend"};
   if (rod.twisted) terms.push_back("twist");
+  if (!rod.strip.isZero(0.0)) terms.push_back("strip");
   if (scene.twist == Twist::kDecoupled) terms.push_back("decoupled_twist");
   if (!scene.loads.gravity.isZero(0.0) && !rod.mass.isZero(0.0)) terms.push_back("gravity");
   if (!scene.loads.tip_force.isZero(0.0)) terms.push_back("tip_force");
   if (!scene.loads.tip_moment.isZero(0.0)) terms.push_back("tip_moment");
   if (scene.loads.tip_torque != 0.0) terms.push_back("tip_torque");
   if (scene.plane) terms.push_back("plane");
+  if (scene.vessel != nullptr) {
+    terms.push_back("contact");
+    if (scene.contact.friction > 0.0) terms.push_back("friction");
+    if (scene.vessel->compliance != nullptr) terms.push_back("yielding_wall");
+  }
   return terms;
+}
+
+/// Contact with the vessel, from the state in which the wire is.
+void add_vessel(const Scene& scene, Setup& s) {
+  s.contact.emplace(s.rod, *scene.vessel, scene.contact);
+  s.contact->start_at(s.state.x);
+  s.problem.contact = &*s.contact;
 }
 
 /// Loads and supports at a part of what they will be.
@@ -192,6 +206,7 @@ void run_newton(const Scene& scene, Setup& s, SceneResult& result) {
     result.steps = step;
     result.worst_energy_rise = std::max(result.worst_energy_rise, solve.worst_energy_rise);
     if (!solve.converged) break;
+    if (s.contact) result.friction_work += s.contact->settle();
   }
   result.residual = solve.residual;
   result.outcome = solve.converged ? SceneOutcome::kConverged : SceneOutcome::kNotConverged;
@@ -266,8 +281,8 @@ double roll_torque(const Problem& problem, const RodState& state, int edge) {
 }
 
 /// Force and moment of a support on its end of the wire. The derivative of the energy at the end
-/// node is the force; the moment is the couple of the clamp's half element and, with directors, the
-/// torque about the edge.
+/// node is the force. The moment is the couple that the clamp's half element, told by leaving it
+/// out, turns its edge with and, with directors, the torque of the rest about the edge.
 Reaction reaction_at(const Support& support, const Problem& problem, const RodState& state,
                      const Eigen::Matrix3Xd& gradient) {
   const Rod& rod = *problem.rod;
@@ -277,11 +292,13 @@ Reaction reaction_at(const Support& support, const Problem& problem, const RodSt
   reaction.force = gradient.col(proximal ? 0 : rod.nodes() - 1);
   if (support.kind == SupportKind::kPinned) return reaction;
   const int edge = proximal ? 0 : rod.nodes() - 2;
-  const double l = rod.rest_length[edge];
-  const double B = proximal ? rod.proximal_bend : rod.distal_bend;
   const Vec3 e = state.x.col(edge + 1) - state.x.col(edge);
-  reaction.moment = e.cross((B / l) * (support.direction - e / l));
-  if (rod.twisted) reaction.moment += roll_torque(problem, state, edge) * e.normalized();
+  Problem rest = problem;
+  (proximal ? rest.proximal : rest.distal).tangent.reset();
+  Eigen::Matrix3Xd rest_gradient(3, rod.nodes());
+  Statics::evaluate(rest, state, rest_gradient);
+  reaction.moment = e.cross(rest_gradient.col(edge + 1) - gradient.col(edge + 1));
+  if (rod.twisted) reaction.moment += roll_torque(rest, state, edge) * e.normalized();
   return reaction;
 }
 
@@ -330,7 +347,7 @@ void add_decoupled_twist(const Scene& scene, const Setup& s, SceneResult& result
   }
 }
 
-void describe(const Scene& scene, const Setup& s, SceneResult& result) {
+void describe(const Scene& scene, Setup& s, SceneResult& result) {
   const int n = s.rod.nodes();
   result.nodes = s.state.x;
   Eigen::Matrix3Xd gradient(3, n);
@@ -353,13 +370,16 @@ void describe(const Scene& scene, const Setup& s, SceneResult& result) {
     }
   }
   if (scene.twist == Twist::kDecoupled) add_decoupled_twist(scene, s, result);
+  if (s.contact) result.contacts = s.contact->touches();
 }
 
 }  // namespace
 
 SceneResult run_scene(const Scene& scene) {
+  expects(scene.vessel == nullptr || scene.solver.method == Method::kNewton);
   Setup setup;
   set_up(scene, setup);
+  if (scene.vessel != nullptr) add_vessel(scene, setup);
   SceneResult result;
   result.terms = name_terms(scene, setup.rod);
   const double begin = thread_seconds();

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "simulate/solver.h"
+#include "simulate/wall_contact.h"
 
 namespace wireplan::simulate {
 
@@ -66,7 +67,9 @@ struct Scene {
   Twist twist = Twist::kAuto;
   std::vector<Support> supports;
   Loads loads;
-  std::optional<Vec3> plane;  // unit normal of a table, see Problem
+  std::optional<Vec3> plane;            // unit normal of a table, see Problem
+  const VesselModel* vessel = nullptr;  // Newton only; null: none
+  ContactOptions contact;               // with the vessel
   SolverOptions solver;
 };
 
@@ -107,6 +110,8 @@ struct SceneResult {
   double critical_time_step = std::numeric_limits<double>::infinity();  // see dynamics.h [s]
   double cpu_time_s = 0.0;                                              // of the solver alone
   std::vector<Reaction> reactions;
+  std::vector<Touch> contacts;  // with the vessel, proximal to distal
+  double friction_work = 0.0;   // turned into heat, Newton's load steps together      [N mm]
 };
 
 /// Static equilibrium on the paper's energy. Expects supports that hold the wire against rigid

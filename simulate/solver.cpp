@@ -1,6 +1,7 @@
 #include "simulate/solver.h"
 
 #include <Eigen/Geometry>
+#include <Eigen/Jacobi>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -13,30 +14,9 @@ namespace wireplan::simulate {
 
 namespace {
 
-/// Contact of node i with the wall. `distance` gets the wall's distance from the node.
+/// All elements that touch a free node, apart from contact with a vessel.
 template <class Sink>
-double add_contact(const Problem& problem, const RodState& state, int i, double& distance,
-                   Sink& sink) {
-  const Rod& rod = *problem.rod;
-  const double near = rod.radius + problem.contact.smoothing;
-  distance = problem.lumen->distance(state.x.col(i));
-  if (distance >= near) return 0.0;
-  const WallSample wall = problem.lumen->sample(state.x.col(i));
-  const ContactLaw::Value law = problem.contact.at(distance - rod.radius);
-  const double share = rod.share[i];
-  sink.gradient(i, share * law.slope * wall.gradient);
-  if constexpr (Sink::kHessian) {
-    Mat3 H = (share * law.curvature) * wall.gradient * wall.gradient.transpose();
-    H += (share * law.slope) * wall.hessian;
-    sink.hessian(i, i, H);
-  }
-  return share * law.energy;
-}
-
-/// All elements that touch a free node. `distances` (n) is written where there is a lumen.
-template <class Sink>
-Energy assemble(const Problem& problem, const RodState& state, std::vector<double>* distances,
-                Sink& sink) {
+Energy assemble(const Problem& problem, const RodState& state, Sink& sink) {
   const Rod& rod = *problem.rod;
   const int n = rod.nodes();
   Energy energy;
@@ -58,6 +38,13 @@ Energy assemble(const Problem& problem, const RodState& state, std::vector<doubl
     for (int i = std::max(1, problem.first - 1); i <= std::min(n - 2, problem.last); ++i) {
       energy.twist += add_twist(problem, state, i, sink);
       if (rod.rest_angle[i] != 0.0) energy.bend += add_rest_bend(problem, state, i, sink);
+      if (rod.strip[i] != 0.0) energy.bend += add_strip(problem, state, i, sink);
+    }
+    if (problem.first == 0 && problem.proximal.tangent) {
+      energy.bend += add_clamp_shape(problem, state, 0, *problem.proximal.tangent, sink);
+    }
+    if (problem.last == n && problem.distal.tangent) {
+      energy.bend += add_clamp_shape(problem, state, n - 2, *problem.distal.tangent, sink);
     }
   }
   if (problem.load != nullptr) {
@@ -73,17 +60,41 @@ Energy assemble(const Problem& problem, const RodState& state, std::vector<doubl
     }
   }
   if (problem.tip_moment) energy.load += add_tip_moment(problem, state, sink);
-  if (problem.lumen != nullptr) {
-    double distance = 0.0;
-    for (int i = problem.first; i < problem.last; ++i) {
-      energy.contact += add_contact(problem, state, i, distance, sink);
-      if (distances != nullptr) (*distances)[static_cast<std::size_t>(i)] = distance;
-    }
-  }
+  return energy;
+}
+
+/// Energy and derivatives of a state with its own lag, contact included.
+template <class Sink>
+Energy assemble_with_contact(const Problem& problem, const RodState& state, Sink& sink) {
+  Energy energy = assemble(problem, state, sink);
+  if (problem.contact == nullptr) return energy;
+  problem.contact->begin(state.x);
+  const ContactEnergy contact = problem.contact->refresh(true);
+  problem.contact->add(sink);
+  energy.contact += contact.contact;
+  energy.wall += contact.wall;
   return energy;
 }
 
 // ---------------------------------------------------------------- sinks
+
+/// Energy alone.
+struct EnergySink {
+  static constexpr bool kHessian = false;
+  void gradient(int, const Vec3&) {}
+  void gradient_theta(int, double) {}
+};
+
+/// Sum of the gradient over the nodes before `first`.
+struct HeldSink {
+  static constexpr bool kHessian = false;
+  int first;
+  Vec3 sum = Vec3::Zero();
+  void gradient(int i, const Vec3& g) {
+    if (i < first) sum += g;
+  }
+  void gradient_theta(int, double) {}
+};
 
 /// Gradient with respect to every node; no Hessian.
 struct GradientSink {
@@ -181,6 +192,17 @@ void hold(const Mat3& P, bool hold_theta, int k, Eigen::VectorXd& g, BlockBand<D
   if (k + 2 < H.size()) H.two(k + 2) = (H.two(k + 2) * Q).eval();
 }
 
+/// Takes what the supports hold out of a vector of the free nodes.
+template <int D>
+void project(const Problem& problem, Eigen::VectorXd& v) {
+  const int n = problem.rod->nodes();
+  const auto project_node = [&](const EndSupport& support, int k) {
+    v.segment<3>(D * k) = (free_directions(support) * v.segment<3>(D * k)).eval();
+  };
+  if (problem.first == 0) project_node(problem.proximal, 0);
+  if (problem.last == n) project_node(problem.distal, n - 1 - problem.first);
+}
+
 template <int D>
 void apply_supports(const Problem& problem, Eigen::VectorXd& g, BlockBand<D>& H) {
   const int n = problem.rod->nodes();
@@ -222,7 +244,7 @@ Quartic elastic_along(const Problem& problem, const RodState& state, const Eigen
   };
   for (int i = std::max(1, problem.first - 1); i <= std::min(n - 2, problem.last); ++i) {
     const double a = 1.0 / rod.rest_length[i - 1], c = 1.0 / rod.rest_length[i], b = -(a + c);
-    add_quadratic(rod.bend[i] * std::cos(rod.rest_angle[i]),
+    add_quadratic(rod.twisted ? rod.bend[i] * std::cos(rod.rest_angle[i]) : rod.bend[i],
                   a * state.x.col(i - 1) + b * state.x.col(i) + c * state.x.col(i + 1),
                   a * move(i - 1) + b * move(i) + c * move(i + 1));
   }
@@ -241,21 +263,6 @@ Quartic elastic_along(const Problem& problem, const RodState& state, const Eigen
     for (int i = problem.first; i < problem.last; ++i) q.a1 -= problem.load->col(i).dot(move(i));
   }
   return q;
-}
-
-/// Largest part of the step that no node can cross the wall with: a node may go as far as it is
-/// from the wall, and a quarter of a millimetre into it, where contact pushes it back.
-template <int D>
-double largest_safe_step(const Problem& problem, const std::vector<double>& distances,
-                         const Eigen::VectorXd& step) {
-  constexpr double kInto = 0.25;  // [mm]
-  double cap = std::numeric_limits<double>::infinity();
-  for (int i = problem.first; i < problem.last; ++i) {
-    const double move = step.segment<3>(D * (i - problem.first)).norm();
-    const double room = kInto + std::max(0.0, distances[static_cast<std::size_t>(i)]);
-    if (move > room) cap = std::min(cap, room / move);
-  }
-  return cap;
 }
 
 /// A twisted rod's directors are carried along by parallel transport, which is lost where an edge
@@ -322,16 +329,20 @@ NewtonResult Statics::solve_with(BlockBand<D>& hessian, BlockBand<D>& untouched,
   const int n = problem.rod->nodes();
   gradient_.resize(D * count);
   step_.resize(D * count);
-  distances_.resize(static_cast<std::size_t>(n));
   constexpr double kSmallestShift = 1e-7;  // [N/mm]
-  const bool bounded = problem.lumen != nullptr, twisted = D == 4;
-  const bool polynomial = !bounded && !twisted && !problem.tip_moment && !problem.plane;
+  constexpr int kEagerRefreshes = 25;  // iterations that refresh the lag; later only those that end
+  WallContact* contact = problem.contact;
+  const bool twisted = D == 4;
+  const bool polynomial = contact == nullptr && !twisted && !problem.tip_moment && !problem.plane;
+  const auto motion = [&] { return WallContact::Motion{problem.first, problem.last, D, step_}; };
 
-  const auto derivatives_at = [&](const RodState& where) {
+  // Gradient and Hessian of the wire, and of contact as it was sampled last; energy of the wire.
+  const auto differentiate = [&](const RodState& where) {
     gradient_.setZero();
     hessian.reset(count);
     BandSink<D> sink{problem.first, problem.last, gradient_, hessian};
-    const Energy energy = assemble(problem, where, &distances_, sink);
+    const Energy energy = assemble(problem, where, sink);
+    if (contact != nullptr) contact->add(sink);
     apply_supports<D>(problem, gradient_, hessian);
     return energy.total();
   };
@@ -356,18 +367,32 @@ NewtonResult Statics::solve_with(BlockBand<D>& hessian, BlockBand<D>& untouched,
   const double shortest = rod.rest_length.minCoeff();
   result.rounding_floor = 8.0 * kEpsilon * extent *
                           (rod.stretch.cwiseQuotient(rod.rest_length).maxCoeff() +
-                           4.0 * rod.bend.maxCoeff() / (shortest * shortest));
+                           4.0 * rod.largest_bend() / (shortest * shortest));
   double shift = 0.0;  // of the Hessian's diagonal
+  double wire_energy;  // without contact
+  double energy;       // that falls: of wire, contact and lagged friction
   trial_ = state;
-  result.energy = derivatives_at(state);
+  if (contact != nullptr) contact->begin(state.x);
+  wire_energy = differentiate(state);
+  const auto finish = [&](bool converged) {
+    result.converged = converged;
+    result.energy = wire_energy;
+    if (contact != nullptr) result.energy += contact->energy().contact + contact->energy().wall;
+    return result;
+  };
   for (;; ++result.iterations) {
+    energy = wire_energy + (contact != nullptr ? contact->energy().total() : 0.0);
     result.residual = largest_force();
-    if (result.residual <= options.residual_tolerance) {
-      result.converged = true;
-      return result;
+    if (result.residual <= options.residual_tolerance && contact != nullptr &&
+        !contact->lag_is_fresh()) {
+      contact->refresh(true);
+      wire_energy = differentiate(state);
+      energy = wire_energy + contact->energy().total();
+      result.residual = largest_force();
     }
+    if (result.residual <= options.residual_tolerance) return finish(true);
     if (result.iterations == options.max_iterations || !std::isfinite(result.residual))
-      return result;
+      return finish(false);
 
     // 1. Direction: Newton's, with the Hessian shifted just far enough to be positive definite.
     untouched = hessian;
@@ -382,20 +407,23 @@ NewtonResult Statics::solve_with(BlockBand<D>& hessian, BlockBand<D>& untouched,
     }
     step_ = -gradient_;
     hessian.solve(step_);
-    const double slope = gradient_.dot(step_);
+    double slope = gradient_.dot(step_);
+    if (contact != nullptr && shift == 0.0 && contact->has_remainder()) {
+      slope = refine_step<D>(problem, hessian, slope);
+    }
     if (step_.cwiseAbs().maxCoeff() < 64.0 * kEpsilon * extent &&
         result.residual <= result.rounding_floor) {
-      result.converged = true;
-      return result;
+      return finish(true);
     }
 
     // 2. Full step, edges turned rather than lengthened; most steps end here.
     double cap = std::numeric_limits<double>::infinity();
-    if (bounded) cap = largest_safe_step<D>(problem, distances_, step_);
+    if (contact != nullptr) cap = contact->largest_safe_part(motion());
     if (twisted) cap = std::min(cap, largest_turning_step<D>(problem, step_));
     // Rounding may hide the fall of the energy close to the minimum.
-    const double rounding = 1e-13 * (1.0 + std::abs(result.energy));
+    const double rounding = 1e-13 * (1.0 + std::abs(energy));
     bool accepted = false;
+    double trial_wire_energy = 0.0;
     const auto try_trial = [&](double length) {
       if constexpr (D == 4) {
         for (int k = 0; k < count && problem.first + k < n - 1; ++k) {
@@ -405,13 +433,19 @@ NewtonResult Statics::solve_with(BlockBand<D>& hessian, BlockBand<D>& untouched,
         transport_frames(state, trial_, std::max(0, problem.first - 1),
                          std::min(n - 2, problem.last - 1));
       }
-      const double energy = derivatives_at(trial_);
-      accepted = energy <= result.energy + 1e-4 * length * slope + rounding;
-      if (accepted) {
-        result.worst_energy_rise = std::max(result.worst_energy_rise, energy - result.energy);
-        result.energy = energy;
+      double trial_energy;
+      if (contact == nullptr) {
+        trial_energy = trial_wire_energy = differentiate(trial_);
+      } else {
+        EnergySink sink;
+        trial_wire_energy = assemble(problem, trial_, sink).total();
+        trial_energy = trial_wire_energy + contact->sample(trial_.x).total();
       }
-      return energy;
+      accepted = trial_energy <= energy + 1e-4 * length * slope + rounding;
+      if (accepted) {
+        result.worst_energy_rise = std::max(result.worst_energy_rise, trial_energy - energy);
+      }
+      return trial_energy;
     };
     turn_edges<D>(problem, state, step_, std::min(1.0, cap), trial_);
     try_trial(std::min(1.0, cap));
@@ -433,14 +467,14 @@ NewtonResult Statics::solve_with(BlockBand<D>& hessian, BlockBand<D>& untouched,
         trial_.x.col(problem.first + k) =
             state.x.col(problem.first + k) + length * step_.segment<3>(D * k);
       }
-      const double energy = try_trial(length);
+      const double trial_energy = try_trial(length);
       if (accepted) break;
       // Lowest point of the parabola through both energies and the slope, within a safe bracket.
-      const double curvature = (energy - result.energy - length * slope) / (length * length);
+      const double curvature = (trial_energy - energy - length * slope) / (length * length);
       const double parabola = curvature > 0.0 ? -slope / (2.0 * curvature) : 0.5 * length;
       length = std::clamp(parabola, 0.1 * length, 0.5 * length);
     }
-    if (!accepted) return result;
+    if (!accepted) return finish(false);
     std::swap(state, trial_);
     if (problem.tip_moment) {
       state.tip_angle = tip_angle(*problem.tip_moment, state, last_edge(state));
@@ -450,7 +484,71 @@ NewtonResult Statics::solve_with(BlockBand<D>& hessian, BlockBand<D>& untouched,
       trial_.director = state.director;
       trial_.reference_twist = state.reference_twist;
     }
+    wire_energy = trial_wire_energy;
+    if (contact != nullptr) {
+      if (result.iterations < kEagerRefreshes) contact->refresh(false);
+      differentiate(state);
+    }
   }
+}
+
+template <int D>
+double Statics::refine_step(const Problem& problem, const BlockBand<D>& factored, double slope) {
+  // What the banded Hessian H lacks of the exact one, R: (I + H^-1 R) step = -H^-1 gradient, by
+  // GMRES (Saad & Schultz 1986) from the banded step, as few directions as it takes.
+  constexpr double kEnough = 1e-3;  // of the first residual
+  const Eigen::Index size = step_.size();
+  krylov_.resize(size, kKrylov + 1);
+  const auto apply_rest = [&](const Eigen::VectorXd& v) {
+    refined_.setZero(size);
+    problem.contact->add_remainder({problem.first, problem.last, D, v}, refined_);
+    project<D>(problem, refined_);
+    factored.solve(refined_);
+  };
+  first_step_ = step_;
+  apply_rest(step_);
+  const double start = refined_.norm();
+  if (start <= kEnough * step_.norm()) {
+    step_ -= refined_;
+  } else {
+    Eigen::Matrix<double, kKrylov + 1, kKrylov> upper;  // the operator on the directions so far
+    Eigen::Matrix<double, kKrylov + 1, 1> right;
+    std::array<Eigen::JacobiRotation<double>, kKrylov> rotations;
+    upper.setZero();
+    right.setZero();
+    right[0] = -start;
+    krylov_.col(0) = refined_ / start;
+    int count = 0;
+    while (count < kKrylov && std::abs(right[count]) > kEnough * start) {
+      const int k = count++;
+      direction_ = krylov_.col(k);
+      apply_rest(direction_);
+      refined_ += direction_;
+      for (int i = 0; i <= k; ++i) {
+        upper(i, k) = krylov_.col(i).dot(refined_);
+        refined_ -= upper(i, k) * krylov_.col(i);
+      }
+      upper(k + 1, k) = refined_.norm();
+      if (upper(k + 1, k) > 0.0) krylov_.col(k + 1) = refined_ / upper(k + 1, k);
+      for (int i = 0; i < k; ++i) {
+        upper.col(k).applyOnTheLeft(i, i + 1, rotations[static_cast<std::size_t>(i)].adjoint());
+      }
+      Eigen::JacobiRotation<double>& rotation = rotations[static_cast<std::size_t>(k)];
+      rotation.makeGivens(upper(k, k), upper(k + 1, k));
+      upper.col(k).applyOnTheLeft(k, k + 1, rotation.adjoint());
+      right.applyOnTheLeft(k, k + 1, rotation.adjoint());
+    }
+    for (int i = count - 1; i >= 0; --i) {
+      for (int j = i + 1; j < count; ++j) right[i] -= upper(i, j) * right[j];
+      right[i] /= upper(i, i);
+      step_ += right[i] * krylov_.col(i);
+    }
+  }
+  // The energy falls along the banded Hessian's step; it must do so along the refined one.
+  const double refined_slope = gradient_.dot(step_);
+  if (refined_slope <= 0.1 * slope) return refined_slope;
+  step_.swap(first_step_);
+  return slope;
 }
 
 NewtonResult Statics::solve(const Problem& problem, RodState& state, const NewtonOptions& options) {
@@ -464,7 +562,18 @@ Energy Statics::evaluate(const Problem& problem, const RodState& state,
                          Eigen::Ref<Eigen::Matrix3Xd> gradient) {
   gradient.setZero();
   GradientSink sink{gradient};
-  return assemble(problem, state, nullptr, sink);
+  return assemble_with_contact(problem, state, sink);
+}
+
+Vec3 Statics::held_force(const Problem& problem, const RodState& state) {
+  // Elements that reach from the free nodes to those before.
+  HeldSink sink{problem.first};
+  Problem near;
+  near.rod = problem.rod;
+  near.first = problem.first;
+  near.last = std::min(problem.first + 1, problem.rod->nodes());
+  assemble(near, state, sink);
+  return sink.sum;
 }
 
 void Statics::derivatives(const Problem& problem, const RodState& state, Eigen::VectorXd& gradient,
@@ -473,7 +582,7 @@ void Statics::derivatives(const Problem& problem, const RodState& state, Eigen::
   gradient.setZero(4 * n - 1);
   hessian.setZero(4 * n - 1, 4 * n - 1);
   DenseSink sink{n, gradient, hessian};
-  assemble(problem, state, nullptr, sink);
+  assemble_with_contact(problem, state, sink);
 }
 
 }  // namespace wireplan::simulate

@@ -6,8 +6,8 @@
 #include <vector>
 
 #include "simulate/block_band.h"
-#include "simulate/contact.h"
 #include "simulate/rod.h"
+#include "simulate/wall_contact.h"
 
 namespace wireplan::simulate {
 
@@ -44,8 +44,7 @@ struct Problem {
   std::optional<Vec3>
       plane;  // unit normal of a table on which the wire lies: every node is held to the
               // plane through node 0, by springs as stiff as the wire's stretch
-  const Lumen* lumen = nullptr;
-  ContactLaw contact;
+  WallContact* contact = nullptr;  // of this rod; the solver samples it at its own states
 };
 
 struct NewtonOptions {
@@ -57,7 +56,8 @@ struct NewtonResult {
   bool converged = false;  // to the tolerance, or to what rounding allows (see rounding_floor)
   double residual = 0.0;   //                                              [N]
   double energy = 0.0;     // all terms                                    [N mm]
-  double worst_energy_rise = 0.0;  // over accepted steps; 0 unless rounding       [N mm]
+  double worst_energy_rise = 0.0;  // over accepted steps, with the lag (WallContact) that they
+                                   // were made with; 0 unless rounding [N mm]
   /// Residual that 64 bit numbers leave in the stiffest element, 8 eps |x| (EA/l + 4 EI/l^3): a
   /// tolerance below it is met once steps fall below rounding [N].
   double rounding_floor = 0.0;
@@ -66,8 +66,8 @@ struct NewtonResult {
 
 /// Energy by term [N mm].
 struct Energy {
-  double stretch = 0.0, bend = 0.0, twist = 0.0, load = 0.0, contact = 0.0;
-  double total() const { return stretch + bend + twist + load + contact; }
+  double stretch = 0.0, bend = 0.0, twist = 0.0, load = 0.0, contact = 0.0, wall = 0.0;
+  double total() const { return stretch + bend + twist + load + contact + wall; }
 };
 
 /// Solver with the memory that its solves reuse. One per thread.
@@ -81,6 +81,9 @@ class Statics {
   /// ones included: minus the gradient is the force of the rod and its loads on a node [N].
   static Energy evaluate(const Problem& problem, const RodState& state,
                          Eigen::Ref<Eigen::Matrix3Xd> gradient);
+  /// Force on the nodes before the first free one that keeps them where they are, against the wire
+  /// alone [N].
+  static Vec3 held_force(const Problem& problem, const RodState& state);
   /// For tests: gradient and dense Hessian over all x, then all theta (4n-1), supports ignored.
   static void derivatives(const Problem& problem, const RodState& state, Eigen::VectorXd& gradient,
                           Eigen::MatrixXd& hessian);
@@ -90,11 +93,15 @@ class Statics {
   NewtonResult solve_with(BlockBand<D>& hessian, BlockBand<D>& untouched, const Problem& problem,
                           RodState& state, const NewtonOptions& options);
 
+  static constexpr int kKrylov = 10;
+  template <int D>
+  double refine_step(const Problem& problem, const BlockBand<D>& factored, double slope);
+
   BlockBand<3> hessian3_, untouched3_;
   BlockBand<4> hessian4_, untouched4_;
   RodState trial_;
-  Eigen::VectorXd gradient_, step_;
-  std::vector<double> distances_;  // of the nodes from the wall, where there is one         [mm]
+  Eigen::VectorXd gradient_, step_, first_step_, refined_, direction_;
+  Eigen::MatrixXd krylov_;
 };
 
 }  // namespace wireplan::simulate

@@ -4,7 +4,9 @@
 /// one: its volume is short by a part that falls with edge^2.
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <map>
 #include <vector>
 
 #include "preprocess/vessel.h"
@@ -146,6 +148,20 @@ inline Eigen::Matrix3Xd bend_axis(double bend_radius, double angle, double lead_
   return axis;
 }
 
+/// Helix about z from the +x axis, counter-clockwise and up by `pitch` per turn, over `angle`
+/// [rad]; points about `step` apart.                                                       [mm]
+inline Eigen::Matrix3Xd helix_axis(double radius, double pitch, double angle, double step) {
+  const double climb = pitch / (2.0 * kPi);
+  const int count =
+      std::max(1, static_cast<int>(std::lround(angle * std::hypot(radius, climb) / step)));
+  Eigen::Matrix3Xd axis(3, count + 1);
+  for (int k = 0; k <= count; ++k) {
+    const double turned = angle * k / count;
+    axis.col(k) << radius * std::cos(turned), radius * std::sin(turned), climb * turned;
+  }
+  return axis;
+}
+
 /// Tube of one radius round `bend_axis`, edges about `edge` long.
 inline Surface bend_tube(double radius, double bend_radius, double angle, double lead_in,
                          double lead_out, double edge) {
@@ -192,6 +208,48 @@ inline Surface box(const Vec3& low, const Vec3& high) {
   surface.triangles.resize(3, 12);
   surface.triangles.transpose() << 0, 2, 1, 1, 2, 3, 4, 5, 6, 5, 7, 6, 0, 1, 4, 1, 5, 4,  //
       2, 6, 3, 3, 6, 7, 0, 4, 2, 2, 4, 6, 1, 3, 5, 3, 7, 5;
+  return surface;
+}
+
+/// Box whose faces are grids of `parts` squares a side, each of two triangles.
+inline Surface divided_box(const Vec3& low, const Vec3& high, int parts) {
+  std::vector<Vec3> vertices;
+  std::map<std::array<int, 3>, int> index_of;
+  const auto vertex = [&](const std::array<int, 3>& n) {
+    const auto [place, fresh] = index_of.try_emplace(n, static_cast<int>(vertices.size()));
+    if (fresh) {
+      vertices.push_back(low + (high - low).cwiseProduct(Vec3(n[0], n[1], n[2])) / parts);
+    }
+    return place->second;
+  };
+  std::vector<Eigen::Vector3i> triangles;
+  for (int d = 0; d < 3; ++d) {
+    for (const int side : {0, parts}) {
+      for (int i = 0; i < parts; ++i) {
+        for (int j = 0; j < parts; ++j) {
+          const auto corner = [&](int a, int b) {
+            std::array<int, 3> n{};
+            n[d] = side;
+            n[(d + 1) % 3] = i + a;
+            n[(d + 2) % 3] = j + b;
+            return vertex(n);
+          };
+          const int p = corner(0, 0), q = corner(1, 0), r = corner(1, 1), s = corner(0, 1);
+          triangles.push_back(side > 0 ? Eigen::Vector3i(p, q, r) : Eigen::Vector3i(p, r, q));
+          triangles.push_back(side > 0 ? Eigen::Vector3i(p, r, s) : Eigen::Vector3i(p, s, r));
+        }
+      }
+    }
+  }
+  Surface surface;
+  surface.vertices.resize(3, static_cast<Eigen::Index>(vertices.size()));
+  for (std::size_t k = 0; k < vertices.size(); ++k) {
+    surface.vertices.col(static_cast<Eigen::Index>(k)) = vertices[k];
+  }
+  surface.triangles.resize(3, static_cast<Eigen::Index>(triangles.size()));
+  for (std::size_t k = 0; k < triangles.size(); ++k) {
+    surface.triangles.col(static_cast<Eigen::Index>(k)) = triangles[k];
+  }
   return surface;
 }
 

@@ -7,6 +7,8 @@
 
 #include "pipeline/bench.h"
 #include "pipeline/bench_report.h"
+#include "pipeline/bench_walls.h"
+#include "preprocess/surface.h"
 #include "tests/pipeline/small_case.h"
 
 namespace wireplan::pipeline {
@@ -80,10 +82,11 @@ bool expect_valid(const fs::path& document) {
 
 TEST(Bench, WritesOneResultAsTextTableJsonAndPlot) {
   bool validated = true;
-  for (const std::string name : {"accuracy", "stability"}) {
+  for (const std::string name : {"accuracy", "stability", "throughput"}) {
     SCOPED_TRACE(name);
     const QuickRun run(name);
-    EXPECT_NE(run.text.find("method"), std::string::npos);
+    const std::string column = name == "throughput" ? "1/s/core" : "method";
+    EXPECT_NE(run.text.find(column), std::string::npos);
     EXPECT_NE(run.text.find((run.folder / name).string()), std::string::npos);
     expect_same_rows(run.result.at("rows"), run.folder / (name + ".csv"));
     const fs::path plot = run.folder / (name + ".png");
@@ -119,9 +122,19 @@ TEST(Bench, ErrorFallsWithTheSquareOfTheElementLength) {
     EXPECT_LT(better.at(80), 0.1 * errors.at(80));
     EXPECT_LT(better.at(20), 0.1);  // 0.1 % at the paper's 20 elements
   }
+  // Every method at every size; what was stopped says so and took all the steps that it had.
   for (const std::string method : {"conjugate_gradient", "explicit", "semi_implicit"}) {
-    EXPECT_FALSE(errors_of(rows, "heavy_cantilever", method).empty()) << method;
+    EXPECT_EQ(errors_of(rows, "heavy_cantilever", method).size(), 4u) << method;
   }
+  std::map<std::string, int> stopped;
+  for (const Json& row : rows) {
+    if (row.at("outcome") == "converged") continue;
+    ++stopped[row.at("method")];
+    EXPECT_EQ(row.at("outcome"), "not_converged") << row.dump();
+    EXPECT_EQ(row.at("iterations"), row.at("step_limit")) << row.dump();
+  }
+  EXPECT_GT(stopped["explicit"], 0);
+  EXPECT_EQ(stopped["newton"], 0);
   const Json& table = accuracy.result.at("results").at("table_1");
   EXPECT_EQ(table.at("explicit_ms").size(), 1u);
   EXPECT_GT(table.at("ratio"), 10.0);  // a thousand times fewer steps; the time is not the test's
@@ -156,13 +169,56 @@ TEST(Bench, ExplicitMethodsBreakWhereNewtonDoesNot) {
   EXPECT_TRUE(lower.empty()) << lower.dump();
 }
 
+TEST(Bench, EveryInsertionIsInBalanceAndTheSameOnTwoThreads) {
+  const QuickRun throughput("throughput");
+  EXPECT_TRUE(throughput.result.at("results").at("same_on_two_threads"));
+  std::map<std::string, int> rows;
+  for (const Json& row : throughput.result.at("rows")) {
+    SCOPED_TRACE(row.dump());
+    EXPECT_LE(row.at("residual_n"), 1e-6);
+    EXPECT_EQ(row.at("not_converged"), 0);
+    EXPECT_GT(row.at("insertions_per_second_per_core"), 0.0);
+    EXPECT_GT(row.at("inserted_mm"), 30.0);
+    EXPECT_LT(row.at("max_penetration_mm"), 0.2);  // a wire of 0.4 mm radius stays in the lumen
+    ++rows[row.at("surface").get<std::string>() + " " + row.at("wall").get<std::string>()];
+  }
+  EXPECT_EQ(rows, (std::map<std::string, int>{{"arterial-tree rigid", 12},
+                                              {"arterial-tree elastic", 12},
+                                              {"s-tube rigid", 4},
+                                              {"paper-tube rigid", 1},
+                                              {"paper-tube elastic", 1}}));
+}
+
+TEST(Bench, TubeOfTheFigureCaseIsThatOfTheBench) {
+  for (const std::string name : {"tube-fig5", "s-tube"}) {
+    const fs::path file = fs::path(WIREPLAN_SOURCE_DIR) / "cases" / name / "tube.obj";
+    const Surface given = preprocess::read_surface(file, "mm", "LPS");
+    const Surface made = (name == "s-tube" ? make_s_tube() : make_paper_tube()).surface;
+    ASSERT_EQ(given.triangles.cols(), made.triangles.cols()) << name;
+    // The file has four decimals.
+    EXPECT_NEAR(preprocess::signed_volume(given), preprocess::signed_volume(made), 1.0) << name;
+    double apart = 0.0;
+    for (const Vec3& vertex : made.vertices.colwise()) {
+      apart = std::max(apart, (given.vertices.colwise() - vertex).colwise().norm().minCoeff());
+    }
+    EXPECT_LT(apart, 1e-4) << name;
+  }
+  EXPECT_EQ(make_paper_tube().surface.triangles.cols(), 1160);  // as in the paper's Fig. 5
+}
+
+TEST(Bench, CaseIsForThroughputAlone) {
+  const TemporaryFolder folder;
+  EXPECT_THROW(run_bench("accuracy", folder.path(), {.case_path = "cases/abdomen"}), Error);
+}
+
 TEST(Bench, UnknownNameIsToldWithTheKnownOnes) {
   const TemporaryFolder folder;
   try {
     run_bench("speed", folder.path(), {});
     FAIL() << "no error";
   } catch (const Error& error) {
-    EXPECT_EQ(std::string(error.what()), "bench: NAME is 'speed', expected accuracy or stability");
+    EXPECT_EQ(std::string(error.what()),
+              "bench: NAME is 'speed', expected accuracy, stability or throughput");
   }
 }
 

@@ -115,10 +115,14 @@ Json full_case(Json json) {
   json["target"]["radius_mm"] = 5;
   json["wires"] = {own_wire(), "amplatz"};
   json["tip_roll_deg"] = {0, 180};
-  json["friction"] = 0;
-  json["insertion"] = {{"length_mm", 250},         {"step_mm", 2},
-                       {"element_length_mm", 0.5}, {"residual_tolerance_n", 1e-5},
-                       {"max_iterations", 50},     {"record_every_mm", 10}};
+  json["friction"] = 0.12;
+  json["insertion"] = {{"length_mm", 250},
+                       {"step_mm", 2},
+                       {"element_length_mm", 0.5},
+                       {"contact_spacing_mm", 2},
+                       {"residual_tolerance_n", 1e-5},
+                       {"max_iterations", 50},
+                       {"record_every_mm", 10}};
   json["limits"] = {{"tip_force_warn_n", 0.2},
                     {"tip_force_fail_n", 1},
                     {"penetration_fail_mm", 0.5},
@@ -143,15 +147,17 @@ TEST_F(CaseFile, GivesEveryMissingKeyItsDefault) {
   EXPECT_EQ(input.study.inclinations.size(), 3u);
   EXPECT_EQ(input.study.azimuths.size(), 4u);
   EXPECT_EQ(input.study.insertion.length, 0.0) << "0: chosen from the path's length";
-  EXPECT_EQ(input.wall.young_modulus, 0.0) << "0: chosen by the wall stage";
+  EXPECT_TRUE(input.wall.elastic);
+  EXPECT_EQ(input.wall.extrusion.young_modulus, 0.0) << "0: chosen by the wall stage";
+  EXPECT_EQ(input.study.insertion.friction, 0.04) << "hydrophilic, references A3";
   ASSERT_EQ(input.study.wires.size(), 1u);
   EXPECT_EQ(input.study.wires[0].name, "amplatz");
 }
 
 TEST_F(CaseFile, ConvertsToInternalUnits) {
   const Case input = read(full_case(volume_case()));
-  EXPECT_DOUBLE_EQ(input.wall.young_modulus, 0.056);          // MPa
-  EXPECT_DOUBLE_EQ(input.study.inclinations[1], kPi / 12.0);  // rad
+  EXPECT_DOUBLE_EQ(input.wall.extrusion.young_modulus, 0.056);  // MPa
+  EXPECT_DOUBLE_EQ(input.study.inclinations[1], kPi / 12.0);    // rad
   EXPECT_DOUBLE_EQ(input.study.azimuths[1], kPi / 2.0);
   EXPECT_DOUBLE_EQ(input.study.rolls[1], kPi);
   const simulate::Wire& wire = input.study.wires[0];
@@ -213,9 +219,8 @@ TEST_F(CaseFile, NamesEachMistakeWithItsRemedy) {
       {"segmentation.seeds_mm=[[1, 2, 3], 7]", {"segmentation.seeds_mm[1] is 7"}},
       {"surface.path=vessel.stl", {"surface.path is given beside volume"}},
       {"wall.thickness_mm=0.001", {"wall.thickness_mm is 0.001", "given in m?"}},
-      {"wall.model=elastic",
-       {"wall.model is \"elastic\", expected \"rigid\"", "not in this version"}},
-      {"friction=0.04", {"friction is 0.04, expected 0", "not in this version"}},
+      {"wall.model=stiff", {"wall.model is \"stiff\"", "\"elastic\"", "\"rigid\""}},
+      {"friction=4", {"friction is 4", "from 0", "0.04 hydrophilic"}},
       {"robustness={\"repeats\": 16}", {"robustness is given", "not in this version"}},
       {"insertion.length_mm=2000", {"insertion.length_mm is 2000", "\"amplatz\" has 1500"}},
       {"insertion.length_mm=0.25", {"insertion.length_mm is 0.25", "0 or at least 1", "in m?"}},
@@ -300,7 +305,7 @@ TEST_F(CaseFile, OverridesTakeJsonAndElseText) {
   const Case input =
       read(volume_case(), {"wall.thickness_mm=2.5", "name=over ride", "wires=[\"amplatz-stiff\"]",
                            "limits.tip_force_fail_n=1"});
-  EXPECT_EQ(input.wall.thickness_mm, 2.5);
+  EXPECT_EQ(input.wall.extrusion.thickness_mm, 2.5);
   EXPECT_EQ(input.name, "over ride");
   EXPECT_EQ(input.study.wires[0].name, "amplatz-stiff");
   EXPECT_EQ(input.limits.tip_force_fail, 1.0);
@@ -726,7 +731,7 @@ TEST_F(CaseFile, ResultsOfBenchesFromFileToFile) {
   // Newton: no time steps. Explicit Euler: unstable, with its limit. Decoupled: rolls.
   const auto result_of = [this](const Json& json) {
     const SceneFile file = read_scene(write("scene.json", json.dump()));
-    write_json(result_json(simulate::run_scene(*file.bench)), folder_ / "result.json");
+    write_json(result_json(simulate::run_scene(*file.bench), {}), folder_ / "result.json");
     return read_json(folder_ / "result.json", "wireplan.result/1");
   };
   const Json newton = result_of(cantilever());
@@ -758,7 +763,10 @@ TEST_F(CaseFile, InsertionSceneBecomesATrial) {
   const SceneFile file = read_scene(write("scene.json", pushed_wire().dump()));
   EXPECT_FALSE(file.bench);
   ASSERT_TRUE(file.insertion);
-  EXPECT_EQ(file.insertion->vessel.path, folder_ / "vessel.stl");
+  ASSERT_TRUE(file.vessel);
+  EXPECT_EQ(file.vessel->surface.path, folder_ / "vessel.stl");
+  EXPECT_FALSE(file.vessel->wall.elastic);
+  EXPECT_FALSE(file.insertion->has_target);
   EXPECT_EQ(file.insertion->introducer.direction, Vec3(0, 0, 1)) << "made a unit vector";
   EXPECT_DOUBLE_EQ(file.insertion->introducer.roll, kPi / 2.0);
   EXPECT_EQ(file.insertion->options.length, 30.0);
@@ -767,7 +775,31 @@ TEST_F(CaseFile, InsertionSceneBecomesATrial) {
   EXPECT_GT(file.insertion->goal.point.norm(), 1e5) << "no target: out of reach";
   Json json = pushed_wire();
   json["target"] = {{"point_mm", {0, 0, 20}}, {"radius_mm", 1}};
-  EXPECT_EQ(read_scene(write("scene.json", json.dump())).insertion->goal.point, Vec3(0, 0, 20));
+  json["vessel"]["friction"] = 0.1;
+  json["vessel"]["contact_spacing_mm"] = 0.5;
+  json["vessel"]["wall"] = {{"model", "elastic"}, {"young_modulus_kpa", 56}};
+  json["wire"]["sections"][0]["element_length_mm"] = 0.5;
+  json["wire"].erase("elements");
+  const SceneFile full = read_scene(write("scene.json", json.dump()));
+  EXPECT_EQ(full.insertion->goal.point, Vec3(0, 0, 20));
+  EXPECT_TRUE(full.insertion->has_target);
+  EXPECT_TRUE(full.vessel->wall.elastic);
+  EXPECT_DOUBLE_EQ(full.vessel->wall.extrusion.young_modulus, 0.056);
+  EXPECT_EQ(full.insertion->options.friction, 0.1);
+  EXPECT_EQ(full.insertion->options.contact_spacing, 0.5);
+  EXPECT_EQ(full.insertion->options.section_element_length, std::vector<double>{0.5});
+}
+
+TEST_F(CaseFile, BenchTakesFrictionAndSpacingFromItsVessel) {
+  Json json = cantilever();
+  json["vessel"] = pushed_wire().at("vessel");
+  json["vessel"]["friction"] = 0.2;
+  json["vessel"]["contact_spacing_mm"] = 0.5;
+  const SceneFile file = read_scene(write("scene.json", json.dump()));
+  ASSERT_TRUE(file.bench && file.vessel);
+  EXPECT_FALSE(file.insertion);
+  EXPECT_EQ(file.bench->contact.friction, 0.2);
+  EXPECT_EQ(file.bench->contact.spacing, 0.5);
 }
 
 TEST_F(CaseFile, ScenesSayWhatIsWrongOrNotInThisVersion) {
@@ -839,8 +871,12 @@ TEST_F(CaseFile, ScenesSayWhatIsWrongOrNotInThisVersion) {
        1,
        {"wire.sections[0].stiffness is not a known"}},
       {cantilever(), "/target", {{"point_mm", {0, 0, 1}}}, {"target is not a known key"}},
-      {pushed_wire(), "/vessel/friction", 0.1, {"vessel.friction is 0.1", "version"}},
-      {pushed_wire(), "/vessel/wall/model", "elastic", {"vessel.wall.model", "version"}},
+      {pushed_wire(), "/vessel/friction", -0.1, {"vessel.friction is -0.1", "from 0"}},
+      {pushed_wire(), "/vessel/wall/model", "soft", {"vessel.wall.model", "\"elastic\""}},
+      {motion("conjugate_gradient"),
+       "/vessel",
+       pushed_wire().at("vessel"),
+       {"solver.method is not \"newton\"", "no vessel"}},
       {pushed_wire(), "/vessel/surface/path", "none.stl", {"vessel.surface.path", "none.stl"}},
       {pushed_wire(), "/insertion/length_mm", 50, {"insertion.length_mm is 50", "40"}},
       {pushed_wire(), "/loads/gravity_m_per_s2", {0, 0, -9.81}, {"loads is", "version"}},
@@ -867,7 +903,7 @@ TEST_F(CaseFile, ResultOfABenchIsWrittenInFileUnitsWithoutNan) {
   result.residual = std::numeric_limits<double>::quiet_NaN();
   result.reactions = {{simulate::WireEnd::kProximal, Vec3(1, 2, 3), Vec3(4, 5, 6)}};
   const fs::path file = folder_ / "result.json";
-  write_json(result_json(result), file);
+  write_json(result_json(result, {}), file);
   const Json read = read_json(file, "wireplan.result/1");
   EXPECT_EQ(read.at("outcome"), "not_converged");
   EXPECT_EQ(read.at("energy_n_mm").at("total"), 0.5);
@@ -889,12 +925,22 @@ TEST_F(CaseFile, HistoryOfAnInsertionKeepsThePeaksBetweenItsRows) {
     push.insertion = i;
     push.peak_contact_force = i == 3 ? 7.0 : 1.0;
     push.residual = i == 4 ? 2e-7 : 1e-7;
+    push.wall_displacement = i == 7 ? 0.5 : 0.25;
+    push.push_work = i;
+    push.stored_energy = 0.5 * i;
+    push.friction_work = 0.25 * i;
     push.iterations = 2;
     result.pushes.push_back(push);
   }
-  result.contacts = {
-      {.node = 3, .point = Vec3(1, 2, 3), .force = Vec3(3, 0, 4), .penetration = 0.1}};
-  const Json json = result_json(result, 5.0);
+  result.contacts = {{.node = 3,
+                      .part = 0.5,
+                      .triangle = 7,
+                      .point = Vec3(1, 2, 3),
+                      .normal_force = Vec3(3, 0, 4),
+                      .friction_force = Vec3(0, 0.5, 0),
+                      .penetration = 0.1},
+                     {.node = 4}};
+  const Json json = result_json(result, 5.0, 0.125);
   ASSERT_EQ(json.at("history").size(), 3u);
   EXPECT_EQ(json.at("history")[0].at("insertion_mm"), 5.0);
   EXPECT_EQ(json.at("history")[0].at("peak_contact_force_n"), 7.0);
@@ -902,7 +948,16 @@ TEST_F(CaseFile, HistoryOfAnInsertionKeepsThePeaksBetweenItsRows) {
   EXPECT_EQ(json.at("history")[2].at("insertion_mm"), 12.0) << "the last push has a row";
   EXPECT_EQ(json.at("iterations"), 24);
   EXPECT_EQ(json.at("residual_n"), 2e-7);
-  EXPECT_EQ(json.at("contacts")[0].at("normal_force_n"), 5.0);
+  EXPECT_EQ(json.at("history")[1].at("wall_displacement_mm"), 0.5);
+  EXPECT_EQ(json.at("history")[0].at("energy_released_n_mm"), 1.25);
+  EXPECT_EQ(json.at("energy_n_mm").at("total"), 6.0);
+  EXPECT_TRUE(json.at("energy_n_mm").at("bend").is_null());
+  EXPECT_TRUE(json.at("energy_n_mm").at("bend_reason").is_string());
+  EXPECT_EQ(json.at("cpu_time_s"), 0.125);
+  EXPECT_EQ(json.at("contacts")[0].at("triangle"), 7);
+  EXPECT_EQ(json.at("contacts")[0].at("normal_force_n"), to_json(Vec3(3, 0, 4)));
+  EXPECT_EQ(json.at("contacts")[0].at("friction_force_n"), to_json(Vec3(0, 0.5, 0)));
+  EXPECT_TRUE(json.at("contacts")[1].at("triangle").is_null());
 }
 
 // ---- writing ----------------------------------------------------------------------------------

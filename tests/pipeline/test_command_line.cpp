@@ -77,6 +77,21 @@ void write_two_tubes(const fs::path& file) {
       file);
 }
 
+// A soft wire pushed askew into the tube, whose wall yields and rubs.
+Json tube_scene() {
+  Json scene;
+  scene["schema"] = "wireplan.scene/1";
+  scene["wire"] = {{"sections", Json::array({{{"length_mm", 60},
+                                              {"element_length_mm", 1},
+                                              {"bending_stiffness_n_mm2", 50},
+                                              {"radius_mm", 0.4}}})}};
+  scene["vessel"] = {{"surface", {{"path", "tube.stl"}, {"unit", "mm"}, {"frame", "LPS"}}},
+                     {"wall", {{"model", "elastic"}}},
+                     {"friction", 0.1}};
+  scene["insertion"] = {{"point_mm", {0, 0, 6}}, {"direction", {0.3, 0, 1}}, {"length_mm", 20}};
+  return scene;
+}
+
 Json volume_case(const Json& tube) {
   Json file = tube;
   file["volume"] = {{"path", "ct.nrrd"}};
@@ -94,9 +109,10 @@ TEST_F(CommandLine, RunsACaseAndTheSecondTimeDoesNothing) {
   EXPECT_NE(first.out.find("best plan of 2 that reach, out of 2 tried"), std::string::npos);
   EXPECT_NE(first.out.find("report: wireplan-out/tube/report.json"), std::string::npos);
   const fs::path results = folder_ / "wireplan-out" / "tube";
-  for (const char* name : {"surface.vtp", "centerline.vtp", "centerline.mrk.json", "wall.vtu",
-                           "report.json", "trials/0000.json", "trials/0001.json",
-                           "trials/plan-1.pvd", "trials/plan-1.mrk.json", "trials/plan-1/0.vtp"}) {
+  for (const char* name :
+       {"surface.vtp", "centerline.vtp", "centerline.mrk.json", "wall.vtu", "report.json",
+        "forces.vtu", "plans.png", "trials/0000.json", "trials/0001.json", "trials/plan-1.pvd",
+        "trials/plan-1.mrk.json", "trials/plan-1/0.vtp"}) {
     EXPECT_TRUE(fs::exists(results / name)) << name;
   }
 
@@ -192,6 +208,53 @@ TEST_F(CommandLine, SimulatesTheBench) {
       << answer.out;
   EXPECT_TRUE(fs::exists(folder_ / "bench" / "result.json"));
   EXPECT_TRUE(fs::exists(folder_ / "bench" / "wire.vtp"));
+}
+
+TEST_F(CommandLine, SimulatesAnInsertionIntoAYieldingVessel) {
+  write_json(tube_scene(), folder_ / "scene.json");
+  const Answer answer = call("simulate scene.json -o pushed");
+  ASSERT_EQ(answer.code, 0) << answer.log;
+  for (const char* name :
+       {"result.json", "wire.vtp", "wire.png", "shapes.pvd", "shapes/0.vtp", "forces.vtu"}) {
+    EXPECT_TRUE(fs::exists(folder_ / "pushed" / name)) << name;
+  }
+  const Json result = read_json(folder_ / "pushed" / "result.json", "wireplan.result/1");
+  EXPECT_EQ(result.at("vessel").at("wall_model"), "elastic");
+  EXPECT_NEAR(result.at("vessel").at("wall_stiffness_kpa_per_mm").get<double>(), 25.0, 1e-9);
+  ASSERT_FALSE(result.at("contacts").empty());
+  EXPECT_GT(result.at("max_wall_displacement_mm"), 0.0);
+  EXPECT_GT(result.at("friction_work_n_mm"), 0.0);
+  const Json& last = result.at("history").back();
+  EXPECT_NEAR(last.at("insertion_mm").get<double>(), 20.0, 1e-9);
+  EXPECT_EQ(last.at("push_work_n_mm"), result.at("push_work_n_mm"));
+}
+
+TEST_F(CommandLine, SimulatesABenchWithinAVessel) {
+  // Clamped on the tube's axis and pressed sideways against its wall, 4 mm away.
+  Json scene = tube_scene();
+  scene.erase("insertion");
+  scene["wire"]["sections"][0]["length_mm"] = 25;
+  scene["supports"] = Json::array({{{"at", "proximal"},
+                                    {"kind", "clamped"},
+                                    {"point_mm", {0, 0, 6}},
+                                    {"direction", {0, 0, 1}}}});
+  scene["loads"] = {{"tip_force_n", {0.2, 0, 0}}};
+  scene["vessel"]["friction"] = 0;
+  write_json(scene, folder_ / "scene.json");
+  const Answer answer = call("simulate scene.json -o bench");
+  ASSERT_EQ(answer.code, 0) << answer.log;
+  EXPECT_TRUE(fs::exists(folder_ / "bench" / "forces.vtu"));
+  const Json result = read_json(folder_ / "bench" / "result.json", "wireplan.result/1");
+  ASSERT_FALSE(result.at("contacts").empty());
+  double wall = 0.0;
+  for (const Json& contact : result.at("contacts")) {
+    wall += contact.at("normal_force_n")[0].get<double>();
+    EXPECT_GE(contact.at("triangle"), 0);
+  }
+  // Load, wall and clamp balance across the axis, to the residuals of some 25 nodes.
+  const double clamp = result.at("reactions")[0].at("force_n")[0];
+  EXPECT_LT(wall, -0.05);
+  EXPECT_NEAR(0.2 + wall + clamp, 0.0, 1e-4);
 }
 
 TEST_F(CommandLine, RefusesAFileThatIsMissingOrBroken) {

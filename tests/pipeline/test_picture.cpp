@@ -104,7 +104,7 @@ TEST(Picture, TurnedFrameIsDrawnUprightTowardTheTarget) {
   wire.nodes.col(0).z() = 0.6 * kHeight;
   wire.nodes = turn * wire.nodes;
   PictureMarks marks = marks_on_axis();
-  marks.target = turn * marks.target;
+  marks.target = Vec3(turn * *marks.target);
   const Picture picture = draw_picture(tube, {wire}, marks, kSmall);
   int above = 0, below = 0;
   for (int row = picture.height / 4; row < picture.height; ++row) {
@@ -181,6 +181,23 @@ TEST(Picture, FileThatCannotBeWrittenIsNamed) {
   } catch (const Error& error) {
     EXPECT_NE(std::string(error.what()).find("/no/such/folder/plan.png"), std::string::npos);
   }
+}
+
+TEST(Picture, DrawsAWireAloneWithoutVesselAndMarks) {
+  PictureWire wire = upright_wire(0, 0);
+  wire.color = Color(0.3F, 0.3F, 0.3F);
+  const Picture bare = draw_picture(Surface(), {wire}, {.title = "bench"}, kSmall);
+  const Picture marked =
+      draw_picture(Surface(), {wire}, {.title = "bench", .access = Vec3(0, 0, 0)}, kSmall);
+  const auto blue = [](const Picture& picture) {
+    int count = 0;
+    for (std::size_t i = 0; i < picture.rgb.size(); i += 3) {
+      count += picture.rgb[i + 2] > picture.rgb[i] + 80;  // of the ball at the access
+    }
+    return count;
+  };
+  EXPECT_EQ(blue(bare), 0);
+  EXPECT_GT(blue(marked), 20);
 }
 
 }  // namespace

@@ -7,6 +7,7 @@
 #include "pipeline/report.h"
 #include "pipeline/stages.h"
 #include "pipeline/trial_file.h"
+#include "preprocess/vessel_io.h"
 #include "tests/pipeline/small_case.h"
 
 namespace wireplan::pipeline {
@@ -59,6 +60,64 @@ TEST(Report, KeepsToItsSchemaWithPlans) {
   ASSERT_FALSE(report.at("ranking").empty());
   EXPECT_EQ(report.at("trials").size(), 2u);
   expect_valid(report, folder.path());
+}
+
+TEST(Report, KeepsToItsSchemaInARigidVesselWithoutFrictionAndSaysSo) {
+  const TemporaryFolder folder;
+  write_tube_case(folder.path());
+  const Json report =
+      run_to_report(folder / "case.json", folder / "cache", 0, {"wall.model=rigid", "friction=0"});
+  const Json warnings = report.at("provenance").at("warnings");
+  const auto warned = [&](const std::string& text) {
+    return std::any_of(warnings.begin(), warnings.end(), [&](const Json& warning) {
+      return warning.get<std::string>().find(text) != std::string::npos;
+    });
+  };
+  EXPECT_TRUE(warned("frictionless (friction is 0): push forces are lower bounds")) << warnings;
+  EXPECT_TRUE(warned("rigid wall: contact forces are upper bounds")) << warnings;
+  for (const Json& trial : report.at("trials")) {
+    EXPECT_TRUE(trial.at("peak_wall_displacement_mm").is_null());
+    EXPECT_TRUE(trial.at("beyond_linear_theory").is_null());
+    EXPECT_EQ(trial.at("null_reasons").at("beyond_linear_theory"), "the wall is rigid");
+    EXPECT_EQ(trial.at("friction_work_n_mm"), 0.0);
+  }
+  expect_valid(report, folder.path());
+}
+
+TEST(Report, TellsHowTheWallMovedAndWhereTheWorkWent) {
+  // A wire askew onto a wall so soft that linear theory ends.
+  const TemporaryFolder folder;
+  write_tube_case(folder.path());
+  const Json report =
+      run_to_report(folder / "case.json", folder / "cache", 0,
+                    {"wall.young_modulus_kpa=20", "access.inclination_deg=[30]", "friction=0.2"});
+  ASSERT_EQ(report.at("trials").size(), 1u);
+  const Json& trial = report.at("trials")[0];
+  ASSERT_TRUE(trial.at("wall_motion").is_object()) << trial;
+  EXPECT_TRUE(trial.at("beyond_linear_theory")) << trial.at("wall_motion");
+  EXPECT_NEAR(trial.at("wall_motion").at("radius_mm").get<double>(), 4.0, 0.3) << "of the tube";
+  EXPECT_GT(trial.at("friction_work_n_mm"), 0.0);
+  EXPECT_GT(trial.at("push_work_n_mm"), trial.at("friction_work_n_mm"));
+  EXPECT_NE(report.at("provenance").at("warnings").dump().find("1 of 1 moved the wall beyond"),
+            std::string::npos);
+  EXPECT_EQ(report.at("vessel").at("wall_model"), "elastic");
+  expect_valid(report, folder.path());
+}
+
+TEST(Report, MapsTheForcesOnTheWall) {
+  const TemporaryFolder folder;
+  write_tube_case(folder.path());
+  RunOptions options;
+  options.cache = folder / "cache";
+  const RunResult result =
+      run_stages(read_case(folder / "case.json", {"wall.model=rigid"}), options);
+  const fs::path results = result.artifacts.back().folder;
+  const Json report = read_json(results / "report.json", kReportSchema);
+  EXPECT_EQ(report.at("artifacts")[3].at("file"), "forces.vtu");
+  EXPECT_GT(preprocess::read_wall(results / "forces.vtu").apexes.cols(), 100);
+  const std::string bytes = read_text(results / "forces.vtu");
+  EXPECT_NE(bytes.find("Name=\"peak_force_n\""), std::string::npos);
+  EXPECT_NE(bytes.find("Name=\"peak_force_best_plan_n\""), std::string::npos);
 }
 
 TEST(Report, KeepsToItsSchemaWithoutPlans) {
@@ -125,8 +184,21 @@ TEST(TrialFile, KeepsEveryBitAndMakesNullOfWhatIsNoNumber) {
   trial.pushes[1].residual = std::nan("");
   trial.pushes[1].iterations = 200;
   trial.nodes = Eigen::Matrix3Xd::Random(3, 5);
-  trial.contacts = {
-      {.node = 3, .point = Vec3(1, 2, 3), .force = Vec3(0.1, 0.2, 0.3), .penetration = 0.7}};
+  trial.pushes[1].wall_displacement = 0.3;
+  trial.pushes[1].wall_displacement_point = Vec3(0.1, 0.2, 0.3);
+  trial.pushes[1].friction_force = 0.7;
+  trial.pushes[1].push_work = 1.1;
+  trial.pushes[1].stored_energy = 1.3;
+  trial.pushes[1].friction_work = 1.7;
+  trial.contacts = {{.node = 3,
+                     .part = 0.1,
+                     .triangle = 17,
+                     .point = Vec3(1, 2, 3),
+                     .normal_force = Vec3(0.1, 0.2, 0.3),
+                     .friction_force = Vec3(0.7, 0.1, 0.2),
+                     .penetration = 0.7,
+                     .wall_displacement = 0.9}};
+  trial.peak_forces = {{3, 0.1}, {17, 1.0 / 3.0}};
   fs::create_directories(folder / "trials");
   const fs::path file = folder / trial_file_name(12);
   EXPECT_EQ(file.filename(), "0012.json");
@@ -142,9 +214,26 @@ TEST(TrialFile, KeepsEveryBitAndMakesNullOfWhatIsNoNumber) {
   EXPECT_EQ(read->pushes[0].tip, trial.pushes[0].tip);
   EXPECT_TRUE(std::isnan(read->pushes[1].residual));
   EXPECT_EQ(read->pushes[1].iterations, 200);
+  EXPECT_EQ(read->pushes[1].wall_displacement, 0.3);
+  EXPECT_EQ(read->pushes[1].wall_displacement_point, Vec3(0.1, 0.2, 0.3));
+  EXPECT_EQ(read->pushes[1].friction_force, 0.7);
+  EXPECT_EQ(read->pushes[1].push_work, 1.1);
+  EXPECT_EQ(read->pushes[1].stored_energy, 1.3);
+  EXPECT_EQ(read->pushes[1].friction_work, 1.7);
   EXPECT_EQ(read->nodes, trial.nodes);
   ASSERT_EQ(read->contacts.size(), 1u);
-  EXPECT_EQ(read->contacts[0].force, trial.contacts[0].force);
+  const simulate::WireContact &contact = read->contacts[0], &written = trial.contacts[0];
+  EXPECT_EQ(contact.node, 3);
+  EXPECT_EQ(contact.part, 0.1);
+  EXPECT_EQ(contact.triangle, 17);
+  EXPECT_EQ(contact.point, written.point);
+  EXPECT_EQ(contact.normal_force, written.normal_force);
+  EXPECT_EQ(contact.friction_force, written.friction_force);
+  EXPECT_EQ(contact.penetration, 0.7);
+  EXPECT_EQ(contact.wall_displacement, 0.9);
+  ASSERT_EQ(read->peak_forces.size(), 2u);
+  EXPECT_EQ(read->peak_forces[1].triangle, 17);
+  EXPECT_EQ(read->peak_forces[1].force, 1.0 / 3.0);
 
   write_text(read_text(file).substr(0, 200), file);
   EXPECT_FALSE(find_trial(file));

@@ -217,10 +217,18 @@ TEST_F(StageKeys, AChangeRerunsWhatReadsItAndNoMore) {
   using Names = std::vector<std::string>;
   run({});
   EXPECT_EQ(not_cached(run({"wall.thickness_mm=2"})), (Names{"wall", "trials", "report"}));
+  EXPECT_EQ(not_cached(run({"friction=0.1"})), (Names{"trials", "report"}));
+  EXPECT_EQ(not_cached(run({"wall.model=rigid"})), (Names{"trials", "report"}));
   EXPECT_EQ(not_cached(run({"wires=[\"amplatz-stiff\"]"})), (Names{"trials", "report"}));
   EXPECT_EQ(not_cached(run({"ranking.weights.margin=1"})), (Names{"report"}));
   EXPECT_EQ(not_cached(run({"target.point_mm=[0,0,26]"})),
             (Names{"centerline", "trials", "report"}));
+}
+
+TEST_F(StageKeys, TrialsInARigidVesselDoNotReadItsWall) {
+  run({"wall.model=rigid"});
+  EXPECT_EQ(not_cached(run({"wall.model=rigid", "wall.thickness_mm=2"})),
+            (std::vector<std::string>{"wall", "report"}));
 }
 
 TEST_F(StageKeys, AStageThatComesOutTheSameStopsTheCascade) {

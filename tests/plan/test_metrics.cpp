@@ -86,6 +86,22 @@ TEST(PushMetrics, PeaksAreOverAllPushesAndIterationsAreSummed) {
   EXPECT_EQ(metrics.iterations, 8);
 }
 
+TEST(PushMetrics, WorkIsThatOfTheEndAndWhatIsMissingWasReleased) {
+  Push early = push_at(1.0, 0.0), late = push_at(2.0, 0.0);
+  early.push_work = 9.0;  // the wire jumped and pushed the hand back since
+  early.stored_energy = 8.0;
+  early.wall_displacement = 0.5;
+  late.push_work = 6.0;
+  late.stored_energy = 2.5;
+  late.friction_work = 0.5;
+  late.wall_displacement = 0.25;
+  const Metrics metrics = compute_push_metrics({early, late});
+  EXPECT_EQ(metrics.push_work, 6.0);
+  EXPECT_EQ(metrics.friction_work, 0.5);
+  EXPECT_EQ(metrics.energy_released, 3.0);
+  EXPECT_EQ(metrics.peak_wall_displacement, 0.5);
+}
+
 TEST(PushMetrics, RefusesPushesThatGoBackwards) {
   EXPECT_THROW(compute_push_metrics({push_at(2.0, 0.0), push_at(1.0, 0.0)}), LogicError);
 }
@@ -121,6 +137,42 @@ TEST(Metrics, OffPathIsTheFurthestPartOutsideTheBallsAlongThePath) {
   trial.nodes.col(2) = Vec3(0.0, 0.0, 107.0);  // 2 mm past the last ball
   const Metrics metrics = compute_metrics(trial, study_with_goal_at(Vec3::Zero()), straight_path());
   EXPECT_NEAR(metrics.off_path, 6.0, 1e-14);  // rounding
+}
+
+TEST(Metrics, WallMotionIsThatWhichIsLargestForTheRadiusOfThePath) {
+  // The path's radius grows from 3 to 5 mm along its 100 mm: 0.7 mm near its start are more of it
+  // than 0.9 mm near its end.
+  TrialResult trial;
+  for (const auto& [z, displacement] : {std::pair(0.0, 0.3), {10.0, 0.7}, {90.0, 0.9}}) {
+    Push push;
+    push.insertion = z;
+    push.wall_displacement = displacement;
+    push.wall_displacement_point = Vec3(4.0, 0.0, z);
+    trial.pushes.push_back(push);
+  }
+  const Metrics metrics = compute_metrics(trial, study_with_goal_at(Vec3::Zero()), straight_path());
+  EXPECT_EQ(metrics.peak_wall_displacement, 0.9);
+  EXPECT_EQ(metrics.wall_motion.displacement, 0.7);
+  EXPECT_NEAR(metrics.wall_motion.radius, 3.2, 1e-14);  // rounding
+  EXPECT_EQ(metrics.wall_motion.point, Vec3(4.0, 0.0, 10.0));
+  EXPECT_TRUE(metrics.wall_motion.beyond_linear_theory());  // 0.7 / 3.2 = 0.22 is over 0.2
+
+  trial.pushes[1].wall_displacement = 0.63;  // 0.197 of the radius
+  EXPECT_FALSE(compute_metrics(trial, study_with_goal_at(Vec3::Zero()), straight_path())
+                   .wall_motion.beyond_linear_theory());
+  EXPECT_FALSE(WallMotion().beyond_linear_theory()) << "a rigid wall";
+}
+
+TEST(Metrics, NearestDistanceIsOverAllPushesAndTheEnd) {
+  TrialResult trial;
+  for (const double z : {20.0, 62.0, 75.0}) {
+    Push push = push_at(z, 0.0);
+    push.tip = Vec3(0.0, 0.0, z);
+    trial.pushes.push_back(push);
+  }
+  const Study study = study_with_goal_at(Vec3(0.0, 0.0, 60.0));
+  EXPECT_EQ(compute_metrics(trial, study, straight_path()).nearest_to_target, 2.0);
+  EXPECT_EQ(compute_metrics(trial, study, straight_path()).tip_to_target, 15.0);
 }
 
 TEST(Metrics, TipDistanceIsThatOfTheLastNode) {

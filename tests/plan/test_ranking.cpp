@@ -145,11 +145,13 @@ TEST(Rank, FollowsTheWeights) {
 
 TEST(Rank, ExcludesEveryTrialThatIsNoPlanWithItsReason) {
   Bench bench;
-  bench.add(0, 12.34, 0.2, Outcome::kMissed);
-  bench.trials.back().pushes.resize(1);
-  bench.trials.back().pushes.front().tip = Vec3(0.0, 0.0, 5.0);  // it passed the goal
+  bench.add(0, 12.34, 0.2, Outcome::kMissed).nearest_to_target = 5.0;  // it passed the goal
   bench.add(0, 50.0, 0.2, Outcome::kStuck);
   bench.add(0, 60.0, 0.2, Outcome::kLeftLumen);
+  bench.add(0, 61.0, 0.2, Outcome::kProlapsed);
+  bench.trials.back().reason = "it folded back at (1, 2, 3) mm";
+  bench.add(0, 62.0, 0.2, Outcome::kLeftOpening);
+  bench.trials.back().reason = "the tip left the vessel through the opening at (1, 2, 3) mm";
   bench.add(0, 70.0, 0.2, Outcome::kNotConverged);
   bench.trials.back().reason = "no equilibrium after 200 iterations";
   bench.add(0, 80.0, 0.0, Outcome::kFailed);
@@ -160,12 +162,15 @@ TEST(Rank, ExcludesEveryTrialThatIsNoPlanWithItsReason) {
   bench.add(1, 1.0, 0.2);  // the only plan
 
   const Ranking ranking = bench.ranked();
-  EXPECT_EQ(order_of(ranking), std::vector<int>{8});
+  EXPECT_EQ(order_of(ranking), std::vector<int>{10});
   const std::vector<std::string> reasons = {
       "missed: tip ended 12.3 mm from the target and came no nearer than 5.0 mm, expected within "
       "4 mm",
       "stuck at 120.0 mm of wire, tip 50.0 mm from the target",
       "left the lumen at 120.0 mm of wire, tip 60.0 mm from the target",
+      "prolapsed at 120.0 mm of wire, tip 61.0 mm from the target: it folded back at (1, 2, 3) mm",
+      "left the vessel at 120.0 mm of wire, tip 62.0 mm from the target: "
+      "the tip left the vessel through the opening at (1, 2, 3) mm",
       "did not converge at 120.0 mm of wire, tip 70.0 mm from the target: "
       "no equilibrium after 200 iterations",
       "internal error: out of paper",
@@ -177,6 +182,19 @@ TEST(Rank, ExcludesEveryTrialThatIsNoPlanWithItsReason) {
     EXPECT_EQ(ranking.excluded[k].trial, static_cast<int>(k));
     EXPECT_EQ(ranking.excluded[k].reason, reasons[k]);
   }
+}
+
+TEST(Rank, RanksAWallBeyondLinearTheoryWithAWarning) {
+  Bench bench(1);
+  bench.add(0, 1.0, 0.2).wall_motion = {1.23, 4.5, Vec3(1.0, -2.0, 30.04)};
+  bench.add(0, 1.0, 0.3).wall_motion = {0.85, 4.5, Vec3::Zero()};  // 0.19 of the radius
+  const Ranking ranking = bench.ranked();
+  ASSERT_EQ(ranking.plans.size(), 2u);
+  EXPECT_EQ(ranking.plans[0].sentence,
+            "reaches the target 1.0 mm from its centre with at most 0.20 N on the wall; warning: "
+            "the wall moved 1.2 mm at (1.0, -2.0, 30.0) mm where the vessel's radius is 4.5 mm, "
+            "beyond linear theory (0.20 of it)");
+  EXPECT_EQ(ranking.plans[1].sentence.find("linear theory"), std::string::npos);
 }
 
 TEST(Rank, NamesBothLimitsWhereBothAreBroken) {

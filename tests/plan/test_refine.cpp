@@ -178,7 +178,7 @@ struct TubeStudy {
   std::vector<Candidate> candidates;
   std::vector<Metrics> metrics;
   Ranking ranking;
-  simulate::Lumen lumen{shapes::straight_tube(4.0, 50.0, 2.0)};
+  simulate::VesselModel vessel{shapes::straight_tube(4.0, 50.0, 2.0)};
 
   TubeStudy() {
     study.wires = {
@@ -195,13 +195,13 @@ struct TubeStudy {
     path.points << 0.0, 0.0, 0.0, 0.0, 5.0, 30.0;
     path.radius = Eigen::Vector2d(4.0, 4.0);
     candidates = list_candidates(study);
-    const BatchResult batch = run_batch(study, candidates, lumen, {.threads = 2});
+    const BatchResult batch = run_batch(study, candidates, vessel, {.threads = 2});
     for (const auto& trial : batch.trials) metrics.push_back(compute_metrics(trial, study, path));
     ranking = rank(study, candidates, batch.trials, metrics, {.tip_force_fail = 5.0}, {});
   }
 
   std::vector<Refinement> refined(int threads) const {
-    return refine_plans(study, candidates, metrics, ranking, lumen,
+    return refine_plans(study, candidates, metrics, ranking, vessel,
                         {.plans = 3, .batch = {.threads = threads}});
   }
 };

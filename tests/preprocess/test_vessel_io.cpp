@@ -129,6 +129,20 @@ TEST_F(VesselFile, WireKeepsItsNamedArrays) {
   EXPECT_EQ(read_centerline(folder_ / "wire.vtp").arc_length, line.arc_length);
 }
 
+TEST_F(VesselFile, WallKeepsItselfBesideNamedArrays) {
+  const Surface surface = full_surface();
+  const Wall wall = full_wall(surface);
+  std::vector<double> force(static_cast<std::size_t>(surface.triangles.cols()), 0.0);
+  force.back() = 0.3;
+  write_wall(surface, wall, folder_ / "forces.vtu", {{"peak_force_n", force}});
+  EXPECT_NE(bytes_of(folder_ / "forces.vtu").find("Name=\"peak_force_n\""), std::string::npos);
+  EXPECT_EQ(read_wall(folder_ / "forces.vtu").apexes, wall.apexes);
+  EXPECT_EQ(read_wall(folder_ / "forces.vtu").height, wall.height);
+  force.pop_back();
+  EXPECT_THROW(write_wall(surface, wall, folder_ / "short.vtu", {{"peak_force_n", force}}),
+               LogicError);
+}
+
 TEST_F(VesselFile, TimeSeriesNamesFilesBesideIt) {
   write_time_series({folder_ / "wire & 0.vtp", folder_ / "sub" / "wire_1.vtp"}, {0.0, 0.1},
                     folder_ / "wire.pvd");

@@ -44,6 +44,31 @@ TEST(Rod, TakesSolidRoundStiffnessWhereNoneIsGiven) {
   EXPECT_FALSE(rod.twisted);
 }
 
+TEST(Rod, KnowsBothStiffnessesOfAStrip) {
+  Wire wire = two_sections();
+  wire.sections[0].bending_stiffness_2 = 2.0;
+  EXPECT_TRUE(wire.straight());
+  EXPECT_FALSE(wire.round());
+  const Rod rod = build_rod(wire, 100.0, 100);
+  EXPECT_TRUE(rod.twisted);
+  EXPECT_DOUBLE_EQ(rod.bend[95], 2.0);  // the smaller one, elements of 1 mm
+  EXPECT_DOUBLE_EQ(rod.strip[95], -3.0);
+  EXPECT_EQ(rod.strip[50], 0.0);  // of the round section
+  EXPECT_DOUBLE_EQ(rod.distal_bend, 4.0);
+  EXPECT_DOUBLE_EQ(rod.distal_strip, -6.0);
+  EXPECT_DOUBLE_EQ(rod.largest_bend(), 500.0);
+}
+
+TEST(Rod, RestShapeStartsAlongTheTangentOfItsEnd) {
+  Wire wire = two_sections();
+  for (Section& section : wire.sections) section.rest_curvature = 0.02;
+  const Rod rod = build_rod(wire, 100.0, 50);  // edges of 2 mm turn by 0.04 rad
+  const RodState state = rest_state(rod, Vec3::Zero(), Vec3::UnitX(), 0.0);
+  const Vec3 first = state.x.col(1) - state.x.col(0);
+  EXPECT_NEAR(std::atan2(-first.y(), first.x()), 0.02, 1e-12);  // toward the director, -y
+  EXPECT_NEAR(rod.distal_rest_angle, 0.02, 1e-12);
+}
+
 TEST(Rod, RefusesMoreWireThanThereIs) {
   EXPECT_THROW(build_rod(two_sections(), 100.1, 10), LogicError);
 }

@@ -1,9 +1,14 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Geometry>
+#include <algorithm>
 #include <cmath>
+#include <limits>
+#include <optional>
 #include <random>
+#include <utility>
 
+#include "simulate/dynamics.h"
 #include "simulate/scene.h"
 #include "simulate/solver.h"
 #include "tests/shapes.h"
@@ -38,19 +43,30 @@ double uniform(std::mt19937_64& random) {
   return static_cast<double>(random() >> 11) * 0x1.0p-52 - 1.0;
 }
 
-/// A crooked, twisted wire with a curved tip, and a problem on it that has every term.
+enum class Section2 { kRound, kStrip };
+
+/// A crooked, twisted wire with a curved tip, clamped at both ends, and a problem on it that has
+/// every term. The strip's tip is stiffer toward its curvature, its shaft across it.
 struct Crooked {
   Rod rod;
   RodState state;
   Eigen::Matrix3Xd load;
-  Lumen lumen{shapes::straight_tube(3.0, 30.0, 1.0), {.grid_spacing = 0.5}};
+  VesselModel vessel{shapes::straight_tube(3.0, 30.0, 1.0), {.grid_spacing = 0.5}};
+  std::optional<WallContact> contact;
   Problem problem;
 
-  Crooked() {
+  explicit Crooked(Section2 section) {
+    const bool strip = section == Section2::kStrip;
     const Wire wire{.name = "crooked",
                     .radius = 0.44,
-                    .sections = {{.length = 6.0, .bending_stiffness = 3.0, .rest_curvature = 0.1},
-                                 {.length = 50.0, .bending_stiffness = 20.0}}};
+                    .sections = {{.length = 6.0,
+                                  .bending_stiffness = 3.0,
+                                  .bending_stiffness_2 = strip ? 0.3 : 0.0,
+                                  .rest_curvature = 0.1},
+                                 {.length = 50.0,
+                                  .bending_stiffness = 20.0,
+                                  .bending_stiffness_2 = strip ? 60.0 : 0.0,
+                                  .rest_curvature = strip ? 0.2 : 0.0}}};
     rod = build_rod(wire, 12.0, 12);
     const RodState straight = straight_state(rod, Vec3(2.5, 0.0, 8.0), Vec3::UnitZ(), 0.3);
     state = straight;
@@ -66,7 +82,8 @@ struct Crooked {
     problem.proximal.tangent = Vec3(0.0, 0.6, 0.8);
     problem.distal.tangent = Vec3(0.0, 0.0, 1.0);
     problem.load = &load;
-    problem.lumen = &lumen;
+    contact.emplace(rod, vessel, ContactOptions());
+    problem.contact = &*contact;
   }
 
   /// Energy after a move of all x and theta, frames carried along.
@@ -81,54 +98,111 @@ struct Crooked {
   }
 };
 
-TEST(Energy, GradientAndHessianAgreeWithFiniteDifferences) {
-  const Crooked c;
+/// Holds gradient and Hessian against fourth-order differences along random directions.
+void expect_exact_derivatives(const Crooked& c, double slope_tolerance,
+                              double curvature_tolerance) {
   Eigen::VectorXd gradient;
   Eigen::MatrixXd hessian;
   Statics::derivatives(c.problem, c.state, gradient, hessian);
-  Eigen::Matrix3Xd forces(3, c.rod.nodes());
-  const Energy energy = Statics::evaluate(c.problem, c.state, forces);
-  for (const double part : {energy.stretch, energy.bend, energy.twist, energy.contact}) {
-    EXPECT_GT(std::abs(part), 1e-3);  // every term takes part
-  }
-
   const Eigen::Index size = gradient.size();
   std::mt19937_64 random(5);
   for (int k = 0; k < 50; ++k) {
     Eigen::VectorXd d(size);
     for (Eigen::Index i = 0; i < size; ++i) d[i] = uniform(random);
     d.normalize();
-    // Fourth-order differences: truncation h^4 against rounding 1e-13 E / h^2.
-    const double h = 2e-3;
+    const double h = 2e-3;  // truncation h^4 against rounding 1e-13 E / h^2
     const double f0 = c.energy_after(0.0 * d), f1 = c.energy_after(h * d),
                  m1 = c.energy_after(-h * d), f2 = c.energy_after(2 * h * d),
                  m2 = c.energy_after(-2 * h * d);
     const double slope = (8.0 * (f1 - m1) - (f2 - m2)) / (12.0 * h);
     const double curvature = (16.0 * (f1 + m1) - (f2 + m2) - 30.0 * f0) / (12.0 * h * h);
-    EXPECT_NEAR(gradient.dot(d), slope, 1e-6 * (1.0 + gradient.norm()));
-    // The wall's field is C2 only: its third derivative jumps within the stencil.
-    EXPECT_NEAR(d.dot(hessian * d), curvature, 1e-4 * (1.0 + std::abs(curvature)));
+    EXPECT_NEAR(gradient.dot(d), slope, slope_tolerance * (1.0 + gradient.norm()));
+    EXPECT_NEAR(d.dot(hessian * d), curvature, curvature_tolerance * (1.0 + std::abs(curvature)));
   }
   EXPECT_LT((hessian - hessian.transpose()).norm(), 1e-9 * hessian.norm());
 }
 
+TEST(Energy, GradientAndHessianAgreeWithFiniteDifferences) {
+  for (const Section2 section : {Section2::kRound, Section2::kStrip}) {
+    SCOPED_TRACE(section == Section2::kStrip);
+    Crooked c(section);
+    Eigen::Matrix3Xd forces(3, c.rod.nodes());
+    const Energy energy = Statics::evaluate(c.problem, c.state, forces);
+    for (const double part : {energy.stretch, energy.bend, energy.twist, energy.contact}) {
+      EXPECT_GT(std::abs(part), 1e-3);  // every term takes part
+    }
+    // The wall's field is C2 only: its third derivative jumps within the stencil.
+    expect_exact_derivatives(c, 1e-6, 1e-4);
+    c.problem.contact = nullptr;
+    expect_exact_derivatives(c, 1e-8, 1e-7);
+
+    // Bending and the clamps alone, so that no stiff term hides them.
+    c.rod.stretch.setZero();
+    c.rod.twist.setZero();
+    expect_exact_derivatives(c, 1e-8, 1e-7);
+  }
+}
+
 TEST(Energy, DoesNotChangeUnderRigidMotion) {
-  Crooked c;
-  c.problem.lumen = nullptr;
-  c.problem.load = nullptr;
-  c.problem.proximal.tangent.reset();
-  c.problem.distal.tangent.reset();
-  Eigen::Matrix3Xd gradient(3, c.rod.nodes());
-  const Energy before = Statics::evaluate(c.problem, c.state, gradient);
-  EXPECT_LT(gradient.rowwise().sum().norm(), 1e-10);  // forces balance
-  const Eigen::Matrix3d R =
-      Eigen::AngleAxisd(1.1, Vec3(1.0, 2.0, -1.0).normalized()).toRotationMatrix();
-  c.state.x = (R * c.state.x).colwise() + Vec3(10.0, -20.0, 5.0);
-  c.state.director = R * c.state.director;
-  const Energy after = Statics::evaluate(c.problem, c.state, gradient);
-  EXPECT_NEAR(after.bend, before.bend, 1e-10 * before.bend);
-  EXPECT_NEAR(after.twist, before.twist, 1e-10 * before.twist);
-  EXPECT_NEAR(after.stretch, before.stretch, 1e-10 * before.stretch);
+  for (const Section2 section : {Section2::kRound, Section2::kStrip}) {
+    SCOPED_TRACE(section == Section2::kStrip);
+    Crooked c(section);
+    c.problem.contact = nullptr;
+    c.problem.load = nullptr;
+    Eigen::Matrix3Xd gradient(3, c.rod.nodes());
+    const Energy before = Statics::evaluate(c.problem, c.state, gradient);
+    EXPECT_LT(gradient.rowwise().sum().norm(), 1e-10);  // forces balance
+    const Eigen::Matrix3d R =
+        Eigen::AngleAxisd(1.1, Vec3(1.0, 2.0, -1.0).normalized()).toRotationMatrix();
+    c.state.x = (R * c.state.x).colwise() + Vec3(10.0, -20.0, 5.0);
+    c.state.director = R * c.state.director;
+    for (EndSupport* end : {&c.problem.proximal, &c.problem.distal}) {
+      end->tangent = Vec3(R * end->tangent.value());
+    }
+    const Energy after = Statics::evaluate(c.problem, c.state, gradient);
+    EXPECT_NEAR(after.bend, before.bend, 1e-10 * before.bend);
+    EXPECT_NEAR(after.twist, before.twist, 1e-10 * before.twist);
+    EXPECT_NEAR(after.stretch, before.stretch, 1e-10 * before.stretch);
+  }
+}
+
+TEST(Strip, WithEqualStiffnessesIsARoundWire) {
+  const Crooked round(Section2::kRound);
+  Crooked equal(Section2::kRound);
+  const Wire wire{.name = "equal",
+                  .radius = 0.44,
+                  .sections = {{.length = 6.0,
+                                .bending_stiffness = 3.0,
+                                .bending_stiffness_2 = 3.0,
+                                .rest_curvature = 0.1},
+                               {.length = 50.0, .bending_stiffness = 20.0}}};
+  equal.rod = build_rod(wire, 12.0, 12);
+  Eigen::Matrix3Xd gradient(3, round.rod.nodes());
+  EXPECT_EQ(Statics::evaluate(equal.problem, equal.state, gradient).total(),
+            Statics::evaluate(round.problem, round.state, gradient).total());
+}
+
+TEST(Strip, BendsAsEachOfItsStiffnessesSays) {
+  // A small tip load toward the material director, -y, meets EI; one across it, along z, EI_2.
+  const double length = 50.0, load = 1e-4, EI = 20.0, EI_2 = 5.0;
+  for (const bool swap : {false, true}) {
+    SCOPED_TRACE(swap);
+    Scene scene = tip_loaded_cantilever(length, swap ? EI_2 : EI, Vec3(0.0, load, load), 40);
+    scene.wire.sections[0].bending_stiffness_2 = swap ? EI : EI_2;
+    scene.wire.sections[0].twist_stiffness = 10.0;
+    const SceneResult bent = run_scene(scene);
+    ASSERT_EQ(bent.outcome, SceneOutcome::kConverged);
+    const double beam = load * std::pow(length, 3) / 3.0 * (1.0 + 1.0 / (2.0 * 40.0 * 40.0));
+    const double tolerance = 2e-3;  // the strip turns a little as it bends: (w/L)^2 (EI/GJ)
+    EXPECT_NEAR(bent.nodes(1, 40), beam / (swap ? EI_2 : EI), tolerance * beam / EI_2);
+    EXPECT_NEAR(bent.nodes(2, 40), beam / (swap ? EI : EI_2), tolerance * beam / EI_2);
+    EXPECT_EQ(bent.terms,
+              (std::vector<std::string>{"stretch", "bend", "twist", "strip", "tip_force"}));
+    // Force and moment of the clamp balance the load.
+    const Vec3 force(0.0, load, load), tip = bent.nodes.rightCols<1>();
+    EXPECT_LT((bent.reactions[0].force + force).norm(), 1e-7);
+    EXPECT_LT((bent.reactions[0].moment + tip.cross(force)).norm(), 1e-5 * load * length);
+  }
 }
 
 TEST(Cantilever, SmallTipLoadBendsAsEulerBernoulliPredicts) {
@@ -244,6 +318,91 @@ TEST(CurvedTip, RestsInItsOwnShapeTowardItsDirector) {
   }
 }
 
+/// A wire curved all along, an arc of 60 mm with a radius of 40 mm, clamped along z and rolled, and
+/// at its other end too if `both`. Round, or a strip with `EI_2` across its curvature.
+struct CurvedScene {
+  static constexpr double kRadius = 40.0, kLength = 60.0, kRoll = 0.7;
+  Scene scene;
+  Vec3 toward = std::cos(kRoll) * Vec3(0.0, -1.0, 0.0) + std::sin(kRoll) * Vec3(1.0, 0.0, 0.0);
+
+  CurvedScene(int elements, bool both, double EI_2) {
+    scene.wire = {.name = "arc",
+                  .radius = 0.4,
+                  .sections = {{.length = kLength,
+                                .bending_stiffness = 20.0,
+                                .bending_stiffness_2 = EI_2,
+                                .axial_stiffness = 1e5,
+                                .twist_stiffness = 15.0,
+                                .rest_curvature = 1.0 / kRadius}}};
+    scene.elements = elements;
+    scene.supports = {{.direction = Vec3::UnitZ(), .roll = kRoll}};
+    const double turn = kLength / kRadius;
+    if (both) {
+      scene.supports.push_back(
+          {.at = WireEnd::kDistal,
+           .point = on_arc(kLength),
+           .direction = std::cos(turn) * Vec3::UnitZ() + std::sin(turn) * toward,
+           .roll = kRoll});
+    }
+    scene.solver.residual_tolerance = 1e-8;
+  }
+
+  Vec3 on_arc(double s) const {
+    const double turn = s / kRadius;
+    return kRadius * (std::sin(turn) * Vec3::UnitZ() + (1.0 - std::cos(turn)) * toward);
+  }
+};
+
+const std::pair<bool, double> kCurvedCases[] = {{false, 0.0}, {true, 0.0},   {false, 2.0},
+                                                {true, 2.0},  {false, 60.0}, {true, 60.0}};
+
+TEST(CurvedClamp, WireRestsOnItsArcToSecondOrder) {
+  for (const auto& [both, EI_2] : kCurvedCases) {
+    SCOPED_TRACE(testing::Message() << both << ", EI_2 " << EI_2);
+    const auto error = [both = both, EI_2 = EI_2](int elements) {
+      const CurvedScene arc(elements, both, EI_2);
+      const SceneResult rest = run_scene(arc.scene);
+      EXPECT_EQ(rest.outcome, SceneOutcome::kConverged);
+      double largest = 0.0;
+      for (int i = 0; i <= elements; ++i) {
+        const Vec3 place = arc.on_arc(i * CurvedScene::kLength / elements);
+        largest = std::max(largest, (rest.nodes.col(i) - place).norm());
+      }
+      return largest;
+    };
+    const double e20 = error(20), e40 = error(40), e80 = error(80);
+    EXPECT_LT(e20, 0.001 * CurvedScene::kLength);
+    EXPECT_NEAR(std::log2(e20 / e40), 2.0, 0.1);
+    EXPECT_NEAR(std::log2(e40 / e80), 2.0, 0.1);
+  }
+}
+
+TEST(CurvedClamp, LoadedWireConvergesToSecondOrder) {
+  // A force out of the plane of the arc, on the tip or, with both ends held, all along.
+  for (const auto& [both, EI_2] : kCurvedCases) {
+    SCOPED_TRACE(testing::Message() << both << ", EI_2 " << EI_2);
+    const auto middle_and_tip = [both = both, EI_2 = EI_2](int elements) {
+      CurvedScene arc(elements, both, EI_2);
+      const double scale = EI_2 == 0.0 ? 1.0 : std::min(1.0, EI_2 / 20.0);  // bent alike
+      const Vec3 force = scale * Vec3(0.02, 0.01, -0.01);
+      if (both) {
+        arc.scene.wire.sections[0].mass_per_length = 1e-8;
+        arc.scene.loads.gravity = 1e7 * force;
+      } else {
+        arc.scene.loads.tip_force = force;
+      }
+      const SceneResult bent = run_scene(arc.scene);
+      EXPECT_EQ(bent.outcome, SceneOutcome::kConverged);
+      Eigen::VectorXd places(6);
+      places << bent.nodes.col(elements / 2), bent.nodes.col(elements);
+      return places;
+    };
+    const Eigen::VectorXd a = middle_and_tip(80), b = middle_and_tip(160), c = middle_and_tip(320);
+    EXPECT_GT((a.head<3>() - CurvedScene(80, both, EI_2).on_arc(30.0)).norm(), 1.0);  // it is bent
+    EXPECT_NEAR(std::log2((b - a).norm() / (c - b).norm()), 2.0, 0.1);
+  }
+}
+
 TEST(Ends, PinnedGuidedColumnShortensAlongItsAxisOnly) {
   Scene scene = tip_loaded_cantilever(50.0, 20.0, Vec3(1.0, 0.3, 0.0), 20);
   scene.supports = {
@@ -262,6 +421,119 @@ TEST(Terms, SceneNamesOnlyWhatItBuilt) {
             (std::vector<std::string>{"stretch", "bend", "gravity"}));
   EXPECT_EQ(run_scene(tip_loaded_cantilever(50.0, 20.0, Vec3(0.0, 0.1, 0.0), 10)).terms,
             (std::vector<std::string>{"stretch", "bend", "tip_force"}));
+}
+
+/// A straight round wire between clamps, the distal one turned round and moved aside: no loads.
+struct Bare {
+  Rod rod = build_rod(paper_wire(), 40.0, 20);
+  RodState state = straight_state(rod, Vec3::Zero(), Vec3::UnitX(), 0.0);
+  Eigen::Matrix3Xd load;
+  Problem problem;
+
+  Bare() {
+    problem.rod = &rod;
+    problem.last = rod.nodes();
+    const EndSupport clamp{.hold_along = true,
+                           .hold_across = true,
+                           .hold_roll = true,
+                           .axis = Vec3::UnitX(),
+                           .tangent = Vec3(Vec3::UnitX())};
+    problem.proximal = problem.distal = clamp;
+    problem.distal.tangent = Vec3(-0.6, 0.8, 0.0);
+    for (int i = 0; i < rod.nodes(); ++i) {
+      state.x(1, i) = 0.3 * i;
+      state.x(2, i) = std::sin(0.2 * i);
+      state.x(0, i) *= 0.8;
+    }
+  }
+  Bare(const Bare&) = delete;
+  Bare& operator=(const Bare&) = delete;
+};
+
+const double kNaN = std::numeric_limits<double>::quiet_NaN();
+
+/// Spoils all that a term depends on and a bare wire does not; and puts the term in.
+struct Poison {
+  const char* term;
+  void (*spoil)(Bare&);
+  void (*put_in)(Bare&);
+};
+
+const Poison kPoisons[] = {
+    {"gravity", [](Bare& b) { b.rod.mass.fill(kNaN); },
+     [](Bare& b) {
+       b.load = Vec3(0.0, -9810.0, 0.0) * b.rod.mass.transpose();
+       b.problem.load = &b.load;
+     }},
+    {"twist",
+     [](Bare& b) {
+       b.rod.twist.fill(kNaN);
+       b.state.theta.fill(kNaN);
+       b.state.director.fill(kNaN);
+       b.state.reference_twist.fill(kNaN);
+     },
+     [](Bare& b) { b.rod.twisted = true; }},
+    {"rest bend",
+     [](Bare& b) {
+       b.rod.rest_angle.fill(kNaN);
+       b.rod.proximal_rest_angle = b.rod.distal_rest_angle = kNaN;
+     },
+     [](Bare& b) { b.rod.twisted = true; }},
+    {"strip",
+     [](Bare& b) {
+       b.rod.strip.fill(kNaN);
+       b.rod.proximal_strip = b.rod.distal_strip = kNaN;
+     },
+     [](Bare& b) { b.rod.twisted = true; }},
+    {"tip moment",
+     [](Bare& b) {
+       b.problem.tip_moment = TipMoment{.axis = Vec3::Constant(kNaN), .size = kNaN};
+       b.problem.tip_moment.reset();
+       b.state.tip_angle = kNaN;
+     },
+     [](Bare& b) { b.problem.tip_moment = TipMoment{.axis = Vec3::UnitZ(), .size = 1.0}; }},
+    {"plane",
+     [](Bare& b) {
+       b.problem.plane = Vec3::Constant(kNaN);
+       b.problem.plane.reset();
+     },
+     [](Bare& b) { b.problem.plane = Vec3::Constant(kNaN); }},
+    // A wall is reached through a pointer, null here, and needs these of the wire.
+    {"vessel",
+     [](Bare& b) {
+       b.rod.radius = kNaN;
+       b.rod.share.fill(kNaN);
+       b.rod.tip_distance.fill(kNaN);
+     },
+     nullptr},
+};
+
+/// What Newton's method and the conjugate gradient make of it.
+std::vector<Eigen::Matrix3Xd> solve_both(const Bare& bare) {
+  RodState newton = bare.state, gradient = bare.state;
+  Statics statics;
+  EXPECT_TRUE(statics.solve(bare.problem, newton, {.residual_tolerance = 1e-8}).converged);
+  run_conjugate_gradient(bare.problem, gradient, {.duration = 0.5});
+  return {newton.x, gradient.x};
+}
+
+TEST(AbsentTerms, NothingOfThemIsRead) {
+  const std::vector<Eigen::Matrix3Xd> clean = solve_both(Bare());
+  ASSERT_TRUE(clean[0].allFinite() && clean[1].allFinite());
+  for (const Poison& poison : kPoisons) {
+    SCOPED_TRACE(poison.term);
+    Bare spoiled;
+    poison.spoil(spoiled);
+    const std::vector<Eigen::Matrix3Xd> found = solve_both(spoiled);
+    EXPECT_EQ(found[0], clean[0]);  // to the last bit
+    EXPECT_EQ(found[1], clean[1]);
+
+    // It would show: with the term there is no energy.
+    if (poison.put_in == nullptr) continue;
+    poison.put_in(spoiled);
+    Eigen::Matrix3Xd forces(3, spoiled.rod.nodes());
+    EXPECT_TRUE(std::isnan(Statics::evaluate(spoiled.problem, spoiled.state, forces).total()));
+  }
 }
 
 TEST(BlockBand, SolvesWhatADenseFactorisationSolves) {

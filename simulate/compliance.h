@@ -1,0 +1,79 @@
+#pragma once
+/// How the wall yields: paper section 1.5 and Eq. (16), linear tetrahedra between the lumen's
+/// surface and fixed outer nodes, seen from the forces that a wire puts on the surface.
+#include <Eigen/Core>
+#include <Eigen/SparseCholesky>
+#include <Eigen/SparseCore>
+#include <atomic>
+#include <cstddef>
+#include <vector>
+
+#include "preprocess/vessel.h"
+
+namespace wireplan::simulate {
+
+/// K of paper Eq. (16): forces on the surface's vertices, x y z of each in turn (3v, 3v), per
+/// displacement of them, the apexes fixed [N/mm]. Rows of vertices without a triangle are empty.
+/// Isotropic and linear. Throws Error where a tetrahedron is flat or turned inward, or where Young
+/// modulus or Poisson ratio are out of range.
+Eigen::SparseMatrix<double> wall_stiffness(const Surface& surface, const Wall& wall);
+
+/// The wall's stiffness, factored once per patient; responses to unit forces are found when first
+/// asked for and kept. Shared by all trials and threads: every answer is the same whoever asks
+/// first, and reading takes no lock.
+class WallCompliance {
+ public:
+  /// What a response leaves out, as part of the displacement under the force.
+  static constexpr double kKeptFraction = 1e-8;
+
+  /// Throws Error as `wall_stiffness` does, and where the factorisation does not solve it.
+  WallCompliance(const Surface& surface, const Wall& wall);
+  ~WallCompliance();
+  WallCompliance(const WallCompliance&) = delete;
+  WallCompliance& operator=(const WallCompliance&) = delete;
+
+  /// A force on a point of the surface acts on the vertices of its triangle and, so that the wall
+  /// is not softer at a vertex than between them, on those joined to them: half of a vertex's part
+  /// on itself, half on its neighbours. The motion of a point is the mean of theirs in the same
+  /// way.
+  struct Part {
+    int vertex;
+    double part;
+  };
+  std::vector<Part> spread(int vertex) const;
+
+  /// Normal displacement of points at the vertices near `vertex`, outward, under a unit outward
+  /// normal force on a point there: c_b = sum over spread(b) and spread(vertex) of n . (K^-1 n), n
+  /// the vertices' normals [mm/N]. Vertices in ascending order; `vertex` itself is one of them.
+  /// Those left out move by less than kKeptFraction of c_a.
+  struct Response {
+    std::vector<int> vertices;
+    std::vector<double> displacement;
+  };
+  /// Expects a vertex with a triangle. The reference stays good as long as this object.
+  const Response& response(int vertex) const;
+
+  /// Displacements (3, v) under forces (3, v) on the vertices, by the factorisation alone [mm, N].
+  /// Vertices without a triangle stay, whatever their force.
+  Eigen::Matrix3Xd displacements(const Eigen::Matrix3Xd& forces) const;
+
+  /// Outward unit normals of the vertices (3, v), angle-weighted; 0 without a triangle.
+  const Eigen::Matrix3Xd& normals() const { return normals_; }
+
+  std::size_t response_count() const { return response_count_; }  // found so far
+  /// Of the factor and of the responses kept so far.
+  std::size_t memory_bytes() const;
+
+ private:
+  using Cholesky =
+      Eigen::SimplicialLLT<Eigen::SparseMatrix<double>, Eigen::Lower, Eigen::NaturalOrdering<int>>;
+  Response find_response(int vertex) const;
+  Eigen::Matrix3Xd normals_;
+  std::vector<int> neighbour_start_, neighbour_;  // vertices joined to each by an edge, and itself
+  std::vector<int> place_;                        // of each vertex in the factor; -1: no triangle
+  Cholesky cholesky_;
+  mutable std::vector<std::atomic<const Response*>> responses_;  // owned; null: not found yet
+  mutable std::atomic<std::size_t> response_count_ = 0, response_bytes_ = 0;
+};
+
+}  // namespace wireplan::simulate

@@ -1,0 +1,26 @@
+#pragma once
+/// The vessel as wires feel it: built once per patient, shared read-only by all trials.
+#include <memory>
+
+#include "preprocess/vessel.h"
+#include "simulate/compliance.h"
+#include "simulate/contact.h"
+#include "simulate/locator.h"
+
+namespace wireplan::simulate {
+
+struct VesselModel {
+  /// Of a rigid vessel; with a wall, of one that yields.
+  explicit VesselModel(const Surface& surface, const LumenOptions& options = {})
+      : lumen(surface, options), locator(surface) {}
+  VesselModel(const Surface& surface, const Wall& wall, const LumenOptions& options = {.band = 5.0})
+      : lumen(surface, options),
+        locator(surface),
+        compliance(std::make_unique<WallCompliance>(surface, wall)) {}
+
+  Lumen lumen;
+  TriangleLocator locator;
+  std::unique_ptr<const WallCompliance> compliance;  // null: the wall is rigid
+};
+
+}  // namespace wireplan::simulate

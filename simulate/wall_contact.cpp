@@ -1,0 +1,410 @@
+#include "simulate/wall_contact.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace wireplan::simulate {
+
+namespace {
+
+/// Potential of friction per force over the displacement u along the wall: its slope grows smoothly
+/// from 0 to 1 at `slip`, and stays there.
+struct Rub {
+  double energy, slope, curvature;
+};
+
+Rub rub(double u, double slip) {
+  if (u >= slip) return {u - slip / 3.0, 1.0, 0.0};
+  const double part = u / slip;
+  return {u * part * (1.0 - part / 3.0), part * (2.0 - part), 2.0 * (1.0 - part) / slip};
+}
+
+/// How much further from the wall than before a point may be than its motion says: the gradient of
+/// the smooth field is not quite 1.
+constexpr double kLipschitz = 1.2;
+
+}  // namespace
+
+WallContact::WallContact(const Rod& rod, const VesselModel& vessel, const ContactOptions& options)
+    : vessel_(vessel),
+      options_(options),
+      yielding_(vessel.compliance != nullptr),
+      radius_(rod.radius),
+      free_from_(std::numeric_limits<double>::infinity()) {
+  expects(options.spacing > 0.0 && options.friction >= 0.0 && options.slip > 0.0);
+  expects(vessel.lumen.band() > reach());
+  const int edges = rod.nodes() - 1;
+  double before = 0.0;  // length of wire that the next point gets from behind it
+  for (int e = 0; e < edges; ++e) {
+    const double l = rod.rest_length[e];
+    const int parts = std::max(1, static_cast<int>(std::ceil(l / options.spacing - 1e-9)));
+    const double half = 0.5 * l / parts;
+    for (int k = 0; k < parts; ++k) {
+      const double part = static_cast<double>(k) / parts;
+      points_.push_back({e, part, (k == 0 ? before : half) + half, rod.tip_distance[e] - part * l});
+    }
+    before = half;
+  }
+  points_.push_back({edges - 1, 1.0, before, 0.0});
+
+  const Eigen::Index m = static_cast<Eigen::Index>(points_.size());
+  memory_.anchor.setZero(3, m);
+  memory_.normal_force.setZero(m);
+  lag_force_.setZero(m);
+  lag_normal_.setZero(3, m);
+  position_.setZero(3, m);
+  known_position_.setConstant(3, m, std::numeric_limits<double>::infinity());
+  known_distance_.setZero(m);
+  bound_.setConstant(m, std::numeric_limits<double>::infinity());
+  touched_.assign(points_.size(), 0);
+  predicted_.setZero(m);
+  lag_points_.reserve(points_.size());
+  kept_points_.reserve(points_.size());
+  active_.reserve(points_.size());
+  touches_.reserve(points_.size());
+  if (yielding_) {
+    feet_.resize(points_.size());
+    press_.setZero(m);
+  }
+}
+
+Vec3 WallContact::position_of(const Point& point, const Eigen::Matrix3Xd& x) const {
+  if (point.part == 0.0) return x.col(point.edge);
+  return (1.0 - point.part) * x.col(point.edge) + point.part * x.col(point.edge + 1);
+}
+
+void WallContact::start_at(const Eigen::Matrix3Xd& x) {
+  for (std::size_t k = 0; k < points_.size(); ++k) {
+    memory_.anchor.col(static_cast<Eigen::Index>(k)) = position_of(points_[k], x);
+  }
+  memory_.normal_force.setZero();
+  lag_force_.setZero();
+}
+
+void WallContact::predict(double distance) {
+  // Tip distances fall along the points; walk through them and through where they will be.
+  predicted_.setZero();
+  std::size_t ahead = 0;
+  for (std::size_t k = 0; k < points_.size(); ++k) {
+    const double wanted = points_[k].tip_distance - distance;
+    while (ahead + 1 < points_.size() && points_[ahead + 1].tip_distance >= wanted - 1e-9) ++ahead;
+    const double found = points_[ahead].tip_distance;
+    if (std::abs(found - wanted) > options_.spacing) continue;
+    const Eigen::Index i = static_cast<Eigen::Index>(k), j = static_cast<Eigen::Index>(ahead);
+    predicted_[i] = memory_.normal_force[j] * points_[k].share / points_[ahead].share;
+  }
+  lag_force_ = predicted_;
+}
+
+// ---------------------------------------------------------------- normal forces
+
+void WallContact::begin(const Eigen::Matrix3Xd& x) {
+  // Points that friction is predicted for rub along the wall where they are now.
+  lag_points_.clear();
+  fresh_ = false;
+  const double near = radius_ + options_.law.smoothing;
+  if (options_.friction > 0.0) {
+    for (std::size_t k = 0; k < points_.size(); ++k) {
+      const Eigen::Index i = static_cast<Eigen::Index>(k);
+      if (lag_force_[i] <= 0.0 || !is_free(points_[k])) continue;
+      const WallSample wall = vessel_.lumen.sample(position_of(points_[k], x));
+      if (wall.distance > near + 1.0 || wall.gradient.isZero(0.0)) continue;
+      lag_normal_.col(i) = wall.gradient.normalized();
+      lag_points_.push_back(static_cast<int>(k));
+    }
+  }
+  std::fill(feet_.begin(), feet_.end(), SurfacePoint{});
+  feet_changed_ = true;
+  sample(x);
+}
+
+double WallContact::reach() const {
+  // A wall that is pressed out bulges in a little beside it.
+  constexpr double kBulge = 0.1;  // [mm]
+  return radius_ + options_.law.smoothing + (yielding_ ? kBulge : 0.0);
+}
+
+ContactEnergy WallContact::sample(const Eigen::Matrix3Xd& x) {
+  // Points near the wall. One that was far enough for its motion since is not looked at.
+  const double near = reach();
+  active_.clear();
+  for (std::size_t k = 0; k < points_.size(); ++k) {
+    const Eigen::Index i = static_cast<Eigen::Index>(k);
+    const Vec3 p = position_of(points_[k], x);
+    position_.col(i) = p;
+    if (!is_free(points_[k])) continue;
+    const double moved = (p - known_position_.col(i)).norm();
+    bound_[i] = known_distance_[i] - kLipschitz * moved;
+    if (bound_[i] >= near) continue;
+    WallSample wall;
+    if (touched_[k] == 0) {
+      wall.distance = vessel_.lumen.distance(p);
+      if (wall.distance < near) wall = vessel_.lumen.sample(p);
+    } else {
+      wall = vessel_.lumen.sample(p);
+    }
+    known_position_.col(i) = p;
+    known_distance_[i] = bound_[i] = wall.distance;
+    touched_[k] = wall.distance < near ? 1 : 0;
+    if (touched_[k] == 0) continue;
+    active_.push_back({.point = static_cast<int>(k), .position = p, .wall = wall});
+  }
+  find_forces();
+  return energy_ = lagged_energy();
+}
+
+void WallContact::find_forces() {
+  energy_ = {};
+  if (!yielding_) {
+    for (Active& active : active_) {
+      const double share = points_[static_cast<std::size_t>(active.point)].share;
+      const ContactLaw::Value law = options_.law.at(active.wall.distance - radius_);
+      energy_.contact += share * law.energy;
+      active.force = -share * law.slope;
+      active.stiffness = share * law.curvature;
+    }
+    return;
+  }
+
+  // All together through the wall. Feet stay where they are until the lag is refreshed.
+  const Eigen::Index m = static_cast<Eigen::Index>(active_.size());
+  bool same = !feet_changed_ && active_.size() == coupled_points_.size();
+  for (std::size_t k = 0; k < active_.size(); ++k) {
+    const std::size_t point = static_cast<std::size_t>(active_[k].point);
+    if (feet_[point].triangle < 0) feet_[point] = foot_of(active_[k]);
+    same = same && coupled_points_[k] == active_[k].point;
+  }
+  if (!same) {
+    coupled_points_.clear();
+    coupled_feet_.clear();
+    for (const Active& active : active_) {
+      coupled_points_.push_back(active.point);
+      coupled_feet_.push_back(feet_[static_cast<std::size_t>(active.point)]);
+    }
+    coupling_.set_feet(*vessel_.compliance, coupled_feet_);
+    feet_changed_ = false;
+  }
+  gap_.resize(m);
+  share_.resize(m);
+  force_.resize(m);
+  for (Eigen::Index k = 0; k < m; ++k) {
+    const Active& active = active_[static_cast<std::size_t>(k)];
+    gap_[k] = active.wall.distance - radius_;
+    share_[k] = points_[static_cast<std::size_t>(active.point)].share;
+    force_[k] = press_[active.point];
+  }
+  energy_.contact = coupling_.solve(options_.law, gap_, share_, force_, displacement_);
+  energy_.wall = 0.5 * force_.dot(displacement_);
+  press_.setZero();
+  for (Eigen::Index k = 0; k < m; ++k) {
+    Active& active = active_[static_cast<std::size_t>(k)];
+    active.force = press_[active.point] = force_[k];
+    active.yield = displacement_[k];
+  }
+}
+
+SurfacePoint WallContact::foot_of(const Active& active) const {
+  const WallSample& wall = active.wall;
+  return vessel_.locator.nearest(active.position -
+                                 (wall.distance / wall.gradient.squaredNorm()) * wall.gradient);
+}
+
+// ---------------------------------------------------------------- friction
+
+WallContact::Rubbing WallContact::rubbing_at(int k) const {
+  const Vec3 normal = lag_normal_.col(k);
+  const Vec3 moved = position_.col(k) - memory_.anchor.col(k);
+  const Vec3 along = moved - moved.dot(normal) * normal;
+  const double length = along.norm();
+  const Rub potential = rub(length, options_.slip);
+  return {.length = length,
+          .toward = length > 0.0 ? Vec3(along / length) : Vec3::Zero(),
+          .limit = options_.friction * lag_force_[k],
+          .energy = potential.energy,
+          .slope = potential.slope,
+          .curvature = potential.curvature};
+}
+
+ContactEnergy WallContact::lagged_energy() const {
+  ContactEnergy energy = energy_;
+  energy.friction = 0.0;
+  for (const int k : lag_points_) {
+    const Rubbing rubbing = rubbing_at(k);
+    energy.friction += rubbing.limit * rubbing.energy;
+  }
+  return energy;
+}
+
+ContactEnergy WallContact::refresh(bool fully) {
+  fresh_ = true;
+  if (yielding_) {
+    for (const Active& active : active_) {
+      feet_[static_cast<std::size_t>(active.point)] = foot_of(active);
+    }
+    feet_changed_ = true;
+    find_forces();
+  }
+  if (options_.friction > 0.0) {
+    // Between equilibria a point that sticks must not lose its hold when it leaves the wall for an
+    // iteration: the normal force of its lag falls no faster than to a fraction of itself.
+    constexpr double kKept = 0.3, kNothing = 1e-9;  // [-], [N]
+    kept_points_.swap(lag_points_);
+    lag_points_.clear();
+    for (const int k : kept_points_) {
+      const bool sticks = rubbing_at(k).length < 2.0 * options_.slip;
+      lag_force_[k] *= sticks && !fully ? kKept : 0.0;
+    }
+    for (const Active& active : active_) {
+      if (active.force <= 0.0) continue;
+      const double slope = active.wall.gradient.norm(), force = active.force * slope;
+      double& kept = lag_force_[active.point];
+      if (kept > force) {
+        fresh_ = false;
+      } else {
+        lag_normal_.col(active.point) = active.wall.gradient / slope;
+      }
+      lag_points_.push_back(active.point);
+      // Marked as taken by its sign until all are through.
+      kept = -std::max(kept, force);
+    }
+    for (const int k : kept_points_) {
+      if (lag_force_[k] > kNothing) {
+        lag_points_.push_back(k);
+        fresh_ = false;
+      } else if (lag_force_[k] > 0.0) {
+        lag_force_[k] = 0.0;
+      }
+    }
+    for (const int k : lag_points_) lag_force_[k] = std::abs(lag_force_[k]);
+  }
+  return energy_ = lagged_energy();
+}
+
+double WallContact::settle() {
+  if (options_.friction == 0.0) return 0.0;
+  // A point that rubbed keeps its anchor `slip` behind it; one that does not touch, where it is.
+  // The heat is the friction now, times the way that the anchor went.
+  double work = 0.0;
+  predicted_.setZero();
+  for (const int k : lag_points_) {
+    const Rubbing rubbing = rubbing_at(k);
+    predicted_[k] = lag_force_[k];
+    const double slipped = rubbing.length - options_.slip;
+    if (slipped > 0.0) {
+      work += rubbing.limit * slipped;
+      memory_.anchor.col(k) = position_.col(k) - options_.slip * rubbing.toward;
+    }
+  }
+  for (Eigen::Index k = 0; k < predicted_.size(); ++k) {
+    if (predicted_[k] == 0.0) memory_.anchor.col(k) = position_.col(k);
+  }
+  memory_.normal_force = predicted_;
+  return work;
+}
+
+const std::vector<Touch>& WallContact::touches() {
+  touches_.clear();
+  for (const Active& active : active_) {
+    if (active.force <= 0.0) continue;
+    const Point& point = points_[static_cast<std::size_t>(active.point)];
+    const double slope = active.wall.gradient.norm();
+    Touch touch{.point = active.point,
+                .edge = point.edge,
+                .part = point.part,
+                .position = active.position,
+                .normal = active.wall.gradient / slope,
+                .normal_force = active.force * slope,
+                .penetration = std::max(0.0, radius_ - active.wall.distance - active.yield),
+                .wall_displacement = active.yield,
+                .tip_distance = point.tip_distance};
+    if (options_.friction > 0.0) {
+      const Rubbing rubbing = rubbing_at(active.point);
+      touch.friction = -(rubbing.limit * rubbing.slope) * rubbing.toward;
+    }
+    touches_.push_back(touch);
+  }
+  return touches_;
+}
+
+// ---------------------------------------------------------------- derivatives
+
+bool WallContact::in_band(const Active& a, const Active& b) const {
+  const Point& p = points_[static_cast<std::size_t>(a.point)];
+  const Point& q = points_[static_cast<std::size_t>(b.point)];
+  const auto last_node = [](const Point& point) { return point.edge + (point.part > 0.0 ? 1 : 0); };
+  return std::max(last_node(p), last_node(q)) - std::min(p.edge, q.edge) <= 2;
+}
+
+void WallContact::find_stiffness() {
+  coupling_.find_stiffness();
+  folded_.setZero(coupling_.size());
+  for (int i = 0; i < coupling_.size(); ++i) {
+    for (int j = coupling_.first_coupled(i); j < i; ++j) {
+      if (in_band(active_[static_cast<std::size_t>(i)], active_[static_cast<std::size_t>(j)])) {
+        continue;
+      }
+      const double size = std::abs(coupling_.stiffness(i, j));
+      folded_[i] += size;
+      folded_[j] += size;
+    }
+  }
+}
+
+double WallContact::gap_change(const Active& active, const Motion& motion) const {
+  return active.wall.gradient.dot(motion.of(points_[static_cast<std::size_t>(active.point)]));
+}
+
+void WallContact::add_remainder(const Motion& motion, Eigen::VectorXd& product) {
+  // How all forces change, by the exact stiffness, and what of it add() has.
+  const Eigen::Index m = static_cast<Eigen::Index>(active_.size());
+  gap_.resize(m);
+  for (Eigen::Index k = 0; k < m; ++k) {
+    gap_[k] = gap_change(active_[static_cast<std::size_t>(k)], motion);
+  }
+  share_ = gap_;  // scratch: becomes the change of the forces
+  force_.setZero(m);
+  if (yielding_) {
+    coupling_.multiply_by_stiffness(share_);
+    force_ = share_ - folded_.cwiseProduct(gap_);
+    for (int i = 0; i < m; ++i) {
+      for (int j = coupling_.first_coupled(i); j <= i; ++j) {
+        if (!in_band(active_[static_cast<std::size_t>(i)], active_[static_cast<std::size_t>(j)])) {
+          continue;
+        }
+        const double s = coupling_.stiffness(i, j);
+        force_[i] -= s * gap_[j];
+        if (j < i) force_[j] -= s * gap_[i];
+      }
+    }
+  } else {
+    for (Eigen::Index k = 0; k < m; ++k) {
+      share_[k] *= active_[static_cast<std::size_t>(k)].stiffness;
+    }
+  }
+
+  for (Eigen::Index k = 0; k < m; ++k) {
+    const Active& active = active_[static_cast<std::size_t>(k)];
+    Vec3 change = force_[k] * active.wall.gradient;
+    if (options_.friction > 0.0 && fresh_ && active.force > 0.0) {
+      const Rubbing rubbing = rubbing_at(active.point);
+      change -= (options_.friction * rubbing.slope * share_[k] * active.wall.gradient.norm()) *
+                rubbing.toward;
+    }
+    motion.scatter(points_[static_cast<std::size_t>(active.point)], change, product);
+  }
+}
+
+double WallContact::largest_safe_part(const Motion& motion) const {
+  constexpr double kInto = 0.25;  // [mm]
+  double cap = std::numeric_limits<double>::infinity();
+  for (std::size_t k = 0; k < points_.size(); ++k) {
+    if (!is_free(points_[k])) continue;
+    const double move = motion.of(points_[k]).norm();
+    const double room = kInto + std::max(0.0, bound_[static_cast<Eigen::Index>(k)]);
+    if (move > room) cap = std::min(cap, room / move);
+  }
+  return cap;
+}
+
+}  // namespace wireplan::simulate

@@ -1,0 +1,170 @@
+#include "simulate/yielding.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace wireplan::simulate {
+
+void Yielding::set_feet(const WallCompliance& wall, const std::vector<SurfacePoint>& feet) {
+  const std::size_t m = feet.size();
+  start_.resize(m);
+  offset_.resize(m);
+  compliance_.values.clear();
+  near_wall_.setZero(std::max(near_wall_.size(), wall.normals().cols()));
+  for (std::size_t i = 0; i < m; ++i) {
+    // The wall's displacement under a unit force at foot i.
+    const auto add_responses = [&](double factor) {
+      for (int a = 0; a < 3; ++a) {
+        const double weight = factor * feet[i].weight[a];
+        if (weight == 0.0) continue;
+        const WallCompliance::Response& response = wall.response(feet[i].vertex[a]);
+        for (std::size_t k = 0; k < response.vertices.size(); ++k) {
+          near_wall_[response.vertices[k]] += weight * response.displacement[k];
+        }
+      }
+    };
+    add_responses(1.0);
+    const auto displacement_at = [&](const SurfacePoint& foot) {
+      return foot.weight[0] * near_wall_[foot.vertex[0]] +
+             foot.weight[1] * near_wall_[foot.vertex[1]] +
+             foot.weight[2] * near_wall_[foot.vertex[2]];
+    };
+    // Its row of C, from the first foot that moves.
+    std::size_t first = 0;
+    while (first < i && displacement_at(feet[first]) == 0.0) ++first;
+    start_[i] = static_cast<int>(first);
+    offset_[i] = static_cast<std::ptrdiff_t>(compliance_.values.size());
+    for (std::size_t j = first; j <= i; ++j) {
+      compliance_.values.push_back(displacement_at(feet[j]));
+    }
+    for (int a = 0; a < 3; ++a) {
+      for (const int vertex : wall.response(feet[i].vertex[a]).vertices) near_wall_[vertex] = 0.0;
+    }
+  }
+  last_coupled_.resize(m);
+  for (int i = 0; i < size(); ++i) {
+    for (int j = first_coupled(i); j <= i; ++j) last_coupled_[static_cast<std::size_t>(j)] = i;
+  }
+  factor_.values.resize(compliance_.values.size());
+  inverse_.values.resize(compliance_.values.size());
+}
+
+void Yielding::multiply_by_compliance(const Eigen::VectorXd& f, Eigen::VectorXd& w) const {
+  w.setZero(size());
+  for (int i = 0; i < size(); ++i) {
+    const double* row = compliance_.row(*this, i);
+    for (int j = first_coupled(i); j < i; ++j) {
+      w[i] += row[j] * f[j];
+      w[j] += row[j] * f[i];
+    }
+    w[i] += row[i] * f[i];
+  }
+}
+
+void Yielding::factor() {
+  for (int i = 0; i < size(); ++i) {
+    const double* c = compliance_.row(*this, i);
+    double* row = factor_.row(*this, i);
+    for (int j = first_coupled(i); j <= i; ++j) {
+      double sum = root_[i] * c[j] * root_[j];
+      const double* above = factor_.row(*this, j);
+      for (int k = std::max(first_coupled(i), first_coupled(j)); k < j; ++k) {
+        sum -= row[k] * above[k];
+      }
+      row[j] = j < i ? sum / above[j] : std::sqrt(1.0 + sum);
+    }
+  }
+}
+
+void Yielding::solve_factored(Eigen::VectorXd& v) const {
+  for (int i = 0; i < size(); ++i) {
+    const double* row = factor_.row(*this, i);
+    for (int k = first_coupled(i); k < i; ++k) v[i] -= row[k] * v[k];
+    v[i] /= row[i];
+  }
+  for (int i = size() - 1; i >= 0; --i) {
+    const double* row = factor_.row(*this, i);
+    v[i] /= row[i];
+    for (int k = first_coupled(i); k < i; ++k) v[k] -= row[k] * v[i];
+  }
+}
+
+double Yielding::solve(const ContactLaw& law, const Eigen::VectorXd& gap,
+                       const Eigen::VectorXd& share, Eigen::VectorXd& force, Eigen::VectorXd& w) {
+  constexpr int kMostRounds = 100;
+  constexpr double kTolerance = 1e-12;  // of the displacements                           [mm]
+  const int m = size();
+  root_.resize(m);
+  lawful_.resize(m);
+  // The wall lies as `force` presses it; `lawful_` is what the law presses then.
+  double law_energy = 0.0;
+  const auto evaluate = [&] {
+    law_energy = 0.0;
+    for (int i = 0; i < m; ++i) {
+      const ContactLaw::Value value = law.at(gap[i] + w[i]);
+      law_energy += share[i] * value.energy;
+      lawful_[i] = -share[i] * value.slope;
+      root_[i] = std::sqrt(share[i] * value.curvature);
+    }
+    return law_energy + 0.5 * force.dot(w);
+  };
+  multiply_by_compliance(force, w);
+  double energy = evaluate();
+  for (int round = 0; round < kMostRounds; ++round) {
+    // Newton on the energy, convex in w: the step takes the forces to lawful_ + z, with z = D^1/2
+    // (I + D^1/2 C D^1/2)^-1 D^1/2 (w - C lawful_).
+    factor();
+    residual_ = lawful_ - force;
+    multiply_by_compliance(residual_, step_);  // C lawful_ - w
+    if (m == 0 || step_.cwiseAbs().maxCoeff() <= kTolerance) break;
+    residual_ = -step_.cwiseProduct(root_);
+    solve_factored(residual_);
+    step_ = lawful_ + residual_.cwiseProduct(root_) - force;
+    multiply_by_compliance(step_, residual_);
+    const double slope = residual_.dot(force - lawful_);
+    double part = 1.0, before = energy;
+    force += step_;
+    w += residual_;
+    energy = evaluate();
+    while (energy > before + 1e-4 * part * slope + 1e-15 * std::abs(before) && part > 1e-6) {
+      force -= 0.5 * part * step_;
+      w -= 0.5 * part * residual_;
+      part *= 0.5;
+      energy = evaluate();
+    }
+  }
+  force = lawful_;
+  return law_energy;
+}
+
+void Yielding::find_stiffness() {
+  // Inverse of the factored matrix within the envelope (Takahashi), from the last row upward. Rows
+  // k > j couple with j where their envelope reaches it; two of them then couple with each other.
+  for (int j = size() - 1; j >= 0; --j) {
+    const double diagonal = factor_.row(*this, j)[j];
+    const int last = last_coupled_[static_cast<std::size_t>(j)];
+    const auto couples = [&](int k) { return first_coupled(k) <= j; };
+    for (int i = last; i >= j; --i) {
+      if (!couples(i)) continue;
+      double sum = i == j ? 1.0 / diagonal : 0.0;
+      for (int k = j + 1; k <= last; ++k) {
+        if (!couples(k)) continue;
+        sum -= factor_.row(*this, k)[j] * inverse_.row(*this, std::max(i, k))[std::min(i, k)];
+      }
+      inverse_.row(*this, i)[j] = sum / diagonal;
+    }
+  }
+}
+
+double Yielding::stiffness(int i, int j) const {
+  if (j < first_coupled(i)) return 0.0;
+  return root_[i] * inverse_.row(*this, i)[j] * root_[j];
+}
+
+void Yielding::multiply_by_stiffness(Eigen::VectorXd& v) const {
+  v.array() *= root_.array();
+  solve_factored(v);
+  v.array() *= root_.array();
+}
+
+}  // namespace wireplan::simulate

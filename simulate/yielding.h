@@ -1,0 +1,57 @@
+#pragma once
+/// Contact points on a wall that yields: their forces couple through the wall (compliance.h).
+#include <Eigen/Core>
+#include <vector>
+
+#include "simulate/compliance.h"
+#include "simulate/contact.h"
+#include "simulate/locator.h"
+
+namespace wireplan::simulate {
+
+/// Forces f >= 0 of m points with gaps g to the resting wall, where the wall gives way by w = C f
+/// and each force follows the contact law at the gap g + w: the minimum over w of the energy of law
+/// and wall. The matrices are kept by rows within an envelope: the wall yields near a force alone,
+/// and neighbours along the wire are neighbours on the wall. Memory only ever grows.
+class Yielding {
+ public:
+  /// Where the points' forces act, in the order of the wire; finds C.
+  void set_feet(const WallCompliance& wall, const std::vector<SurfacePoint>& feet);
+  int size() const { return static_cast<int>(start_.size()); }
+
+  /// Finds the forces, starting from what they are, and w; `share` is each point's length of wire
+  /// [mm]. All of size(). Returns the energy of the contact law [N mm].
+  double solve(const ContactLaw& law, const Eigen::VectorXd& gap, const Eigen::VectorXd& share,
+               Eigen::VectorXd& force, Eigen::VectorXd& w);
+
+  /// S = -d force / d gap = (C + 1/law's stiffness)^-1 where solve() ended [N/mm]: its entries
+  /// within the envelope, which find_stiffness() fills, and all of it as a product in place.
+  void find_stiffness();
+  double stiffness(int i, int j) const;  // j <= i; 0 beyond the envelope
+  int first_coupled(int i) const { return start_[static_cast<std::size_t>(i)]; }
+  void multiply_by_stiffness(Eigen::VectorXd& v) const;
+
+ private:
+  /// Lower triangle of a symmetric matrix, row i from column start_[i] on.
+  struct Envelope {
+    std::vector<double> values;
+    double* row(const Yielding& y, int i) { return values.data() + y.offset_[i] - y.start_[i]; }
+    const double* row(const Yielding& y, int i) const {
+      return values.data() + y.offset_[i] - y.start_[i];
+    }
+  };
+  void multiply_by_compliance(const Eigen::VectorXd& f, Eigen::VectorXd& w) const;
+  void factor();  // of I + D^1/2 C D^1/2, D the law's stiffness
+  void solve_factored(Eigen::VectorXd& v) const;
+
+  std::vector<int> start_;         // first column of each row
+  std::vector<int> last_coupled_;  // last row with an entry in each column
+  std::vector<std::ptrdiff_t> offset_;
+  Envelope compliance_, factor_, inverse_;
+  Eigen::VectorXd root_;  // D^1/2
+  Eigen::VectorXd
+      near_wall_;  // per vertex of the surface: its displacement under a force at a foot
+  Eigen::VectorXd lawful_, residual_, step_;
+};
+
+}  // namespace wireplan::simulate

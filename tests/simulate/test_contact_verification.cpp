@@ -1,0 +1,729 @@
+// Contact, friction and the yielding wall against theory: the pressed tip, a helix in a tube, the
+// capstan, a uniform bend, sinusoidal buckling, and a wire with its wall as one system. Numbers and
+// tolerances: references D7, D8 and D11.
+#include <gtest/gtest.h>
+
+#include <Eigen/Geometry>
+#include <Eigen/LU>
+#include <Eigen/SparseCore>
+#include <Eigen/SparseLU>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <functional>
+#include <vector>
+
+#include "simulate/scene.h"
+#include "tests/shapes.h"
+
+namespace wireplan::simulate {
+namespace {
+
+// ---------------------------------------------------------------- wires in vessels
+
+Wire uniform_wire(double length, double radius, double EI, double EA = 0.0) {
+  return {.name = "uniform",
+          .radius = radius,
+          .sections = {{.length = length, .bending_stiffness = EI, .axial_stiffness = EA}}};
+}
+
+/// A straight rod, a vessel, and the rod's present state along given points.
+struct Bench {
+  Rod rod;
+  RodState state;
+  WallContact contact;
+  Problem problem;
+  Statics statics;
+
+  Bench(const Wire& wire, int elements, const VesselModel& vessel, const ContactOptions& options,
+        const std::function<Vec3(double)>& point_at)
+      : rod(build_rod(wire, wire.length(), elements)),
+        state(straight_state(rod, Vec3::Zero(), Vec3::UnitZ(), 0.0)),
+        contact(rod, vessel, options) {
+    for (int i = 0; i < rod.nodes(); ++i) {
+      state.x.col(i) = point_at(rod.tip_distance[0] - rod.tip_distance[i]);
+    }
+    contact.start_at(state.x);
+    problem.rod = &rod;
+    problem.last = rod.nodes();
+    problem.contact = &contact;
+  }
+  Bench(const Bench&) = delete;
+  Bench& operator=(const Bench&) = delete;
+
+  /// Equilibrium, and what slipped has slipped.
+  NewtonResult solve(double tolerance = 1e-6) {
+    const NewtonResult result =
+        statics.solve(problem, state, {.residual_tolerance = tolerance, .max_iterations = 500});
+    if (result.converged) contact.settle();
+    return result;
+  }
+};
+
+EndSupport held_along(const Vec3& axis) {
+  EndSupport end;
+  end.hold_along = true;
+  end.axis = axis;
+  return end;
+}
+
+EndSupport held_across(const Vec3& axis) {
+  EndSupport end;
+  end.hold_across = true;
+  end.axis = axis;
+  return end;
+}
+
+EndSupport pinned() {
+  EndSupport end;
+  end.hold_along = end.hold_across = true;
+  return end;
+}
+
+/// Tube along z whose circles have many corners, for a smooth cross section, but lie far apart.
+Surface long_tube(double radius, double length, int sides) {
+  const int rows = static_cast<int>(std::lround(length / 20.0));
+  Eigen::Matrix3Xd axis = Eigen::Matrix3Xd::Zero(3, rows + 1);
+  axis.row(2) = Eigen::RowVectorXd::LinSpaced(rows + 1, 0.0, length);
+  return shapes::tube(axis, Eigen::VectorXd::Constant(rows + 1, radius), sides);
+}
+
+/// Sum of the normal forces of the touches that `counts`.                                   [N]
+double normal_force(const std::vector<Touch>& touches,
+                    const std::function<bool(const Touch&)>& counts) {
+  double sum = 0.0;
+  for (const Touch& touch : touches) {
+    if (counts(touch)) sum += touch.normal_force;
+  }
+  return sum;
+}
+
+// ---------------------------------------------------------------- V6: the pressed tip
+
+/// A rod of length and EI 1, clamped along the normal of a plane and pressed onto it by eps, with
+/// its tip stuck right below the clamp: force along the normal, across, and angle of the tip.
+struct PressedTip {
+  double N = 0.0, H = 0.0, angle = 0.0;
+};
+
+/// theta'' = -(H cos theta + N sin theta) from the tip (theta' = 0) back to the clamp, theta from
+/// the normal; Newton's method finds N, H and the tip's angle that bring the clamp to theta = 0,
+/// right above the tip, at the height 1 - eps.
+PressedTip press_tip(double eps) {
+  const auto miss = [eps](const Vec3& unknown) -> Vec3 {
+    constexpr int kSteps = 200;  // Runge-Kutta: error 1e-9
+    const double N = unknown[0], H = unknown[1], h = 1.0 / kSteps;
+    const auto rate = [&](const Eigen::Vector4d& y) -> Eigen::Vector4d {
+      return {y[1], -(H * std::cos(y[0]) + N * std::sin(y[0])), std::sin(y[0]), std::cos(y[0])};
+    };
+    Eigen::Vector4d y(unknown[2], 0.0, 0.0, 0.0);
+    for (int k = 0; k < kSteps; ++k) {
+      const Eigen::Vector4d a = rate(y), b = rate(y + 0.5 * h * a), c = rate(y + 0.5 * h * b),
+                            d = rate(y + h * c);
+      y += h / 6.0 * (a + 2.0 * b + 2.0 * c + d);
+    }
+    return {y[0], y[2], y[3] - (1.0 - eps)};
+  };
+  // From the mode of small eps: H/N = -0.448 sqrt(eps) for a tip that leans to the other side.
+  Vec3 unknown(20.3, -0.448 * std::sqrt(eps) * 20.3, 2.5 * std::sqrt(eps));
+  for (int round = 0; round < 30; ++round) {
+    const Vec3 at = miss(unknown);
+    Mat3 slope;
+    for (int d = 0; d < 3; ++d) {
+      slope.col(d) = (miss(unknown + 1e-6 * Vec3::Unit(d)) - at) / 1e-6;
+    }
+    unknown -= slope.partialPivLu().solve(at);
+  }
+  return {unknown[0], std::abs(unknown[1]), std::abs(unknown[2])};
+}
+
+TEST(PressedTipReference, IsTheMasterCurveOfTheReferences) {
+  // References D8: N, H/N and the tip's angle, to the digits printed there.
+  const PressedTip small = press_tip(0.02), large = press_tip(0.2);
+  EXPECT_NEAR(small.N, 20.343, 1e-3);
+  EXPECT_NEAR(small.H / small.N, 0.0639, 1e-4);
+  EXPECT_NEAR(small.angle / kRadPerDeg, 20.3, 0.1);
+  EXPECT_NEAR(large.N, 21.721, 1e-3);
+  EXPECT_NEAR(large.H / large.N, 0.2378, 1e-4);
+  EXPECT_NEAR(large.angle / kRadPerDeg, 67.2, 0.1);
+}
+
+/// A wire of 40 mm clamped along -z above the floor of a box, 0.01 mm of air below its tip.
+class PressedWire {
+ public:
+  static constexpr double kLength = 40.0, kEI = 20.0, kRadius = 0.1, kSlip = 0.02;
+
+  /// Penetration, 0.03 mm, does not count as compression: see eps().
+  explicit PressedWire(double friction)
+      : vessel_(shapes::box(Vec3(-30.0, -30.0, 0.0), Vec3(30.0, 30.0, 60.0)),
+                {.grid_spacing = 2.0, .band = 4.0}),
+        bench_(uniform_wire(kLength, kRadius, kEI), 40, vessel_,
+               {.law = {}, .spacing = 1.0, .friction = friction, .slip = kSlip}, [](double s) {
+                 // A little bowed, so that it buckles toward x.
+                 return Vec3(0.05 * std::pow(std::sin(kPi * s / kLength), 2), 0.0,
+                             kRadius + 0.01 + kLength - s);
+               }) {
+    bench_.problem.proximal = pinned();
+    bench_.problem.proximal.tangent = -Vec3::UnitZ();
+    bench_.problem.plane = Vec3::UnitY();
+  }
+
+  /// Moves the clamp down until the wire would be compressed by eps if the wall were rigid.
+  NewtonResult press_to(double eps) {
+    const double move = kRadius + kLength * (1.0 - eps) - bench_.state.x(2, 0);
+    for (int i = 0; i < bench_.rod.nodes(); ++i) {
+      bench_.state.x(2, i) += move * bench_.rod.tip_distance[i] / kLength;
+    }
+    return bench_.solve();
+  }
+  /// The same in steps of 0.005 of sqrt(eps), as the wire bows. Returns whether all converged.
+  bool press_slowly_to(double eps) {
+    const double start = std::sqrt(std::max(0.0, this->eps()));
+    const int steps = static_cast<int>(std::ceil((std::sqrt(eps) - start) / 0.005));
+    for (int k = 1; k <= steps; ++k) {
+      const double root = start + (std::sqrt(eps) - start) * k / steps;
+      if (!press_to(root * root).converged) return false;
+    }
+    return true;
+  }
+  /// From where the tip is.
+  double eps() const { return 1.0 - (bench_.state.x(2, 0) - tip().z()) / kLength; }
+  Vec3 tip() const { return bench_.state.x.rightCols<1>(); }
+  std::vector<Touch> touches() { return bench_.contact.touches(); }
+
+ private:
+  VesselModel vessel_;
+  Bench bench_;
+};
+
+TEST(PressedTip, PushesAndHoldsAsTheElasticaDoes) {
+  PressedWire wire(1.0);
+  int checked = 0;
+  for (const double eps : {0.02, 0.05, 0.1, 0.2}) {
+    SCOPED_TRACE(eps);
+    ASSERT_TRUE(wire.press_slowly_to(eps));
+    const PressedTip theory = press_tip(wire.eps());
+    const std::vector<Touch> touches = wire.touches();
+    ASSERT_EQ(touches.size(), 1u);
+    // 40 elements leave 0.1 %, the displacement that friction needs 0.1 %; references D11 ask 2 %.
+    const double scale = PressedWire::kEI / (PressedWire::kLength * PressedWire::kLength);
+    const double N = touches[0].normal_force, H = touches[0].friction.norm();
+    EXPECT_NEAR(N, theory.N * scale, 0.005 * theory.N * scale);
+    EXPECT_NEAR(H / N, theory.H / theory.N, 0.01 * theory.H / theory.N);
+    EXPECT_LT(std::abs(wire.tip().x()), PressedWire::kSlip);  // sticks
+    ++checked;
+  }
+  EXPECT_EQ(checked, 4);
+}
+
+TEST(PressedTip, SlidesOffWhereFrictionIsOvercome) {
+  for (const double friction : {0.1, 0.15}) {
+    SCOPED_TRACE(friction);
+    // The compression at which H/N meets the friction, by bisection of the reference.
+    double low = 0.01, high = 0.2;
+    for (int k = 0; k < 40; ++k) {
+      const double middle = 0.5 * (low + high);
+      const PressedTip theory = press_tip(middle);
+      (theory.H / theory.N < friction ? low : high) = middle;
+    }
+    if (friction == 0.1) {
+      EXPECT_NEAR(low, 0.047, 5e-4);  // references D8
+    }
+    // H/N grows as sqrt(eps): 2 % of it are 4 % of eps.
+    PressedWire wire(friction);
+    ASSERT_TRUE(wire.press_slowly_to(0.96 * low));
+    EXPECT_LT(std::abs(wire.tip().x()), PressedWire::kSlip);
+    wire.press_slowly_to(1.04 * low);
+    EXPECT_GT(std::abs(wire.tip().x()), 10.0 * PressedWire::kSlip);
+  }
+}
+
+// ---------------------------------------------------------------- V7: a helix in a tube
+
+TEST(HelixInATube, HasTheWallForceAndPitchOfTheory) {
+  // Weightless wire under a thrust F: the helix of least energy has q^2 = F/(2 EI), that is a pitch
+  // of sqrt(8 pi^2 EI/F), and presses on the wall with F^2 r/(4 EI) per length. Angles to the axis
+  // of 2 pi r/pitch = 0.08 change that by 0.6 %; what the free ends do decays within pitch/(4 pi).
+  const double EI = 1000.0, pitch = 160.0, r = 2.0, radius = 0.25;
+  const double q = 2.0 * kPi / pitch, F = 2.0 * EI * q * q;
+  const VesselModel vessel(long_tube(r + radius, 700.0, 48), {.grid_spacing = 0.5, .band = 1.0});
+  const double start_q = 1.1 * q, climb = 1.0 / std::hypot(1.0, r * start_q);
+  Bench bench(uniform_wire(640.0, radius, EI), 160, vessel,
+              {.law = {.stiffness = 20.0, .smoothing = 0.005}, .spacing = 4.0}, [&](double s) {
+                const double z = climb * s;
+                return Vec3(r * std::cos(start_q * z), r * std::sin(start_q * z), 30.0 + z);
+              });
+  const int n = bench.rod.nodes();
+  bench.problem.proximal =
+      pinned();  // free to turn; without it the helix could roll round the axis
+  Eigen::Matrix3Xd load = Eigen::Matrix3Xd::Zero(3, n);
+  load(2, n - 1) = -F;
+  bench.problem.load = &load;
+  const NewtonResult solve = bench.solve();
+  ASSERT_TRUE(solve.converged) << solve.residual;
+
+  // The middle half: straight line through the azimuth over z, and the wall's force.
+  const Eigen::Matrix3Xd& x = bench.state.x;
+  const int first = n / 4, last = 3 * n / 4;
+  double turned = 0.0;
+  for (int i = first; i < last; ++i) {
+    turned += std::atan2(x(0, i) * x(1, i + 1) - x(1, i) * x(0, i + 1),
+                         x(0, i) * x(0, i + 1) + x(1, i) * x(1, i + 1));
+  }
+  const double rise = x(2, last) - x(2, first);
+  EXPECT_NEAR(2.0 * kPi * rise / turned, pitch, 0.03 * pitch);
+  const double force = normal_force(bench.contact.touches(), [&](const Touch& touch) {
+    return touch.position.z() > x(2, first) && touch.position.z() < x(2, last);
+  });
+  const double expected = F * F * r / (4.0 * EI);
+  EXPECT_NEAR(force / rise, expected, 0.03 * expected);
+}
+
+// ---------------------------------------------------------------- V8: the capstan
+
+TEST(Capstan, TensionGrowsExponentiallyWithTheAngle) {
+  // A soft wire on the inner side of a helical tube, held back by 1 N at its tip and pulled until
+  // it slips all along. EI = 0.05 N mm^2 bends within sqrt(EI/T) = 0.2 mm: its stiffness is felt at
+  // the ends alone. The tangent turns by a/sqrt(a^2 + b^2) = 0.999 of the azimuth.
+  const double lumen = 2.0, axis_radius = 20.0, pitch = 6.0, radius = 0.2, hold = 1.0;
+  const double path = axis_radius - lumen + radius, climb = pitch / (2.0 * kPi);
+  const double start = 10.0 * kRadPerDeg, length_per_angle = std::hypot(path, climb);
+  const double length = 400.0 * kRadPerDeg * length_per_angle;
+  const Eigen::Matrix3Xd axis = shapes::helix_axis(axis_radius, pitch, 420.0 * kRadPerDeg, 0.9);
+  const VesselModel vessel(shapes::tube(axis, Eigen::VectorXd::Constant(axis.cols(), lumen), 16),
+                           {.grid_spacing = 0.5, .band = 1.0});
+  for (const double friction : {0.1, 0.3}) {
+    SCOPED_TRACE(friction);
+    const auto point_at = [&](double s) {
+      const double azimuth = start + s / length_per_angle;
+      return Vec3(path * std::cos(azimuth), path * std::sin(azimuth), climb * azimuth);
+    };
+    Bench bench(uniform_wire(length, radius, 0.05, 2000.0), 128, vessel,
+                {.law = {}, .spacing = 1.0, .friction = friction}, point_at);
+    const int n = bench.rod.nodes();
+    bench.problem.first = 1;  // the hand holds node 0
+    Eigen::Matrix3Xd load = Eigen::Matrix3Xd::Zero(3, n);
+    load.col(n - 1) = hold * (bench.state.x.col(n - 1) - bench.state.x.col(n - 2)).normalized();
+    bench.problem.load = &load;
+    ASSERT_TRUE(bench.solve().converged);
+    for (int pull = 0; pull < 4; ++pull) {
+      // The whole wire slides back along the tube by half a millimetre.
+      const double turn = -0.5 / length_per_angle;
+      bench.state.x = (Eigen::AngleAxisd(turn, Vec3::UnitZ()).matrix() * bench.state.x).eval();
+      bench.state.x.row(2).array() += climb * turn;
+      const NewtonResult solve = bench.solve();
+      ASSERT_TRUE(solve.converged) << solve.residual;
+    }
+
+    // Tension at an azimuth, from the edges on either side of it.
+    const Eigen::Matrix3Xd& x = bench.state.x;
+    const auto azimuth_of = [&](int i) {
+      const double turns =
+          std::floor(x(2, i) / pitch - std::atan2(x(1, i), x(0, i)) / (2.0 * kPi) + 0.5);
+      return std::atan2(x(1, i), x(0, i)) + 2.0 * kPi * turns;
+    };
+    const auto tension_at = [&](double azimuth) {
+      const auto middle = [&](int e) { return 0.5 * (azimuth_of(e) + azimuth_of(e + 1)); };
+      const auto tension = [&](int e) {
+        const double ratio = (x.col(e + 1) - x.col(e)).norm() / bench.rod.rest_length[e];
+        return 0.5 * bench.rod.stretch[e] * (ratio * ratio - 1.0) * ratio;
+      };
+      int e = 0;
+      while (middle(e + 1) < azimuth) ++e;
+      const double part = (azimuth - middle(e)) / (middle(e + 1) - middle(e));
+      return (1.0 - part) * tension(e) + part * tension(e + 1);
+    };
+    const double tip_side = azimuth_of(n - 1) - 15.0 * kRadPerDeg;
+    for (const double angle : {90.0, 180.0, 360.0}) {
+      const double theta = angle * kRadPerDeg;
+      const double expected = std::exp(friction * theta * path / length_per_angle);
+      // Nodes turn by 3 degrees each: tan of half of it instead of the angle is 1e-4. Facets move
+      // the stations by their angle at most, 2 degrees or 1 % at 0.3.
+      EXPECT_NEAR(tension_at(tip_side - theta) / tension_at(tip_side), expected, 0.03 * expected)
+          << angle;
+    }
+    for (const Touch& touch : bench.contact.touches()) {
+      EXPECT_NEAR(touch.friction.norm(), friction * touch.normal_force,
+                  1e-3 * touch.normal_force + 1e-6);  // it slips everywhere
+    }
+  }
+}
+
+// ---------------------------------------------------------------- V9: a uniform bend
+
+TEST(UniformBend, IsFeltAtTheEndsOfTheWireAlone) {
+  // A straight wire in a tube of constant curvature is bent uniformly and needs no force along its
+  // length; over the last sqrt(12 r/kappa) at either end it crosses from the inner to the outer
+  // side, where tip and inner wall make the couple EI kappa. So for r much less than 1/(12 kappa):
+  // the wall pushes toward the centre of the bend alone, which leaves a thrust EI kappa^2, here 3 %
+  // of the forces of the couple. The law is soft against the wire (spreads its forces over 10 mm),
+  // so that the tube's facets are not felt as a line force.
+  const double lumen = 2.0, bend_radius = 200.0, angle = 0.85, radius = 1.5, EI = 1000.0;
+  const Eigen::Matrix3Xd axis = shapes::bend_axis(bend_radius, angle, 0.0, 0.0, 1.5);
+  const VesselModel vessel(shapes::tube(axis, Eigen::VectorXd::Constant(axis.cols(), lumen), 40),
+                           {.grid_spacing = 0.5});
+  const double start = 0.05, end = 0.8, r = lumen - radius;
+  Bench bench(uniform_wire(bend_radius * (end - start), radius, EI), 100, vessel,
+              {.law = {.stiffness = 0.5, .smoothing = 0.01}, .spacing = 1.5}, [&](double s) {
+                const double at = start + s / bend_radius;
+                return Vec3(bend_radius * (1.0 - std::cos(at)), 0.0, bend_radius * std::sin(at));
+              });
+  bench.problem.proximal = held_along(Vec3(std::sin(start), 0.0, std::cos(start)));
+  const NewtonResult solve = bench.solve();
+  ASSERT_TRUE(solve.converged) << solve.residual;
+
+  // Moments at the middle: of the bent wire, and of all contact forces beyond.
+  const Eigen::Matrix3Xd& x = bench.state.x;
+  const int middle = bench.rod.nodes() / 2;
+  const double moment = EI / bend_radius, lever = std::sqrt(12.0 * r * bend_radius);
+  const Vec3 a = (x.col(middle) - x.col(middle - 1)).normalized(),
+             b = (x.col(middle + 1) - x.col(middle)).normalized();
+  EXPECT_NEAR(bench.rod.bend[middle] * a.cross(b).norm(), moment, 0.03 * moment);
+  const std::vector<Touch> touches = bench.contact.touches();
+  Vec3 couple = Vec3::Zero(), force = Vec3::Zero();
+  for (const Touch& touch : touches) {
+    if (touch.edge < middle) continue;
+    const Vec3 f = touch.normal_force * touch.normal;
+    couple += (touch.position - x.col(middle)).cross(f);
+    force += f;
+  }
+  EXPECT_NEAR(couple.norm(), moment, 0.03 * moment);
+
+  // The couple's force at the tip. The soft law lets the tip give way by 0.2 mm.
+  const double at_tip =
+      normal_force(touches, [&](const Touch& touch) { return touch.tip_distance < 0.5 * lever; });
+  EXPECT_NEAR(at_tip, moment / lever, 0.1 * moment / lever);
+  EXPECT_NEAR(force.norm(), moment / bend_radius, 0.03 * at_tip);  // that thrust in the middle
+
+  // Between the two couples there is no line force, measured against the couple's force per lever.
+  const double half = 0.5 * bench.rod.tip_distance[0] - 1.5 * lever;
+  ASSERT_GT(half, 20.0);
+  const double interior = normal_force(touches, [&](const Touch& touch) {
+    return std::abs(touch.tip_distance - 0.5 * bench.rod.tip_distance[0]) < half;
+  });
+  EXPECT_LT(interior * lever / (2.0 * half), 0.03 * at_tip);
+}
+
+// ---------------------------------------------------------------- sinusoidal buckling
+
+TEST(SinusoidalBuckling, StartsAtTheLoadOfDawsonAndPaslay) {
+  // Pinned ends three half waves apart, of the wave length that buckles first: then the load is
+  // that of an infinite wire, 2 sqrt(EI w/r).
+  const double EI = 100.0, weight = 1e-3, r = 3.5, radius = 0.5;
+  const double q = std::pow(weight / (EI * r), 0.25), length = 3.0 * kPi / q;
+  const double theory = 2.0 * std::sqrt(EI * weight / r);
+  const VesselModel vessel(long_tube(r + radius, length + 20.0, 128), {.grid_spacing = 0.8});
+  const auto buckled_angle = [&](double thrust) {
+    Bench bench(uniform_wire(length, radius, EI), 76, vessel,
+                {.law = {.stiffness = 20.0, .smoothing = 0.005}, .spacing = 4.0}, [&](double s) {
+                  const double across = 0.02 * std::sin(q * s);
+                  return Vec3(r * std::sin(across), 0.004 - r * std::cos(across), 10.0 + s);
+                });
+    const int n = bench.rod.nodes();
+    bench.problem.proximal = pinned();
+    bench.problem.distal = held_across(Vec3::UnitZ());
+    Eigen::Matrix3Xd load = -weight * Vec3::UnitY() * bench.rod.share.transpose();
+    load(2, n - 1) -= thrust;
+    bench.problem.load = &load;
+    const NewtonResult solve = bench.solve(1e-8);
+    EXPECT_TRUE(solve.converged) << thrust << " " << solve.residual;
+    return bench.state.x.row(0).cwiseAbs().maxCoeff() / r;
+  };
+  double low = 0.7 * theory, high = 1.4 * theory;
+  ASSERT_LT(buckled_angle(low), 1e-3);
+  ASSERT_GT(buckled_angle(high), 0.3);
+  for (int k = 0; k < 7; ++k) {
+    const double middle = 0.5 * (low + high);
+    // The amplitude grows as sqrt(1.45 (F/F_c - 1)): 0.1 comes 0.7 % past the load.
+    (buckled_angle(middle) < 0.1 ? low : high) = middle;
+  }
+  // Facets of 0.2 mm under a grid of 0.8 mm bend the floor by 2 % more or less than the circle;
+  // references D11 ask 10 %.
+  EXPECT_NEAR(0.5 * (low + high), theory, 0.03 * theory);
+}
+
+// ---------------------------------------------------------------- wire and yielding wall as one
+
+/// The wall that preprocess extrudes: an apex over the middle of each triangle.
+Wall extruded(const Surface& surface, double thickness, double young_modulus) {
+  Wall wall{.apexes = Eigen::Matrix3Xd(3, surface.triangles.cols()),
+            .height = Eigen::VectorXd::Constant(surface.triangles.cols(), thickness),
+            .young_modulus = young_modulus,
+            .poisson_ratio = 0.3};
+  for (Eigen::Index k = 0; k < surface.triangles.cols(); ++k) {
+    const Vec3 a = surface.vertices.col(surface.triangles(0, k)),
+               b = surface.vertices.col(surface.triangles(1, k)),
+               c = surface.vertices.col(surface.triangles(2, k));
+    wall.apexes.col(k) = (a + b + c) / 3.0 + thickness * (b - a).cross(c - a).normalized();
+  }
+  return wall;
+}
+
+/// Wire and wall as one system: positions x of the nodes from 1 on, then displacements u of all
+/// vertices. Energy: wire(x) + u'Ku/2 + the contact law at the gaps d(x) + c'u of the nodes, where
+/// c'u is the outward displacement of the wall at the node's foot: of the vertices' displacements
+/// along their normals, interpolated in the triangle. A foot moves with its node, but the wall's
+/// force stays normal, so feet are held while the energy is differentiated.
+class Monolith {
+ public:
+  Monolith(const Surface& surface, const Wall& wall, const VesselModel& vessel, Bench& wire)
+      : vessel_(vessel), rod_(wire.rod), problem_(wire.problem), K_(wall_stiffness(surface, wall)) {
+    problem_.contact = nullptr;
+  }
+
+  struct Solution {
+    Eigen::Matrix3Xd x;     // (3, n)                                                     [mm]
+    Eigen::VectorXd u;      // (3v)                                                       [mm]
+    Eigen::VectorXd force;  // (n) normal                                                 [N]
+    double residual = 0.0;  //                                                            [N]
+  };
+  /// Newton's method from the given state and a wall at rest, shortened until the energy falls.
+  Solution solve(RodState state) const {
+    const Eigen::Index v = K_.cols();
+    Solution at;
+    at.u = Eigen::VectorXd::Zero(v);
+    for (int round = 0; round < 200; ++round) {
+      find_feet(state);
+      Eigen::VectorXd gradient;
+      Eigen::SparseMatrix<double> hessian;
+      differentiate(state, at, gradient, hessian);
+      at.residual = gradient.cwiseAbs().maxCoeff();
+      if (at.residual < 1e-10) break;
+      Eigen::SparseLU<Eigen::SparseMatrix<double>> lu(hessian);
+      Eigen::VectorXd step = -lu.solve(gradient);
+      if (step.dot(gradient) > 0.0) step = -step;
+      double part = std::min(1.0, 0.25 / step.cwiseAbs().maxCoeff());
+      const double before = energy(state, at.u);
+      RodState moved = state;
+      Eigen::VectorXd u;
+      for (int cut = 0; cut < 30; ++cut, part *= 0.5) {
+        moved.x.rightCols(moved.x.cols() - 1).reshaped() =
+            state.x.rightCols(moved.x.cols() - 1).reshaped() + part * step.head(step.size() - v);
+        u = at.u + part * step.tail(v);
+        if (energy(moved, u) <= before + 1e-13) break;
+      }
+      state = moved;
+      at.u = u;
+    }
+    at.x = state.x;
+    return at;
+  }
+
+ private:
+  void find_feet(const RodState& state) const {
+    feet_.clear();
+    for (int i = 0; i < rod_.nodes(); ++i) {
+      const WallSample wall = vessel_.lumen.sample(state.x.col(i));
+      const bool near = wall.distance < rod_.radius + 1.0;
+      feet_.push_back(
+          near ? vessel_.locator.nearest(
+                     state.x.col(i) - (wall.distance / wall.gradient.squaredNorm()) * wall.gradient)
+               : SurfacePoint{});
+    }
+  }
+  double yield_at(int i, const Eigen::VectorXd& u) const {
+    double yield = 0.0;
+    for (const auto& [vertex, part] : parts_at(i)) yield += part.dot(u.segment<3>(3 * vertex));
+    return yield;
+  }
+  /// Vertices that move the wall under node i, and by how much of their motion.
+  std::vector<std::pair<int, Vec3>> parts_at(int i) const {
+    const SurfacePoint& foot = feet_[static_cast<std::size_t>(i)];
+    std::vector<std::pair<int, Vec3>> parts;
+    for (int b = 0; b < 3 && foot.triangle >= 0; ++b) {
+      for (const auto& [vertex, part] : vessel_.compliance->spread(foot.vertex[b])) {
+        parts.emplace_back(vertex,
+                           foot.weight[b] * part * vessel_.compliance->normals().col(vertex));
+      }
+    }
+    return parts;
+  }
+  double energy(const RodState& state, const Eigen::VectorXd& u) const {
+    Eigen::Matrix3Xd unused(3, rod_.nodes());
+    double sum = Statics::evaluate(problem_, state, unused).total() + 0.5 * u.dot(K_ * u);
+    for (int i = 0; i < rod_.nodes(); ++i) {
+      const double gap = vessel_.lumen.distance(state.x.col(i)) - rod_.radius + yield_at(i, u);
+      sum += rod_.share[i] * law_.at(gap).energy;
+    }
+    return sum;
+  }
+  void differentiate(const RodState& state, Solution& at, Eigen::VectorXd& gradient,
+                     Eigen::SparseMatrix<double>& hessian) const {
+    // The wire, all but node 0.
+    const int n = rod_.nodes(), free = 3 * (n - 1);
+    Eigen::VectorXd wire_gradient;
+    Eigen::MatrixXd wire_hessian;
+    Statics::derivatives(problem_, state, wire_gradient, wire_hessian);
+    std::vector<Eigen::Triplet<double>> entries;
+    for (int i = 0; i < free; ++i) {
+      for (int j = std::max(0, i - 8); j < std::min(free, i + 9); ++j) {
+        entries.emplace_back(i, j, wire_hessian(3 + i, 3 + j));
+      }
+    }
+    gradient.resize(free + K_.cols());
+    gradient << wire_gradient.segment(3, free), K_ * at.u;
+
+    // The wall.
+    for (int k = 0; k < K_.outerSize(); ++k) {
+      for (Eigen::SparseMatrix<double>::InnerIterator entry(K_, k); entry; ++entry) {
+        entries.emplace_back(free + static_cast<int>(entry.row()),
+                             free + static_cast<int>(entry.col()), entry.value());
+      }
+    }
+
+    // Contact: derivatives of the gap by the node and by the three vertices of the foot.
+    at.force = Eigen::VectorXd::Zero(n);
+    for (int i = 1; i < n; ++i) {
+      const WallSample wall = vessel_.lumen.sample(state.x.col(i));
+      const ContactLaw::Value law = law_.at(wall.distance - rod_.radius + yield_at(i, at.u));
+      if (law.slope == 0.0) continue;
+      at.force[i] = -rod_.share[i] * law.slope * wall.gradient.norm();
+      const std::vector<std::pair<int, Vec3>> parts = parts_at(i);
+      const int size = 3 + 3 * static_cast<int>(parts.size());
+      std::vector<int> place(static_cast<std::size_t>(size));
+      Eigen::VectorXd by(size);
+      for (int d = 0; d < 3; ++d) place[static_cast<std::size_t>(d)] = 3 * (i - 1) + d;
+      by.head<3>() = wall.gradient;
+      for (std::size_t k = 0; k < parts.size(); ++k) {
+        for (std::size_t d = 0; d < 3; ++d) {
+          place[3 + 3 * k + d] = free + 3 * parts[k].first + static_cast<int>(d);
+        }
+        by.segment<3>(3 + 3 * static_cast<Eigen::Index>(k)) = parts[k].second;
+      }
+      Eigen::MatrixXd H = rod_.share[i] * law.curvature * by * by.transpose();
+      H.topLeftCorner<3, 3>() += rod_.share[i] * law.slope * wall.hessian;
+      for (int p = 0; p < size; ++p) {
+        const int row = place[static_cast<std::size_t>(p)];
+        gradient[row] += rod_.share[i] * law.slope * by[p];
+        for (int q = 0; q < size; ++q) {
+          entries.emplace_back(row, place[static_cast<std::size_t>(q)], H(p, q));
+        }
+      }
+    }
+    hessian.resize(gradient.size(), gradient.size());
+    hessian.setFromTriplets(entries.begin(), entries.end());
+  }
+
+  const VesselModel& vessel_;
+  const Rod& rod_;
+  Problem problem_;  // of the wire alone
+  ContactLaw law_;
+  Eigen::SparseMatrix<double> K_;
+  mutable std::vector<SurfacePoint> feet_;
+};
+
+TEST(YieldingWall, BalancesTheWireAsOneLargeSystemDoes) {
+  // A stiff wire clamped in a bend presses the wall outward by a few tenths of a millimetre.
+  const double bend_radius = 20.0;
+  const Surface surface = shapes::bend_tube(1.5, bend_radius, 0.5 * kPi, 0.0, 0.0, 0.8);
+  const Wall wall = extruded(surface, 1.0, 0.4);
+  const VesselModel yielding(surface, wall), rigid(surface);
+  const auto along_the_bend = [&](double s) {
+    const double at = 0.15 + s / bend_radius;
+    return Vec3(bend_radius * (1.0 - std::cos(at)), 0.0, bend_radius * std::sin(at));
+  };
+  const Wire wire = uniform_wire(27.0, 1.0, 50.0);
+  Bench bench(wire, 27, yielding, {}, along_the_bend), start(wire, 27, rigid, {}, along_the_bend);
+  for (Bench* each : {&bench, &start}) {
+    each->problem.proximal = pinned();
+    each->problem.proximal.tangent = Vec3(std::sin(0.15), 0.0, std::cos(0.15));
+  }
+  const NewtonResult solve = bench.solve(1e-9);
+  ASSERT_TRUE(solve.converged) << solve.residual;
+  ASSERT_TRUE(start.solve().converged);
+
+  // The large system starts from the shape in a rigid wall.
+  const Monolith::Solution large = Monolith(surface, wall, yielding, bench).solve(start.state);
+  ASSERT_LT(large.residual, 1e-10);
+  EXPECT_GT((large.x - start.state.x).cwiseAbs().maxCoeff(), 0.05);
+  EXPECT_LT((large.x - bench.state.x).cwiseAbs().maxCoeff(), 1e-6);
+  int touching = 0;
+  double deepest = 0.0;
+  for (const Touch& touch : bench.contact.touches()) {
+    const int node = touch.edge + (touch.part == 1.0 ? 1 : 0);
+    if (node == 0) continue;
+    EXPECT_NEAR(touch.normal_force, large.force[node], 1e-6) << node;
+    deepest = std::max(deepest, touch.wall_displacement);
+    ++touching;
+  }
+  EXPECT_EQ(touching, (large.force.array() > 0.0).count());
+  EXPECT_GE(touching, 5);
+  EXPECT_GT(deepest, 0.05);
+}
+
+// ---------------------------------------------------------------- scenes
+
+Scene wire_on_the_floor(const VesselModel& vessel, double friction) {
+  Scene scene;
+  scene.wire = uniform_wire(40.0, 0.5, 100.0);
+  scene.wire.sections[0].mass_per_length = 1e-7;
+  scene.elements = 20;
+  scene.supports = {{.at = WireEnd::kProximal,
+                     .kind = SupportKind::kClamped,
+                     .point = Vec3(-20.0, 0.0, 0.547)}};  // as high as it will lie
+  scene.loads.gravity = Vec3(0.0, 0.0, -9810.0);
+  scene.vessel = &vessel;
+  scene.contact.friction = friction;
+  scene.solver.load_steps = 2;
+  return scene;
+}
+
+const VesselModel& floor_box() {
+  static const VesselModel vessel(shapes::box(Vec3(-40.0, -40.0, 0.0), Vec3(40.0, 40.0, 30.0)),
+                                  {.grid_spacing = 2.0, .band = 4.0});
+  return vessel;
+}
+
+TEST(SceneWithAVessel, FloorAndClampCarryTheWeight) {
+  const SceneResult result = run_scene(wire_on_the_floor(floor_box(), 0.0));
+  ASSERT_EQ(result.outcome, SceneOutcome::kConverged) << result.reason;
+  EXPECT_EQ(result.terms, (std::vector<std::string>{"stretch", "bend", "gravity", "contact"}));
+  const double weight = 40.0 * 1e-7 * 9810.0;
+  double carried = result.reactions.at(0).force.z();
+  EXPECT_LT(std::abs(carried), 0.05 * weight);
+  for (const Touch& touch : result.contacts) {
+    EXPECT_TRUE(touch.normal.isApprox(Vec3::UnitZ(), 1e-4));
+    carried += touch.normal_force;
+  }
+  EXPECT_EQ(result.contacts.size(), 41u);   // every millimetre: nodes and middles of edges
+  EXPECT_NEAR(carried, weight, 21 * 1e-6);  // residual of each node
+  EXPECT_GT(result.energy.contact, 0.0);
+  EXPECT_EQ(result.friction_work, 0.0);
+}
+
+TEST(SceneWithAVessel, FrictionAloneHoldsAWireAgainstAPull) {
+  const double friction = 0.2, weight = 40.0 * 1e-7 * 9810.0, pull = 0.7 * friction * weight;
+  Scene scene = wire_on_the_floor(floor_box(), friction);
+  scene.supports[0].kind = SupportKind::kGuided;
+  scene.loads.tip_force = Vec3(pull, 0.0, 0.0);
+  const SceneResult result = run_scene(scene);
+  ASSERT_EQ(result.outcome, SceneOutcome::kConverged) << result.reason;
+  EXPECT_EQ(result.terms, (std::vector<std::string>{"stretch", "bend", "gravity", "tip_force",
+                                                    "contact", "friction"}));
+  Vec3 held = Vec3::Zero();
+  for (const Touch& touch : result.contacts) held += touch.friction;
+  EXPECT_NEAR(held.x(), -pull, 21 * 1e-6);  // residual of each node
+  EXPECT_LT(result.nodes(0, 0) + 20.0, scene.contact.slip);
+  EXPECT_EQ(result.friction_work, 0.0);
+}
+
+TEST(SceneWithAVessel, AStretchedWireRubsAlongTheFloor) {
+  // Clamped, and pulled by more than friction can hold: it slips but next to the clamp, where it
+  // moves by less than the slip.
+  const double friction = 0.2, weight = 40.0 * 1e-7 * 9810.0, pull = 2.0 * friction * weight;
+  Scene scene = wire_on_the_floor(floor_box(), friction);
+  scene.wire.sections[0].axial_stiffness = 1.0;
+  scene.loads.tip_force = Vec3(pull, 0.0, 0.0);
+  const SceneResult result = run_scene(scene);
+  ASSERT_EQ(result.outcome, SceneOutcome::kConverged) << result.reason;
+  Vec3 held = Vec3::Zero();
+  for (const Touch& touch : result.contacts) held += touch.friction;
+  EXPECT_NEAR(held.x() + result.reactions.at(0).force.x() + pull, 0.0, 21 * 1e-6);
+  EXPECT_LT(held.x(), -0.85 * friction * weight);
+  EXPECT_GE(held.x(), -friction * weight - 21 * 1e-6);
+  EXPECT_GT(result.friction_work, 0.0);
+  EXPECT_LT(result.friction_work, pull * (result.nodes(0, 20) - 20.0));
+}
+
+}  // namespace
+}  // namespace wireplan::simulate
