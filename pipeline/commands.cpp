@@ -320,14 +320,19 @@ int run_command(int argc, const char* const* argv) {
 
   std::string bench_name, bench_output = "wireplan-out/bench";
   BenchOptions bench_options;
-  CLI::App* bench = app.add_subcommand("bench", "Error against run time, and stability");
-  bench->add_option("NAME", bench_name, "accuracy or stability")->required();
+  CLI::App* bench = app.add_subcommand("bench", "Error against run time, stability and throughput");
+  bench->add_option("NAME", bench_name, "accuracy, stability or throughput")->required();
   bench->add_option("-o,--output", bench_output, "Folder for results [wireplan-out/bench]");
   bench->add_flag("--quick", bench_options.quick, "A small size, under 20 s");
+  bench->add_option("--case", bench_options.case_path, "Throughput: the case whose vessel to take");
+  bench->add_option("--set", bench_options.overrides, "Throughput: key=value of that case")
+      ->allow_extra_args(false);
+  bench->add_option("--cache", bench_options.cache, "Throughput: store of that case's stages");
   bench->footer(
       "Writes NAME.json, NAME.csv and the plot NAME.png, and prints the table.\n"
       "  accuracy   each method's error and time on scenes whose answer is known\n"
       "  stability  stiff and extreme scenes: which method converges, stops or fails\n"
+      "  throughput insertions per second and core, rigid and yielding, with their error\n"
       "Example: wireplan bench accuracy -o out");
   bench->callback([&] { code = run_bench(bench_name, bench_output, bench_options); });
 

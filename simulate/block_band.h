@@ -50,33 +50,39 @@ class BlockBand {
 
   /// Solves A x = b after factor(); b, of size() * D values, becomes x.
   void solve(Eigen::Ref<Eigen::VectorXd> b) const {
-    for (int i = 0; i < size_; ++i) {
+    // The two unknowns before (or after) the one at hand stay in registers.
+    Vector near = Vector::Zero(), far = Vector::Zero();
+    double* x = b.data();
+    for (int i = 0; i < size_; ++i, x += D) {
       const Row& row = rows_[static_cast<std::size_t>(i)];
-      Vector v = b.template segment<D>(D * i);
-      if (i >= 1) v.noalias() -= row.one * b.template segment<D>(D * (i - 1));
-      if (i >= 2) v.noalias() -= row.two * b.template segment<D>(D * (i - 2));
+      Vector v;
       for (int r = 0; r < D; ++r) {
-        for (int c = 0; c < r; ++c) v[r] -= row.own(r, c) * v[c];
-        v[r] *= row.own(r, r);  // holds 1 / L_rr
+        double sum = x[r];
+        for (int c = 0; c < D; ++c) sum -= row.one(r, c) * near[c] + row.two(r, c) * far[c];
+        for (int c = 0; c < r; ++c) sum -= row.own(r, c) * v[c];
+        x[r] = v[r] = sum * row.own(r, r);  // holds 1 / L_rr
       }
-      b.template segment<D>(D * i) = v;
+      far = near;
+      near = v;
     }
+    near.setZero();
+    far.setZero();
+    const Row none{Block::Zero(), Block::Zero(), Block::Zero()};
+    const Row *next = &none, *after = &none;
     for (int i = size_ - 1; i >= 0; --i) {
+      x -= D;
       const Row& row = rows_[static_cast<std::size_t>(i)];
-      Vector v = b.template segment<D>(D * i);
-      if (i + 1 < size_) {
-        v.noalias() -= rows_[static_cast<std::size_t>(i + 1)].one.transpose() *
-                       b.template segment<D>(D * (i + 1));
-      }
-      if (i + 2 < size_) {
-        v.noalias() -= rows_[static_cast<std::size_t>(i + 2)].two.transpose() *
-                       b.template segment<D>(D * (i + 2));
-      }
+      Vector v;
       for (int r = D - 1; r >= 0; --r) {
-        for (int c = r + 1; c < D; ++c) v[r] -= row.own(c, r) * v[c];
-        v[r] *= row.own(r, r);
+        double sum = x[r];
+        for (int c = 0; c < D; ++c) sum -= next->one(c, r) * near[c] + after->two(c, r) * far[c];
+        for (int c = r + 1; c < D; ++c) sum -= row.own(c, r) * v[c];
+        x[r] = v[r] = sum * row.own(r, r);
       }
-      b.template segment<D>(D * i) = v;
+      far = near;
+      near = v;
+      after = next;
+      next = &row;
     }
   }
 

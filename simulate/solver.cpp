@@ -496,17 +496,19 @@ template <int D>
 double Statics::refine_step(const Problem& problem, const BlockBand<D>& factored, double slope) {
   // What the banded Hessian H lacks of the exact one, R: (I + H^-1 R) step = -H^-1 gradient, by
   // GMRES (Saad & Schultz 1986) from the banded step, as few directions as it takes.
-  constexpr double kEnough = 1e-3;  // of the first residual
+  constexpr double kEnough = 0.2;  // of the first residual: more saved no iterations
   const Eigen::Index size = step_.size();
   krylov_.resize(size, kKrylov + 1);
-  const auto apply_rest = [&](const Eigen::VectorXd& v) {
+  constexpr double kSmall = 0.02;  // of the gradient: not worth a solve
+  const auto find_rest = [&](const Eigen::VectorXd& v) {
     refined_.setZero(size);
     problem.contact->add_remainder({problem.first, problem.last, D, v}, refined_);
     project<D>(problem, refined_);
-    factored.solve(refined_);
   };
   first_step_ = step_;
-  apply_rest(step_);
+  find_rest(step_);
+  if (refined_.norm() <= kSmall * gradient_.norm()) return slope;
+  factored.solve(refined_);
   const double start = refined_.norm();
   if (start <= kEnough * step_.norm()) {
     step_ -= refined_;
@@ -522,7 +524,8 @@ double Statics::refine_step(const Problem& problem, const BlockBand<D>& factored
     while (count < kKrylov && std::abs(right[count]) > kEnough * start) {
       const int k = count++;
       direction_ = krylov_.col(k);
-      apply_rest(direction_);
+      find_rest(direction_);
+      factored.solve(refined_);
       refined_ += direction_;
       for (int i = 0; i <= k; ++i) {
         upper(i, k) = krylov_.col(i).dot(refined_);

@@ -514,8 +514,9 @@ TrialResult run_trial(const Wire& wire, const Introducer& introducer, const Goal
           insertion.depth() - result.pushes[result.pushes.size() - 1 - back].insertion;
       const Vec3 then = result.pushes[result.pushes.size() - 1 - back].tip;
       const double moved = (push->tip - then).norm();
-      const std::optional<Vec3> fold = insertion.find_fold();
-      if (fold && moved < kProlapseMove * went) {
+      const std::optional<Vec3> fold =
+          moved < kProlapseMove * went ? insertion.find_fold() : std::nullopt;
+      if (fold) {
         return finish(Outcome::kProlapsed, "the wire folds back at " + place(*fold) + " after " +
                                                millimetres(insertion.depth()) +
                                                " of insertion; its tip is behind at " +

@@ -5,40 +5,67 @@
 
 namespace wireplan::simulate {
 
+int Yielding::slot_of(const WallCompliance& wall, int vertex) {
+  const auto known = std::lower_bound(
+      slots_.begin(), slots_.end(), vertex,
+      [](const std::pair<int, int>& entry, int wanted) { return entry.first < wanted; });
+  if (known != slots_.end() && known->first == vertex) return known->second;
+  const int slot = static_cast<int>(slots_.size());
+  const WallCompliance::Response& response = wall.response(vertex);
+  double* row = table_.data() + static_cast<std::size_t>(slot) * table_side_;
+  auto from = response.vertices.begin();
+  slots_.insert(known, {vertex, slot});
+  for (const auto& [other, place] : slots_) {  // ascending, as the response is
+    from = std::lower_bound(from, response.vertices.end(), other);
+    const bool found = from != response.vertices.end() && *from == other;
+    const double c =
+        found ? response.displacement[static_cast<std::size_t>(from - response.vertices.begin())]
+              : 0.0;
+    row[place] = c;
+    table_[static_cast<std::size_t>(place) * table_side_ + static_cast<std::size_t>(slot)] = c;
+  }
+  return slot;
+}
+
 void Yielding::set_feet(const WallCompliance& wall, const std::vector<SurfacePoint>& feet) {
   const std::size_t m = feet.size();
   start_.resize(m);
   offset_.resize(m);
   compliance_.values.clear();
-  near_wall_.setZero(std::max(near_wall_.size(), wall.normals().cols()));
+
+  // The feet's vertices in the table; when it is full, it starts anew with these.
+  if (slots_.size() + 3 * m > table_side_) {
+    slots_.clear();
+    table_side_ = std::max({table_side_, kSmallestTable, 2 * 3 * m});
+    table_.resize(table_side_ * table_side_);
+  }
+  foot_slots_.resize(m);
   for (std::size_t i = 0; i < m; ++i) {
-    // The wall's displacement under a unit force at foot i.
-    const auto add_responses = [&](double factor) {
-      for (int a = 0; a < 3; ++a) {
-        const double weight = factor * feet[i].weight[a];
-        if (weight == 0.0) continue;
-        const WallCompliance::Response& response = wall.response(feet[i].vertex[a]);
-        for (std::size_t k = 0; k < response.vertices.size(); ++k) {
-          near_wall_[response.vertices[k]] += weight * response.displacement[k];
-        }
-      }
-    };
-    add_responses(1.0);
-    const auto displacement_at = [&](const SurfacePoint& foot) {
-      return foot.weight[0] * near_wall_[foot.vertex[0]] +
-             foot.weight[1] * near_wall_[foot.vertex[1]] +
-             foot.weight[2] * near_wall_[foot.vertex[2]];
-    };
-    // Its row of C, from the first foot that moves.
+    for (std::size_t a = 0; a < 3; ++a) {
+      foot_slots_[i][a] = feet[i].triangle < 0 ? 0 : slot_of(wall, feet[i].vertex[a]);
+    }
+  }
+
+  // Rows of C, each from the first foot that moves under a force at its own.
+  const auto compliance_between = [&](std::size_t i, std::size_t j) {
+    double sum = 0.0;
+    for (int a = 0; a < 3; ++a) {
+      const double* row =
+          table_.data() +
+          static_cast<std::size_t>(foot_slots_[i][static_cast<std::size_t>(a)]) * table_side_;
+      sum += feet[i].weight[a] * (feet[j].weight[0] * row[foot_slots_[j][0]] +
+                                  feet[j].weight[1] * row[foot_slots_[j][1]] +
+                                  feet[j].weight[2] * row[foot_slots_[j][2]]);
+    }
+    return sum;
+  };
+  for (std::size_t i = 0; i < m; ++i) {
     std::size_t first = 0;
-    while (first < i && displacement_at(feet[first]) == 0.0) ++first;
+    while (first < i && compliance_between(i, first) == 0.0) ++first;
     start_[i] = static_cast<int>(first);
     offset_[i] = static_cast<std::ptrdiff_t>(compliance_.values.size());
     for (std::size_t j = first; j <= i; ++j) {
-      compliance_.values.push_back(displacement_at(feet[j]));
-    }
-    for (int a = 0; a < 3; ++a) {
-      for (const int vertex : wall.response(feet[i].vertex[a]).vertices) near_wall_[vertex] = 0.0;
+      compliance_.values.push_back(compliance_between(i, j));
     }
   }
   last_coupled_.resize(m);

@@ -1,6 +1,8 @@
 #pragma once
 /// Contact points on a wall that yields: their forces couple through the wall (compliance.h).
 #include <Eigen/Core>
+#include <array>
+#include <utility>
 #include <vector>
 
 #include "simulate/compliance.h"
@@ -40,9 +42,18 @@ class Yielding {
       return values.data() + y.offset_[i] - y.start_[i];
     }
   };
+  /// Place of a vertex in the table of responses, which it enters if it is new.
+  int slot_of(const WallCompliance& wall, int vertex);
   void multiply_by_compliance(const Eigen::VectorXd& f, Eigen::VectorXd& w) const;
   void factor();  // of I + D^1/2 C D^1/2, D the law's stiffness
   void solve_factored(Eigen::VectorXd& v) const;
+
+  /// Responses between the vertices that feet stood on lately; vertices in ascending order.
+  static constexpr std::size_t kSmallestTable = 300;
+  std::size_t table_side_ = 0;
+  std::vector<std::pair<int, int>> slots_;  // vertex, its row in the table
+  std::vector<double> table_;               // table_side_ squared                        [mm/N]
+  std::vector<std::array<int, 3>> foot_slots_;
 
   std::vector<int> start_;         // first column of each row
   std::vector<int> last_coupled_;  // last row with an entry in each column
