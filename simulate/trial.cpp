@@ -47,7 +47,8 @@ constexpr double kOutside = 1.0;      // penetration that contact does not expla
 constexpr double kGuessInto = 0.5;    // a guessed tip may lie this much deeper in the wall than the
                                       // wire did: contact bends it back more smoothly than a guess
                                       // could [mm]
-constexpr double kSmallestPart = 0.05;       // of a node's share of wire that bends at the exit
+constexpr double kSmallestPart = 0.05;  // of a node's share of wire that bends at the exit
+constexpr double kLongestPart = 2.0;  // of a push: friction turns with the path               [mm]
 constexpr double kSmallestCut = 1.0 / 16.0;  // of a push, when one does not converge
 
 std::string place(const Vec3& p) {
@@ -139,12 +140,12 @@ class Insertion {
   Eigen::Matrix3Xd free_nodes() const { return state_.x.rightCols(rod_.nodes() - problem_.first); }
   const Eigen::Matrix3Xd& forces() const { return forces_; }
 
-  /// One push by `distance`, cut smaller where it has no equilibrium. Empty when even the smallest
-  /// cut has none.
+  /// One push by `distance`, in parts that friction can follow, cut smaller where one has no
+  /// equilibrium. Empty when even the smallest cut has none.
   std::optional<Push> push(double distance) {
     Push record;
     const double target = depth_ + distance;
-    double cut = distance;
+    double cut = std::min(distance, kLongestPart);
     while (depth_ < target - 1e-9) {
       before_cut_ = state_;
       const double from = depth_;

@@ -128,6 +128,7 @@ double WallContact::reach() const {
 ContactEnergy WallContact::sample(const Eigen::Matrix3Xd& x) {
   // Points near the wall. One that was far enough for its motion since is not looked at.
   const double near = reach();
+  fresh_ = false;
   active_.clear();
   for (std::size_t k = 0; k < points_.size(); ++k) {
     const Eigen::Index i = static_cast<Eigen::Index>(k);

@@ -89,7 +89,8 @@ class WallContact {
   /// Takes the lag from the state sampled last; `fully`: and nothing of the one before. Returns the
   /// state's energy with that lag.
   ContactEnergy refresh(bool fully);
-  bool lag_is_fresh() const { return fresh_; }
+  /// Whether the lag is that of the state sampled last; always so where nothing is lagged.
+  bool lag_is_fresh() const { return fresh_ || (!yielding_ && options_.friction == 0.0); }
   /// Energy with the lag as it is, of the state sampled last.
   ContactEnergy energy() const { return energy_; }
 

@@ -51,11 +51,23 @@ struct Bench {
   Bench(const Bench&) = delete;
   Bench& operator=(const Bench&) = delete;
 
-  /// Equilibrium, and what slipped has slipped.
+  /// Equilibrium, with the friction of that very state and not of one before; and what slipped has
+  /// slipped.
   NewtonResult solve(double tolerance = 1e-6) {
     const NewtonResult result =
         statics.solve(problem, state, {.residual_tolerance = tolerance, .max_iterations = 500});
-    if (result.converged) contact.settle();
+    Eigen::Matrix3Xd gradient(3, rod.nodes());
+    Statics::evaluate(problem, state, gradient);
+    gradient.leftCols(problem.first).setZero();
+    gradient.rightCols(rod.nodes() - problem.last).setZero();
+    if (problem.first == 0) gradient.col(0) = free_directions(problem.proximal) * gradient.col(0);
+    if (problem.last == rod.nodes()) {
+      gradient.rightCols<1>() = (free_directions(problem.distal) * gradient.rightCols<1>()).eval();
+    }
+    if (result.converged) {
+      EXPECT_NEAR(gradient.colwise().norm().maxCoeff(), result.residual, 1e-3 * tolerance);
+      contact.settle();
+    }
     return result;
   }
 };
