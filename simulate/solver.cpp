@@ -329,7 +329,7 @@ NewtonResult Statics::solve_with(BlockBand<D>& hessian, BlockBand<D>& untouched,
   const int n = problem.rod->nodes();
   gradient_.resize(D * count);
   step_.resize(D * count);
-  constexpr double kSmallestShift = 1e-7;  // [N/mm]
+  constexpr double kSmallestShift = 1e-7, kLargestShift = 1e30;  // [N/mm]
   constexpr int kEagerRefreshes = 25;  // iterations that refresh the lag; later only those that end
   WallContact* contact = problem.contact;
   const bool twisted = D == 4;
@@ -404,6 +404,7 @@ NewtonResult Statics::solve_with(BlockBand<D>& hessian, BlockBand<D>& untouched,
         for (int k = 0; k < count; ++k) hessian.own(k).diagonal().array() += shift;
       }
       if (hessian.factor()) break;
+      if (!(shift < kLargestShift)) return finish(false);  // a number in it is not finite
     }
     step_ = -gradient_;
     hessian.solve(step_);

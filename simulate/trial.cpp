@@ -395,6 +395,9 @@ class Insertion {
           vessel_.locator.nearest(touch.position - rod_.radius * touch.normal).triangle;
       if (triangle >= 0) triangle_forces_.emplace_back(triangle, touch.normal_force);
     }
+    if (contact_.lost()) {
+      record.max_penetration = std::max(record.max_penetration, vessel_.lumen.band());
+    }
     record.tip_force = at_tip.norm();
     for (int i = std::max(1, problem_.first); i + 1 < n; ++i) {
       record.peak_curvature = std::max(record.peak_curvature, turn_at(i).norm() / rod_.share[i]);

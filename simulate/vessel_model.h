@@ -1,5 +1,6 @@
 #pragma once
 /// The vessel as wires feel it: built once per patient, shared read-only by all trials.
+#include <algorithm>
 #include <memory>
 
 #include "preprocess/vessel.h"
@@ -10,11 +11,14 @@
 namespace wireplan::simulate {
 
 struct VesselModel {
-  /// Of a rigid vessel; with a wall, of one that yields.
+  /// A wall that yields is felt further out than one that does not.
+  static constexpr double kYieldingBand = 5.0;  //                                        [mm]
+
+  /// Of a rigid vessel; with a wall, of one that yields: its band is at least kYieldingBand.
   explicit VesselModel(const Surface& surface, const LumenOptions& options = {})
       : lumen(surface, options), locator(surface) {}
-  VesselModel(const Surface& surface, const Wall& wall, const LumenOptions& options = {.band = 5.0})
-      : lumen(surface, options),
+  VesselModel(const Surface& surface, const Wall& wall, LumenOptions options = {})
+      : lumen(surface, (options.band = std::max(options.band, kYieldingBand), options)),
         locator(surface),
         compliance(std::make_unique<WallCompliance>(surface, wall)) {}
 

@@ -20,6 +20,9 @@ Rub rub(double u, double slip) {
   return {u * part * (1.0 - part / 3.0), part * (2.0 - part), 2.0 * (1.0 - part) / slip};
 }
 
+/// A smaller gradient than this is that of no wall: the point is beyond the field.
+constexpr double kSmallestSlope = 0.01;
+
 /// How much further from the wall than before a point may be than its motion says: the gradient of
 /// the smooth field is not quite 1.
 constexpr double kLipschitz = 1.2;
@@ -109,7 +112,7 @@ void WallContact::begin(const Eigen::Matrix3Xd& x) {
       const Eigen::Index i = static_cast<Eigen::Index>(k);
       if (lag_force_[i] <= 0.0 || !is_free(points_[k])) continue;
       const WallSample wall = vessel_.lumen.sample(position_of(points_[k], x));
-      if (wall.distance > near + 1.0 || wall.gradient.isZero(0.0)) continue;
+      if (wall.distance > near + 1.0 || wall.gradient.norm() < kSmallestSlope) continue;
       lag_normal_.col(i) = wall.gradient.normalized();
       lag_points_.push_back(static_cast<int>(k));
     }
@@ -128,7 +131,7 @@ double WallContact::reach() const {
 ContactEnergy WallContact::sample(const Eigen::Matrix3Xd& x) {
   // Points near the wall. One that was far enough for its motion since is not looked at.
   const double near = reach();
-  fresh_ = false;
+  fresh_ = lost_ = false;
   active_.clear();
   for (std::size_t k = 0; k < points_.size(); ++k) {
     const Eigen::Index i = static_cast<Eigen::Index>(k);
@@ -149,6 +152,10 @@ ContactEnergy WallContact::sample(const Eigen::Matrix3Xd& x) {
     known_distance_[i] = bound_[i] = wall.distance;
     touched_[k] = wall.distance < near ? 1 : 0;
     if (touched_[k] == 0) continue;
+    if (wall.gradient.squaredNorm() < kSmallestSlope * kSmallestSlope) {
+      lost_ = true;
+      continue;
+    }
     active_.push_back({.point = static_cast<int>(k), .position = p, .wall = wall});
   }
   find_forces();

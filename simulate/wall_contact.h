@@ -71,6 +71,10 @@ class WallContact {
   /// Points that touch in the state sampled last, proximal to distal.
   const std::vector<Touch>& touches();
 
+  /// Whether a point is so far outside that the field knows no wall there, in the state sampled
+  /// last: it feels nothing.
+  bool lost() const { return lost_; }
+
   /// What the points remember from one equilibrium to the next.
   struct Memory {
     Eigen::Matrix3Xd anchor;       // (3, m) where friction holds a point to              [mm]
@@ -161,6 +165,7 @@ class WallContact {
 
   // The lag, per point: normal force and normal, for friction; the points that have one.
   bool fresh_ = false;
+  bool lost_ = false;
   Eigen::VectorXd lag_force_;    // [N]
   Eigen::Matrix3Xd lag_normal_;  // unit
   std::vector<int> lag_points_, kept_points_;
