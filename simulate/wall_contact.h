@@ -243,14 +243,15 @@ void WallContact::add(Sink& sink) {
       for (int j = coupled ? coupling_.first_coupled(row) : row; j < row; ++j) {
         const Active& other = active_[static_cast<std::size_t>(j)];
         if (!in_band(active, other)) continue;
-        const Mat3 H = coupling_.stiffness(row, j) * n * other.wall.gradient.transpose();
+        const Vec3 m = coupling_.stiffness(row, j) * other.wall.gradient;
+        const Mat3 H = n * m.transpose(), H_transposed = m * n.transpose();
         for_each_node(point_of(active), [&](int p, double w_p) {
           for_each_node(point_of(other), [&](int q, double w_q) {
             if (p == q) {
-              sink.hessian(p, q, (w_p * w_q) * (H + H.transpose()));
+              sink.hessian(p, q, (w_p * w_q) * (H + H_transposed));
             } else {
               sink.hessian(std::max(p, q), std::min(p, q),
-                           (w_p * w_q) * (p > q ? H : Mat3(H.transpose())));
+                           (w_p * w_q) * (p > q ? H : H_transposed));
             }
           });
         });
