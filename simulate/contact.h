@@ -1,7 +1,9 @@
 #pragma once
 /// Wire against wall: a smooth signed distance field of the vessel's surface, shared by all trials,
 /// and the law that turns a gap into a force.
+#include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstdint>
 #include <optional>
 #include <vector>
@@ -90,6 +92,15 @@ struct ContactLaw {
     if (gap <= -s) return {0.5 * k * gap * gap + k * s * s / 6.0, k * gap, k};
     const double d = s - gap;
     return {k * d * d * d / (12.0 * s), -k * d * d / (4.0 * s), k * d / (2.0 * s)};
+  }
+  /// Mean stiffness between the gap and the one at which the force is `expected` >= 0 [N/mm]: the
+  /// slope of the chord [N/mm^2].
+  double chord(double gap, double expected) const {
+    const Value here = at(gap);
+    const double s = smoothing, k = stiffness;
+    const double there = expected < k * s ? s - std::sqrt(4.0 * s * expected / k) : -expected / k;
+    if (std::abs(there - gap) < 1e-9) return here.curvature;
+    return std::max(0.0, (expected + here.slope) / (gap - there));
   }
 };
 

@@ -153,6 +153,26 @@ SurfacePoint TriangleLocator::nearest(const Vec3& point) const {
   return {best.triangle, {t[0], t[1], t[2]}, weight / weight.sum()};
 }
 
+Mat3 TriangleLocator::weight_slopes(const SurfacePoint& at) const {
+  Mat3 slopes = Mat3::Zero();
+  if (at.triangle < 0) return slopes;
+  const std::array<Vec3, 3> corner = corners(at.triangle);
+  const int inside = static_cast<int>((at.weight.array() > 0.0).count());
+  if (inside == 3) {
+    const Vec3 normal = (corner[1] - corner[0]).cross(corner[2] - corner[0]);
+    for (int a = 0; a < 3; ++a) {
+      const std::size_t b = static_cast<std::size_t>((a + 1) % 3), c = 3 - b - std::size_t(a);
+      slopes.row(a) = normal.cross(corner[c] - corner[b]) / normal.squaredNorm();
+    }
+  } else if (inside == 2) {
+    const std::size_t b = at.weight[0] > 0.0 ? 0 : 1, c = at.weight[2] > 0.0 ? 2 : 1;
+    const Vec3 edge = corner[c] - corner[b];
+    slopes.row(static_cast<int>(c)) = edge / edge.squaredNorm();
+    slopes.row(static_cast<int>(b)) = -slopes.row(static_cast<int>(c));
+  }
+  return slopes;
+}
+
 std::size_t TriangleLocator::memory_bytes() const {
   return sizeof(double) * static_cast<std::size_t>(surface_.vertices.size()) +
          sizeof(int) * static_cast<std::size_t>(surface_.triangles.size()) +

@@ -26,6 +26,10 @@ class TriangleLocator {
   /// of lowest index. Fastest within 0.4 mm of the surface. Allocates nothing.
   SurfacePoint nearest(const Vec3& point) const;
 
+  /// How the weights of a point that nearest() found change as it moves on: per weight (row) and
+  /// coordinate [1/mm]. Along its edge alone where it lies on one, not at all at a corner.
+  Mat3 weight_slopes(const SurfacePoint& at) const;
+
   std::size_t memory_bytes() const;
 
  private:

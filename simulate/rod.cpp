@@ -177,21 +177,25 @@ void transport_frames(const RodState& base, RodState& moved, int first_edge, int
   const auto tangent = [](const RodState& state, int i) -> Vec3 {
     return (state.x.col(i + 1) - state.x.col(i)).normalized();
   };
-  for (int i = first_edge; i <= last_edge; ++i) {
-    const Vec3 to = tangent(moved, i);
-    Vec3 d = parallel_transport(base.director.col(i), tangent(base, i), to);
-    d -= d.dot(to) * to;  // rounding must not build up over thousands of steps
-    moved.director.col(i) = d.normalized();
-  }
-  // Twist of the reference directors: follow the angle of before, so that it never jumps by a turn.
-  for (int i = std::max(first_edge, 1); i <= std::min(last_edge + 1, edges - 1); ++i) {
-    const Vec3 t_a = tangent(moved, i - 1), t_b = tangent(moved, i);
-    const Vec3 carried = parallel_transport(moved.director.col(i - 1), t_a, t_b);
-    const double before = base.reference_twist[i];
-    const Vec3 expected = std::cos(before) * carried + std::sin(before) * t_b.cross(carried);
-    const Vec3 actual = moved.director.col(i);
-    moved.reference_twist[i] =
-        before + std::atan2(expected.cross(actual).dot(t_b), expected.dot(actual));
+  Vec3 t_a = first_edge > 0 ? tangent(moved, first_edge - 1) : Vec3::Zero();
+  for (int i = first_edge; i <= std::min(last_edge + 1, edges - 1); ++i) {
+    const Vec3 t_b = tangent(moved, i);
+    if (i <= last_edge) {
+      Vec3 d = parallel_transport(base.director.col(i), tangent(base, i), t_b);
+      d -= d.dot(t_b) * t_b;  // rounding must not build up over thousands of steps
+      moved.director.col(i) = d.normalized();
+    }
+    if (i > 0) {
+      // Twist of the reference directors: the angle next to that of before, so that it never jumps
+      // by a turn.
+      const Vec3 carried = parallel_transport(moved.director.col(i - 1), t_a, t_b);
+      const Vec3 actual = moved.director.col(i);
+      const double angle = std::atan2(carried.cross(actual).dot(t_b), carried.dot(actual));
+      const double before = base.reference_twist[i];
+      const bool far = std::abs(angle - before) > kPi;
+      moved.reference_twist[i] = far ? before + std::remainder(angle - before, 2.0 * kPi) : angle;
+    }
+    t_a = t_b;
   }
 }
 

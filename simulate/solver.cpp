@@ -68,6 +68,7 @@ template <class Sink>
 Energy assemble_with_contact(const Problem& problem, const RodState& state, Sink& sink) {
   Energy energy = assemble(problem, state, sink);
   if (problem.contact == nullptr) return energy;
+  problem.contact->expect_nothing();
   problem.contact->begin(state.x);
   const ContactEnergy contact = problem.contact->refresh(true);
   problem.contact->add(sink);
@@ -330,6 +331,8 @@ NewtonResult Statics::solve_with(BlockBand<D>& hessian, BlockBand<D>& untouched,
   gradient_.resize(D * count);
   step_.resize(D * count);
   constexpr double kSmallestShift = 1e-7, kLargestShift = 1e30;  // [N/mm]
+  constexpr double kFirstShift = 1e-4;  // of a step that is too long [N/mm]
+  constexpr int kMostShifts = 6;        // of those
   constexpr int kEagerRefreshes = 25;  // iterations that refresh the lag; later only those that end
   WallContact* contact = problem.contact;
   const bool twisted = D == 4;
@@ -394,33 +397,43 @@ NewtonResult Statics::solve_with(BlockBand<D>& hessian, BlockBand<D>& untouched,
     if (result.iterations == options.max_iterations || !std::isfinite(result.residual))
       return finish(false);
 
-    // 1. Direction: Newton's, with the Hessian shifted just far enough to be positive definite.
+    // 1. Direction: Newton's, with the Hessian shifted just far enough to be positive definite, and
+    // for the whole step to be safe: a floppy wire would else go far and be cut short.
     untouched = hessian;
-    shift *= 0.1;
-    if (shift < kSmallestShift) shift = 0.0;
-    for (;; shift = std::max(kSmallestShift, 8.0 * shift)) {
-      if (shift > 0.0) {
-        hessian = untouched;
-        for (int k = 0; k < count; ++k) hessian.own(k).diagonal().array() += shift;
+    const double last_shift = shift;
+    const auto apply_shift = [&] {
+      hessian = untouched;
+      for (int k = 0; k < count; ++k) hessian.own(k).diagonal().array() += shift;
+    };
+    double slope, cap;  // of the energy along the step; largest part of the step that is safe
+    shift = 0.0;
+    for (int shifts = 0;; ++shifts) {
+      while (!hessian.factor()) {
+        shift = shift == 0.0 ? std::max(kSmallestShift, 0.1 * last_shift) : 8.0 * shift;
+        if (!(shift < kLargestShift)) return finish(false);  // a number in it is not finite
+        apply_shift();
       }
-      if (hessian.factor()) break;
-      if (!(shift < kLargestShift)) return finish(false);  // a number in it is not finite
-    }
-    step_ = -gradient_;
-    hessian.solve(step_);
-    double slope = gradient_.dot(step_);
-    if (contact != nullptr && shift == 0.0 && contact->has_remainder()) {
-      slope = refine_step<D>(problem, hessian, slope);
+      step_ = -gradient_;
+      hessian.solve(step_);
+      slope = gradient_.dot(step_);
+      if (contact != nullptr && shift == 0.0 && contact->has_remainder()) {
+        slope = refine_step<D>(problem, hessian, slope);
+      }
+      cap = std::numeric_limits<double>::infinity();
+      if (contact != nullptr) cap = contact->largest_safe_part(motion());
+      if (twisted) cap = std::min(cap, largest_turning_step<D>(problem, step_));
+      if (contact == nullptr || cap >= 1.0 || shifts == kMostShifts) break;
+      shift = std::max(kFirstShift, 10.0 * shift);
+      apply_shift();
     }
     if (step_.cwiseAbs().maxCoeff() < 64.0 * kEpsilon * extent &&
         result.residual <= result.rounding_floor) {
       return finish(true);
     }
 
+    if (contact != nullptr) contact->expect_after(motion());
+
     // 2. Full step, edges turned rather than lengthened; most steps end here.
-    double cap = std::numeric_limits<double>::infinity();
-    if (contact != nullptr) cap = contact->largest_safe_part(motion());
-    if (twisted) cap = std::min(cap, largest_turning_step<D>(problem, step_));
     // Rounding may hide the fall of the energy close to the minimum.
     const double rounding = 1e-13 * (1.0 + std::abs(energy));
     bool accepted = false;
@@ -450,6 +463,15 @@ NewtonResult Statics::solve_with(BlockBand<D>& hessian, BlockBand<D>& untouched,
     };
     turn_edges<D>(problem, state, step_, std::min(1.0, cap), trial_);
     try_trial(std::min(1.0, cap));
+    // What friction and yielding lag has no energy: a full step may be a good one all the same.
+    bool refreshed = false;
+    if (!accepted && shift == 0.0 && contact != nullptr && contact->has_remainder()) {
+      contact->save_lag();
+      contact->refresh(false);
+      trial_wire_energy = differentiate(trial_);
+      accepted = refreshed = largest_force() <= 0.5 * result.residual;
+      if (!accepted) contact->restore_lag();
+    }
 
     // 3. Else straight along the step to the lowest point of the exact quartic, plus a parabola for
     // the terms that are no polynomial; shorter until the energy falls.
@@ -486,7 +508,7 @@ NewtonResult Statics::solve_with(BlockBand<D>& hessian, BlockBand<D>& untouched,
       trial_.reference_twist = state.reference_twist;
     }
     wire_energy = trial_wire_energy;
-    if (contact != nullptr) {
+    if (contact != nullptr && !refreshed) {
       if (result.iterations < kEagerRefreshes) contact->refresh(false);
       differentiate(state);
     }
@@ -497,7 +519,7 @@ template <int D>
 double Statics::refine_step(const Problem& problem, const BlockBand<D>& factored, double slope) {
   // What the banded Hessian H lacks of the exact one, R: (I + H^-1 R) step = -H^-1 gradient, by
   // GMRES (Saad & Schultz 1986) from the banded step, as few directions as it takes.
-  constexpr double kEnough = 0.2;  // of the first residual: more saved no iterations
+  constexpr double kEnough = 0.1;  // of the first residual: more saved no iterations
   const Eigen::Index size = step_.size();
   krylov_.resize(size, kKrylov + 1);
   constexpr double kSmall = 0.02;  // of the gradient: not worth a solve

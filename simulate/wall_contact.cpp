@@ -23,6 +23,10 @@ Rub rub(double u, double slip) {
 /// A smaller gradient than this is that of no wall: the point is beyond the field.
 constexpr double kSmallestSlope = 0.01;
 
+/// A point that is expected to touch stays in sight so much further from the wall than contact
+/// reaches [mm].
+constexpr double kInSight = 0.3;
+
 /// How much further from the wall than before a point may be than its motion says: the gradient of
 /// the smooth field is not quite 1.
 constexpr double kLipschitz = 1.2;
@@ -54,20 +58,21 @@ WallContact::WallContact(const Rod& rod, const VesselModel& vessel, const Contac
   const Eigen::Index m = static_cast<Eigen::Index>(points_.size());
   memory_.anchor.setZero(3, m);
   memory_.normal_force.setZero(m);
-  lag_force_.setZero(m);
-  lag_normal_.setZero(3, m);
+  lag_.force.setZero(m);
+  lag_.normal.setZero(3, m);
   position_.setZero(3, m);
   known_position_.setConstant(3, m, std::numeric_limits<double>::infinity());
   known_distance_.setZero(m);
   bound_.setConstant(m, std::numeric_limits<double>::infinity());
   touched_.assign(points_.size(), 0);
   predicted_.setZero(m);
-  lag_points_.reserve(points_.size());
+  expected_.setConstant(m, kNoExpectation);
+  lag_.points.reserve(points_.size());
   kept_points_.reserve(points_.size());
   active_.reserve(points_.size());
   touches_.reserve(points_.size());
   if (yielding_) {
-    feet_.resize(points_.size());
+    lag_.feet.resize(points_.size());
     press_.setZero(m);
   }
 }
@@ -82,7 +87,8 @@ void WallContact::start_at(const Eigen::Matrix3Xd& x) {
     memory_.anchor.col(static_cast<Eigen::Index>(k)) = position_of(points_[k], x);
   }
   memory_.normal_force.setZero();
-  lag_force_.setZero();
+  lag_.force.setZero();
+  expect_nothing();
 }
 
 void WallContact::predict(double distance) {
@@ -97,27 +103,27 @@ void WallContact::predict(double distance) {
     const Eigen::Index i = static_cast<Eigen::Index>(k), j = static_cast<Eigen::Index>(ahead);
     predicted_[i] = memory_.normal_force[j] * points_[k].share / points_[ahead].share;
   }
-  lag_force_ = predicted_;
+  lag_.force = expected_ = predicted_;
 }
 
 // ---------------------------------------------------------------- normal forces
 
 void WallContact::begin(const Eigen::Matrix3Xd& x) {
   // Points that friction is predicted for rub along the wall where they are now.
-  lag_points_.clear();
+  lag_.points.clear();
   fresh_ = false;
   const double near = radius_ + options_.law.smoothing;
   if (options_.friction > 0.0) {
     for (std::size_t k = 0; k < points_.size(); ++k) {
       const Eigen::Index i = static_cast<Eigen::Index>(k);
-      if (lag_force_[i] <= 0.0 || !is_free(points_[k])) continue;
+      if (lag_.force[i] <= 0.0 || !is_free(points_[k])) continue;
       const WallSample wall = vessel_.lumen.sample(position_of(points_[k], x));
       if (wall.distance > near + 1.0 || wall.gradient.norm() < kSmallestSlope) continue;
-      lag_normal_.col(i) = wall.gradient.normalized();
-      lag_points_.push_back(static_cast<int>(k));
+      lag_.normal.col(i) = wall.gradient.normalized();
+      lag_.points.push_back(static_cast<int>(k));
     }
   }
-  std::fill(feet_.begin(), feet_.end(), SurfacePoint{});
+  std::fill(lag_.feet.begin(), lag_.feet.end(), SurfacePoint{});
   feet_changed_ = true;
   sample(x);
 }
@@ -130,7 +136,6 @@ double WallContact::reach() const {
 
 ContactEnergy WallContact::sample(const Eigen::Matrix3Xd& x) {
   // Points near the wall. One that was far enough for its motion since is not looked at.
-  const double near = reach();
   fresh_ = lost_ = false;
   active_.clear();
   for (std::size_t k = 0; k < points_.size(); ++k) {
@@ -140,6 +145,7 @@ ContactEnergy WallContact::sample(const Eigen::Matrix3Xd& x) {
     if (!is_free(points_[k])) continue;
     const double moved = (p - known_position_.col(i)).norm();
     bound_[i] = known_distance_[i] - kLipschitz * moved;
+    const double near = reach() + (expected_[i] > 0.0 ? kInSight : 0.0);
     if (bound_[i] >= near) continue;
     WallSample wall;
     if (touched_[k] == 0) {
@@ -170,7 +176,6 @@ void WallContact::find_forces() {
       const ContactLaw::Value law = options_.law.at(active.wall.distance - radius_);
       energy_.contact += share * law.energy;
       active.force = -share * law.slope;
-      active.stiffness = share * law.curvature;
     }
     return;
   }
@@ -180,7 +185,7 @@ void WallContact::find_forces() {
   bool same = !feet_changed_ && active_.size() == coupled_points_.size();
   for (std::size_t k = 0; k < active_.size(); ++k) {
     const std::size_t point = static_cast<std::size_t>(active_[k].point);
-    if (feet_[point].triangle < 0) feet_[point] = foot_of(active_[k]);
+    if (lag_.feet[point].triangle < 0) lag_.feet[point] = foot_of(active_[k]);
     same = same && coupled_points_[k] == active_[k].point;
   }
   if (!same) {
@@ -188,26 +193,27 @@ void WallContact::find_forces() {
     coupled_feet_.clear();
     for (const Active& active : active_) {
       coupled_points_.push_back(active.point);
-      coupled_feet_.push_back(feet_[static_cast<std::size_t>(active.point)]);
+      coupled_feet_.push_back(lag_.feet[static_cast<std::size_t>(active.point)]);
     }
     coupling_.set_feet(*vessel_.compliance, coupled_feet_);
     feet_changed_ = false;
   }
   gap_.resize(m);
   share_.resize(m);
-  force_.resize(m);
+  forces_.resize(m);
   for (Eigen::Index k = 0; k < m; ++k) {
     const Active& active = active_[static_cast<std::size_t>(k)];
+    const double expected = expected_[active.point];
     gap_[k] = active.wall.distance - radius_;
     share_[k] = points_[static_cast<std::size_t>(active.point)].share;
-    force_[k] = press_[active.point];
+    forces_[k] = expected >= 0.0 ? expected : press_[active.point];
   }
-  energy_.contact = coupling_.solve(options_.law, gap_, share_, force_, displacement_);
-  energy_.wall = 0.5 * force_.dot(displacement_);
+  energy_.contact = coupling_.solve(options_.law, gap_, share_, forces_, displacement_);
+  energy_.wall = 0.5 * forces_.dot(displacement_);
   press_.setZero();
   for (Eigen::Index k = 0; k < m; ++k) {
     Active& active = active_[static_cast<std::size_t>(k)];
-    active.force = press_[active.point] = force_[k];
+    active.force = press_[active.point] = forces_[k];
     active.yield = displacement_[k];
   }
 }
@@ -221,14 +227,14 @@ SurfacePoint WallContact::foot_of(const Active& active) const {
 // ---------------------------------------------------------------- friction
 
 WallContact::Rubbing WallContact::rubbing_at(int k) const {
-  const Vec3 normal = lag_normal_.col(k);
+  const Vec3 normal = lag_.normal.col(k);
   const Vec3 moved = position_.col(k) - memory_.anchor.col(k);
   const Vec3 along = moved - moved.dot(normal) * normal;
   const double length = along.norm();
   const Rub potential = rub(length, options_.slip);
   return {.length = length,
           .toward = length > 0.0 ? Vec3(along / length) : Vec3::Zero(),
-          .limit = options_.friction * lag_force_[k],
+          .limit = options_.friction * lag_.force[k],
           .energy = potential.energy,
           .slope = potential.slope,
           .curvature = potential.curvature};
@@ -237,7 +243,7 @@ WallContact::Rubbing WallContact::rubbing_at(int k) const {
 ContactEnergy WallContact::lagged_energy() const {
   ContactEnergy energy = energy_;
   energy.friction = 0.0;
-  for (const int k : lag_points_) {
+  for (const int k : lag_.points) {
     const Rubbing rubbing = rubbing_at(k);
     energy.friction += rubbing.limit * rubbing.energy;
   }
@@ -248,7 +254,7 @@ ContactEnergy WallContact::refresh(bool fully) {
   fresh_ = true;
   if (yielding_) {
     for (const Active& active : active_) {
-      feet_[static_cast<std::size_t>(active.point)] = foot_of(active);
+      lag_.feet[static_cast<std::size_t>(active.point)] = foot_of(active);
     }
     feet_changed_ = true;
     find_forces();
@@ -257,34 +263,34 @@ ContactEnergy WallContact::refresh(bool fully) {
     // Between equilibria a point that sticks must not lose its hold when it leaves the wall for an
     // iteration: the normal force of its lag falls no faster than to a fraction of itself.
     constexpr double kKept = 0.3, kNothing = 1e-9;  // [-], [N]
-    kept_points_.swap(lag_points_);
-    lag_points_.clear();
+    kept_points_.swap(lag_.points);
+    lag_.points.clear();
     for (const int k : kept_points_) {
       const bool sticks = rubbing_at(k).length < 2.0 * options_.slip;
-      lag_force_[k] *= sticks && !fully ? kKept : 0.0;
+      lag_.force[k] *= sticks && !fully ? kKept : 0.0;
     }
     for (const Active& active : active_) {
       if (active.force <= 0.0) continue;
       const double slope = active.wall.gradient.norm(), force = active.force * slope;
-      double& kept = lag_force_[active.point];
+      double& kept = lag_.force[active.point];
       if (kept > force) {
         fresh_ = false;
       } else {
-        lag_normal_.col(active.point) = active.wall.gradient / slope;
+        lag_.normal.col(active.point) = active.wall.gradient / slope;
       }
-      lag_points_.push_back(active.point);
+      lag_.points.push_back(active.point);
       // Marked as taken by its sign until all are through.
       kept = -std::max(kept, force);
     }
     for (const int k : kept_points_) {
-      if (lag_force_[k] > kNothing) {
-        lag_points_.push_back(k);
+      if (lag_.force[k] > kNothing) {
+        lag_.points.push_back(k);
         fresh_ = false;
-      } else if (lag_force_[k] > 0.0) {
-        lag_force_[k] = 0.0;
+      } else if (lag_.force[k] > 0.0) {
+        lag_.force[k] = 0.0;
       }
     }
-    for (const int k : lag_points_) lag_force_[k] = std::abs(lag_force_[k]);
+    for (const int k : lag_.points) lag_.force[k] = std::abs(lag_.force[k]);
   }
   return energy_ = lagged_energy();
 }
@@ -295,9 +301,9 @@ double WallContact::settle() {
   // The heat is the friction now, times the way that the anchor went.
   double work = 0.0;
   predicted_.setZero();
-  for (const int k : lag_points_) {
+  for (const int k : lag_.points) {
     const Rubbing rubbing = rubbing_at(k);
-    predicted_[k] = lag_force_[k];
+    predicted_[k] = lag_.force[k];
     const double slipped = rubbing.length - options_.slip;
     if (slipped > 0.0) {
       work += rubbing.limit * slipped;
@@ -345,9 +351,34 @@ bool WallContact::in_band(const Active& a, const Active& b) const {
 }
 
 void WallContact::find_stiffness() {
-  coupling_.find_stiffness();
-  folded_.setZero(coupling_.size());
-  for (int i = 0; i < coupling_.size(); ++i) {
+  const Eigen::Index m = static_cast<Eigen::Index>(active_.size());
+  change_.resize(m);  // scratch: of the contact law
+  for (Eigen::Index k = 0; k < m; ++k) {
+    Active& active = active_[static_cast<std::size_t>(k)];
+    const double share = points_[static_cast<std::size_t>(active.point)].share;
+    const double gap = active.wall.distance - radius_ + active.yield;
+    const double expected = expected_[active.point];
+    active.stiffness = change_[k] =
+        share * (expected >= 0.0 ? options_.law.chord(gap, expected / share)
+                                 : options_.law.at(gap).curvature);
+  }
+  if (!yielding_) return;
+  coupling_.find_stiffness(change_);
+
+  foot_slopes_.resize(active_.size());
+  for (std::size_t k = 0; k < active_.size(); ++k) {
+    // Of the foot p - d n / |n|^2 as its point p moves.
+    const WallSample& wall = active_[k].wall;
+    const double squared = wall.gradient.squaredNorm();
+    const Mat3 along = wall.gradient * wall.gradient.transpose() / squared;
+    foot_slopes_[k] = vessel_.locator.weight_slopes(coupled_feet_[k]) *
+                      (Mat3::Identity() - along -
+                       (wall.distance / squared) * (Mat3::Identity() - 2.0 * along) * wall.hessian);
+  }
+  coupling_.find_slopes(coupled_feet_, foot_slopes_);
+
+  folded_.setZero(m);
+  for (int i = 0; i < m; ++i) {
     for (int j = coupling_.first_coupled(i); j < i; ++j) {
       if (in_band(active_[static_cast<std::size_t>(i)], active_[static_cast<std::size_t>(j)])) {
         continue;
@@ -359,47 +390,63 @@ void WallContact::find_stiffness() {
   }
 }
 
-double WallContact::gap_change(const Active& active, const Motion& motion) const {
-  return active.wall.gradient.dot(motion.of(points_[static_cast<std::size_t>(active.point)]));
+void WallContact::find_change(const Motion& motion) {
+  const Eigen::Index m = static_cast<Eigen::Index>(active_.size());
+  gap_.resize(m);
+  motion_.resize(3, m);
+  for (Eigen::Index k = 0; k < m; ++k) {
+    const Active& active = active_[static_cast<std::size_t>(k)];
+    motion_.col(k) = motion.of(points_[static_cast<std::size_t>(active.point)]);
+    gap_[k] = active.wall.gradient.dot(motion_.col(k));
+  }
+  change_ = gap_;
+  if (yielding_) {
+    coupling_.add_change_of_compliance(motion_, forces_, change_);
+    coupling_.multiply_by_stiffness(change_);
+  } else {
+    for (Eigen::Index k = 0; k < m; ++k) {
+      change_[k] *= active_[static_cast<std::size_t>(k)].stiffness;
+    }
+  }
+}
+
+void WallContact::expect_after(const Motion& motion) {
+  find_change(motion);
+  expect_nothing();
+  for (std::size_t k = 0; k < active_.size(); ++k) {
+    expected_[active_[k].point] =
+        std::max(0.0, active_[k].force - change_[static_cast<Eigen::Index>(k)]);
+  }
 }
 
 void WallContact::add_remainder(const Motion& motion, Eigen::VectorXd& product) {
-  // How all forces change, by the exact stiffness, and what of it add() has.
+  find_change(motion);
   const Eigen::Index m = static_cast<Eigen::Index>(active_.size());
-  gap_.resize(m);
-  for (Eigen::Index k = 0; k < m; ++k) {
-    gap_[k] = gap_change(active_[static_cast<std::size_t>(k)], motion);
-  }
-  share_ = gap_;  // scratch: becomes the change of the forces
-  force_.setZero(m);
+  left_out_.setZero(m);
   if (yielding_) {
-    coupling_.multiply_by_stiffness(share_);
-    force_ = share_ - folded_.cwiseProduct(gap_);
+    left_out_ = change_ - folded_.cwiseProduct(gap_);
     for (int i = 0; i < m; ++i) {
       for (int j = coupling_.first_coupled(i); j <= i; ++j) {
         if (!in_band(active_[static_cast<std::size_t>(i)], active_[static_cast<std::size_t>(j)])) {
           continue;
         }
         const double s = coupling_.stiffness(i, j);
-        force_[i] -= s * gap_[j];
-        if (j < i) force_[j] -= s * gap_[i];
+        left_out_[i] -= s * gap_[j];
+        if (j < i) left_out_[j] -= s * gap_[i];
       }
-    }
-  } else {
-    for (Eigen::Index k = 0; k < m; ++k) {
-      share_[k] *= active_[static_cast<std::size_t>(k)].stiffness;
     }
   }
 
   for (Eigen::Index k = 0; k < m; ++k) {
     const Active& active = active_[static_cast<std::size_t>(k)];
-    Vec3 change = force_[k] * active.wall.gradient;
+    Vec3 out_of_balance = left_out_[k] * active.wall.gradient;
     if (options_.friction > 0.0 && fresh_ && active.force > 0.0) {
       const Rubbing rubbing = rubbing_at(active.point);
-      change -= (options_.friction * rubbing.slope * share_[k] * active.wall.gradient.norm()) *
-                rubbing.toward;
+      out_of_balance -=
+          (options_.friction * rubbing.slope * change_[k] * active.wall.gradient.norm()) *
+          rubbing.toward;
     }
-    motion.scatter(points_[static_cast<std::size_t>(active.point)], change, product);
+    motion.scatter(points_[static_cast<std::size_t>(active.point)], out_of_balance, product);
   }
 }
 

@@ -93,17 +93,17 @@ class WallContact {
   /// Takes the lag from the state sampled last; `fully`: and nothing of the one before. Returns the
   /// state's energy with that lag.
   ContactEnergy refresh(bool fully);
+  /// The lag may be taken back to what it was when saved; the next sampling is with that.
+  void save_lag() { saved_lag_ = lag_; }
+  void restore_lag() {
+    lag_ = saved_lag_;
+    fresh_ = false;
+    feet_changed_ = true;
+  }
   /// Whether the lag is that of the state sampled last; always so where nothing is lagged.
   bool lag_is_fresh() const { return fresh_ || (!yielding_ && options_.friction == 0.0); }
   /// Energy with the lag as it is, of the state sampled last.
   ContactEnergy energy() const { return energy_; }
-
-  /// Adds gradient and Hessian of the state sampled last to a sink of elements.h. Pairs of points
-  /// further apart than two nodes are left out of the Hessian, with their size added on its
-  /// diagonal, so that it is positive definite where the exact one is; and so is how friction
-  /// depends on the normal force: see add_remainder().
-  template <class Sink>
-  void add(Sink& sink);
 
   /// A motion of the wire, node by node with `stride` numbers each, of which the first three are
   /// the node's; nodes from `first` to before `last`, the others are at rest.
@@ -116,7 +116,29 @@ class WallContact {
     /// Adds a force at a point to its nodes, in the same layout.
     void scatter(const Point& point, const Vec3& force, Eigen::VectorXd& target) const;
   };
-  /// Adds to `product` what the Hessian of add() leaves out, times the motion.
+
+  /// What Newton's method expects the normal forces to become. Where there is an expectation, the
+  /// Hessian of add() has the contact law's mean stiffness between the force and the expected one,
+  /// and the wall's curvature times the latter: Newton's method for positions and forces together.
+  /// The law is quadratic where it starts; on its tangent a force that is to vanish would fall to
+  /// only a quarter of itself per iteration, and a tip that was guessed too deep in the wall would
+  /// make the Hessian indefinite.
+  ///
+  /// After a step along the motion, full or not: as the Hessian of the state sampled last says.
+  void expect_after(const Motion& motion);
+  /// Makes the Hessian that of the energy.
+  void expect_nothing() { expected_.setConstant(kNoExpectation); }
+
+  /// Adds gradient and Hessian of the state sampled last to a sink of elements.h. Pairs of points
+  /// further apart than two nodes are left out of the Hessian, with their size added on its
+  /// diagonal, so that it is positive definite where the exact one is; and so is how friction
+  /// depends on the normal force: see add_remainder().
+  template <class Sink>
+  void add(Sink& sink);
+
+  /// Adds to `product` what the Hessian of add() leaves out, times the motion: far pairs,
+  /// friction's dependence on normal forces, and how the wall yields less or more where the wire
+  /// slides to.
   void add_remainder(const Motion& motion, Eigen::VectorXd& product);
   bool has_remainder() const { return !active_.empty() && (yielding_ || options_.friction > 0.0); }
 
@@ -151,7 +173,7 @@ class WallContact {
   SurfacePoint foot_of(const Active& active) const;
   void find_stiffness();
   bool in_band(const Active& a, const Active& b) const;
-  double gap_change(const Active& active, const Motion& motion) const;
+  void find_change(const Motion& motion);
 
   const VesselModel& vessel_;
   ContactOptions options_;
@@ -163,12 +185,18 @@ class WallContact {
   std::vector<Touch> touches_;
   ContactEnergy energy_;
 
-  // The lag, per point: normal force and normal, for friction; the points that have one.
+  /// Per point: normal force and normal, for friction; the points that have one; and the place on
+  /// the yielding wall.
+  struct Lag {
+    Eigen::VectorXd force;    // [N]
+    Eigen::Matrix3Xd normal;  // unit
+    std::vector<int> points;
+    std::vector<SurfacePoint> feet;
+  };
+  Lag lag_, saved_lag_;
+  std::vector<int> kept_points_;
   bool fresh_ = false;
   bool lost_ = false;
-  Eigen::VectorXd lag_force_;    // [N]
-  Eigen::Matrix3Xd lag_normal_;  // unit
-  std::vector<int> lag_points_, kept_points_;
 
   // Per point: where it is, and the last known distance of the wall, with the place of that.
   Eigen::Matrix3Xd position_, known_position_;  // [mm]
@@ -176,15 +204,23 @@ class WallContact {
   Eigen::VectorXd bound_;                       // at least so far from the wall now         [mm]
   std::vector<char> touched_;                   // when the wall was last looked at
 
-  // The yielding wall: feet per point, and the coupling of those that touch.
+  // The yielding wall: the coupling of the points that touch, and their feet.
   Yielding coupling_;
-  std::vector<SurfacePoint> feet_, coupled_feet_;
+  std::vector<SurfacePoint> coupled_feet_;
   std::vector<int> coupled_points_;
   bool feet_changed_ = true;
+  std::vector<Mat3> foot_slopes_;  // of the weights of each foot over its point's motion   [1/mm]
+  Eigen::VectorXd forces_;         // per active point                                      [N]
   Eigen::VectorXd folded_;  // on the diagonal, per active point: see add()                [N/mm]
   Eigen::VectorXd press_;   // normal force on the yielding wall, per point, last found         [N]
 
-  Eigen::VectorXd predicted_, gap_, share_, displacement_, force_;  // scratch
+  static constexpr double kNoExpectation = -1.0;
+  Eigen::VectorXd expected_;  // normal force per point, or kNoExpectation                   [N]
+
+  // Scratch. The last four are per active point: gap, length of wire, how a motion changes the
+  // force, and what of that add() leaves out.
+  Eigen::VectorXd predicted_, displacement_, gap_, share_, change_, left_out_;
+  Eigen::Matrix3Xd motion_;
 };
 
 inline Vec3 WallContact::Motion::of_node(int i) const {
@@ -230,15 +266,17 @@ void WallContact::add(Sink& sink) {
 
   // Normal forces: each by itself, and through the wall with its neighbours.
   const bool coupled = Sink::kHessian && yielding_;
-  if (coupled) find_stiffness();
+  if constexpr (Sink::kHessian) find_stiffness();
   for (std::size_t k = 0; k < active_.size(); ++k) {
     const Active& active = active_[k];
     const Vec3& n = active.wall.gradient;
     const int row = static_cast<int>(k);
     const double stiffness =
         coupled ? coupling_.stiffness(row, row) + folded_[row] : active.stiffness;
+    const double expected = expected_[active.point];
     add_own(point_of(active), -active.force * n,
-            stiffness * n * n.transpose() - active.force * active.wall.hessian);
+            stiffness * n * n.transpose() -
+                (expected >= 0.0 ? expected : active.force) * active.wall.hessian);
     if constexpr (Sink::kHessian) {
       for (int j = coupled ? coupling_.first_coupled(row) : row; j < row; ++j) {
         const Active& other = active_[static_cast<std::size_t>(j)];
@@ -260,16 +298,16 @@ void WallContact::add(Sink& sink) {
   }
 
   // Friction, with the normal force and normal of the lag.
-  for (const int k : lag_points_) {
+  for (const int k : lag_.points) {
     const Rubbing rubbing = rubbing_at(k);
     if (rubbing.length == 0.0) {  // at its anchor: as stiff to all sides
-      const Vec3 normal = lag_normal_.col(k);
+      const Vec3 normal = lag_.normal.col(k);
       add_own(
           points_[static_cast<std::size_t>(k)], Vec3::Zero(),
           (rubbing.limit * rubbing.curvature) * (Mat3::Identity() - normal * normal.transpose()));
       continue;
     }
-    const Vec3 normal = lag_normal_.col(k), &t = rubbing.toward;
+    const Vec3 normal = lag_.normal.col(k), &t = rubbing.toward;
     const double across = rubbing.slope / rubbing.length;
     const Mat3 along = t * t.transpose(), off = normal * normal.transpose();
     add_own(

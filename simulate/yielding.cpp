@@ -76,6 +76,38 @@ void Yielding::set_feet(const WallCompliance& wall, const std::vector<SurfacePoi
   inverse_.values.resize(compliance_.values.size());
 }
 
+void Yielding::find_slopes(const std::vector<SurfacePoint>& feet, const std::vector<Mat3>& slopes) {
+  slope_.resize(compliance_.values.size());
+  for (std::size_t i = 0; i < feet.size(); ++i) {
+    const std::size_t first = static_cast<std::size_t>(start_[i]);
+    for (std::size_t j = first; j <= i; ++j) {
+      Mat3 response;  // between the vertices of either foot
+      for (std::size_t a = 0; a < 3; ++a) {
+        const double* row =
+            table_.data() + static_cast<std::size_t>(foot_slots_[i][a]) * table_side_;
+        for (std::size_t b = 0; b < 3; ++b) {
+          response(static_cast<int>(a), static_cast<int>(b)) = row[foot_slots_[j][b]];
+        }
+      }
+      auto& slope = slope_[static_cast<std::size_t>(offset_[i]) + j - first];
+      slope.col(0) = slopes[i].transpose() * (response * feet[j].weight);
+      slope.col(1) = slopes[j].transpose() * (response.transpose() * feet[i].weight);
+    }
+  }
+}
+
+void Yielding::add_change_of_compliance(const Eigen::Matrix3Xd& motion, const Eigen::VectorXd& f,
+                                        Eigen::VectorXd& w) const {
+  for (int i = 0; i < size(); ++i) {
+    const auto* row = slope_.data() + offset_[static_cast<std::size_t>(i)] - first_coupled(i);
+    for (int j = first_coupled(i); j <= i; ++j) {
+      const double change = row[j].col(0).dot(motion.col(i)) + row[j].col(1).dot(motion.col(j));
+      w[i] += change * f[j];
+      if (j < i) w[j] += change * f[i];
+    }
+  }
+}
+
 void Yielding::multiply_by_compliance(const Eigen::VectorXd& f, Eigen::VectorXd& w) const {
   w.setZero(size());
   for (int i = 0; i < size(); ++i) {
@@ -95,9 +127,9 @@ void Yielding::factor() {
     for (int j = first_coupled(i); j <= i; ++j) {
       double sum = root_[i] * c[j] * root_[j];
       const double* above = factor_.row(*this, j);
-      for (int k = std::max(first_coupled(i), first_coupled(j)); k < j; ++k) {
-        sum -= row[k] * above[k];
-      }
+      const int first = std::max(first_coupled(i), first_coupled(j));
+      sum -= Eigen::Map<const Eigen::VectorXd>(row + first, j - first)
+                 .dot(Eigen::Map<const Eigen::VectorXd>(above + first, j - first));
       row[j] = j < i ? sum / above[j] : std::sqrt(1.0 + sum);
     }
   }
@@ -140,10 +172,10 @@ double Yielding::solve(const ContactLaw& law, const Eigen::VectorXd& gap,
   for (int round = 0; round < kMostRounds; ++round) {
     // Newton on the energy, convex in w: the step takes the forces to lawful_ + z, with z = D^1/2
     // (I + D^1/2 C D^1/2)^-1 D^1/2 (w - C lawful_).
-    factor();
     residual_ = lawful_ - force;
     multiply_by_compliance(residual_, step_);  // C lawful_ - w
     if (m == 0 || step_.cwiseAbs().maxCoeff() <= kTolerance) break;
+    factor();
     residual_ = -step_.cwiseProduct(root_);
     solve_factored(residual_);
     step_ = lawful_ + residual_.cwiseProduct(root_) - force;
@@ -164,7 +196,9 @@ double Yielding::solve(const ContactLaw& law, const Eigen::VectorXd& gap,
   return law_energy;
 }
 
-void Yielding::find_stiffness() {
+void Yielding::find_stiffness(const Eigen::VectorXd& law_stiffness) {
+  root_ = law_stiffness.cwiseSqrt();
+  factor();
   // Inverse of the factored matrix within the envelope (Takahashi), from the last row upward. Rows
   // k > j couple with j where their envelope reaches it; two of them then couple with each other.
   for (int j = size() - 1; j >= 0; --j) {

@@ -28,10 +28,17 @@ class Yielding {
 
   /// S = -d force / d gap = (C + 1/law's stiffness)^-1 where solve() ended [N/mm]: its entries
   /// within the envelope, which find_stiffness() fills, and all of it as a product in place.
-  void find_stiffness();
+  void find_stiffness(const Eigen::VectorXd& law_stiffness);
   double stiffness(int i, int j) const;  // j <= i; 0 beyond the envelope
   int first_coupled(int i) const { return start_[static_cast<std::size_t>(i)]; }
   void multiply_by_stiffness(Eigen::VectorXd& v) const;
+
+  /// How C changes as the points move along the wall: `slopes` of each foot's weights over the
+  /// motion of its point (TriangleLocator::weight_slopes), of those that set_feet() had.
+  void find_slopes(const std::vector<SurfacePoint>& feet, const std::vector<Mat3>& slopes);
+  /// Adds (dC) f to `w`, for motions (3, m) of the points.
+  void add_change_of_compliance(const Eigen::Matrix3Xd& motion, const Eigen::VectorXd& f,
+                                Eigen::VectorXd& w) const;
 
  private:
   /// Lower triangle of a symmetric matrix, row i from column start_[i] on.
@@ -59,7 +66,8 @@ class Yielding {
   std::vector<int> last_coupled_;  // last row with an entry in each column
   std::vector<std::ptrdiff_t> offset_;
   Envelope compliance_, factor_, inverse_;
-  Eigen::VectorXd root_;  // D^1/2
+  std::vector<Eigen::Matrix<double, 3, 2>> slope_;  // of each entry of C, over either motion
+  Eigen::VectorXd root_;                            // D^1/2
   Eigen::VectorXd
       near_wall_;  // per vertex of the surface: its displacement under a force at a foot
   Eigen::VectorXd lawful_, residual_, step_;

@@ -264,6 +264,21 @@ inline Surface joined(const Surface& a, const Surface& b) {
   return both;
 }
 
+/// The wall that preprocess extrudes: an apex over the middle of each triangle; E in MPa.
+inline Wall extruded_wall(const Surface& surface, double thickness, double young_modulus) {
+  Wall wall{.apexes = Eigen::Matrix3Xd(3, surface.triangles.cols()),
+            .height = Eigen::VectorXd::Constant(surface.triangles.cols(), thickness),
+            .young_modulus = young_modulus,
+            .poisson_ratio = 0.3};
+  for (Eigen::Index k = 0; k < surface.triangles.cols(); ++k) {
+    const Vec3 a = surface.vertices.col(surface.triangles(0, k)),
+               b = surface.vertices.col(surface.triangles(1, k)),
+               c = surface.vertices.col(surface.triangles(2, k));
+    wall.apexes.col(k) = (a + b + c) / 3.0 + thickness * (b - a).cross(c - a).normalized();
+  }
+  return wall;
+}
+
 /// The same surface inside out.
 inline Surface inside_out(Surface surface) {
   surface.triangles.row(1).swap(surface.triangles.row(2));

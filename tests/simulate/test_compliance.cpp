@@ -417,6 +417,36 @@ TEST(TriangleLocator, TakesTheFirstOfTrianglesThatAreEquallyNear) {
   }
 }
 
+TEST(TriangleLocator, WeightsChangeAsTheirSlopesSay) {
+  const Surface surface = small_tube();
+  const TriangleLocator locator(surface);
+  constexpr double kStep = 1e-5;  // [mm]
+  for (Eigen::Index f = 0; f < surface.triangles.cols(); f += 7) {
+    const auto [a, b, c] = corners(surface, f);
+    const Vec3 foot = 0.2 * a + 0.5 * b + 0.3 * c;
+    const SurfacePoint at = locator.nearest(foot);
+    ASSERT_EQ(at.triangle, f);
+    const Mat3 slopes = locator.weight_slopes(at);
+    for (const Vec3& along : {Vec3(b - a), Vec3(c - a)}) {
+      const Vec3 change = (locator.nearest(foot + kStep * along).weight -
+                           locator.nearest(foot - kStep * along).weight) /
+                          (2.0 * kStep);
+      EXPECT_LT((slopes * along - change).norm(), 1e-8);
+    }
+    EXPECT_LT((slopes * (b - a).cross(c - a)).norm(), 1e-12);
+
+    // On an edge along that alone, at a corner not at all.
+    const std::array<int, 3> vertex = {surface.triangles(0, f), surface.triangles(1, f),
+                                       surface.triangles(2, f)};
+    const SurfacePoint on_edge{static_cast<std::int32_t>(f), vertex, Vec3(0.25, 0.0, 0.75)},
+        at_corner{static_cast<std::int32_t>(f), vertex, Vec3(0.0, 1.0, 0.0)};
+    EXPECT_LT((locator.weight_slopes(on_edge) * (c - a) - Vec3(-1.0, 0.0, 1.0)).norm(), 1e-12);
+    EXPECT_LT((locator.weight_slopes(on_edge) * (b - a).cross(c - a)).norm(), 1e-12);
+    EXPECT_EQ(locator.weight_slopes(at_corner), Mat3::Zero());
+  }
+  EXPECT_EQ(locator.weight_slopes(SurfacePoint{}), Mat3::Zero());
+}
+
 TEST(TriangleLocator, FindsNothingOutOfReach) {
   const Surface box = shapes::box(Vec3::Zero(), Vec3(8.0, 8.0, 8.0));
   const TriangleLocator locator(box, 0.5);

@@ -107,5 +107,19 @@ TEST(ContactLaw, EnergyForceAndStiffnessAreContinuousAndAgree) {
   }
 }
 
+TEST(ContactLaw, ChordPassesThroughTheForceAtTheGapAndTheExpectedOne) {
+  const ContactLaw law{.stiffness = 20.0, .smoothing = 0.05};
+  for (const double gap : {-0.3, -0.06, -0.04, 0.0, 0.03, 0.2}) {
+    for (const double other : {-0.4, -0.05, -0.01, 0.02, 0.05}) {
+      const double expected = -law.at(other).slope;
+      EXPECT_NEAR(law.chord(gap, expected) * (gap - other), expected + law.at(gap).slope, 1e-12)
+          << gap << " " << other;
+    }
+    if (gap > 0.05) continue;
+    EXPECT_NEAR(law.chord(gap, -law.at(gap).slope), law.at(gap).curvature, 1e-9) << gap;
+  }
+  EXPECT_DOUBLE_EQ(law.chord(0.2, 0.0), 0.0);
+}
+
 }  // namespace
 }  // namespace wireplan::simulate

@@ -456,21 +456,6 @@ TEST(SinusoidalBuckling, StartsAtTheLoadOfDawsonAndPaslay) {
 
 // ---------------------------------------------------------------- wire and yielding wall as one
 
-/// The wall that preprocess extrudes: an apex over the middle of each triangle.
-Wall extruded(const Surface& surface, double thickness, double young_modulus) {
-  Wall wall{.apexes = Eigen::Matrix3Xd(3, surface.triangles.cols()),
-            .height = Eigen::VectorXd::Constant(surface.triangles.cols(), thickness),
-            .young_modulus = young_modulus,
-            .poisson_ratio = 0.3};
-  for (Eigen::Index k = 0; k < surface.triangles.cols(); ++k) {
-    const Vec3 a = surface.vertices.col(surface.triangles(0, k)),
-               b = surface.vertices.col(surface.triangles(1, k)),
-               c = surface.vertices.col(surface.triangles(2, k));
-    wall.apexes.col(k) = (a + b + c) / 3.0 + thickness * (b - a).cross(c - a).normalized();
-  }
-  return wall;
-}
-
 /// Wire and wall as one system: positions x of the nodes from 1 on, then displacements u of all
 /// vertices. Energy: wire(x) + u'Ku/2 + the contact law at the gaps d(x) + c'u of the nodes, where
 /// c'u is the outward displacement of the wall at the node's foot: of the vertices' displacements
@@ -628,7 +613,7 @@ TEST(YieldingWall, BalancesTheWireAsOneLargeSystemDoes) {
   // A stiff wire clamped in a bend presses the wall outward by a few tenths of a millimetre.
   const double bend_radius = 20.0;
   const Surface surface = shapes::bend_tube(1.5, bend_radius, 0.5 * kPi, 0.0, 0.0, 0.8);
-  const Wall wall = extruded(surface, 1.0, 0.4);
+  const Wall wall = shapes::extruded_wall(surface, 1.0, 0.4);
   const VesselModel yielding(surface, wall), rigid(surface);
   const auto along_the_bend = [&](double s) {
     const double at = 0.15 + s / bend_radius;
@@ -661,6 +646,44 @@ TEST(YieldingWall, BalancesTheWireAsOneLargeSystemDoes) {
   EXPECT_EQ(touching, (large.force.array() > 0.0).count());
   EXPECT_GE(touching, 5);
   EXPECT_GT(deepest, 0.05);
+}
+
+TEST(YieldingWall, KnowsHowForcesChangeAsTheWireMoves) {
+  // Also along the wall, which yields differently from place to place: what add() and
+  // add_remainder() have together is the derivative of the forces.
+  const double bend_radius = 20.0;
+  const Surface surface = shapes::bend_tube(1.5, bend_radius, 0.5 * kPi, 0.0, 0.0, 0.8);
+  const VesselModel vessel(surface, shapes::extruded_wall(surface, 1.0, 0.4));
+  Bench bench(uniform_wire(27.0, 1.0, 50.0), 27, vessel, {}, [&](double s) {
+    const double at = 0.15 + s / bend_radius, off = 0.52;  // presses outward everywhere
+    return Vec3(bend_radius - (bend_radius + off) * std::cos(at), 0.02 * s,
+                (bend_radius + off) * std::sin(at));
+  });
+  const int n = bench.rod.nodes();
+  const auto gradient_at = [&](const RodState& state) {
+    Eigen::Matrix3Xd gradient(3, n);
+    Statics::evaluate(bench.problem, state, gradient);
+    return gradient;
+  };
+  for (const Vec3& direction : {Vec3(0.0, 1.0, 0.0), Vec3(0.6, 0.0, 0.8)}) {
+    Eigen::VectorXd motion(3 * n);
+    for (int i = 0; i < n; ++i) {
+      motion.segment<3>(3 * i) = (1.0 + 0.3 * std::sin(2.0 * i)) * direction;
+    }
+    constexpr double kStep = 1e-5;  // [mm]
+    RodState there = bench.state, back = bench.state;
+    there.x.reshaped() += kStep * motion;
+    back.x.reshaped() -= kStep * motion;
+    const Eigen::VectorXd found =
+        ((gradient_at(there) - gradient_at(back)) / (2.0 * kStep)).reshaped();
+
+    Eigen::VectorXd unused, predicted, remainder = Eigen::VectorXd::Zero(3 * n);
+    Eigen::MatrixXd hessian;
+    Statics::derivatives(bench.problem, bench.state, unused, hessian);
+    bench.contact.add_remainder({0, n, 3, motion}, remainder);
+    predicted = hessian.topLeftCorner(3 * n, 3 * n) * motion + remainder;
+    EXPECT_LT((predicted - found).norm(), 1e-4 * remainder.norm());
+  }
 }
 
 // ---------------------------------------------------------------- scenes

@@ -174,6 +174,47 @@ TEST(Trial, WireThatLeavesThroughAnOpenEndIsNamedSo) {
   EXPECT_NE(trial.reason.find(" mm"), std::string::npos) << trial.reason;
 }
 
+TEST(Trial, NoPushGoesThroughTheWall) {
+  // In a bend that 20 mm straight on leave, beyond the field of the wall; with another vessel 1 mm
+  // outside it, which a wire that gets through would go on in.
+  const Surface lumen = shapes::bend_tube(4.0, 40.0, 0.5 * kPi, 40.0, 60.0, 1.5);
+  Surface outside = lumen;
+  outside.vertices.colwise() += Vec3(-9.0, 0.0, 9.0);
+  const VesselModel vessel(shapes::joined(lumen, outside), {.grid_spacing = 0.6});
+  for (const double step : {1.0, 7.0, 20.0}) {
+    for (const Wire& wire : {straight_wire(5.0), straight_wire(4857.0), curved_wire(520.0)}) {
+      InsertionOptions some = options();
+      some.step = step;
+      some.length = 140.0;
+      const TrialResult trial =
+          run_trial(wire, along_z(), {.point = Vec3(0.0, 0.0, 1e3)}, vessel, some);
+      EXPECT_EQ(trial.outcome, Outcome::kMissed) << step << trial.reason;
+      for (const Push& push : trial.pushes) {
+        EXPECT_LT(push.max_penetration, 0.45) << step;
+        EXPECT_LE(push.residual, 1e-6) << step;
+      }
+      EXPECT_LT((trial.nodes.rightCols<1>() - Vec3(80.0, 0.0, 80.0)).norm(), 8.0)
+          << step << " " << trial.nodes.rightCols<1>().transpose();
+    }
+  }
+}
+
+TEST(Trial, WireThatTheWallCannotHoldHasLeftTheLumen) {
+  // A wall as soft as none under a stiff wire yields until the wire is beyond the field.
+  const Surface surface = shapes::bend_tube(4.0, 40.0, 0.5 * kPi, 40.0, 60.0, 3.0);
+  const VesselModel soft(surface, shapes::extruded_wall(surface, 1.0, 1e-4), {.grid_spacing = 1.0});
+  for (const double step : {1.0, 20.0}) {
+    InsertionOptions some = options();
+    some.step = step;
+    const TrialResult trial =
+        run_trial(straight_wire(4857.0), along_z(), end_of_bend(), soft, some);
+    EXPECT_EQ(trial.outcome, Outcome::kLeftLumen)
+        << outcome_name(trial.outcome) << ": " << trial.reason;
+    EXPECT_TRUE(trial.nodes.allFinite());
+    for (const Push& push : trial.pushes) EXPECT_TRUE(std::isfinite(push.push_force));
+  }
+}
+
 // ---------------------------------------------------------------- long elements
 
 TEST(Trial, LongElementsFeelARidgeShorterThanTheyAre) {
