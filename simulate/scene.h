@@ -36,7 +36,7 @@ struct Loads {
 
 /// How the wire's twist is found.
 enum class Twist {
-  kAuto,       // coupled where the wire is curved at rest, else not at all
+  kAuto,       // coupled where the wire is curved at rest or a strip, else not at all
   kCoupled,    // with the shape, by material directors
   kDecoupled,  // beside the shape, which it leaves as it is: paper Eq. (14)-(15)
 };

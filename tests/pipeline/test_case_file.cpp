@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdlib>
 #include <fstream>
@@ -615,6 +616,16 @@ Json decoupled() {
   return json;
 }
 
+Json strip() {
+  Json json = cantilever();
+  Json& section = json["wire"]["sections"][0];
+  section["bending_stiffness_n_mm2"] = 2.0;
+  section["bending_stiffness_2_n_mm2"] = 50.0;
+  section["twist_stiffness_n_mm2"] = 1.0;
+  json["loads"] = {{"tip_force_n", {0, 1e-4, 0}}};
+  return json;
+}
+
 Json pushed_wire() {
   Json json = cantilever();
   json.erase("supports");
@@ -727,6 +738,27 @@ TEST_F(CaseFile, MethodsTwistAndTableOfABenchAreRead) {
   EXPECT_EQ(*scene.plane, Vec3(0, 0, 1));
 }
 
+TEST_F(CaseFile, StripsBendAsTheyLie) {
+  const simulate::Scene scene = *read_scene(write("scene.json", strip().dump())).bench;
+  EXPECT_EQ(scene.wire.sections[0].bending_stiffness_2, 50.0);
+  EXPECT_EQ(scene.twist, simulate::Twist::kAuto);
+  // F L^3 / 3 EI of the stiffness across the force, which a quarter turn of the support swaps.
+  std::vector<double> deflections;
+  for (const double roll : {0.0, 90.0}) {
+    Json json = strip();
+    json["supports"][0]["roll_deg"] = roll;
+    const simulate::SceneResult result =
+        run_scene(*read_scene(write("scene.json", json.dump())).bench);
+    EXPECT_EQ(result.terms,
+              (std::vector<std::string>{"stretch", "bend", "twist", "strip", "tip_force"}));
+    deflections.push_back(result.nodes(1, result.nodes.cols() - 1));
+  }
+  const double of_one = 1e-4 * 40.0 * 40.0 * 40.0 / 3.0;  // EI 1 N mm^2                    [mm]
+  std::sort(deflections.begin(), deflections.end());
+  EXPECT_NEAR(deflections[0], of_one / 50.0, 0.01 * of_one / 50.0);
+  EXPECT_NEAR(deflections[1], of_one / 2.0, 0.01 * of_one / 2.0);
+}
+
 TEST_F(CaseFile, ResultsOfBenchesFromFileToFile) {
   // Newton: no time steps. Explicit Euler: unstable, with its limit. Decoupled: rolls.
   const auto result_of = [this](const Json& json) {
@@ -821,6 +853,18 @@ TEST_F(CaseFile, ScenesSayWhatIsWrongOrNotInThisVersion) {
        0,
        {"loads.gravity_m_per_s2", "mass_kg_per_m is 0", "above 0"}},
       {motion("semi_implicit"), "/wire/twist", "coupled", {"wire.twist is \"coupled\"", "newton"}},
+      {motion("semi_implicit"),
+       "/wire/sections/0/bending_stiffness_2_n_mm2",
+       2,
+       {"bending_stiffness_2_n_mm2", "newton"}},
+      {strip(),
+       "/wire/sections/0/bending_stiffness_2_n_mm2",
+       0,
+       {"bending_stiffness_2_n_mm2 is 0", "above 0"}},
+      {strip(),
+       "/wire/sections/0/twist_stiffness_n_mm2",
+       0,
+       {"twist_stiffness_n_mm2 is 0", "above 0", "strip"}},
       {motion("conjugate_gradient"),
        "/solver/damping_per_s",
        1,
