@@ -109,25 +109,6 @@ void write_wire_picture(const LoadedVessel* vessel, const PictureWire& wire,
   write_picture(vessel ? vessel->surface : Surface(), wires, marks, folder / "wire.png");
 }
 
-/// The same contacts with the triangles that they are on.
-std::vector<simulate::WireContact> locate_contacts(const simulate::SceneResult& result,
-                                                   double wire_radius,
-                                                   const simulate::TriangleLocator& locator) {
-  std::vector<simulate::WireContact> contacts;
-  for (const simulate::Touch& touch : result.contacts) {
-    const Vec3 point = touch.position - wire_radius * touch.normal;
-    contacts.push_back({.node = touch.edge,
-                        .part = touch.part,
-                        .triangle = locator.nearest(point).triangle,
-                        .point = point,
-                        .normal_force = touch.normal_force * touch.normal,
-                        .friction_force = touch.friction,
-                        .penetration = touch.penetration,
-                        .wall_displacement = touch.wall_displacement});
-  }
-  return contacts;
-}
-
 /// Sum of the contacts on each triangle that has one, ascending.
 std::vector<simulate::TriangleForce> sum_by_triangle(
     const std::vector<simulate::WireContact>& contacts) {
@@ -148,7 +129,9 @@ SceneAnswer run_bench_scene(const SceneFile& file, const LoadedVessel* vessel,
 
   std::vector<simulate::WireContact> contacts;
   if (vessel) {
-    contacts = locate_contacts(result, scene.wire.radius, vessel->model->locator);
+    for (const simulate::Touch& touch : result.contacts) {
+      contacts.push_back(simulate::contact_of(touch, scene.wire.radius, vessel->model->locator));
+    }
     write_forces(*vessel, sum_by_triangle(contacts), folder);
   }
   write_result(result_json(result, contacts), file, vessel, folder);

@@ -34,6 +34,19 @@ const char* outcome_name(Outcome outcome) {
   return "failed";
 }
 
+WireContact contact_of(const Touch& touch, double wire_radius, const TriangleLocator& locator) {
+  const bool at_next = touch.part == 1.0;
+  const Vec3 point = touch.position - wire_radius * touch.normal;
+  return {.node = touch.edge + (at_next ? 1 : 0),
+          .part = at_next ? 0.0 : touch.part,
+          .triangle = locator.nearest(point).triangle,
+          .point = point,
+          .normal_force = touch.normal_force * touch.normal,
+          .friction_force = touch.friction,
+          .penetration = touch.penetration,
+          .wall_displacement = touch.wall_displacement};
+}
+
 namespace {
 
 constexpr double kTipRegion = 2.0;     // wire that counts as tip for its force            [mm]
@@ -172,16 +185,8 @@ class Insertion {
     Statics::evaluate(problem_, state_, unused);  // a restored state was not sampled last
     std::vector<WireContact> list;
     for (const Touch& touch : contact_.touches()) {
-      const bool whole = touch.part == 1.0;
-      const Vec3 point = touch.position - rod_.radius * touch.normal;
-      list.push_back({.node = touch.edge + (whole ? 1 : 0) - problem_.first,
-                      .part = whole ? 0.0 : touch.part,
-                      .triangle = vessel_.locator.nearest(point).triangle,
-                      .point = point,
-                      .normal_force = touch.normal_force * touch.normal,
-                      .friction_force = touch.friction,
-                      .penetration = touch.penetration,
-                      .wall_displacement = touch.wall_displacement});
+      list.push_back(contact_of(touch, rod_.radius, vessel_.locator));
+      list.back().node -= problem_.first;
     }
     return list;
   }

@@ -7,6 +7,7 @@
 
 #include "simulate/rod.h"
 #include "simulate/vessel_model.h"
+#include "simulate/wall_contact.h"
 
 namespace wireplan::simulate {
 
@@ -82,6 +83,9 @@ struct WireContact {
   double penetration = 0.0;            //                                                [mm]
   double wall_displacement = 0.0;      // outward                                        [mm]
 };
+
+/// The same, with the triangle that the point is on; nodes counted from the rod's proximal end.
+WireContact contact_of(const Touch& touch, double wire_radius, const TriangleLocator& locator);
 
 /// Largest normal force that a triangle of the surface took at any time.
 struct TriangleForce {

@@ -21,6 +21,20 @@ struct Ring {
   double phase = 0.0;  // of the first vertex, in steps of 2 pi / sides
 };
 
+inline Surface as_surface(const std::vector<Vec3>& vertices,
+                          const std::vector<Eigen::Vector3i>& triangles) {
+  Surface surface;
+  surface.vertices.resize(3, static_cast<Eigen::Index>(vertices.size()));
+  for (std::size_t k = 0; k < vertices.size(); ++k) {
+    surface.vertices.col(static_cast<Eigen::Index>(k)) = vertices[k];
+  }
+  surface.triangles.resize(3, static_cast<Eigen::Index>(triangles.size()));
+  for (std::size_t k = 0; k < triangles.size(); ++k) {
+    surface.triangles.col(static_cast<Eigen::Index>(k)) = triangles[k];
+  }
+  return surface;
+}
+
 /// Skin over rings from one closing point to another; each ring turns counter-clockwise seen from
 /// the end. Neighbouring rings may differ in their number of sides.
 inline Surface skin(const Vec3& start, const std::vector<Ring>& rings, const Vec3& end) {
@@ -60,16 +74,7 @@ inline Surface skin(const Vec3& start, const std::vector<Ring>& rings, const Vec
     triangles.emplace_back(at(rings.size() - 1, k), at(rings.size() - 1, k + 1), last);
   }
 
-  Surface surface;
-  surface.vertices.resize(3, static_cast<Eigen::Index>(vertices.size()));
-  for (std::size_t k = 0; k < vertices.size(); ++k) {
-    surface.vertices.col(static_cast<Eigen::Index>(k)) = vertices[k];
-  }
-  surface.triangles.resize(3, static_cast<Eigen::Index>(triangles.size()));
-  for (std::size_t k = 0; k < triangles.size(); ++k) {
-    surface.triangles.col(static_cast<Eigen::Index>(k)) = triangles[k];
-  }
-  return surface;
+  return as_surface(vertices, triangles);
 }
 
 /// Tube round a polyline (3, n >= 2) with a radius [mm] at each of its points and flat caps at both
@@ -241,16 +246,7 @@ inline Surface divided_box(const Vec3& low, const Vec3& high, int parts) {
       }
     }
   }
-  Surface surface;
-  surface.vertices.resize(3, static_cast<Eigen::Index>(vertices.size()));
-  for (std::size_t k = 0; k < vertices.size(); ++k) {
-    surface.vertices.col(static_cast<Eigen::Index>(k)) = vertices[k];
-  }
-  surface.triangles.resize(3, static_cast<Eigen::Index>(triangles.size()));
-  for (std::size_t k = 0; k < triangles.size(); ++k) {
-    surface.triangles.col(static_cast<Eigen::Index>(k)) = triangles[k];
-  }
-  return surface;
+  return as_surface(vertices, triangles);
 }
 
 /// Both surfaces in one, unjoined.

@@ -29,18 +29,9 @@ Vec3 random_vector(std::mt19937_64& random) {
   return {2.0 * uniform(random) - 1.0, 2.0 * uniform(random) - 1.0, 2.0 * uniform(random) - 1.0};
 }
 
-/// Paper section 1.5: apexes over the centroids, whatever else is there.
 Wall extruded(const Surface& surface, double thickness) {
-  Wall wall{.apexes = Eigen::Matrix3Xd(3, surface.triangles.cols()),
-            .height = Eigen::VectorXd::Constant(surface.triangles.cols(), thickness),
-            .young_modulus = kYoung,
-            .poisson_ratio = kPoisson};
-  for (Eigen::Index k = 0; k < surface.triangles.cols(); ++k) {
-    const Vec3 a = surface.vertices.col(surface.triangles(0, k)),
-               b = surface.vertices.col(surface.triangles(1, k)),
-               c = surface.vertices.col(surface.triangles(2, k));
-    wall.apexes.col(k) = (a + b + c) / 3.0 + thickness * (b - a).cross(c - a).normalized();
-  }
+  Wall wall = shapes::extruded_wall(surface, thickness, kYoung);
+  wall.poisson_ratio = kPoisson;
   return wall;
 }
 
