@@ -60,6 +60,8 @@ constexpr double kOutside = 1.0;      // penetration that contact does not expla
 constexpr double kGuessInto = 0.5;    // a guessed tip may lie this much deeper in the wall than the
                                       // wire did: contact bends it back more smoothly than a guess
                                       // could [mm]
+constexpr double kSnap = 2.0;         // way off the path per push that is a jump, not to go on
+constexpr double kKeptDrift = 0.8;    // of the last push's way off the path, in the next
 constexpr double kSmallestPart = 0.05;  // of a node's share of wire that bends at the exit
 constexpr double kLongestPart = 2.0;  // of a push: friction turns with the path               [mm]
 constexpr double kSmallestCut = 1.0 / 16.0;  // of a push, when one does not converge
@@ -143,6 +145,8 @@ class Insertion {
     contact_.start_at(state_.x);
     forces_ = Eigen::Matrix3Xd::Zero(3, n);
     guess_ahead_.resize(3, n);
+    path_.resize(3, n);
+    drift_ = Eigen::Matrix3Xd::Zero(3, n);
   }
 
   double longest() const { return longest_; }
@@ -243,6 +247,7 @@ class Insertion {
     forces_ = snapshot.forces;
     contact_.restore(snapshot.memory);
     contact_.free_from(depth_);
+    drift_.setZero();
     bend_at_the_exit();
   }
 
@@ -251,7 +256,8 @@ class Insertion {
   NewtonResult advance(double distance) {
     guess_ = state_;
     depth_ += distance;
-    // Nodes in the introducer lie on its axis; the others go where the wire ahead of them was.
+    // Nodes in the introducer lie on its axis; the others go where the wire ahead of them was, and
+    // most of what they came off that path in the last push, per length of it.
     const int n = rod_.nodes();
     problem_.first = n;
     ahead_ = 0;
@@ -259,10 +265,11 @@ class Insertion {
       const double behind = rod_.tip_distance[i] - depth_;
       if (behind >= -1e-9) {
         guess_.x.col(i) = introducer_.point - behind * introducer_.direction;
-        guess_ahead_.col(i) = guess_.x.col(i);
+        guess_ahead_.col(i) = path_.col(i) = guess_.x.col(i);
       } else {
         problem_.first = std::min(problem_.first, i);
-        guess_ahead_.col(i) = ahead_of(i, distance);
+        path_.col(i) = ahead_of(i, distance);
+        guess_ahead_.col(i) = path_.col(i) + (kKeptDrift * distance) * drift_.col(i);
       }
     }
     // Keep the edges' lengths of before, and a curved tip's shape, which turns with the edge that
@@ -281,7 +288,12 @@ class Insertion {
     bend_at_the_exit();
     contact_.free_from(depth_);
     contact_.predict(distance);
-    return statics_.solve(problem_, state_, newton_);
+    const NewtonResult result = statics_.solve(problem_, state_, newton_);
+    if (result.converged) {
+      drift_ = (state_.x - path_) / distance;
+      if (drift_.colwise().norm().maxCoeff() > kSnap) drift_.setZero();
+    }
+    return result;
   }
 
   /// The introducer is straight: a node bends with that part alone of its share of the wire that is
@@ -438,7 +450,9 @@ class Insertion {
   int exit_first_ = 1, exit_last_ = 0;  // nodes that bend_at_the_exit() changed
   double deepest_ = 0.0;  // the wire was past the resting wall                            [mm]
   double depth_ = 0.0, longest_ = 0.0;
-  Push totals_;  // push force, works and energy so far
+  Push totals_;             // push force, works and energy so far
+  Eigen::Matrix3Xd path_;   // where the wire ahead of each node was before the last push   [mm]
+  Eigen::Matrix3Xd drift_;  // off that path, per length of push
   Eigen::Matrix3Xd forces_, guess_ahead_;
   std::vector<Touch> touches_;
   std::vector<std::pair<int, double>> triangle_forces_;  // of this push
