@@ -57,8 +57,8 @@ constexpr double kFoldTurn = 150.0 * kRadPerDeg;  // turning beyond the rest sha
 constexpr double kFoldLead = 10.0;    // ... with the bow so far ahead of the tip            [mm]
 constexpr double kFoldLength = 60.0;  // ... within so much wire                [mm]
 constexpr double kOutside = 1.0;      // penetration that contact does not explain        [mm]
-constexpr double kGuessInto = 0.5;    // a guessed tip may lie this much deeper in the wall than the
-                                      // wire did: contact bends it back more smoothly than a guess
+constexpr double kGuessInto = 0.5;    // a guess may lie this much deeper in the wall than the wire
+                                      // did: contact bends it back more smoothly than a guess
                                       // could [mm]
 constexpr double kSnap = 2.0;         // way off the path per push that is a jump, not to go on
 constexpr double kKeptDrift = 0.8;    // of the last push's way off the path, in the next
@@ -257,10 +257,12 @@ class Insertion {
     guess_ = state_;
     depth_ += distance;
     // Nodes in the introducer lie on its axis; the others go where the wire ahead of them was, and
-    // most of what they came off that path in the last push, per length of it.
+    // most of what they came off that path in the last push, per length of it, unless that leads
+    // through the wall.
     const int n = rod_.nodes();
     problem_.first = n;
     ahead_ = 0;
+    bool through = false;
     for (int i = 0; i < n; ++i) {
       const double behind = rod_.tip_distance[i] - depth_;
       if (behind >= -1e-9) {
@@ -269,9 +271,13 @@ class Insertion {
       } else {
         problem_.first = std::min(problem_.first, i);
         path_.col(i) = ahead_of(i, distance);
-        guess_ahead_.col(i) = path_.col(i) + (kKeptDrift * distance) * drift_.col(i);
+        const Vec3 way = (kKeptDrift * distance) * drift_.col(i);
+        guess_ahead_.col(i) = path_.col(i) + way;
+        through = through || (way.norm() > kGuessInto &&
+                              vessel_.lumen.distance(guess_ahead_.col(i)) < -kGuessInto - deepest_);
       }
     }
+    if (through) guess_ahead_ = path_;
     // Keep the edges' lengths of before, and a curved tip's shape, which turns with the edge that
     // carries it: a guess that strains or unbends a stiff wire costs more than one that lies a
     // little in the wall.
