@@ -20,8 +20,9 @@ Rub rub(double u, double slip) {
   return {u * part * (1.0 - part / 3.0), part * (2.0 - part), 2.0 * (1.0 - part) / slip};
 }
 
-/// A smaller gradient than this is that of no wall: the point is beyond the field.
-constexpr double kSmallestSlope = 0.01;
+/// A smaller gradient than this has no direction: the point is beyond the field, or on the axis of
+/// a lumen.
+constexpr double kSmallestSlope = 1e-6;
 
 /// A point that is expected to touch stays in sight so much further from the wall than contact
 /// reaches [mm].
@@ -159,7 +160,7 @@ ContactEnergy WallContact::sample(const Eigen::Matrix3Xd& x) {
     touched_[k] = wall.distance < near ? 1 : 0;
     if (touched_[k] == 0) continue;
     if (wall.gradient.squaredNorm() < kSmallestSlope * kSmallestSlope) {
-      lost_ = true;
+      lost_ = lost_ || wall.distance < 0.0;
       continue;
     }
     active_.push_back({.point = static_cast<int>(k), .position = p, .wall = wall});

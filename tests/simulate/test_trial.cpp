@@ -222,6 +222,23 @@ TEST(Trial, WireThatTheWallCannotHoldHasLeftTheLumen) {
   }
 }
 
+TEST(Trial, WireOnTheAxisOfALumenNarrowerThanItselfIsInIt) {
+  // On the axis the field has no direction, and the wall pushes from all sides alike.
+  const int rows = 30;
+  Eigen::Matrix3Xd axis = Eigen::Matrix3Xd::Zero(3, rows + 1);
+  axis.row(2) = Eigen::RowVectorXd::LinSpaced(rows + 1, 0.0, 60.0);
+  Eigen::VectorXd radius(rows + 1);
+  for (int k = 0; k <= rows; ++k)
+    radius[k] = std::min(4.0, 0.4 + 0.2 * std::abs(axis(2, k) - 30.0));
+  const VesselModel stenosis(shapes::tube(axis, radius, 32), {.grid_spacing = 0.4});
+  InsertionOptions some = options();
+  some.length = 50.0;
+  const TrialResult trial =
+      run_trial(straight_wire(1000.0), along_z(), {.point = Vec3(0.0, 0.0, 1e3)}, stenosis, some);
+  EXPECT_EQ(trial.outcome, Outcome::kMissed) << outcome_name(trial.outcome) << ": " << trial.reason;
+  for (const Push& push : trial.pushes) EXPECT_LT(push.max_penetration, 0.1);
+}
+
 // ---------------------------------------------------------------- long elements
 
 TEST(Trial, LongElementsFeelARidgeShorterThanTheyAre) {
