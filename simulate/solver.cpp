@@ -333,7 +333,10 @@ NewtonResult Statics::solve_with(BlockBand<D>& hessian, BlockBand<D>& untouched,
   constexpr double kSmallestShift = 1e-7, kLargestShift = 1e30;  // [N/mm]
   constexpr double kFirstShift = 1e-4;  // of a step that is too long [N/mm]
   constexpr int kMostShifts = 6;        // of those
-  constexpr int kEagerRefreshes = 25;  // iterations that refresh the lag; later only those that end
+  // Iterations that refresh the lag, at first and after one that met the residual with an old lag;
+  // others only where they meet the residual.
+  constexpr int kEagerRefreshes = 25;
+  int eager_until = kEagerRefreshes;
   WallContact* contact = problem.contact;
   const bool twisted = D == 4;
   const bool polynomial = contact == nullptr && !twisted && !problem.tip_moment && !problem.plane;
@@ -389,6 +392,7 @@ NewtonResult Statics::solve_with(BlockBand<D>& hessian, BlockBand<D>& untouched,
     if (result.residual <= options.residual_tolerance && contact != nullptr &&
         !contact->lag_is_fresh()) {
       contact->refresh(true);
+      eager_until = result.iterations + kEagerRefreshes;
       wire_energy = differentiate(state);
       energy = wire_energy + contact->energy().total();
       result.residual = largest_force();
@@ -423,7 +427,7 @@ NewtonResult Statics::solve_with(BlockBand<D>& hessian, BlockBand<D>& untouched,
       if (contact != nullptr) cap = contact->largest_safe_part(motion());
       if (twisted) cap = std::min(cap, largest_turning_step<D>(problem, step_));
       if (contact == nullptr || cap >= 1.0 || shifts == kMostShifts) break;
-      shift = std::max(kFirstShift, 10.0 * shift);
+      shift = std::max({kFirstShift, 0.25 * last_shift, 4.0 * shift});
       apply_shift();
     }
     if (step_.cwiseAbs().maxCoeff() < 64.0 * kEpsilon * extent &&
@@ -509,7 +513,7 @@ NewtonResult Statics::solve_with(BlockBand<D>& hessian, BlockBand<D>& untouched,
     }
     wire_energy = trial_wire_energy;
     if (contact != nullptr && !refreshed) {
-      if (result.iterations < kEagerRefreshes) contact->refresh(false);
+      if (result.iterations < eager_until) contact->refresh(false);
       differentiate(state);
     }
   }
