@@ -54,6 +54,7 @@ std::vector<bool> for_each_slot(int count, const std::function<void(int slot)>& 
   std::mutex mutex;  // guards all of these, and keeps the callbacks one at a time
   std::vector<bool> finished(count, false);
   bool stopped = false;
+  std::exception_ptr failure;  // the first that the work threw
   int done = 0;
 
   const auto may_start = [&] {
@@ -70,7 +71,14 @@ std::vector<bool> for_each_slot(int count, const std::function<void(int slot)>& 
   const auto run_slots = [&](const tbb::blocked_range<int>& slots) {
     for (int slot = slots.begin(); slot < slots.end(); ++slot) {
       if (!may_start()) return;
-      work(slot);
+      try {
+        work(slot);
+      } catch (...) {
+        const std::scoped_lock lock(mutex);
+        if (!failure) failure = std::current_exception();
+        stopped = true;
+        return;
+      }
       mark_finished(slot);
     }
   };
@@ -83,6 +91,7 @@ std::vector<bool> for_each_slot(int count, const std::function<void(int slot)>& 
   });
 
   const std::scoped_lock lock(mutex);  // what the slots wrote is seen from here on
+  if (failure) std::rethrow_exception(failure);
   return finished;
 }
 

@@ -335,7 +335,7 @@ NewtonResult Statics::solve_with(BlockBand<D>& hessian, BlockBand<D>& untouched,
   constexpr int kMostShifts = 6;        // of those
   // Iterations that refresh the lag, at first and after one that met the residual with an old lag;
   // others only where they meet the residual.
-  constexpr int kEagerRefreshes = 25;
+  constexpr int kEagerRefreshes = 25, kEagerAgain = 8;
   int eager_until = kEagerRefreshes;
   WallContact* contact = problem.contact;
   const bool twisted = D == 4;
@@ -392,7 +392,7 @@ NewtonResult Statics::solve_with(BlockBand<D>& hessian, BlockBand<D>& untouched,
     if (result.residual <= options.residual_tolerance && contact != nullptr &&
         !contact->lag_is_fresh()) {
       contact->refresh(true);
-      eager_until = result.iterations + kEagerRefreshes;
+      eager_until = result.iterations + kEagerAgain;
       wire_energy = differentiate(state);
       energy = wire_energy + contact->energy().total();
       result.residual = largest_force();

@@ -402,7 +402,8 @@ void WallContact::find_change(const Motion& motion) {
   }
   change_ = gap_;
   if (yielding_) {
-    coupling_.add_change_of_compliance(motion_, forces_, change_);
+    if (fresh_)
+      coupling_.add_change_of_compliance(motion_, forces_, change_);  // else feet are held
     coupling_.multiply_by_stiffness(change_);
   } else {
     for (Eigen::Index k = 0; k < m; ++k) {
