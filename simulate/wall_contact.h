@@ -154,7 +154,7 @@ class WallContact {
     Vec3 position;
     WallSample wall;
     double force = 0.0;      // normal, of the potential: times the gradient's norm in newtons
-    double stiffness = 0.0;  // of the contact law; rigid wall only                      [N/mm]
+    double stiffness = 0.0;  // of the contact law, see expect_after(); found by add()   [N/mm]
     double yield = 0.0;      // displacement of the wall                                 [mm]
   };
   /// Where a point is, from where friction holds it, along the wall.
