@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <map>
+#include <utility>
 
 #include "simulate/triangle.h"
 
@@ -26,6 +28,18 @@ double mean_edge(const Surface& surface) {
     }
   }
   return sum / (3.0 * static_cast<double>(surface.triangles.cols()));
+}
+
+/// How the barycentric weights of the point at which a line meets a triangle's plane change as the
+/// line moves, per weight (row) and coordinate [1/mm]. Not finite where it runs along the plane.
+Mat3 line_slopes(const std::array<Vec3, 3>& corner, const Vec3& direction) {
+  const Vec3 u = corner[1] - corner[0], v = corner[2] - corner[0];
+  const double volume = u.cross(v).dot(direction);
+  Mat3 slopes;
+  slopes.row(1) = v.cross(direction) / volume;
+  slopes.row(2) = direction.cross(u) / volume;
+  slopes.row(0) = -slopes.row(1) - slopes.row(2);
+  return slopes;
 }
 
 }  // namespace
@@ -53,11 +67,26 @@ TriangleLocator::TriangleLocator(const Surface& surface, double reach)
                     static_cast<std::size_t>(bricks_[2]),
                 -1);
   register_triangles();
+  find_neighbours();
 }
 
 std::array<Vec3, 3> TriangleLocator::corners(std::int32_t triangle) const {
   const Eigen::Vector3i t = surface_.triangles.col(triangle);
   return {surface_.vertices.col(t[0]), surface_.vertices.col(t[1]), surface_.vertices.col(t[2])};
+}
+
+void TriangleLocator::find_neighbours() {
+  neighbour_.setConstant(3, surface_.triangles.cols(), -1);
+  std::map<std::pair<int, int>, std::pair<int, int>> open;  // edge -> its corner and triangle
+  for (int f = 0; f < surface_.triangles.cols(); ++f) {
+    for (int c = 0; c < 3; ++c) {
+      const int a = surface_.triangles((c + 1) % 3, f), b = surface_.triangles((c + 2) % 3, f);
+      const auto [other, fresh] = open.try_emplace(std::minmax(a, b), c, f);
+      if (fresh) continue;
+      neighbour_(c, f) = other->second.second;
+      neighbour_(other->second.first, other->second.second) = f;
+    }
+  }
 }
 
 /// Cells that a box overlaps; low > high beyond the grid.
@@ -153,29 +182,39 @@ SurfacePoint TriangleLocator::nearest(const Vec3& point) const {
   return {best.triangle, {t[0], t[1], t[2]}, weight / weight.sum()};
 }
 
-Mat3 TriangleLocator::weight_slopes(const SurfacePoint& at) const {
-  Mat3 slopes = Mat3::Zero();
-  if (at.triangle < 0) return slopes;
-  const std::array<Vec3, 3> corner = corners(at.triangle);
-  const int inside = static_cast<int>((at.weight.array() > 0.0).count());
-  if (inside == 3) {
-    const Vec3 normal = (corner[1] - corner[0]).cross(corner[2] - corner[0]);
-    for (int a = 0; a < 3; ++a) {
-      const std::size_t b = static_cast<std::size_t>((a + 1) % 3), c = 3 - b - std::size_t(a);
-      slopes.row(a) = normal.cross(corner[c] - corner[b]) / normal.squaredNorm();
+SurfacePoint TriangleLocator::pierced(const Vec3& point, const Vec3& direction) const {
+  constexpr int kMostSteps = 10;
+  const SurfacePoint start = nearest(point);
+  std::int32_t triangle = start.triangle;
+  for (int step = 0; step < kMostSteps && triangle >= 0; ++step) {
+    const std::array<Vec3, 3> corner = corners(triangle);
+    const Mat3 slopes = line_slopes(corner, direction);
+    const Vec3 weight = Vec3::UnitX() + slopes * (point - corner[0]);
+    if (!weight.allFinite()) break;
+    int lowest;
+    if (weight.minCoeff(&lowest) >= 0.0) {
+      const Eigen::Vector3i t = surface_.triangles.col(triangle);
+      return {triangle, {t[0], t[1], t[2]}, weight / weight.sum()};
     }
-  } else if (inside == 2) {
-    const std::size_t b = at.weight[0] > 0.0 ? 0 : 1, c = at.weight[2] > 0.0 ? 2 : 1;
-    const Vec3 edge = corner[c] - corner[b];
-    slopes.row(static_cast<int>(c)) = edge / edge.squaredNorm();
-    slopes.row(static_cast<int>(b)) = -slopes.row(static_cast<int>(c));
+    triangle = neighbour_(lowest, triangle);
   }
-  return slopes;
+  return start;
+}
+
+Vec3 TriangleLocator::position(const SurfacePoint& at) const {
+  const std::array<Vec3, 3> corner = corners(at.triangle);
+  return at.weight[0] * corner[0] + at.weight[1] * corner[1] + at.weight[2] * corner[2];
+}
+
+Mat3 TriangleLocator::weight_slopes(const SurfacePoint& at, const Vec3& direction) const {
+  if (at.triangle < 0) return Mat3::Zero();
+  const Mat3 slopes = line_slopes(corners(at.triangle), direction);
+  return slopes.allFinite() ? slopes : Mat3(Mat3::Zero());
 }
 
 std::size_t TriangleLocator::memory_bytes() const {
   return sizeof(double) * static_cast<std::size_t>(surface_.vertices.size()) +
-         sizeof(int) * static_cast<std::size_t>(surface_.triangles.size()) +
+         2 * sizeof(int) * static_cast<std::size_t>(surface_.triangles.size()) +
          sizeof(std::int32_t) * (brick_.size() + start_.size() + entry_.size());
 }
 

@@ -26,9 +26,16 @@ class TriangleLocator {
   /// of lowest index. Fastest within 0.4 mm of the surface. Allocates nothing.
   SurfacePoint nearest(const Vec3& point) const;
 
-  /// How the weights of a point that nearest() found change as it moves on: per weight (row) and
-  /// coordinate [1/mm]. Along its edge alone where it lies on one, not at all at a corner.
-  Mat3 weight_slopes(const SurfacePoint& at) const;
+  /// Where the line through `point` along `direction`, across the surface there, goes through it:
+  /// unlike the nearest point, this does not jump where the surface folds toward `point`. Found by
+  /// walking from the triangle nearest to `point`; the nearest point where the walk ends nowhere.
+  SurfacePoint pierced(const Vec3& point, const Vec3& direction) const;
+
+  Vec3 position(const SurfacePoint& at) const;  // expects one that was found                [mm]
+
+  /// How the weights of a point that pierced() found change as the line moves along itself or
+  /// aside: per weight (row) and coordinate [1/mm].
+  Mat3 weight_slopes(const SurfacePoint& at, const Vec3& direction) const;
 
   std::size_t memory_bytes() const;
 
@@ -43,13 +50,15 @@ class TriangleLocator {
   template <typename Visit>
   void for_each_cell(const CellBox& box, const Visit& visit) const;
   std::array<Vec3, 3> corners(std::int32_t triangle) const;
+  void find_neighbours();
   void register_triangles();
   void search(const CellBox& box, const Vec3& point, Best& best) const;
 
   Surface surface_;
-  double reach_, margin_;                  //                                             [mm]
-  double cell_ = 0.0;                      // edge of the cells                           [mm]
-  Vec3 origin_ = Vec3::Zero();             // of brick (0, 0, 0)                          [mm]
+  Eigen::Matrix3Xi neighbour_;  // of each triangle, over the edge that a corner is not on
+  double reach_, margin_;       //                                             [mm]
+  double cell_ = 0.0;           // edge of the cells                           [mm]
+  Vec3 origin_ = Vec3::Zero();  // of brick (0, 0, 0)                          [mm]
   std::array<int, 3> bricks_ = {0, 0, 0};  // along each axis
   std::vector<std::int32_t> brick_;        // slot of each brick, or -1: no triangle near
   std::vector<std::int32_t> start_;        // of each cell's entries, kSide^3 per slot; and the end

@@ -221,8 +221,9 @@ void WallContact::find_forces() {
 
 SurfacePoint WallContact::foot_of(const Active& active) const {
   const WallSample& wall = active.wall;
-  return vessel_.locator.nearest(active.position -
-                                 (wall.distance / wall.gradient.squaredNorm()) * wall.gradient);
+  return vessel_.locator.pierced(
+      active.position - (wall.distance / wall.gradient.squaredNorm()) * wall.gradient,
+      wall.gradient);
 }
 
 // ---------------------------------------------------------------- friction
@@ -368,13 +369,15 @@ void WallContact::find_stiffness() {
 
   foot_slopes_.resize(active_.size());
   for (std::size_t k = 0; k < active_.size(); ++k) {
-    // Of the foot p - d n / |n|^2 as its point p moves.
-    const WallSample& wall = active_[k].wall;
-    const double squared = wall.gradient.squaredNorm();
-    const Mat3 along = wall.gradient * wall.gradient.transpose() / squared;
-    foot_slopes_[k] = vessel_.locator.weight_slopes(coupled_feet_[k]) *
-                      (Mat3::Identity() - along -
-                       (wall.distance / squared) * (Mat3::Identity() - 2.0 * along) * wall.hessian);
+    // The foot lies on the line from the point along the gradient, which turns as the point moves.
+    const Active& active = active_[k];
+    const SurfacePoint& foot = coupled_feet_[k];
+    foot_slopes_[k].setZero();
+    if (foot.triangle < 0) continue;
+    const Vec3& normal = active.wall.gradient;
+    const double along = (vessel_.locator.position(foot) - active.position).dot(normal);
+    foot_slopes_[k] = vessel_.locator.weight_slopes(foot, normal) *
+                      (Mat3::Identity() + (along / normal.squaredNorm()) * active.wall.hessian);
   }
   coupling_.find_slopes(coupled_feet_, foot_slopes_);
 

@@ -513,8 +513,9 @@ class Monolith {
       const WallSample wall = vessel_.lumen.sample(state.x.col(i));
       const bool near = wall.distance < rod_.radius + 1.0;
       feet_.push_back(
-          near ? vessel_.locator.nearest(
-                     state.x.col(i) - (wall.distance / wall.gradient.squaredNorm()) * wall.gradient)
+          near ? vessel_.locator.pierced(
+                     state.x.col(i) - (wall.distance / wall.gradient.squaredNorm()) * wall.gradient,
+                     wall.gradient)
                : SurfacePoint{});
     }
   }
