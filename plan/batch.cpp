@@ -101,7 +101,7 @@ simulate::TrialResult run_candidate(const Study& study, const Candidate& candida
     expects(candidate.wire >= 0 && candidate.wire < std::ssize(study.wires));
     simulate::TrialResult trial =
         simulate::run_trial(study.wires[candidate.wire], make_introducer(study, candidate),
-                            study.goal, vessel, study.insertion);
+                            study.goal, vessel, study.insertion, candidate.moves);
     if (!is_finite(trial)) throw LogicError("the trial has a number that is not finite");
     return trial;
   } catch (const std::exception& exception) {

@@ -2,34 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
+
+#include "plan/path_place.h"
 
 namespace wireplan::plan {
 namespace {
-
-/// Distance of a point from the path's axis, and from the balls inscribed along it (0 inside one).
-struct PathDistance {
-  double axis = 0.0, lumen = 0.0;  //                                                       [mm]
-  double radius = 0.0;             // of the path at the nearest point of its axis          [mm]
-};
-
-PathDistance distance_to_path(const Vec3& p, const Centerline& path) {
-  PathDistance nearest{(p - path.points.col(0)).norm(), 0.0, path.radius[0]};
-  nearest.lumen = std::max(0.0, nearest.axis - path.radius[0]);
-  for (Eigen::Index k = 1; k < path.points.cols(); ++k) {
-    const Vec3 a = path.points.col(k - 1), ab = path.points.col(k) - path.points.col(k - 1);
-    const double squared = ab.squaredNorm();
-    const double t = squared == 0.0 ? 0.0 : std::clamp((p - a).dot(ab) / squared, 0.0, 1.0);
-    const double axis = (p - a - t * ab).norm();
-    const double radius = (1.0 - t) * path.radius[k - 1] + t * path.radius[k];
-    if (axis < nearest.axis) {
-      nearest.axis = axis;
-      nearest.radius = radius;
-    }
-    nearest.lumen = std::min(nearest.lumen, std::max(0.0, axis - radius));
-  }
-  return nearest;
-}
 
 /// Where the tip ended: of the final shape, else of the last push, else still at the access.
 Vec3 final_tip(const simulate::TrialResult& trial, const Study& study) {
@@ -41,7 +18,7 @@ WallMotion find_wall_motion(const std::vector<simulate::Push>& pushes, const Cen
   WallMotion worst;
   for (const simulate::Push& push : pushes) {
     if (push.wall_displacement <= 0.0) continue;
-    const double radius = distance_to_path(push.wall_displacement_point, path).radius;
+    const double radius = find_place(push.wall_displacement_point, path).radius;
     if (worst.displacement > 0.0 &&
         push.wall_displacement * worst.radius <= worst.displacement * radius) {
       continue;
@@ -55,11 +32,11 @@ WallMotion find_wall_motion(const std::vector<simulate::Push>& pushes, const Cen
 
 Metrics compute_push_metrics(const std::vector<simulate::Push>& pushes) {
   Metrics metrics;
-  double last_total = 0.0;
+  double last_total = 0.0, way = 0.0;  // of the wire, in and out
   for (const simulate::Push& push : pushes) {
-    expects(push.insertion >= metrics.insertion);
-    metrics.force_impulse +=
-        0.5 * (last_total + push.total_contact_force) * (push.insertion - metrics.insertion);
+    const double moved = std::abs(push.insertion - metrics.insertion);
+    metrics.force_impulse += 0.5 * (last_total + push.total_contact_force) * moved;
+    way += moved;
     last_total = push.total_contact_force;
     metrics.insertion = push.insertion;
 
@@ -79,9 +56,7 @@ Metrics compute_push_metrics(const std::vector<simulate::Push>& pushes) {
     metrics.friction_work = last.friction_work;
     metrics.energy_released = last.push_work - last.stored_energy - last.friction_work;
   }
-  if (metrics.insertion > 0.0) {
-    metrics.mean_contact_force = metrics.force_impulse / metrics.insertion;
-  }
+  if (way > 0.0) metrics.mean_contact_force = metrics.force_impulse / way;
   return metrics;
 }
 
@@ -98,9 +73,9 @@ Metrics compute_metrics(const simulate::TrialResult& trial, const Study& study,
   }
   metrics.wall_motion = find_wall_motion(trial.pushes, path);
   for (Eigen::Index k = 0; k < trial.nodes.cols(); ++k) {
-    const PathDistance distance = distance_to_path(trial.nodes.col(k), path);
-    metrics.centerline_deviation += distance.axis / static_cast<double>(trial.nodes.cols());
-    metrics.off_path = std::max(metrics.off_path, distance.lumen);
+    const PathPlace place = find_place(trial.nodes.col(k), path);
+    metrics.centerline_deviation += place.from_axis / static_cast<double>(trial.nodes.cols());
+    metrics.off_path = std::max(metrics.off_path, place.from_lumen);
   }
   return metrics;
 }

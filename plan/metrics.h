@@ -23,8 +23,8 @@ struct Metrics {
   double nearest_to_target = 0.0;       // smallest distance after any push                  [mm]
   double peak_tip_force = 0.0;          // over the insertion                                [N]
   double peak_contact_force = 0.0;      // largest single contact                            [N]
-  double mean_contact_force = 0.0;      // all contacts together, mean over the insertion    [N]
-  double force_impulse = 0.0;           // integral of all contacts' force over insertion    [N mm]
+  double mean_contact_force = 0.0;      // all contacts together, mean over the wire's way   [N]
+  double force_impulse = 0.0;           // integral of all contacts' force over that way     [N mm]
   double peak_push_force = 0.0;         // largest size, pushed or held back                 [N]
   double peak_curvature = 0.0;          //                                                   [1/mm]
   double centerline_deviation = 0.0;    // mean distance of the final wire from the path     [mm]
@@ -48,9 +48,9 @@ Metrics compute_metrics(const simulate::TrialResult& trial, const Study& study,
                         const Centerline& path);
 
 /// The part that the pushes alone tell: insertion, forces, curvature, penetration, displacement,
-/// work, residual and iterations. The impulse is the integral of the total contact force by the
-/// trapezoidal rule, from rest (no force at insertion 0) through the pushes; the mean is the
-/// impulse over the insertion. Expects pushes in order of insertion.
+/// work, residual and iterations. The impulse is the integral of the total contact force over the
+/// way of the wire, in and out, by the trapezoidal rule, from rest (no force at insertion 0); the
+/// mean is the impulse over that way.
 Metrics compute_push_metrics(const std::vector<simulate::Push>& pushes);
 
 }  // namespace wireplan::plan

@@ -86,15 +86,17 @@ struct EnergySink {
   void gradient_theta(int, double) {}
 };
 
-/// Sum of the gradient over the nodes before `first`.
+/// Sum of the gradient over the nodes and edges before `first`.
 struct HeldSink {
   static constexpr bool kHessian = false;
   int first;
-  Vec3 sum = Vec3::Zero();
+  HeldEnd sum = {};
   void gradient(int i, const Vec3& g) {
-    if (i < first) sum += g;
+    if (i < first) sum.force += g;
   }
-  void gradient_theta(int, double) {}
+  void gradient_theta(int e, double g) {
+    if (e < first) sum.torque += g;
+  }
 };
 
 /// Gradient with respect to every node; no Hessian.
@@ -595,7 +597,7 @@ Energy Statics::evaluate(const Problem& problem, const RodState& state,
   return assemble_with_contact(problem, state, sink);
 }
 
-Vec3 Statics::held_force(const Problem& problem, const RodState& state) {
+HeldEnd Statics::held_end(const Problem& problem, const RodState& state) {
   // Elements that reach from the free nodes to those before.
   HeldSink sink{problem.first};
   Problem near;

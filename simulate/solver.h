@@ -70,6 +70,12 @@ struct Energy {
   double total() const { return stretch + bend + twist + load + contact + wall; }
 };
 
+/// What holds the part of a rod that is not free, against the rod alone.
+struct HeldEnd {
+  Vec3 force = Vec3::Zero();  //                                                           [N]
+  double torque = 0.0;        // about its edges, which turn as one                     [N mm]
+};
+
 /// Solver with the memory that its solves reuse. One per thread.
 class Statics {
  public:
@@ -81,9 +87,8 @@ class Statics {
   /// ones included: minus the gradient is the force of the rod and its loads on a node [N].
   static Energy evaluate(const Problem& problem, const RodState& state,
                          Eigen::Ref<Eigen::Matrix3Xd> gradient);
-  /// Force on the nodes before the first free one that keeps them where they are, against the wire
-  /// alone [N].
-  static Vec3 held_force(const Problem& problem, const RodState& state);
+  /// What keeps the nodes before the first free one, and their edges, where they are.
+  static HeldEnd held_end(const Problem& problem, const RodState& state);
   /// For tests: gradient and dense Hessian over all x, then all theta (4n-1), supports ignored.
   static void derivatives(const Problem& problem, const RodState& state, Eigen::VectorXd& gradient,
                           Eigen::MatrixXd& hessian);

@@ -7,6 +7,7 @@
 #include <array>
 #include <cmath>
 #include <map>
+#include <utility>
 #include <vector>
 
 #include "preprocess/vessel.h"
@@ -247,6 +248,88 @@ inline Surface divided_box(const Vec3& low, const Vec3& high, int parts) {
     }
   }
   return as_surface(vertices, triangles);
+}
+
+/// Where `depth`, positive inside, is zero within a box that holds the shape: marching tetrahedra
+/// on a grid of the given spacing. Unlike the other shapes, its triangles may be slivers.
+template <class Depth>
+Surface level_set(const Depth& depth, const Vec3& low, const Vec3& high, double spacing) {
+  const Eigen::Array3i nodes = ((high - low).array() / spacing).ceil().cast<int>() + 1;
+  const auto index = [&](const Eigen::Array3i& n) {
+    return n[0] + nodes[0] * (n[1] + nodes[1] * n[2]);
+  };
+  const auto place = [&](int k) -> Vec3 {
+    return low + spacing * Vec3(k % nodes[0], k / nodes[0] % nodes[1], k / nodes[0] / nodes[1]);
+  };
+  std::vector<double> value(static_cast<std::size_t>(nodes.prod()));
+  for (int k = 0; k < nodes.prod(); ++k) {
+    const double found = depth(place(k));
+    // A vertex on a node would collapse triangles.
+    value[static_cast<std::size_t>(k)] = std::abs(found) < 1e-3 * spacing ? 1e-3 * spacing : found;
+  }
+  const auto at = [&](int k) { return value[static_cast<std::size_t>(k)]; };
+  std::vector<Vec3> vertices;
+  std::vector<Eigen::Vector3i> triangles;
+  std::map<std::pair<int, int>, int> vertex_of;  // of the edge between two nodes
+  const auto vertex = [&](int a, int b) {
+    const auto [found, fresh] =
+        vertex_of.try_emplace(std::minmax(a, b), static_cast<int>(vertices.size()));
+    if (fresh) {
+      const double part = at(a) / (at(a) - at(b));
+      vertices.push_back((1.0 - part) * place(a) + part * place(b));
+    }
+    return found->second;
+  };
+  const auto add_facing = [&](int a, int b, int c, const Vec3& outside) {
+    const Vec3 &p = vertices[static_cast<std::size_t>(a)],
+               &q = vertices[static_cast<std::size_t>(b)],
+               &r = vertices[static_cast<std::size_t>(c)];
+    const bool outward = (q - p).cross(r - p).dot(outside - p) > 0.0;
+    triangles.emplace_back(a, outward ? b : c, outward ? c : b);
+  };
+  const auto add_tetrahedron = [&](const std::array<int, 4>& corners) {
+    std::vector<int> in, out;
+    for (const int k : corners) (at(k) > 0.0 ? in : out).push_back(k);
+    if (in.size() == 1 || out.size() == 1) {
+      const bool one_in = in.size() == 1;
+      const int one = one_in ? in[0] : out[0];
+      const std::vector<int>& rest = one_in ? out : in;
+      const int a = vertex(one, rest[0]), b = vertex(one, rest[1]), c = vertex(one, rest[2]);
+      add_facing(a, b, c, one_in ? place(rest[0]) : place(one));
+    } else if (in.size() == 2) {
+      const int a = vertex(in[0], out[0]), b = vertex(in[0], out[1]), c = vertex(in[1], out[1]),
+                d = vertex(in[1], out[0]);
+      add_facing(a, b, c, place(out[1]));
+      add_facing(a, c, d, place(out[0]));
+    }
+  };
+  // Six tetrahedra round a diagonal of each cell.
+  const std::array<std::array<int, 3>, 6> orders = {
+      {{0, 1, 2}, {0, 2, 1}, {1, 0, 2}, {1, 2, 0}, {2, 0, 1}, {2, 1, 0}}};
+  for (int k = 0; k + 1 < nodes[2]; ++k) {
+    for (int j = 0; j + 1 < nodes[1]; ++j) {
+      for (int i = 0; i + 1 < nodes[0]; ++i) {
+        for (const std::array<int, 3>& order : orders) {
+          Eigen::Array3i n(i, j, k);
+          std::array<int, 4> corners{index(n)};
+          for (std::size_t c = 0; c < 3; ++c) {
+            ++n[order[c]];
+            corners[c + 1] = index(n);
+          }
+          add_tetrahedron(corners);
+        }
+      }
+    }
+  }
+  return as_surface(vertices, triangles);
+}
+
+/// How deep a point is inside a straight tube with flat ends, from a to b; negative outside.
+inline double depth_in_tube(const Vec3& p, const Vec3& a, const Vec3& b, double radius) {
+  const Vec3 axis = (b - a).normalized();
+  const double along = axis.dot(p - a);
+  const double from_axis = (p - a - along * axis).norm();
+  return std::min({radius - from_axis, along, (b - a).norm() - along});
 }
 
 /// Both surfaces in one, unjoined.

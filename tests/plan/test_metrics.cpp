@@ -102,8 +102,13 @@ TEST(PushMetrics, WorkIsThatOfTheEndAndWhatIsMissingWasReleased) {
   EXPECT_EQ(metrics.peak_wall_displacement, 0.5);
 }
 
-TEST(PushMetrics, RefusesPushesThatGoBackwards) {
-  EXPECT_THROW(compute_push_metrics({push_at(2.0, 0.0), push_at(1.0, 0.0)}), LogicError);
+TEST(PushMetrics, PullingBackCountsAsWayAndTurningDoesNot) {
+  // In by 2 at 1 N in the mean, back by 1 at 2 N, turned to 4 N, in again by 1 at 3 N.
+  const Metrics metrics = compute_push_metrics(
+      {push_at(2.0, 2.0), push_at(1.0, 2.0), push_at(1.0, 4.0), push_at(2.0, 2.0)});
+  EXPECT_EQ(metrics.force_impulse, 2.0 + 2.0 + 3.0);
+  EXPECT_EQ(metrics.mean_contact_force, 7.0 / 4.0);
+  EXPECT_EQ(metrics.insertion, 2.0);
 }
 
 TEST(Metrics, DeviationIsTheMeanDistanceToTheSegmentsAndTheirEnds) {

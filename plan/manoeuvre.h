@@ -1,0 +1,38 @@
+#pragma once
+/// Where no straight push reaches the target: scripts of pushes, pulls and turns that do.
+#include <string>
+#include <vector>
+
+#include "plan/batch.h"
+#include "preprocess/vessel.h"
+
+namespace wireplan::plan {
+
+/// The straight pushes worth going on from: of each wire that feels turns of the hub, the
+/// `per_wire` whose tips came furthest along the path, in order of candidates. What reached the
+/// target or has moves of its own is none. `progress` as find_progress() gives it.
+std::vector<int> choose_starts(const Study& study, const std::vector<Candidate>& candidates,
+                               const std::vector<double>& progress,
+                               const std::vector<simulate::Outcome>& outcomes, int per_wire);
+
+/// How far along the path the tip came in any push while it was in the path's lumen [mm].
+double find_progress(const simulate::TrialResult& trial, const Centerline& path);
+
+struct Manoeuvres {
+  std::vector<Candidate> found;  // with the moves that reach the target; may be empty
+  long branches = 0;             // that were tried
+};
+
+/// Searches from each start, in parallel, for the moves that bring the tip into the target: where
+/// the wire leaves the path it is turned, or pulled back and turned, and pushed on; the branches
+/// that come further are gone on from in the same way. Up to three scripts per start, those of few
+/// moves first, then those that press the wall least. The same at any thread count.
+Manoeuvres find_manoeuvres(const Study& study, const std::vector<Candidate>& starts,
+                           const Centerline& path, const simulate::VesselModel& vessel,
+                           const BatchOptions& options);
+
+/// "push 112 mm, turn 90 deg clockwise, pull back 10 mm, push 35 mm": as the hand does it, seen
+/// from the hub toward the patient.
+std::string describe_moves(const std::vector<simulate::Move>& moves);
+
+}  // namespace wireplan::plan

@@ -1,0 +1,30 @@
+#include "plan/path_place.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace wireplan::plan {
+
+PathPlace find_place(const Vec3& p, const Centerline& path) {
+  expects(path.points.cols() > 0 && path.radius.size() == path.points.cols());
+  PathPlace place{.radius = path.radius[0], .from_axis = (p - path.points.col(0)).norm()};
+  place.from_lumen = std::max(0.0, place.from_axis - path.radius[0]);
+  double before = 0.0;
+  for (Eigen::Index k = 1; k < path.points.cols(); ++k) {
+    const Vec3 a = path.points.col(k - 1), ab = path.points.col(k) - path.points.col(k - 1);
+    const double squared = ab.squaredNorm(), length = std::sqrt(squared);
+    const double t = squared == 0.0 ? 0.0 : std::clamp((p - a).dot(ab) / squared, 0.0, 1.0);
+    const double axis = (p - a - t * ab).norm();
+    const double radius = (1.0 - t) * path.radius[k - 1] + t * path.radius[k];
+    if (axis < place.from_axis) {
+      place.arc = before + t * length;
+      place.from_axis = axis;
+      place.radius = radius;
+    }
+    place.from_lumen = std::min(place.from_lumen, std::max(0.0, axis - radius));
+    before += length;
+  }
+  return place;
+}
+
+}  // namespace wireplan::plan

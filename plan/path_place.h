@@ -1,0 +1,17 @@
+#pragma once
+/// Where a point is along and beside the path from access to target.
+#include "preprocess/vessel.h"
+
+namespace wireplan::plan {
+
+struct PathPlace {
+  double arc = 0.0;         // of the nearest point of the path's axis, from the access     [mm]
+  double radius = 0.0;      // of the path there                                            [mm]
+  double from_axis = 0.0;   // distance from the axis, exact to its segments                [mm]
+  double from_lumen = 0.0;  // from the balls inscribed along it; 0 inside one              [mm]
+};
+
+/// Expects a path of at least one point.
+PathPlace find_place(const Vec3& p, const Centerline& path);
+
+}  // namespace wireplan::plan

@@ -1,0 +1,209 @@
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+#include "simulate/trial.h"
+#include "tests/shapes.h"
+
+namespace wireplan::simulate {
+namespace {
+
+Wire straight_wire() {
+  return {.name = "straight",
+          .radius = 0.445,
+          .sections = {{.length = 400.0, .bending_stiffness = 50.0}}};
+}
+
+Wire curved_wire() {
+  return {.name = "curved",
+          .radius = 0.445,
+          .sections = {{.length = 12.0, .bending_stiffness = 10.0, .rest_curvature = 1.0 / 6.0},
+                       {.length = 400.0, .bending_stiffness = 50.0}}};
+}
+
+/// Lumen of 4 mm radius that bends by 90 degrees round 40 mm, from +z to +x.
+const VesselModel& bend() {
+  static const VesselModel vessel(shapes::bend_tube(4.0, 40.0, 0.5 * kPi, 40.0, 60.0, 1.5),
+                                  {.grid_spacing = 0.6});
+  return vessel;
+}
+const VesselModel& straight() {
+  static const VesselModel vessel(shapes::straight_tube(4.0, 100.0, 1.5), {.grid_spacing = 0.6});
+  return vessel;
+}
+
+Introducer along_z(double roll = 0.0) {
+  return {.point = Vec3(0.0, 0.0, 5.0), .direction = Vec3::UnitZ(), .roll = roll};
+}
+const Goal kNowhere{.point = Vec3(0.0, 0.0, -1e3)};
+InsertionOptions options(double friction = 0.0) {
+  return {.length = 160.0, .step = 1.0, .element_length = 2.0, .friction = friction};
+}
+
+TrialResult make_moves(const Wire& wire, const VesselModel& vessel, const std::vector<Move>& moves,
+                       const InsertionOptions& with = options(), double roll = 0.0) {
+  return run_trial(wire, along_z(roll), kNowhere, vessel, with, moves);
+}
+
+double largest_difference(const TrialResult& a, const TrialResult& b) {
+  EXPECT_EQ(a.nodes.cols(), b.nodes.cols());
+  if (a.nodes.cols() != b.nodes.cols()) return INFINITY;
+  return (a.nodes - b.nodes).colwise().norm().maxCoeff();
+}
+
+TEST(Moves, OnePushIsWhatATrialDoesByItself) {
+  InsertionOptions some = options(0.1);
+  some.length = 70.0;
+  const TrialResult whole = make_moves(curved_wire(), bend(), {}, some);
+  const TrialResult moved = make_moves(curved_wire(), bend(), {{.push = 70.0}}, some);
+  EXPECT_EQ(whole.nodes, moved.nodes);
+  EXPECT_EQ(whole.pushes.size(), moved.pushes.size());
+}
+
+TEST(Moves, PullingBackUndoesAPushWithoutFriction) {
+  for (const Wire& wire : {straight_wire(), curved_wire()}) {
+    SCOPED_TRACE(wire.name);
+    const TrialResult there = make_moves(wire, bend(), {{.push = 70.0}});
+    const TrialResult back = make_moves(wire, bend(), {{.push = 90.0}, {.push = -20.0}});
+    ASSERT_EQ(back.pushes.size(), 110u);
+    EXPECT_NEAR(back.pushes.back().insertion, 70.0, 1e-9);
+    // A straight wire lies anywhere on the outer side of the bend, almost for free.
+    EXPECT_LT(largest_difference(there, back), wire.name == "curved" ? 0.02 : 1.0);
+    EXPECT_NEAR(there.pushes.back().push_force, back.pushes.back().push_force, 1e-3);
+    EXPECT_NEAR(there.pushes.back().stored_energy, back.pushes.back().stored_energy, 1e-3);
+  }
+}
+
+TEST(Moves, FrictionHoldsAgainstPushAndPull) {
+  // The capstan: the same bend resists either way, so the hand's force lies about as far above the
+  // frictionless one in pushing as below it in pulling.
+  const double free =
+      make_moves(straight_wire(), bend(), {{.push = 110.0}}).pushes.back().push_force;
+  const TrialResult rubbed =
+      make_moves(straight_wire(), bend(), {{.push = 112.0}, {.push = -2.0}}, options(0.2));
+  const double pushed = rubbed.pushes[109].push_force, pulled = rubbed.pushes.back().push_force;
+  EXPECT_NEAR(rubbed.pushes[109].insertion, rubbed.pushes.back().insertion, 1e-9);
+  EXPECT_GT(pushed - free, 0.005);
+  EXPECT_LT(pulled - free, -0.005);
+  EXPECT_NEAR((pushed - free) / (free - pulled), 1.0, 0.3);  // by exp(mu theta) not quite the same
+}
+
+TEST(Moves, EveryMoveBalancesItsEnergy) {
+  // Work of the hand = stored + heat + what jumps release, which is never negative.
+  const std::vector<Move> moves = {
+      {.push = 60.0}, {.turn = 0.5 * kPi}, {.push = -15.0}, {.turn = -0.25 * kPi}, {.push = 30.0}};
+  for (const double friction : {0.0, 0.1}) {
+    SCOPED_TRACE(friction);
+    InsertionOptions fine = options(friction);
+    fine.step = 0.25;
+    const TrialResult trial = make_moves(curved_wire(), bend(), moves, fine);
+    double most = 0.0;
+    for (const Push& push : trial.pushes) {
+      const double released = push.push_work - push.stored_energy - push.friction_work;
+      most = std::max(most, push.stored_energy);
+      EXPECT_GE(released, -0.03 * most) << push.insertion;
+    }
+    const Push& last = trial.pushes.back();
+    const double released = last.push_work - last.stored_energy - last.friction_work;
+    EXPECT_LT(released, 0.1 * most);  // no jump here
+    EXPECT_GT(most, 0.1);
+    EXPECT_NEAR(last.insertion, 75.0, 1e-9);
+    EXPECT_NEAR(last.hub_angle, 0.25 * kPi, 1e-12);
+  }
+}
+
+TEST(Moves, TurningTheHubTurnsACurvedTipAsEnteringItTurnedDoes) {
+  const double angle = 70.0 * kRadPerDeg;
+  const TrialResult entered =
+                        make_moves(curved_wire(), straight(), {{.push = 30.0}}, options(), angle),
+                    turned =
+                        make_moves(curved_wire(), straight(), {{.push = 30.0}, {.turn = angle}});
+  EXPECT_LT(largest_difference(entered, turned), 0.02);  // the tube has corners of its own
+  EXPECT_NEAR(turned.pushes.back().hub_angle, angle, 1e-12);
+  // In a round tube there is nothing to turn against.
+  EXPECT_LT(std::abs(turned.pushes.back().hub_torque), 0.05);
+}
+
+TEST(Moves, TurnedWireComesBackIntoTheIntroducerAndOutAgainAsTurned) {
+  const double angle = 0.5 * kPi;
+  const TrialResult once =
+      make_moves(curved_wire(), bend(), {{.push = 50.0}, {.turn = angle}, {.push = 30.0}});
+  const TrialResult again =
+      make_moves(curved_wire(), bend(),
+                 {{.push = 80.0}, {.turn = angle}, {.push = -70.0}, {.push = 70.0}});
+  EXPECT_LT(largest_difference(once, again), 0.05);
+  EXPECT_GT(once.pushes.back().stored_energy, 0.01);
+  EXPECT_NEAR(once.pushes.back().stored_energy, again.pushes.back().stored_energy,
+              0.01 * once.pushes.back().stored_energy);
+}
+
+TEST(Moves, ATipHeldInABendNeedsTorqueToTurn) {
+  // Turned against the bend, the curved tip stores energy; the torque is its slope.
+  const TrialResult trial =
+      make_moves(curved_wire(), bend(), {{.push = 60.0}, {.turn = 0.5 * kPi}, {.turn = kPi}});
+  double largest = 0.0;
+  for (const Push& push : trial.pushes) largest = std::max(largest, std::abs(push.hub_torque));
+  EXPECT_GT(largest, 0.05);
+  EXPECT_EQ(trial.outcome, Outcome::kMissed) << trial.reason;
+}
+
+TEST(Moves, AStraightRoundWireDoesNotFeelTheHub) {
+  const TrialResult pushed = make_moves(straight_wire(), bend(), {{.push = 60.0}}),
+                    turned = make_moves(straight_wire(), bend(), {{.push = 60.0}, {.turn = 1.0}});
+  EXPECT_LT(largest_difference(pushed, turned), 1e-9);
+  EXPECT_EQ(turned.pushes.back().hub_torque, 0.0);
+}
+
+TEST(Moves, PullingEndsBeforeTheWireIsOut) {
+  const TrialResult trial =
+      make_moves(straight_wire(), straight(), {{.push = 20.0}, {.push = -1000.0}, {.push = 5.0}});
+  const auto least =
+      std::min_element(trial.pushes.begin() + 20, trial.pushes.end(),
+                       [](const Push& a, const Push& b) { return a.insertion < b.insertion; });
+  EXPECT_NEAR(least->insertion, 1.0, 1e-9);  // a step stays in
+  EXPECT_NEAR(trial.pushes.back().insertion, 6.0, 1e-9);
+  EXPECT_EQ(trial.outcome, Outcome::kMissed);
+}
+
+TEST(Moves, PullingAndTurningAreNotStuck) {
+  const TrialResult trial = make_moves(
+      curved_wire(), straight(),
+      {{.push = 40.0}, {.push = -15.0}, {.push = 15.0}, {.turn = 8.0 * kPi}, {.push = -15.0}});
+  EXPECT_EQ(trial.outcome, Outcome::kMissed) << trial.reason;
+  EXPECT_NEAR(trial.pushes.back().insertion, 25.0, 1e-9);
+}
+
+TEST(Moves, AMarkTakesATrialBack) {
+  const Wire wire = curved_wire();
+  const InsertionOptions with = options(0.1);
+  Trial trial(wire, along_z(), kNowhere, bend(), with);
+  trial.make({.push = 50.0});
+  Trial::Mark mark;
+  trial.save(mark);
+  trial.make({.push = 30.0});
+  trial.restore(mark);
+  EXPECT_NEAR(trial.depth(), 50.0, 1e-9);
+  EXPECT_EQ(trial.result().pushes.size(), 50u);
+  trial.make({.turn = 0.5});
+  trial.make({.push = 20.0});
+  const TrialResult detour = trial.finish();
+  const TrialResult direct =
+      make_moves(wire, bend(), {{.push = 50.0}, {.turn = 0.5}, {.push = 20.0}}, with);
+  ASSERT_EQ(detour.pushes.size(), direct.pushes.size());
+  EXPECT_LT(largest_difference(detour, direct), 1e-3);  // both in equilibrium to 1e-6 N
+  EXPECT_NEAR(detour.pushes.back().push_work, direct.pushes.back().push_work, 1e-4);
+}
+
+TEST(Moves, ShapesAreKeptOnTheWayBackToo) {
+  const TrialResult trial =
+      make_moves(curved_wire(), straight(), {{.push = 20.0}, {.push = -10.0}, {.turn = kPi}});
+  // Every 5 mm of the hand's way, every 30 degrees of the hub.
+  ASSERT_EQ(trial.shapes.size(), 4u + 2u + 6u);
+  EXPECT_NEAR(trial.shapes[5].insertion, 10.0, 1e-9);
+  EXPECT_NEAR(trial.shapes.back().hub_angle, kPi, 1e-12);
+}
+
+}  // namespace
+}  // namespace wireplan::simulate
