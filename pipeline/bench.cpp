@@ -2,11 +2,12 @@
 
 #include <algorithm>
 #include <ctime>
-#include <fstream>
 #include <iostream>
+#include <sstream>
 
 #include "pipeline/bench_report.h"
 #include "pipeline/commands.h"
+#include "pipeline/disk.h"
 #include "pipeline/report.h"
 #include "preprocess/vessel_io.h"
 
@@ -25,9 +26,7 @@ std::string csv_value(const Json& value) {
 }
 
 void write_csv(const std::vector<Json>& rows, const std::filesystem::path& path) {
-  std::filesystem::path beside = path;
-  beside += ".part";
-  std::ofstream file(beside, std::ios::binary);
+  std::ostringstream file;
   const auto write_line = [&file](const Json& row, const auto& text_of) {
     const char* separator = "";
     for (const auto& [key, value] : row.items()) {
@@ -40,13 +39,7 @@ void write_csv(const std::vector<Json>& rows, const std::filesystem::path& path)
   for (const Json& row : rows) {
     write_line(row, [](const std::string&, const Json& value) { return csv_value(value); });
   }
-  file.close();
-  if (!file) {
-    throw Error(path.string() +
-                ": cannot write the table; expected a folder that may be written to and has space "
-                "left");
-  }
-  std::filesystem::rename(beside, path);
+  write_whole(file.str(), path);
 }
 
 std::string cell_text(const Json& value) {

@@ -125,8 +125,9 @@ Vessel vessel_of_case(const Case& given, const std::filesystem::path& cache) {
   RunOptions options;
   options.cache = cache.empty() ? Store::default_root() : cache;
   options.to = "wall";
-  Workspace work(given, options.work);
-  for (const Artifact& artifact : run_stages(given, options).artifacts) work.add(artifact);
+  Workspace work(given, options.work, Store(options.cache));
+  const RunResult result = run_stages(given, options);
+  for (const Artifact& artifact : result.artifacts) work.add(artifact);
   return {work.surface(), work.path(), work.wall()};
 }
 

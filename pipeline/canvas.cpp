@@ -12,8 +12,8 @@
 #include <array>
 #include <cmath>
 #include <cstdio>
-#include <fstream>
 
+#include "pipeline/disk.h"
 #include "preprocess/base.h"
 
 namespace wireplan::pipeline {
@@ -118,14 +118,9 @@ void write_png(const Picture& picture, const std::filesystem::path& png) {
   writer->Write();
   vtkUnsignedCharArray* bytes = writer->GetResult();
   expects(bytes != nullptr);
-  std::ofstream file(png, std::ios::binary);
-  file.write(reinterpret_cast<const char*>(bytes->GetPointer(0)), bytes->GetNumberOfValues());
-  file.close();
-  if (!file) {
-    throw Error(png.string() +
-                ": cannot write the picture; expected a folder that exists, may be "
-                "written to and has space left");
-  }
+  write_whole({reinterpret_cast<const char*>(bytes->GetPointer(0)),
+               static_cast<std::size_t>(bytes->GetNumberOfValues())},
+              png);
 }
 
 }  // namespace wireplan::pipeline

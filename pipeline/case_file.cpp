@@ -133,8 +133,8 @@ void read_segmentation(JsonReader& root, Case& input) {
     }
     return;
   }
-  JsonReader reader = root.object("segmentation", true);
   const std::size_t problems_before = root.problems().count();
+  JsonReader reader = root.object("segmentation", true);
   const Range band{.min = -1100.0, .max = 65535.0};
   SegmentationInput& segmentation = input.segmentation;
   segmentation.lower_hu = reader.number("lower_hu", std::nullopt, band);

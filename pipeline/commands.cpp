@@ -15,7 +15,9 @@
 #include <iostream>
 #include <memory>
 
+#include "pipeline/batch_run.h"
 #include "pipeline/bench.h"
+#include "pipeline/cache.h"
 #include "pipeline/case_file.h"
 #include "pipeline/catalogue.h"
 #include "pipeline/check.h"
@@ -28,6 +30,8 @@ namespace wireplan::pipeline {
 namespace {
 
 namespace fs = std::filesystem;
+
+constexpr double kBytesPerMb = 1e6;
 
 // Set by Ctrl-C. A signal handler reaches nothing but a global.
 std::atomic<bool> stop_asked = false;
@@ -123,9 +127,13 @@ std::string stage_line(const StageOutcome& outcome, bool with_reasons) {
   return line;
 }
 
+fs::path cache_folder(const std::string& given) {
+  return given.empty() ? Store::default_root() : fs::path(given);
+}
+
 RunOptions run_options(const RunArguments& arguments) {
   RunOptions options;
-  options.cache = arguments.cache.empty() ? Store::default_root() : fs::path(arguments.cache);
+  options.cache = cache_folder(arguments.cache);
   options.to = arguments.to;
   options.force = arguments.force;
   options.dry_run = arguments.dry_run;
@@ -169,9 +177,75 @@ int run_case(const RunArguments& arguments) {
     return kDone;
   }
   const fs::path file = output / "report.json";
-  const Json report = read_json(file, kReportSchema);
+  const Json report = read_report(file);
   std::cout << describe_best(report) << "\nreport: " << file.string() << "\n";
   return report.at("ranking").empty() ? kNoPlan : kDone;
+}
+
+struct BatchArguments {
+  std::vector<std::string> cases;
+  std::string output, cache;
+  int threads = 0;
+  double memory_gb = 0.0;
+  bool fail_fast = false;
+};
+
+int run_batch_command(const BatchArguments& arguments) {
+  BatchRunOptions options{.output = arguments.output,
+                          .cache = cache_folder(arguments.cache),
+                          .threads = arguments.threads,
+                          .memory_gb = arguments.memory_gb,
+                          .fail_fast = arguments.fail_fast,
+                          .cancelled = [] { return stop_asked.load(); },
+                          .on_line =
+                              [](const std::string& line) {
+                                std::cout << line << std::endl;  // at once, for who watches
+                              }};
+  std::signal(SIGINT, ask_to_stop);
+  const Json batch = run_batch_cases(list_batch_cases(arguments.cases), options);
+  std::string counts;
+  for (const auto& [outcome, count] : batch.at("counts").items()) {
+    if (count == 0) continue;
+    counts += (counts.empty() ? "" : ", ") + count.dump() + " " + outcome;
+  }
+  std::cout << counts << "; batch: " << (fs::path(arguments.output) / "batch.json").string()
+            << "\n";
+  return exit_code_of(batch);
+}
+
+int print_cache(const std::string& folder) {
+  const Store store(cache_folder(folder));
+  std::cout << "stage       key           MB  unused days\n";
+  for (const CacheEntry& entry : list_cache(store)) {
+    std::cout << format("%-10s  %s  %8.2f  %11.1f\n", entry.artifact.stage.c_str(),
+                        entry.artifact.key.substr(0, 8).c_str(),
+                        static_cast<double>(entry.bytes) / kBytesPerMb, entry.days_unused);
+  }
+  std::cout << store.root().string() << ": "
+            << format("%.1f MB on the disk\n",
+                      static_cast<double>(bytes_on_disk(store)) / kBytesPerMb);
+  return kDone;
+}
+
+int verify_cache_command(const std::string& folder) {
+  const Store store(cache_folder(folder));
+  const std::vector<CacheDamage> damages = verify_cache(store);
+  for (const CacheDamage& damage : damages) {
+    std::cout << damage.place.string() << ": " << damage.what << "\n";
+  }
+  std::cout << (damages.empty() ? "every artifact is intact"
+                                : std::to_string(damages.size()) +
+                                      " damaged; they will be made again when they are needed")
+            << "\n";
+  return damages.empty() ? kDone : kBadInput;
+}
+
+int prune_cache_command(const std::string& folder, const PruneOptions& options) {
+  const PruneResult result = prune_cache(Store(cache_folder(folder)), options);
+  std::cout << format("removed %d artifacts, %d trials and %d leftovers of stopped runs: %.1f MB\n",
+                      result.artifacts, result.pieces, result.leftovers,
+                      static_cast<double>(result.bytes) / kBytesPerMb);
+  return kDone;
 }
 
 // The "schema" of a file, to tell a case from a scene; empty where it has none.
@@ -239,12 +313,16 @@ int make_phantom_files(const std::string& path, const std::string& output) {
   return kDone;
 }
 
+void add_cache_option(CLI::App& command, std::string& folder) {
+  command.add_option(
+      "--cache", folder,
+      "Folder of the artifact store [$XDG_CACHE_HOME/wireplan or ~/.cache/wireplan]");
+}
+
 void add_case_options(CLI::App& command, RunArguments& arguments) {
   command.add_option("CASE", arguments.case_path, "Case file, or a folder with a case.json")
       ->required();
-  command.add_option(
-      "--cache", arguments.cache,
-      "Folder of the artifact store [$XDG_CACHE_HOME/wireplan or ~/.cache/wireplan]");
+  add_cache_option(command, arguments.cache);
   command.add_option("--to", arguments.to, "Last stage to run");
   command.add_option("--force", arguments.force, "Stage to run again although it is cached")
       ->allow_extra_args(false);
@@ -254,6 +332,34 @@ void add_case_options(CLI::App& command, RunArguments& arguments) {
 }
 
 }  // namespace
+
+int run_one_case(const fs::path& case_path, const fs::path& output, const fs::path& cache,
+                 int threads) {
+  return run_case({.case_path = case_path.string(),
+                   .output = output.string(),
+                   .cache = cache.string(),
+                   .to = {},
+                   .force = {},
+                   .overrides = {},
+                   .threads = threads});
+}
+
+Failure describe_failure() {
+  try {
+    throw;
+  } catch (const DiskError& error) {
+    return {kOurFault, error.what()};
+  } catch (const Error& error) {
+    return {kBadInput, error.what()};
+  } catch (const fs::filesystem_error& error) {
+    return {kOurFault, error.path1().string() + ": " + error.code().message() +
+                           " (check the disk's space and the folder's permissions)"};
+  } catch (const Interrupted& stop) {
+    return {kInterrupted, stop.what()};
+  } catch (const std::exception& error) {
+    return {kOurFault, std::string("internal error, please report it: ") + error.what()};
+  }
+}
 
 int run_command(int argc, const char* const* argv) {
   CLI::App app(
@@ -278,6 +384,54 @@ int run_command(int argc, const char* const* argv) {
   run->add_flag("--explain", run_arguments.explain, "Say why each stage runs");
   run->footer("Example: wireplan run cases/abdomen -o out -j 2");
   run->callback([&] { code = run_case(run_arguments); });
+
+  BatchArguments batch_arguments;
+  CLI::App* batch = app.add_subcommand("batch", "Plan many cases; one that fails stops no other");
+  batch->add_option("CASE", batch_arguments.cases, "Case files, case folders, or a folder of them")
+      ->required();
+  batch->add_option("-o,--output", batch_arguments.output, "Folder for batch.json and the results")
+      ->required();
+  batch->add_option("-j,--threads", batch_arguments.threads, "Cases at a time [all cores]")
+      ->check(CLI::Range(1, 4096));
+  batch
+      ->add_option("--memory-gb", batch_arguments.memory_gb,
+                   "Memory of all cases together [3/4 of the machine's]")
+      ->check(CLI::Range(0.1, 1e6));
+  batch->add_flag("--fail-fast", batch_arguments.fail_fast, "Stop after the first that fails");
+  add_cache_option(*batch, batch_arguments.cache);
+  batch->footer(
+      "Exits with the code of the case that ended worst. What is finished is kept: a batch that\n"
+      "was stopped goes on from there. Example: wireplan batch study/ -o out --memory-gb 8");
+  batch->callback([&] { code = run_batch_command(batch_arguments); });
+
+  std::string cache_root;
+  PruneOptions prune_options;
+  double unused_days = 0.0, max_gb = 0.0;
+  CLI::App* cache = app.add_subcommand("cache", "List, verify or prune the artifact store");
+  cache->require_subcommand(1);
+  cache->footer("Example: wireplan cache prune --unused-days 30");
+  CLI::App* list = cache->add_subcommand("list", "Every artifact, its size and when it was used");
+  add_cache_option(*list, cache_root);
+  list->callback([&] { code = print_cache(cache_root); });
+  CLI::App* verify = cache->add_subcommand("verify", "Read every byte; exits 2 where some differ");
+  add_cache_option(*verify, cache_root);
+  verify->callback([&] { code = verify_cache_command(cache_root); });
+  CLI::App* prune =
+      cache->add_subcommand("prune", "Remove what is damaged, and what stopped runs left");
+  add_cache_option(*prune, cache_root);
+  CLI::Option* days =
+      prune->add_option("--unused-days", unused_days, "Also what was not used for so many days")
+          ->check(CLI::Range(0.0, 1e5));
+  CLI::Option* most =
+      prune->add_option("--max-gb", max_gb, "Also what was not used for longest, down to this size")
+          ->check(CLI::Range(0.0, 1e6));
+  prune->callback([&] {
+    if (days->count() > 0) prune_options.unused_days = unused_days;
+    if (most->count() > 0) {
+      prune_options.max_bytes = static_cast<std::uintmax_t>(max_gb * 1e3 * kBytesPerMb);
+    }
+    code = prune_cache_command(cache_root, prune_options);
+  });
 
   RunArguments status_arguments;
   CLI::App* status = app.add_subcommand("status", "Which stages are cached, which would run, why");

@@ -1,6 +1,7 @@
 #include "pipeline/hash.h"
 
 #include <openssl/evp.h>
+#include <sys/stat.h>
 
 #include <algorithm>
 #include <array>
@@ -43,8 +44,8 @@ class Sha256 {
   std::unique_ptr<EVP_MD_CTX, decltype(&EVP_MD_CTX_free)> context_;
 };
 
-std::string hash_folder(const fs::path& folder) {
-  // Names relative to the folder, in an order that no file system decides.
+// Names of the files relative to the folder, in an order that no file system decides.
+std::vector<std::string> names_below(const fs::path& folder) try {
   std::vector<std::string> names;
   for (const fs::directory_entry& entry : fs::recursive_directory_iterator(folder)) {
     if (entry.is_regular_file()) {
@@ -52,7 +53,14 @@ std::string hash_folder(const fs::path& folder) {
     }
   }
   std::sort(names.begin(), names.end());
+  return names;
+} catch (const fs::filesystem_error& error) {
+  throw Error(folder.string() + ": cannot be read (" + error.code().message() +
+              "), expected a readable folder; check the path and its permissions");
+}
 
+std::string hash_folder(const fs::path& folder) {
+  const std::vector<std::string> names = names_below(folder);
   Sha256 sum;
   for (const std::string& name : names) {
     const fs::path file = folder / name;
@@ -92,6 +100,23 @@ std::string hash_file(const fs::path& file) {
 
 std::string hash_input(const fs::path& path) {
   return fs::is_directory(path) ? hash_folder(path) : hash_file(path);
+}
+
+std::string input_stamp(const fs::path& path) {
+  std::vector<std::string> names = {""};
+  if (fs::is_directory(path)) names = names_below(path);
+  std::string stamp;
+  for (const std::string& name : names) {
+    const fs::path file = name.empty() ? path : path / name;
+    struct stat status {};
+    if (::stat(file.c_str(), &status) != 0) continue;  // gone: the others' stamps do not match
+    stamp += name + " " + std::to_string(status.st_size) + " " + std::to_string(status.st_ino);
+    for (const timespec& time : {status.st_mtim, status.st_ctim}) {
+      stamp += ' ' + std::to_string(time.tv_sec) + '.' + std::to_string(time.tv_nsec);
+    }
+    stamp += "\n";
+  }
+  return stamp;
 }
 
 }  // namespace wireplan::pipeline

@@ -13,7 +13,11 @@ std::string hash_file(const std::filesystem::path& file);
 
 /// A file, or a folder with everything below it (a DICOM series): then the hash of the lines
 /// "relative name, size, SHA-256" in order of the names, so that moving the folder changes nothing
-/// and renaming, adding or changing a file does.
+/// and renaming, adding or changing a file does. Throws `Error` where one cannot be read.
 std::string hash_input(const std::filesystem::path& path);
+
+/// Name, size, inode and times of the file, or of each below the folder: what differs where one was
+/// changed or replaced meanwhile.
+std::string input_stamp(const std::filesystem::path& path);
 
 }  // namespace wireplan::pipeline

@@ -1,18 +1,17 @@
 #include "pipeline/json_reader.h"
 
-#include <fcntl.h>
-#include <unistd.h>
-
 #include <algorithm>
-#include <cerrno>
+#include <array>
 #include <cmath>
-#include <cstring>
+#include <cstdlib>
 #include <fstream>
 #include <set>
 #include <sstream>
 #include <string_view>
 #include <system_error>
 #include <utility>
+
+#include "pipeline/disk.h"
 
 namespace wireplan::pipeline {
 namespace {
@@ -182,20 +181,39 @@ void expect_finite(const Json& value) {
   for (const Json& element : value) expect_finite(element);
 }
 
-[[noreturn]] void throw_not_written(const std::filesystem::path& path, int error_number) {
-  throw Error(path.string() + ": cannot be written: " + std::strerror(error_number) +
-              " (check that its folder exists, its permissions and the free space)");
+/// "wireplan.case/2" -> "wireplan.case" and 2; version 0 where there is none.
+std::pair<std::string, int> kind_and_version(const std::string& schema) {
+  const std::size_t slash = schema.find('/');
+  if (slash == std::string::npos) return {schema, 0};
+  return {schema.substr(0, slash), std::atoi(schema.c_str() + slash + 1)};
 }
 
-/// Writes and flushes to the disk; returns 0 or the number of the system's error.
-int write_through(int file, std::string_view text) {
-  while (!text.empty()) {
-    const ssize_t written = ::write(file, text.data(), text.size());
-    if (written < 0 && errno == EINTR) continue;
-    if (written < 0) return errno;
-    text.remove_prefix(static_cast<std::size_t>(written));
+/// Which program reads the file, where not this one as a file of the schema `wanted`.
+std::string who_reads(const Json& file, const std::string& wanted) {
+  const std::string here = std::string("wireplan ") + WIREPLAN_VERSION;
+  const auto found = file.find("schema");
+  if (found == file.end() || !found->is_string()) return "the version that " + here + " reads";
+  const auto [kind, version] = kind_and_version(found->get<std::string>());
+  const auto [wanted_kind, wanted_version] = kind_and_version(wanted);
+  if (kind == wanted_kind) {
+    const Json writer = file.value("/provenance/program/version"_json_pointer, Json());
+    if (writer.is_string()) {
+      return "wireplan " + writer.get<std::string>() + " wrote it and reads it, " + here +
+             " does not";
+    }
+    return version > wanted_version
+               ? "a later wireplan reads it, " + here + " is too old"
+               : "an earlier wireplan reads it, " + here + " does not; make the file anew";
   }
-  return ::fsync(file) == 0 ? 0 : errno;
+  constexpr std::array<std::pair<const char*, const char*>, 4> kCommands = {
+      {{"wireplan.case", "run"},
+       {"wireplan.scene", "simulate"},
+       {"wireplan.phantom", "phantom"},
+       {"wireplan.report", "compare"}}};
+  for (const auto& [known, command] : kCommands) {
+    if (kind == known) return "`wireplan " + std::string(command) + "` reads this file";
+  }
+  return "the version that " + here + " reads";
 }
 
 }  // namespace
@@ -223,7 +241,7 @@ Json parse_json(const std::string& text, const std::string& file, const std::str
   if (found == value.end() || *found != schema) {
     Problems problems(file);
     problems.add("schema", found == value.end() ? "missing" : shown(*found), "\"" + schema + "\"",
-                 "the version that this program reads");
+                 who_reads(value, schema));
     problems.throw_if_any();
   }
   return value;
@@ -235,22 +253,7 @@ Json read_json(const std::filesystem::path& path, const std::string& schema) {
 
 void write_json(const Json& value, const std::filesystem::path& path) {
   expect_finite(value);
-  const std::string text = value.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
-
-  // Under a temporary name beside the place, through to the disk.
-  std::filesystem::path beside = path;
-  beside += ".part-" + std::to_string(::getpid());
-  const int file = ::open(beside.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);
-  if (file < 0) throw_not_written(path, errno);
-  int failure = write_through(file, text);
-  if (::close(file) != 0 && failure == 0) failure = errno;
-
-  // Into place.
-  if (failure == 0 && std::rename(beside.c_str(), path.c_str()) != 0) failure = errno;
-  if (failure != 0) {
-    ::unlink(beside.c_str());
-    throw_not_written(path, failure);
-  }
+  write_whole(value.dump(2, ' ', false, Json::error_handler_t::replace) + "\n", path);
 }
 
 double clean(double value) {

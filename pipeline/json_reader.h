@@ -23,9 +23,9 @@ Json read_json(const std::filesystem::path& path, const std::string& schema);
 /// The same for a text; `file` names it in messages.
 Json parse_json(const std::string& text, const std::string& file, const std::string& schema);
 
-/// Writes UTF-8, two spaces of indent, numbers with as few digits as read back the same, under a
-/// temporary name beside the place and renamed into it. Throws LogicError where a number is not
-/// finite, Error where the disk refuses; the place keeps what it held then.
+/// Writes UTF-8, two spaces of indent, numbers with as few digits as read back the same, whole or
+/// not at all (disk.h). Throws LogicError where a number is not finite, DiskError where the disk
+/// refuses.
 void write_json(const Json& value, const std::filesystem::path& path);
 
 /// The number without the last bits that converting a unit there and back leaves: 12 digits.

@@ -298,8 +298,8 @@ void write_phantom(const Phantom& phantom, const fs::path& folder) {
   try {
     write_files(phantom, folder);
   } catch (const fs::filesystem_error& error) {
-    throw Error(folder.string() + ": cannot be written: " + error.code().message() +
-                " (check its permissions and the free space)");
+    throw DiskError(folder.string() + ": cannot be written: " + error.code().message() +
+                    " (check its permissions and the free space)");
   }
 }
 

@@ -372,6 +372,18 @@ Json build_info() {
             {"nlohmann_json", json}}}};
 }
 
+Json read_report(const std::filesystem::path& path) {
+  Json report = read_json(path, kReportSchema);
+  try {
+    describe_best(report);
+  } catch (const Json::exception&) {
+    throw Error(path.string() +
+                ": is no whole report, expected trials and ranking as `wireplan run` writes them; "
+                "run the case again");
+  }
+  return report;
+}
+
 std::string describe_best(const Json& report) {
   const Json& ranking = report.at("ranking");
   const Json& trials = report.at("trials");

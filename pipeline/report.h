@@ -1,6 +1,7 @@
 #pragma once
 /// report.json (design section 6): what a run found, as plain JSON with a fixed order of keys.
 /// Outside "timing" it is the same, byte for byte, for the same inputs and build.
+#include <filesystem>
 #include <string>
 #include <vector>
 
@@ -38,6 +39,9 @@ Json openings_json(const std::vector<simulate::Opening>& openings);
 
 /// Version, revision, compiler, build type and library versions of this program.
 Json build_info();
+
+/// Reads a report and sees that it has what describe_best tells. Throws Error where it has not.
+Json read_report(const std::filesystem::path& path);
 
 /// The best plan of a report in one line, or why there is none.
 std::string describe_best(const Json& report);

@@ -7,6 +7,7 @@
 #include <thread>
 #include <utility>
 
+#include "pipeline/catalogue.h"
 #include "pipeline/picture.h"
 #include "pipeline/report.h"
 #include "pipeline/trial_file.h"
@@ -97,13 +98,25 @@ double choose_insertion(const Centerline& path, const plan::Study& study) {
   return length;
 }
 
-// The trials to be done: those that an interrupted run did not finish.
-std::vector<int> list_unfinished(std::size_t count, const fs::path& folder) {
-  std::vector<int> ids;
-  for (int id = 0; id < static_cast<int>(count); ++id) {
-    if (!find_trial(folder / trial_file_name(id))) ids.push_back(id);
-  }
-  return ids;
+// All that one trial reads: what its stage reads, but of the lists only its own entry.
+std::string trial_key_text(const Workspace& work, const plan::Study& study,
+                           const plan::Candidate& candidate) {
+  const auto& [wire, inclination, azimuth, roll] = candidate;
+  const std::string shared =
+      without_parameters(work.key_text, {"wires", "access.inclination_deg", "access.azimuth_deg",
+                                         "tip_roll_deg", "insertion.length_mm"});
+  return shared + key_text({{"wire", wire_json(study.wires[static_cast<std::size_t>(wire)]).dump()},
+                            {"inclination", Json(inclination).dump()},
+                            {"azimuth", Json(azimuth).dump()},
+                            {"roll", Json(roll).dump()},
+                            {"length", Json(study.insertion.length).dump()}});
+}
+
+// Puts a kept trial into the stage's folder: the same bytes, not a second time on the disk.
+void take_piece(const fs::path& piece, const fs::path& to) {
+  std::error_code cannot_link;
+  fs::create_hard_link(piece, to, cannot_link);
+  if (cannot_link) fs::copy_file(piece, to);
 }
 
 // Largest force on each triangle, over trials.
@@ -175,8 +188,8 @@ Json timing_json(const Workspace& work, const std::vector<plan::Refinement>& ref
 
 }  // namespace
 
-Workspace::Workspace(Case given, WorkOptions options)
-    : given_(std::move(given)), options_(std::move(options)) {
+Workspace::Workspace(Case given, WorkOptions options, Store store)
+    : given_(std::move(given)), options_(std::move(options)), store_(std::move(store)) {
   input = given_.volume ? given_.volume->path : given_.surface_input->path;
 }
 
@@ -381,9 +394,18 @@ void make_trials(Workspace& work, const fs::path& folder) {
   const std::vector<plan::Candidate> candidates = plan::list_candidates(study);
   const simulate::VesselModel& vessel = work.model();
 
-  // Each trial is kept as soon as it is finished, so that a run goes on where it was stopped.
-  fs::create_directories(work.unfinished / "trials");
-  const std::vector<int> ids = list_unfinished(candidates.size(), work.unfinished);
+  // Each trial is kept as soon as it is finished: a run goes on where it was stopped, and a case
+  // that has a trial in common with another takes it from there.
+  fs::create_directories(folder / "trials");
+  std::vector<std::string> keys;
+  std::vector<int> ids;
+  for (const plan::Candidate& candidate : candidates) {
+    const int id = static_cast<int>(keys.size());
+    keys.push_back(trial_key_text(work, study, candidate));
+    const std::optional<fs::path> kept = work.store().find_piece(keys.back());
+    if (kept) take_piece(*kept, folder / trial_file_name(id));
+    if (!kept) ids.push_back(id);
+  }
   const int total = static_cast<int>(candidates.size());
   const int kept = total - static_cast<int>(ids.size());
   plan::BatchOptions batch{
@@ -399,12 +421,13 @@ void make_trials(Workspace& work, const fs::path& folder) {
         const int id = ids[static_cast<std::size_t>(slot)];
         const plan::Candidate& candidate = candidates[static_cast<std::size_t>(id)];
         const simulate::TrialResult trial = plan::run_candidate(study, candidate, vessel);
-        write_trial(id, study, candidate, trial, work.unfinished / trial_file_name(id));
+        const fs::path piece = work.store().keep_piece(keys[static_cast<std::size_t>(id)],
+                                                       trial_text(study, candidate, trial));
+        take_piece(piece, folder / trial_file_name(id));
         cpu_seconds[static_cast<std::size_t>(slot)] = plan::thread_cpu_seconds() - start;
       },
       batch);
   if (std::find(finished.begin(), finished.end(), false) != finished.end()) throw Interrupted();
-  fs::rename(work.unfinished / "trials", folder / "trials");
 
   Json figures = figures_of("trials");
   figures["trials"] = total;

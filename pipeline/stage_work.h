@@ -33,10 +33,11 @@ struct WorkOptions {
 /// The artifacts made so far and what was read from them, each once and only when a stage asks.
 class Workspace {
  public:
-  Workspace(Case given, WorkOptions options);
+  Workspace(Case given, WorkOptions options, Store store);
 
   const Case& given() const { return given_; }
   const WorkOptions& options() const { return options_; }
+  const Store& store() const { return store_; }
 
   void add(const Artifact& artifact) { artifacts_[artifact.stage] = artifact; }
   bool has(const std::string& stage) const { return artifacts_.count(stage) != 0; }
@@ -57,12 +58,14 @@ class Workspace {
 
   std::filesystem::path input;  // the volume or surface that the case names
   std::string input_sha256;
-  Json parameters;                   // of the case after defaults, without folder names
-  std::filesystem::path unfinished;  // where the stage under way may keep what it finished
+  std::string input_stamp;  // before it was hashed
+  Json parameters;          // of the case after defaults, without folder names
+  std::string key_text;     // of the stage under way
 
  private:
   Case given_;
   WorkOptions options_;
+  Store store_;
   std::map<std::string, Artifact> artifacts_;
   std::optional<preprocess::Image> image_;
   std::optional<Surface> surface_;

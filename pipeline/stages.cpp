@@ -90,10 +90,17 @@ std::string in_context(const Workspace& work, const std::string& stage, const st
 
 Artifact make_artifact(const Stage& stage, const Store& store, const std::string& key_text,
                        Workspace& work) {
-  work.unfinished = store.unfinished(stage.name, key_text);
+  work.key_text = key_text;
+  const auto make = [&](const fs::path& folder) {
+    stage.make(work, folder);
+    if (stage.reads_input && input_stamp(work.input) != work.input_stamp) {
+      throw Error(work.input.string() + ": changed while it was read; run again");
+    }
+  };
   try {
-    return store.commit(stage.name, key_text,
-                        [&](const fs::path& folder) { stage.make(work, folder); });
+    return store.commit(stage.name, key_text, make);
+  } catch (const DiskError& error) {
+    throw DiskError(in_context(work, stage.name, error.what()));
   } catch (const Error& error) {
     throw Error(in_context(work, stage.name, error.what()));
   }
@@ -160,15 +167,20 @@ Json used_parameters(const Case& given) {
 }
 
 RunResult run_stages(const Case& given, const RunOptions& options) {
-  const std::vector<Stage> stages = stages_of(given);
+  return run_stages(given, options, stages_of(given));
+}
+
+RunResult run_stages(const Case& given, const RunOptions& options,
+                     const std::vector<Stage>& stages) {
   if (!options.to.empty()) require_known(stages, options.to);
   for (const std::string& name : options.force) require_known(stages, name);
 
   const Store store(options.cache);
-  Workspace work(given, options.work);
+  RunResult result{.stages = {}, .artifacts = {}, .use = store.use()};
+  Workspace work(given, options.work, store);
   work.parameters = used_parameters(given);
+  work.input_stamp = input_stamp(work.input);
   work.input_sha256 = hash_input(work.input);
-  RunResult result;
   for (const Stage& stage : stages) {
     if (options.work.cancelled && options.work.cancelled()) throw Interrupted();
 
@@ -182,7 +194,7 @@ RunResult run_stages(const Case& given, const RunOptions& options) {
 
     // Run it, unless another process just did; or in a dry run say so.
     if (!artifact && !options.dry_run) {
-      const std::optional<StoreLock> lock = store.lock(stage.name, text, options.work.cancelled);
+      const std::optional<FileLock> lock = store.lock(stage.name, text, options.work.cancelled);
       if (!lock) throw Interrupted();
       if (forced) store.forget(stage.name, text);
       artifact = store.find(stage.name, text);

@@ -4,6 +4,7 @@
 /// of earlier ones counts by its contents, so a stage that comes out the same stops the cascade.
 #include <filesystem>
 #include <functional>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -52,11 +53,16 @@ struct RunOptions {
 struct RunResult {
   std::vector<StageOutcome> stages;
   std::vector<Artifact> artifacts;  // of the stages that were cached or made
+  std::optional<FileLock> use;      // they stay in the cache as long as this
 };
 
 /// Throws `Error` for what a stage says of the world, with case file and stage named, or for a
 /// stage name that the case does not have; `Interrupted` where the user stopped it. What was
 /// finished by then is in the store.
 RunResult run_stages(const Case& given, const RunOptions& options);
+
+/// The same for other stages than those of stages_of().
+RunResult run_stages(const Case& given, const RunOptions& options,
+                     const std::vector<Stage>& stages);
 
 }  // namespace wireplan::pipeline

@@ -8,8 +8,9 @@
 #include <functional>
 #include <optional>
 #include <string>
-#include <utility>
 #include <vector>
+
+#include "pipeline/disk.h"
 
 namespace wireplan::pipeline {
 
@@ -21,6 +22,10 @@ struct KeyLine {
 /// "name: value" on a line each. Expects neither to hold a line break and no name to hold ": ", so
 /// that different lists never give the same text; values are JSON texts or digests.
 std::string key_text(const std::vector<KeyLine>& lines);
+
+/// The text without the lines of these parameters and of what lies below them: "wires" takes out
+/// "parameter wires[0].name".
+std::string without_parameters(const std::string& key_text, const std::vector<std::string>& names);
 
 /// What differs between two such texts, one sentence each: "parameter wall.thickness_mm: 1.0 ->
 /// 2.0"; of digests only the first digits.
@@ -50,19 +55,8 @@ struct Artifact {
   std::string contents() const;
 };
 
-/// The right to make one artifact, among all processes that share the cache; ends with its scope
-/// and with the process.
-class StoreLock {
- public:
-  explicit StoreLock(int file) : file_(file) {}
-  StoreLock(StoreLock&& other) noexcept : file_(std::exchange(other.file_, -1)) {}
-  StoreLock(const StoreLock&) = delete;
-  StoreLock& operator=(const StoreLock&) = delete;
-  ~StoreLock();
-
- private:
-  int file_;
-};
+/// Whether every file is there and as the manifest says. What cannot be read is not.
+bool is_intact(const Artifact& artifact);
 
 class Store {
  public:
@@ -81,14 +75,24 @@ class Store {
   Artifact commit(const std::string& stage, const std::string& key_text,
                   const std::function<void(const std::filesystem::path&)>& make) const;
 
-  /// A folder for what an interrupted stage finished, to go on from; `commit` of the same key
-  /// removes it. It may not exist.
-  std::filesystem::path unfinished(const std::string& stage, const std::string& key_text) const;
+  /// A piece of a stage's work, kept as soon as it is finished, so that an interrupted stage goes
+  /// on from it and every other that needs the same piece takes it. `key_text` names all that it
+  /// was made from. Nothing where it is absent or damaged.
+  std::optional<std::filesystem::path> find_piece(const std::string& key_text) const;
+  std::filesystem::path keep_piece(const std::string& key_text, const std::string& bytes) const;
 
-  /// Waits until no other process makes the same artifact; look it up again then. Nothing where
-  /// `give_up`, asked every tenth of a second, says so first; it may be empty.
-  std::optional<StoreLock> lock(const std::string& stage, const std::string& key_text,
-                                const std::function<bool()>& give_up = {}) const;
+  /// The right to make one artifact, among all processes that share the cache: waits until no other
+  /// makes it; look it up again then. Nothing where `give_up`, asked every tenth of a second, says
+  /// so first; it may be empty.
+  std::optional<FileLock> lock(const std::string& stage, const std::string& key_text,
+                               const std::function<bool()>& give_up = {}) const;
+
+  /// Held by who reads or makes artifacts; nothing is removed from the cache meanwhile. Nothing
+  /// where the cache cannot be written.
+  std::optional<FileLock> use() const;
+
+  /// Held by who removes; nothing where the cache is in use.
+  std::optional<FileLock> own() const;
 
   /// Takes the artifact out of the cache, so that it is made again.
   void forget(const std::string& stage, const std::string& key_text) const;
@@ -98,16 +102,20 @@ class Store {
   std::string last_key_text(const std::filesystem::path& case_file, const std::string& stage) const;
   void remember(const std::filesystem::path& case_file, const Artifact& artifact) const;
 
+  /// Every artifact whose manifest can be read, by stage and key; its files are not read.
+  std::vector<Artifact> artifacts() const;
+
   const std::filesystem::path& root() const { return root_; }
+  std::filesystem::path pieces() const { return root_ / "pieces"; }
 
  private:
   std::filesystem::path root_;
 };
 
 /// Puts the artifacts' files, but for figures and times, into `folder` under their names, by hard
-/// link where the file system
-/// can and else by copy; what is there already stays. A file that an earlier call put there and
-/// that `artifacts` has no longer is removed; other files are not touched.
+/// link where the file system can and else by copy; what is there already stays. A file that an
+/// earlier call put there and that `artifacts` has no longer is removed; other files are not
+/// touched.
 void publish(const std::vector<Artifact>& artifacts, const std::filesystem::path& folder);
 
 }  // namespace wireplan::pipeline

@@ -1,13 +1,10 @@
 #include "pipeline/trial_file.h"
 
-#include <unistd.h>
-
 #include <array>
-#include <cerrno>
 #include <cmath>
 #include <cstdio>
-#include <cstring>
 #include <fstream>
+#include <sstream>
 #include <utility>
 
 #include "pipeline/json_reader.h"
@@ -22,7 +19,7 @@ using simulate::TrialResult;
 using simulate::TriangleForce;
 using simulate::WireContact;
 
-constexpr const char* kSchema = "wireplan.trial/2";
+constexpr const char* kSchema = "wireplan.trial/3";
 
 constexpr std::array kOutcomes = {
     Outcome::kReached,     Outcome::kMissed,    Outcome::kStuck,        Outcome::kProlapsed,
@@ -141,24 +138,16 @@ std::vector<TriangleForce> peaks_from_json(const Json& columns) {
   return peaks;
 }
 
-// One key of the root per line: compact, and still to be read and compared by eye. Renamed into
-// place, so that a file of that name is whole.
-void write_lines(const Json& object, const std::filesystem::path& path) {
-  std::filesystem::path beside = path;
-  beside += ".part-" + std::to_string(::getpid());
-  std::ofstream stream(beside, std::ios::binary);
+// One key of the root per line: compact, and still to be read and compared by eye.
+std::string to_lines(const Json& object) {
+  std::ostringstream stream;
   const char* separator = "{";
   for (const auto& [key, value] : object.items()) {
     stream << separator << "\n" << Json(key) << ": " << value;
     separator = ",";
   }
   stream << "\n}\n";
-  stream.close();
-  if (stream) std::filesystem::rename(beside, path);
-  if (!stream) {
-    throw Error(path.string() + ": cannot be written (" + std::strerror(errno) +
-                "); free some space or choose another folder with --cache");
-  }
+  return stream.str();
 }
 
 }  // namespace
@@ -169,11 +158,10 @@ std::string trial_file_name(int id) {
   return name.data();
 }
 
-void write_trial(int id, const plan::Study& study, const plan::Candidate& candidate,
-                 const TrialResult& trial, const std::filesystem::path& path) {
+std::string trial_text(const plan::Study& study, const plan::Candidate& candidate,
+                       const TrialResult& trial) {
   Json file;
   file["schema"] = kSchema;
-  file["id"] = id;
   file["wire"] = study.wires[static_cast<std::size_t>(candidate.wire)].name;
   file["inclination_deg"] = clean(candidate.inclination / kRadPerDeg);
   file["azimuth_deg"] = clean(candidate.azimuth / kRadPerDeg);
@@ -185,7 +173,7 @@ void write_trial(int id, const plan::Study& study, const plan::Candidate& candid
   file["nodes_mm"] = to_json(trial.nodes);
   file["contacts"] = contacts_to_json(trial.contacts);
   file["peak_forces"] = peaks_to_json(trial.peak_forces);
-  write_lines(file, path);
+  return to_lines(file);
 }
 
 std::optional<TrialResult> find_trial(const std::filesystem::path& path) {

@@ -13,10 +13,12 @@ namespace wireplan::pipeline {
 /// "trials/0007.json"
 std::string trial_file_name(int id);
 
-void write_trial(int id, const plan::Study& study, const plan::Candidate& candidate,
-                 const simulate::TrialResult& trial, const std::filesystem::path& path);
+/// The text of the file. It does not hold the trial's number, so that a trial is the same file in
+/// every case that tries it.
+std::string trial_text(const plan::Study& study, const plan::Candidate& candidate,
+                       const simulate::TrialResult& trial);
 
-/// Reads what write_trial wrote, bit for bit but for `shapes`, which is empty. Nothing where the
+/// Reads such a file, bit for bit but for `shapes`, which is empty. Nothing where the
 /// file is absent or cut.
 std::optional<simulate::TrialResult> find_trial(const std::filesystem::path& path);
 

@@ -20,6 +20,13 @@ class Error : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
+/// The world is wrong in that the disk refuses what wireplan writes: full, read-only, failing, not
+/// permitted. Nothing is wrong with the input, so `main` exits 3.
+class DiskError : public Error {
+ public:
+  using Error::Error;
+};
+
 /// The code is wrong: a precondition of a function does not hold. `main` exits 3.
 class LogicError : public std::logic_error {
  public:

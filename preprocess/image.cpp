@@ -567,8 +567,13 @@ void write_nrrd(const Grid& grid, const void* voxels, itk::IOComponentEnum type,
   io->SetFileType(itk::IOFileEnum::Binary);
   io->SetUseCompression(true);
   io->SetFileName(path.string());
-  call_itk(path, "cannot be written; check that the folder exists, may be written and has room",
-           [&] { io->Write(voxels); });
+  try {
+    io->Write(voxels);
+  } catch (const std::exception&) {
+    throw DiskError(
+        path.string() +
+        ": cannot be written; check that the folder exists, may be written and has room");
+  }
 }
 
 }  // namespace

@@ -75,7 +75,7 @@ void write_with(vtkDataObject* data, const std::filesystem::path& path) {
   writer->EncodeAppendedDataOff();
   writer->SetByteOrderToLittleEndian();
   if (writer->Write() != 1 || errors.any()) {
-    throw Error(path.string() + ": cannot be written (" + errors.text() +
+    throw DiskError(path.string() + ": cannot be written (" + errors.text() +
                 "); check that the folder exists, may be written to and that the disk is not full");
   }
 }
@@ -238,7 +238,7 @@ void write_time_series(const std::vector<std::filesystem::path>& files,
   out << "</Collection>\n</VTKFile>\n";
   out.close();
   if (!out) {
-    throw Error(path.string() +
+    throw DiskError(path.string() +
                 ": cannot be written; check that the folder exists, may be written to and that the "
                 "disk is not full");
   }

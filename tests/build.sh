@@ -4,7 +4,7 @@
 # other ones than ours.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
-preset=${1:?usage: tests/build.sh PRESET (release, dev, tsan, tidy or surface-only)}
+preset=${1:?usage: tests/build.sh PRESET (release, dev, tsan, tidy, fuzz or surface-only)}
 
 bash tests/install.sh
 

@@ -12,7 +12,17 @@ if ! { command -v apt-get && command -v dpkg-query; } >/dev/null; then
 fi
 
 # What the list names and dpkg does not have.
-mapfile -t wanted < <(sed 's/#.*//' packages.txt | xargs -n 1 | sort -u)
+mapfile -t listed < <(sed 's/#.*//' packages.txt | xargs -n 1 | sort -u)
+# A name with a "?" counts unless apt knows packages (clang), but none of that name.
+is_unknown() {
+  ! dpkg-query -W "$1" >/dev/null 2>&1 && apt-cache show clang >/dev/null 2>&1 &&
+    ! apt-cache show "$1" >/dev/null 2>&1
+}
+wanted=()
+for package in "${listed[@]}"; do
+  if [[ $package == *\? ]] && is_unknown "${package%\?}"; then continue; fi
+  wanted+=("${package%\?}")
+done
 present=$(dpkg-query -W -f '${Package} ${db:Status-Status}\n' "${wanted[@]}" 2>/dev/null |
   sed -n 's/ installed$//p' | sort -u) || true
 mapfile -t missing < <(comm -23 <(printf '%s\n' "${wanted[@]}") <(echo "$present"))
@@ -38,6 +48,9 @@ apt() {
     </dev/null >>"$log" 2>&1
 }
 apt update || true  # a broken source that has none of our packages does not matter
+for k in "${!missing[@]}"; do
+  if grep -q "^${missing[k]}?" packages.txt && is_unknown "${missing[k]}"; then unset "missing[k]"; fi
+done
 if ! apt install --no-install-recommends "${missing[@]}"; then
   tail -n 30 "$log" >&2
   echo "install: apt-get failed (see above); expected network access and Debian 12, Ubuntu 22.04" \

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # The whole suite: formatting, the tests in a release build and in one without ITK, cases end to end,
-# simulate and plan with Clang and clang-tidy, the tests under address and undefined behaviour
+# simulate and plan with Clang and clang-tidy, the parsers fuzzed, the tests under address and undefined behaviour
 # sanitizers, simulate and plan under the thread sanitizer. Stops at the first step that fails and
 # names it.
 set -euo pipefail
@@ -45,6 +45,18 @@ build_tidy() {
 
 run_suite() { ctest --preset "$1" --parallel "$(nproc)"; }
 
+# Each parser gets a fixed number of executions, some 20 s; tests/fuzz/run.sh takes as many as asked.
+fuzz_parsers() {
+  if ! clang++ -fsanitize=fuzzer -x c++ - -o /dev/null 2>/dev/null \
+    <<<'extern "C" int LLVMFuzzerTestOneInput(const unsigned char*, unsigned long) { return 0; }'; then
+    echo "not run: this clang++ has no libFuzzer (package libclang-rt-dev)"
+    return 0
+  fi
+  bash tests/build.sh fuzz
+  bash tests/fuzz/run.sh 20000 case scene report
+  bash tests/fuzz/run.sh 4000 surface volume
+}
+
 # Cases start from nothing, not from what earlier runs left in the user's cache.
 case_cache=$PWD/build/case-cache
 rm -rf "$case_cache"
@@ -69,6 +81,7 @@ step "aorta-iliac-mra" run_real_case
 step "build without ITK" bash tests/build.sh surface-only
 step "tests without ITK" run_suite surface-only
 step "simulate and plan with Clang and clang-tidy" build_tidy
+step "fuzz the parsers" fuzz_parsers
 step "thread sanitizer build of simulate and plan" bash tests/build.sh tsan
 step "tests under thread sanitizer" run_suite tsan
 step "sanitizer build" bash tests/build.sh dev

@@ -1,9 +1,14 @@
 #pragma once
 /// What the tests of the pipeline share: a folder of their own, and a case small enough to run in
 /// well under a second.
+#include <gtest/gtest.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <atomic>
+#include <cmath>
+#include <cstdint>
+#include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <sstream>
@@ -79,6 +84,78 @@ inline Json write_tube_case(const std::filesystem::path& folder) {
   file["insertion"] = {{"length_mm", 30}, {"step_mm", 2}, {"element_length_mm", 2}};
   write_json(file, folder / "case.json");
   return file;
+}
+
+/// Two tubes of 300 HU, 12 mm wide, side by side in soft tissue under a layer of air, 1 mm voxels:
+/// raw NRRD, 40 x 40 x 36.
+inline void write_two_tubes(const std::filesystem::path& file) {
+  std::string voxels;
+  for (int k = 0; k < 36; ++k) {
+    for (int j = 0; j < 40; ++j) {
+      for (int i = 0; i < 40; ++i) {
+        const double y = j - 20.0, a = std::hypot(i - 10.0, y), b = std::hypot(i - 30.0, y);
+        const int hu = j < 4 ? -1000 : std::min(a, b) < 6.0 ? 300 : 40;
+        const auto bits = static_cast<std::uint16_t>(static_cast<std::int16_t>(hu));
+        voxels += static_cast<char>(bits & 255U);
+        voxels += static_cast<char>(bits >> 8U);
+      }
+    }
+  }
+  write_text(
+      "NRRD0004\ntype: short\ndimension: 3\nspace: left-posterior-superior\nsizes: 40 40 36\n"
+      "space directions: (1,0,0) (0,1,0) (0,0,1)\nkinds: domain domain domain\nendian: little\n"
+      "encoding: raw\nspace origin: (0,0,0)\n\n" +
+          voxels,
+      file);
+}
+
+/// The tube case, started from the first of them.
+inline Json volume_case(const Json& tube) {
+  Json file = tube;
+  file["volume"] = {{"path", "ct.nrrd"}};
+  file["surface"] = {{"edge_length_mm", 1.5}};
+  file["segmentation"] = {
+      {"lower_hu", 150}, {"upper_hu", 500}, {"seeds_mm", Json::array({{10, 20, 18}})}};
+  file["access"]["point_mm"] = {10, 20, 8};
+  file["target"]["point_mm"] = {10, 20, 30};
+  return file;
+}
+
+/// Holds every JSON file below the folder that names a schema of ours against pipeline/schemas, by
+/// python3-jsonschema. Where that is not installed the test is marked as skipped.
+inline void expect_follows_schemas(const std::filesystem::path& folder) {
+  const std::string python = "/usr/bin/python3 ";
+  if (std::system(
+          (python + "-c 'from jsonschema import Draft202012Validator' 2> /dev/null").c_str()) !=
+      0) {
+    GTEST_SKIP() << "python3 has no jsonschema 4.0 (package python3-jsonschema)";
+  }
+  const TemporaryFolder own;
+  write_text(R"(import json, os, sys, jsonschema
+schemas, folder = sys.argv[1:]
+validators, checked = {}, 0
+for name in os.listdir(schemas):
+    schema = json.load(open(os.path.join(schemas, name)))
+    jsonschema.Draft202012Validator.check_schema(schema)
+    validators["wireplan." + name.split(".")[0]] = jsonschema.Draft202012Validator(schema)
+for root, _, names in os.walk(folder):
+    for name in names:
+        if not name.endswith(".json"): continue
+        try: document = json.load(open(os.path.join(root, name)))
+        except ValueError: continue
+        kind = str(document.get("schema")).split("/")[0] if isinstance(document, dict) else None
+        if kind not in validators: continue
+        checked += 1
+        for error in validators[kind].iter_errors(document):
+            print(os.path.join(root, name), error.json_path, error.message[:300])
+if checked == 0: print("no file below " + folder + " names a schema of ours")
+)",
+             own / "validate.py");
+  const std::string command = python + "'" + (own / "validate.py").string() + "' '" +
+                              WIREPLAN_SOURCE_DIR + "/pipeline/schemas' '" + folder.string() +
+                              "' > '" + (own / "told.txt").string() + "' 2>&1";
+  EXPECT_EQ(std::system(command.c_str()), 0);
+  EXPECT_EQ(read_text(own / "told.txt"), "");
 }
 
 }  // namespace wireplan::pipeline

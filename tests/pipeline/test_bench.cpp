@@ -69,17 +69,6 @@ void expect_same_rows(const Json& rows, const fs::path& csv_file) {
   EXPECT_FALSE(std::getline(csv, line));
 }
 
-/// With the JSON Schema library of Python. False where there is none.
-bool expect_valid(const fs::path& document) {
-  const std::string python = "/usr/bin/python3 -W ignore";
-  if (std::system((python + " -c 'import jsonschema' 2> /dev/null").c_str()) != 0) return false;
-  const fs::path schema = fs::path(WIREPLAN_SOURCE_DIR) / "pipeline/schemas/bench.schema.json";
-  const std::string command =
-      python + " -m jsonschema -i '" + document.string() + "' '" + schema.string() + "'";
-  EXPECT_EQ(std::system(command.c_str()), 0);
-  return true;
-}
-
 /// One result as text, table, JSON and plot; `column` is a title of the table.
 void expect_written(const QuickRun& run, const std::string& name, const std::string& column) {
   EXPECT_NE(run.text.find(column), std::string::npos);
@@ -88,9 +77,7 @@ void expect_written(const QuickRun& run, const std::string& name, const std::str
   const fs::path plot = run.folder / (name + ".png");
   EXPECT_EQ(read_text(plot).substr(1, 3), "PNG");
   EXPECT_GT(fs::file_size(plot), 10'000u);  // a plot, not a blank sheet
-  if (!expect_valid(run.folder / (name + ".json"))) {
-    GTEST_SKIP() << "python3 has no jsonschema (package python3-jsonschema)";
-  }
+  expect_follows_schemas(run.folder.path());
 }
 
 /// Error of one method at its tightest tolerance, by the number of elements.

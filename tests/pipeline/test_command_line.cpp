@@ -1,39 +1,24 @@
 // The program itself: its exit codes, what it says of bad input, and that it then writes nothing.
 #include <gtest/gtest.h>
-#include <sys/wait.h>
 
 #include <array>
 #include <chrono>
-#include <cstdint>
-#include <cstdlib>
 #include <functional>
 
 #include "pipeline/catalogue.h"
-#include "tests/pipeline/small_case.h"
+#include "tests/pipeline/program.h"
 
 namespace wireplan::pipeline {
 namespace {
 
 namespace fs = std::filesystem;
 
-struct Answer {
-  int code = -1;
-  std::string out, log;
-};
-
 // A folder with the tube case, and the program run within it.
 class CommandLine : public testing::Test {
  protected:
   void SetUp() override { case_ = write_tube_case(folder_.path()); }
 
-  Answer call(const std::string& arguments) const {
-    const std::string command = "cd '" + folder_.path().string() + "' && XDG_CACHE_HOME='" +
-                                (folder_ / "cache").string() + "' '" + WIREPLAN_PROGRAM + "' " +
-                                arguments + " > out.txt 2> log.txt";
-    const int status = std::system(command.c_str());
-    return {WIFEXITED(status) ? WEXITSTATUS(status) : -1, read_text(folder_ / "out.txt"),
-            read_text(folder_ / "log.txt")};
-  }
+  Answer call(const std::string& arguments) const { return run_program(folder_.path(), arguments); }
 
   // Runs a case that is wrong: exit 2, told in words that name `expected`, nothing written over.
   void expect_refused(const Json& file, const std::string& expected) const {
@@ -54,29 +39,6 @@ class CommandLine : public testing::Test {
   Json case_;
 };
 
-// Two tubes of 300 HU, 12 mm wide, side by side in soft tissue under a layer of air, 1 mm voxels:
-// raw NRRD, 40 x 40 x 36.
-void write_two_tubes(const fs::path& file) {
-  std::string voxels;
-  for (int k = 0; k < 36; ++k) {
-    for (int j = 0; j < 40; ++j) {
-      for (int i = 0; i < 40; ++i) {
-        const double y = j - 20.0, a = std::hypot(i - 10.0, y), b = std::hypot(i - 30.0, y);
-        const int hu = j < 4 ? -1000 : std::min(a, b) < 6.0 ? 300 : 40;
-        const auto bits = static_cast<std::uint16_t>(static_cast<std::int16_t>(hu));
-        voxels += static_cast<char>(bits & 255U);
-        voxels += static_cast<char>(bits >> 8U);
-      }
-    }
-  }
-  write_text(
-      "NRRD0004\ntype: short\ndimension: 3\nspace: left-posterior-superior\nsizes: 40 40 36\n"
-      "space directions: (1,0,0) (0,1,0) (0,0,1)\nkinds: domain domain domain\nendian: little\n"
-      "encoding: raw\nspace origin: (0,0,0)\n\n" +
-          voxels,
-      file);
-}
-
 // A soft wire pushed askew into the tube, whose wall yields and rubs.
 Json tube_scene() {
   Json scene;
@@ -90,17 +52,6 @@ Json tube_scene() {
                      {"friction", 0.1}};
   scene["insertion"] = {{"point_mm", {0, 0, 6}}, {"direction", {0.3, 0, 1}}, {"length_mm", 20}};
   return scene;
-}
-
-Json volume_case(const Json& tube) {
-  Json file = tube;
-  file["volume"] = {{"path", "ct.nrrd"}};
-  file["surface"] = {{"edge_length_mm", 1.5}};
-  file["segmentation"] = {
-      {"lower_hu", 150}, {"upper_hu", 500}, {"seeds_mm", Json::array({{10, 20, 18}})}};
-  file["access"]["point_mm"] = {10, 20, 8};
-  file["target"]["point_mm"] = {10, 20, 30};
-  return file;
 }
 
 TEST_F(CommandLine, RunsACaseAndTheSecondTimeDoesNothing) {
@@ -149,7 +100,8 @@ TEST_F(CommandLine, StopsAtAStageAndForcesOne) {
 }
 
 TEST_F(CommandLine, HelpAndVersionAreAnswersAndUnknownArgumentsAreBadInput) {
-  for (const char* command : {"", "run", "check", "status", "wires", "simulate", "phantom"}) {
+  for (const char* command : {"", "run", "batch", "check", "status", "cache", "cache prune",
+                              "wires", "simulate", "phantom"}) {
     SCOPED_TRACE(command);
     const Answer help = call(std::string(command) + " --help");
     EXPECT_EQ(help.code, 0);

@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <fstream>
+#include <map>
 
 #include "pipeline/case_file.h"
 #include "pipeline/hash.h"
@@ -145,7 +146,7 @@ TEST(Store, LetsOneAtATimeMakeAnArtifact) {
   const Store store(folder.path());
   const auto give_up = [] { return true; };
   {
-    const std::optional<StoreLock> held = store.lock("surface", "key: 1\n");
+    const std::optional<FileLock> held = store.lock("surface", "key: 1\n");
     ASSERT_TRUE(held);
     EXPECT_FALSE(store.lock("surface", "key: 1\n", give_up));
     EXPECT_TRUE(store.lock("surface", "key: 2\n", give_up));
@@ -213,16 +214,140 @@ TEST_F(StageKeys, ASecondRunRunsNoStage) {
   EXPECT_TRUE(not_cached(run({})).empty());
 }
 
-TEST_F(StageKeys, AChangeRerunsWhatReadsItAndNoMore) {
+// Stages that do nothing and come out the same whatever they read: then what reruns is what reads
+// the changed parameter itself.
+void make_nothing(Workspace&, const fs::path& folder) { write_text("same", folder / "made.txt"); }
+
+class RerunMatrix : public testing::Test {
+ protected:
+  std::vector<std::string> not_cached(const Json& file) {
+    write_json(file, folder_ / "case.json");
+    const Case given = read_case(folder_ / "case.json");
+    std::vector<Stage> stages = stages_of(given);
+    for (Stage& stage : stages) stage.make = make_nothing;
+    RunOptions options;
+    options.cache = folder_ / "cache";
+    std::vector<std::string> names;
+    for (const StageOutcome& outcome : run_stages(given, options, stages).stages) {
+      if (outcome.state != StageState::kCached) names.push_back(outcome.stage);
+    }
+    return names;
+  }
+
+  // Runs the case, then with each parameter changed in turn: an entry of the table for every
+  // parameter that the case has.
+  void expect_reruns(const Json& file, std::map<std::string, std::vector<std::string>> table,
+                     const Json& changes) {
+    write_json(file, folder_ / "case.json");
+    const Json all = case_parameters(read_case(folder_ / "case.json"));
+    not_cached(all);
+    const Json leaves = all.flatten();
+    for (const auto& [pointer, value] : leaves.items()) {
+      if (pointer == "/schema") continue;
+      SCOPED_TRACE(pointer);
+      const auto row = table.find(pointer);
+      ASSERT_NE(row, table.end()) << "a new parameter: say which stages read it";
+      Json changed = all;
+      Json& place = changed[Json::json_pointer(pointer)];
+      place = changes.contains(pointer) ? changes.at(pointer)
+              : value.is_number()       ? Json(value.get<double>() + 0.25)
+                                        : Json("other");
+      EXPECT_EQ(not_cached(changed), row->second);
+      table.erase(row);
+    }
+    for (const auto& [pointer, stages] : table) ADD_FAILURE() << pointer << " is no parameter";
+  }
+
+  TemporaryFolder folder_;
+};
+
+// What every case has, whatever it starts from.
+std::map<std::string, std::vector<std::string>> common_table() {
   using Names = std::vector<std::string>;
+  const Names report = {"report"}, trials = {"trials", "report"}, wall = {"wall", "report"};
+  const Names ends = {"centerline", "trials", "report"};
+  std::map<std::string, Names> table = {{"/name", report},
+                                        {"/surface/edge_length_mm", {"surface", "report"}},
+                                        {"/wall/model", trials},
+                                        {"/wall/thickness_mm", wall},
+                                        {"/wall/young_modulus_kpa", wall},
+                                        {"/wall/poisson_ratio", wall},
+                                        {"/target/radius_mm", trials},
+                                        {"/access/inclination_deg/0", trials},
+                                        {"/access/azimuth_deg/0", trials},
+                                        {"/tip_roll_deg/0", trials},
+                                        {"/friction", trials}};
+  for (const char* k : {"0", "1", "2"}) {
+    table[std::string("/access/point_mm/") + k] = ends;
+    table[std::string("/target/point_mm/") + k] = ends;
+  }
+  for (const char* key : {"name", "diameter_mm", "sections/0/length_mm",
+                          "sections/0/bending_stiffness_n_mm2", "sections/0/axial_stiffness_n",
+                          "sections/0/twist_stiffness_n_mm2", "sections/0/mass_kg_per_m"}) {
+    table[std::string("/wires/0/") + key] = trials;
+  }
+  for (const char* key : {"length_mm", "step_mm", "element_length_mm", "contact_spacing_mm",
+                          "residual_tolerance_n", "max_iterations", "record_every_mm"}) {
+    table[std::string("/insertion/") + key] = trials;
+  }
+  for (const char* key :
+       {"limits/tip_force_warn_n", "limits/tip_force_fail_n", "limits/penetration_fail_mm",
+        "limits/off_path_fail_mm", "ranking/weights/reach", "ranking/weights/peak_force",
+        "ranking/weights/mean_force", "ranking/weights/margin"}) {
+    table[std::string("/") + key] = report;
+  }
+  return table;
+}
+
+Json common_changes() {
+  return {{"/wall/model", "rigid"},
+          {"/wall/poisson_ratio", 0.4},
+          {"/insertion/residual_tolerance_n", 1e-5},
+          {"/insertion/max_iterations", 150}};
+}
+
+Json case_with_every_list_of_one(const fs::path& folder) {
+  Json file = write_tube_case(folder);
+  file["access"]["inclination_deg"] = {20};
+  file["tip_roll_deg"] = {0};
+  return file;
+}
+
+TEST_F(RerunMatrix, OfACaseThatStartsFromASurface) {
+  const Json file = case_with_every_list_of_one(folder_.path());
+  fs::copy(folder_ / "tube.stl", folder_ / "other.stl");
+  auto table = common_table();
+  table["/surface/path"] = {"report"};  // its contents count, not where it lies
+  table["/surface/unit"] = table["/surface/frame"] = {"surface", "report"};
+  Json changes = common_changes();
+  changes["/surface/path"] = "other.stl";
+  changes["/surface/unit"] = "cm";
+  changes["/surface/frame"] = "RAS";
+  expect_reruns(file, table, changes);
+}
+
+TEST_F(RerunMatrix, OfACaseThatStartsFromAVolume) {
+  Json file = case_with_every_list_of_one(folder_.path());
+  for (const char* name : {"ct.nrrd", "other.nrrd"}) write_text("values", folder_ / name);
+  file["volume"] = {{"path", "ct.nrrd"}};
+  file["surface"] = {{"edge_length_mm", 1.5}};
+  file["segmentation"] = {
+      {"lower_hu", 150}, {"upper_hu", 500}, {"seeds_mm", Json::array({{10, 20, 18}})}};
+  auto table = common_table();
+  table["/volume/path"] = {"report"};
+  for (const char* key : {"lower_hu", "upper_hu", "seeds_mm/0/0", "seeds_mm/0/1", "seeds_mm/0/2",
+                          "smoothing_mm", "neck_opening_mm"}) {
+    table[std::string("/segmentation/") + key] = {"segment", "report"};
+  }
+  Json changes = common_changes();
+  changes["/volume/path"] = "other.nrrd";
+  expect_reruns(file, table, changes);
+}
+
+TEST_F(StageKeys, AChangeRerunsAlsoWhatReadsWhatItChanges) {
   run({});
-  EXPECT_EQ(not_cached(run({"wall.thickness_mm=2"})), (Names{"wall", "trials", "report"}));
-  EXPECT_EQ(not_cached(run({"friction=0.1"})), (Names{"trials", "report"}));
-  EXPECT_EQ(not_cached(run({"wall.model=rigid"})), (Names{"trials", "report"}));
-  EXPECT_EQ(not_cached(run({"wires=[\"amplatz-stiff\"]"})), (Names{"trials", "report"}));
-  EXPECT_EQ(not_cached(run({"ranking.weights.margin=1"})), (Names{"report"}));
-  EXPECT_EQ(not_cached(run({"target.point_mm=[0,0,26]"})),
-            (Names{"centerline", "trials", "report"}));
+  EXPECT_EQ(not_cached(run({"wall.thickness_mm=2"})),
+            (std::vector<std::string>{"wall", "trials", "report"}));
 }
 
 TEST_F(StageKeys, TrialsInARigidVesselDoNotReadItsWall) {
@@ -278,6 +403,61 @@ TEST_F(StageKeys, AnInterruptedRunGoesOnFromItsFinishedTrials) {
   };
   EXPECT_EQ(not_cached(run_stages(given, options)), (std::vector<std::string>{"trials", "report"}));
   EXPECT_EQ(counts, std::vector<int>{2});
+}
+
+TEST_F(StageKeys, ANewWireAddsItsTrialsOnly) {
+  const auto trials_run = [](const RunResult& result) {
+    return read_json(result.artifacts[3].folder / kTimingFile, "wireplan.timing/1")
+        .at("trials_run")
+        .get<int>();
+  };
+  const Json soft = read_json(folder_ / "case.json", "wireplan.case/1")["wires"][0];
+  Json stiff = soft;
+  stiff["name"] = "stiff";
+  stiff["sections"][0]["bending_stiffness_n_mm2"] = 500;
+  const RunResult alone = run({});
+  EXPECT_EQ(trials_run(alone), 2);
+  // Before the other, so that the old trials get new numbers.
+  const RunResult both = run({"wires=" + Json::array({stiff, soft}).dump()});
+  EXPECT_EQ(trials_run(both), 2);
+  EXPECT_EQ(read_text(both.artifacts[3].folder / "trials/0002.json"),
+            read_text(alone.artifacts[3].folder / "trials/0000.json"));
+  // Each angle is a trial of its own too; another stiffness makes all trials of its wire anew.
+  EXPECT_EQ(trials_run(run({"access.inclination_deg=[0, 10, 20]"})), 1);
+  EXPECT_EQ(trials_run(run({"friction=0.1"})), 2);
+}
+
+TEST_F(StageKeys, AKeptTrialThatIsDamagedIsComputedAgain) {
+  const RunResult first = run({});
+  // The trial of the cache and the one kept are the same bytes on the disk.
+  const fs::path trial = first.artifacts[3].folder / "trials/0000.json";
+  const std::string whole = read_text(trial);
+  std::string flipped = whole;
+  flipped[whole.find("insertion_mm") + 20] ^= 1;
+  overwrite(trial, flipped);
+  const RunResult second = run({});
+  EXPECT_EQ(not_cached(second), std::vector<std::string>{"trials"});
+  EXPECT_EQ(read_text(trial), whole);
+}
+
+TEST_F(StageKeys, AnInputThatChangesWhileItIsReadIsNotTrusted) {
+  const Case given = read_case(folder_ / "case.json");
+  std::vector<Stage> stages = stages_of(given);
+  stages.front().make = [](Workspace& work, const fs::path& folder) {
+    write_text("half old, half new", folder / "surface.vtp");
+    std::ofstream(work.input, std::ios::app) << "\n";
+  };
+  RunOptions options;
+  options.cache = folder_ / "cache";
+  try {
+    run_stages(given, options, stages);
+    FAIL() << "a surface that changed was accepted";
+  } catch (const Error& error) {
+    EXPECT_NE(std::string(error.what()).find("changed while it was read; run again"),
+              std::string::npos)
+        << error.what();
+  }
+  EXPECT_TRUE(Store(options.cache).artifacts().empty());
 }
 
 }  // namespace
