@@ -104,23 +104,25 @@ std::string format(const char* pattern, double value) {
   return text.data();
 }
 
-void write_png(const Picture& picture, const std::filesystem::path& png) {
+std::string encode_png(const Picture& picture) {
   vtkNew<vtkImageData> image;
   image->SetDimensions(picture.width, picture.height, 1);
   image->AllocateScalars(VTK_UNSIGNED_CHAR, 3);
   std::copy(picture.rgb.begin(), picture.rgb.end(),
             static_cast<std::uint8_t*>(image->GetScalarPointer()));
-
-  // VTK only warns about a file it cannot open, so the file is written to memory first.
   vtkNew<vtkPNGWriter> writer;
   writer->SetInputData(image);
   writer->WriteToMemoryOn();
   writer->Write();
   vtkUnsignedCharArray* bytes = writer->GetResult();
   expects(bytes != nullptr);
-  write_whole({reinterpret_cast<const char*>(bytes->GetPointer(0)),
-               static_cast<std::size_t>(bytes->GetNumberOfValues())},
-              png);
+  return {reinterpret_cast<const char*>(bytes->GetPointer(0)),
+          static_cast<std::size_t>(bytes->GetNumberOfValues())};
+}
+
+void write_png(const Picture& picture, const std::filesystem::path& png) {
+  // VTK only warns about a file it cannot open, so the picture is made in memory first.
+  write_whole(encode_png(picture), png);
 }
 
 }  // namespace wireplan::pipeline

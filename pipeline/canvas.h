@@ -37,6 +37,9 @@ void draw_text(Picture& picture, const std::string& text, int x, int y, int size
 /// One number in the manner of printf, e.g. "%g mm".
 std::string format(const char* pattern, double value);
 
+/// The bytes of a PNG file.
+std::string encode_png(const Picture& picture);
+
 /// Throws `Error` where the file cannot be written.
 void write_png(const Picture& picture, const std::filesystem::path& png);
 

@@ -6,6 +6,7 @@
 #include <optional>
 
 #include "pipeline/hash.h"
+#include "pipeline/page.h"
 
 namespace wireplan::pipeline {
 namespace {
@@ -81,6 +82,9 @@ Json provenance_json(const ReportInput& input) {
   Json warnings = Json::array();
   for (const Json& figures : input.figures) {
     for (const Json& warning : figures.at("warnings")) warnings.push_back(warning);
+  }
+  if (!page_missing().empty()) {
+    warnings.push_back("report: the page report.html was left out: " + page_missing());
   }
   const auto flagged =
       std::count_if(input.metrics.begin(), input.metrics.end(),
@@ -297,9 +301,15 @@ Json artifacts_json(const ReportInput& input) {
       "the wall with the largest normal force that each triangle took in any trial (peak_force_n) "
       "and in the best plan (peak_force_best_plan_n)");
   add("plans.png", "best plan of each wire, or its closest attempt");
+  if (page_missing().empty()) add("report.html", "this report as a page for any browser");
+  add("trials.csv", "every trial as a row of a table");
   for (std::size_t k = 1; k <= std::min(kPlansShown, input.ranking.plans.size()); ++k) {
     add("trials/plan-" + std::to_string(k) + ".pvd",
         "insertion of a plan, by rank, as a time series");
+  }
+  for (std::size_t k = 1; k <= input.ranking.plans.size(); ++k) {
+    add("trials/plan-" + std::to_string(k) + ".mrk.json",
+        "wire, entry and target of a plan, by rank, for 3D Slicer");
   }
   return files;
 }
@@ -363,6 +373,7 @@ Json build_info() {
           {"revision", WIREPLAN_REVISION},
           {"compiler", WIREPLAN_COMPILER},
           {"build_type", WIREPLAN_BUILD_TYPE},
+          {"page_template_sha256", page_template_sha256()},
           {"libraries",
            {{"Eigen", eigen},
             {"TBB", WIREPLAN_TBB_VERSION},

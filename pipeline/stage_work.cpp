@@ -10,7 +10,9 @@
 #include "pipeline/catalogue.h"
 #include "pipeline/picture.h"
 #include "pipeline/report.h"
+#include "pipeline/report_page.h"
 #include "pipeline/trial_file.h"
+#include "pipeline/viewer_files.h"
 #include "plan/batch.h"
 #include "plan/metrics.h"
 #include "preprocess/centerline.h"
@@ -28,8 +30,6 @@ namespace fs = std::filesystem;
 constexpr double kTangentSpan = 10.0;
 // Wire that is brought along where the case leaves it open: a wire does not keep to the middle.
 constexpr double kInsertionFactor = 1.25, kInsertionExtra = 20.0;
-// Spacing of the control points that Slicer draws a curve through.
-constexpr double kMarkupSpacing = 2.0;
 
 constexpr std::array kStagesBeforeReport = {"volume",     "segment", "surface",
                                             "centerline", "wall",    "trials"};
@@ -49,37 +49,6 @@ void write_figures(const Json& figures, const fs::path& folder) {
               std::string("surface, or configure with -DWIREPLAN_IMAGING=ON"));
 }
 #endif
-
-// Points every `spacing` or more along a line, and its last.
-std::vector<Vec3> thin_out(const Eigen::Matrix3Xd& points, double spacing) {
-  std::vector<Vec3> kept;
-  for (Eigen::Index k = 0; k < points.cols(); ++k) {
-    const bool last = k + 1 == points.cols();
-    if (kept.empty() || last || (points.col(k) - kept.back()).norm() >= spacing) {
-      kept.emplace_back(points.col(k));
-    }
-  }
-  return kept;
-}
-
-// A curve for 3D Slicer (references G).
-void write_markups(const Eigen::Matrix3Xd& points, const std::string& name, const fs::path& path) {
-  Json controls = Json::array();
-  for (const Vec3& point : thin_out(points, kMarkupSpacing)) {
-    const std::string id = std::to_string(controls.size() + 1);
-    controls.push_back({{"id", id}, {"label", name + "-" + id}, {"position", to_json(point)}});
-  }
-  const Json curve = {{"type", "Curve"},
-                      {"coordinateSystem", "LPS"},
-                      {"coordinateUnits", "mm"},
-                      {"controlPoints", std::move(controls)},
-                      {"display", {{"pointLabelsVisibility", false}}}};
-  write_json({{"@schema",
-               "https://raw.githubusercontent.com/slicer/slicer/master/Modules/Loadable/Markups/"
-               "Resources/Schema/markups-schema-v1.0.0.json#"},
-              {"markups", Json::array({curve})}},
-             path);
-}
 
 void require_inside(const Surface& surface, const std::string& key, const Vec3& point) {
   const preprocess::InsideAnswer answer = preprocess::locate_point(surface, point);
@@ -353,7 +322,7 @@ void make_centerline(Workspace& work, const fs::path& folder) {
 
   const Centerline line = preprocess::find_centerline(surface, study.access, study.goal.point);
   preprocess::write_centerline(line, folder / "centerline.vtp");
-  write_markups(line.points, "centerline", folder / "centerline.mrk.json");
+  write_curve_markups(line.points, "centerline", folder / "centerline.mrk.json");
 
   const Eigen::Index last = line.points.cols() - 1;
   const double length = line.arc_length(last);
@@ -453,35 +422,56 @@ void make_trials(Workspace& work, const fs::path& folder) {
 namespace {
 
 /// The best plan of each wire in the vessel, or its closest attempt where it has none.
-void write_overview(Workspace& work, const ReportInput& report, const fs::path& png) {
+Picture draw_overview(Workspace& work, const ReportInput& report, const PageInput& page) {
   std::vector<PictureWire> wires;
-  for (std::size_t w = 0; w < report.study.wires.size(); ++w) {
-    std::optional<std::size_t> shown;
-    for (std::size_t id = 0; id < report.trials.size(); ++id) {
-      if (report.candidates[id].wire != static_cast<int>(w)) continue;
-      if (report.metrics[id].insertion <= 0.0) continue;
-      if (!shown || report.metrics[id].tip_to_target < report.metrics[*shown].tip_to_target)
-        shown = id;
-    }
-    const std::optional<int> best = report.ranking.wires[w].best_trial;
-    if (best) shown = static_cast<std::size_t>(*best);
-    if (!shown) continue;
-    const simulate::TrialResult trial = read_trial(work, *shown);
+  for (const int id : best_of_each_wire(report)) {
+    const auto w = static_cast<std::size_t>(report.candidates[static_cast<std::size_t>(id)].wire);
+    const bool best = report.ranking.wires[w].best_trial == id;
+    const PageTrial& trial = page.trials[static_cast<std::size_t>(id)];
     if (trial.nodes.cols() < 2) continue;
+    const simulate::Outcome outcome = report.trials[static_cast<std::size_t>(id)].outcome;
     wires.push_back(
         {.name = report.study.wires[w].name + ": " +
-                 (best ? "best plan" : "no plan, " + std::string(outcome_name(trial.outcome))),
-         .nodes = trial.nodes,
+                 (best ? "best plan" : "no plan, " + std::string(outcome_name(outcome))),
+         .nodes = trial.nodes.cast<double>(),
          .contact_force = {},
          .radius = report.study.wires[w].radius,
          .color = wire_color(static_cast<int>(wires.size()))});
   }
-  write_picture(work.surface(), wires,
-                {.title = report.name,
-                 .access = report.study.access,
-                 .target = report.study.goal.point,
-                 .target_radius = report.study.goal.radius},
-                png);
+  return draw_picture(work.surface(), wires,
+                      {.title = report.name,
+                       .access = report.study.access,
+                       .target = report.study.goal.point,
+                       .target_radius = report.study.goal.radius});
+}
+
+/// What the page shows of the vessel and of where to; trials and insertions are added by the caller.
+PageInput start_page(Workspace& work) {
+  const plan::Study& study = work.study();
+  PageInput page;
+  page.surface = work.surface();
+  page.path = work.path();
+  page.access = study.access;
+  page.target = study.goal.point;
+  page.target_radius = study.goal.radius;
+  for (const simulate::Wire& wire : study.wires) page.wire_radius.push_back(wire.radius);
+  return page;
+}
+
+/// Every ranked plan for 3D Slicer.
+void write_ranked_markups(const ReportInput& report, const PageInput& page,
+                          const fs::path& folder) {
+  fs::create_directories(folder);
+  for (std::size_t k = 0; k < report.ranking.plans.size(); ++k) {
+    const auto id = static_cast<std::size_t>(report.ranking.plans[k].trial);
+    const std::string name = "plan-" + std::to_string(k + 1);
+    write_plan_markups({.name = name,
+                        .nodes = page.trials[id].nodes.cast<double>(),
+                        .access = page.access,
+                        .direction = page.trials[id].direction,
+                        .target = page.target},
+                       folder / (name + ".mrk.json"));
+  }
 }
 
 }  // namespace
@@ -493,11 +483,14 @@ void make_report(Workspace& work, const fs::path& folder) {
   // Measure the trials one by one; of each only how it ended is kept.
   ReportInput report = describe_run(work);
   const std::vector<plan::Candidate>& candidates = report.candidates;
+  PageInput page = start_page(work);
   ForceMap all_forces(work.surface().triangles.cols());
   for (std::size_t id = 0; id < candidates.size(); ++id) {
     const simulate::TrialResult trial = read_trial(work, id);
     report.metrics.push_back(plan::compute_metrics(trial, study, work.path()));
     all_forces.add(trial);
+    page.trials.push_back(
+        page_trial(trial, plan::make_introducer(study, candidates[id]).direction));
     simulate::TrialResult& end = report.trials.emplace_back();
     end.outcome = trial.outcome;
     end.reason = trial.reason;
@@ -529,24 +522,39 @@ void make_report(Workspace& work, const fs::path& folder) {
 
   // Repeat the best for their shapes on the way.
   const simulate::VesselModel& vessel = work.model();
-  const std::size_t shown = std::min(kPlansShown, report.ranking.plans.size());
+  const std::vector<int> played = choose_played(report);
+  page.insertions.resize(played.size());
   plan::for_each_slot(
-      static_cast<int>(shown),
+      static_cast<int>(played.size()),
       [&](int slot) {
-        const int id = report.ranking.plans[static_cast<std::size_t>(slot)].trial;
+        const int id = played[static_cast<std::size_t>(slot)];
         const plan::Candidate& candidate = candidates[static_cast<std::size_t>(id)];
-        const simulate::TrialResult trial = plan::run_candidate(study, candidate, vessel);
-        const std::string name = "plan-" + std::to_string(slot + 1);
-        write_shapes(trial, name, folder / "trials");
-        write_markups(trial.nodes, name, folder / "trials" / (name + ".mrk.json"));
+        simulate::TrialResult trial = plan::run_candidate(study, candidate, vessel);
+        if (static_cast<std::size_t>(slot) < std::min(kPlansShown, report.ranking.plans.size())) {
+          write_shapes(trial, "plan-" + std::to_string(slot + 1), folder / "trials");
+        }
+        page.insertions[static_cast<std::size_t>(slot)] = {id, std::move(trial.shapes),
+                                                           std::move(trial.peak_forces)};
       },
       batch);
   if (work.options().cancelled && work.options().cancelled()) throw Interrupted();
-  write_overview(work, report, folder / "plans.png");
+  write_ranked_markups(report, page, folder / "trials");
+
+  // What people look at.
+  const Picture overview = draw_overview(work, report, page);
+  write_png(overview, folder / "plans.png");
+  if (page_missing().empty()) {
+    page.peak_force = all_forces.values();
+    page.slices = cut_case_slices(work, forces.back().values);
+    page.picture_png = encode_png(overview);
+  }
   report.timing = timing_json(work, report.refinements);
   report.timing["report_s"] =
       std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-  write_json(build_report(report), folder / "report.json");
+  const Json result = build_report(report);
+  if (page_missing().empty()) write_whole(build_page(result, page), folder / "report.html");
+  write_whole(trials_csv(result), folder / "trials.csv");
+  write_json(result, folder / "report.json");
 }
 
 }  // namespace wireplan::pipeline

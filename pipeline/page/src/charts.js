@@ -1,0 +1,192 @@
+// Charts, each with its numbers as a table for who cannot see it or wants to copy it.
+import {dot, frame, gridX, gridY, line, plot, ruleX, ruleY, text} from "@observablehq/plot";
+import {lineColors} from "./colors.js";
+import {el, section, table} from "./dom.js";
+import {number, percent, planName, withError} from "./format.js";
+
+const kHeight = 340;
+
+/** A figure that draws itself to the width it has. `make(width)` gives the chart or null. */
+const figure = (caption, make, numbers) => {
+  const holder = el("div", {class: "chart"});
+  const node = el("figure", {}, holder, el("figcaption", {}, caption), numbers);
+  let width = 0;
+  const draw = () => holder.replaceChildren(...[make(width)].filter(Boolean));
+  new ResizeObserver(() => {
+    const now = Math.min(760, Math.floor(holder.clientWidth));
+    if (now === width || now === 0) return;
+    width = now;
+    draw();
+  }).observe(holder);
+  return {node, draw: () => width && draw()};
+};
+
+const chart = (label, options) => {
+  const node = plot({
+    height: kHeight,
+    marginLeft: 56,
+    marginBottom: 44,
+    marginRight: 24,
+    style: {fontSize: "13px", background: "transparent", color: "#1b1b1b"},
+    ...options,
+  });
+  node.setAttribute("role", "img");
+  node.setAttribute("aria-label", label);
+  return node;
+};
+
+const numbersOf = (label, head, rows) =>
+  el("details", {}, el("summary", {}, `Numbers: ${label}`), table(label, head, rows));
+
+// ---- Force over insertion.
+const kForces = [
+  {key: "peak", name: "largest contact", dash: null},
+  {key: "push", name: "hand", dash: "7 4"},
+  {key: "tip", name: "tip", dash: "2 3"},
+  {key: "total", name: "all contacts", dash: "9 3 2 3"},
+];
+
+const forceFigure = (page, selection) => {
+  const title = el("span", {});
+  const details = el("details", {}, el("summary", {}, "Numbers: force over insertion, every 10 mm"));
+  const make = (width) => {
+    const trial = page.trials[selection.get()];
+    const pushes = trial.pushes();
+    if (!pushes.length) return el("p", {}, "This wire never entered the vessel.");
+    const rows = kForces.flatMap(({key, name}) => pushes.map((p) => ({x: p.insertion, y: p[key], name})));
+    return chart(`Forces over the insertion of ${planName(trial)}`, {
+      width,
+      x: {label: "insertion [mm] \u2192", nice: true},
+      y: {label: "\u2191 force [N]", nice: true},
+      marks: [
+        gridX(), gridY(), ruleY([0]),
+        kForces.map(({name, dash}, k) =>
+          line(rows.filter((r) => r.name === name), {x: "x", y: "y", stroke: lineColors[k], strokeWidth: 2, strokeDasharray: dash})),
+      ],
+    });
+  };
+  const legend = el("ul", {class: "keys"}, kForces.map(({name, dash}, k) => {
+    const key = document.createElementNS("http://www.w3.org/2000/svg", "svg");
+    key.setAttribute("width", "34");
+    key.setAttribute("height", "10");
+    key.setAttribute("aria-hidden", "true");
+    const stroke = document.createElementNS("http://www.w3.org/2000/svg", "path");
+    stroke.setAttribute("d", "M0 5H34");
+    stroke.setAttribute("stroke", lineColors[k]);
+    stroke.setAttribute("stroke-width", "3");
+    if (dash) stroke.setAttribute("stroke-dasharray", dash);
+    key.append(stroke);
+    return el("li", {}, key, ` ${name}`);
+  }));
+  const shown = figure(
+    el("span", {}, el("b", {}, "Force over insertion"), ": ", title, legend), make, details);
+  selection.follow((id) => {
+    const trial = page.trials[id];
+    const {peak_contact_force_error_n: error} = trial.errors;
+    title.textContent = `${planName(trial)}; largest contact ${withError(trial.peak_contact_force_n, error)}\u00a0N.`;
+    const every = trial.pushes().filter((p, k, all) => k === all.length - 1 || Math.floor(p.insertion / 10) > Math.floor((all[k - 1]?.insertion ?? 0) / 10));
+    details.replaceChildren(details.firstChild,
+      table("Force over insertion", ["Insertion [mm]", ...kForces.map(({name}) => `${name} [N]`)],
+        every.map((p) => [number(p.insertion), ...kForces.map(({key}) => number(p[key]))])));
+    shown.draw();
+  });
+  return shown.node;
+};
+
+// ---- Pareto front.
+const paretoFigure = (page, selection) => {
+  const goal = page.targetRadius;
+  const rows = page.trials.filter((t) => t.plan).map((t) => ({
+    id: t.id, trial: t,
+    x: t.peak_contact_force_n, xError: t.errors.peak_contact_force_error_n ?? null,
+    y: goal - t.tip_to_target_mm, yError: t.errors.position_error_mm ?? null,
+    front: page.report.pareto.includes(t.id),
+  }));
+  if (!rows.length) return el("p", {}, "Pareto front: no plan is ranked, so there is none.");
+  const front = rows.filter((r) => r.front).sort((a, b) => a.x - b.x);
+  const make = (width) => chart("Largest contact force against reach margin of every ranked plan", {
+    width,
+    x: {label: "largest contact [N] \u2192", nice: true, zero: true},
+    y: {label: "\u2191 reach margin [mm]", nice: true, zero: true},
+    marks: [
+      gridX(), gridY(),
+      line(front, {x: "x", y: "y", stroke: lineColors[1], strokeWidth: 1.5, strokeDasharray: "5 4"}),
+      ruleY(rows.filter((r) => r.xError !== null), {y: "y", x1: (r) => r.x - r.xError, x2: (r) => r.x + r.xError, stroke: "#333"}),
+      ruleX(rows.filter((r) => r.yError !== null), {x: "x", y1: (r) => r.y - r.yError, y2: (r) => r.y + r.yError, stroke: "#333"}),
+      dot(rows.filter((r) => !r.front), {x: "x", y: "y", r: 4, stroke: lineColors[0], strokeWidth: 1.5, title: (r) => planName(r.trial)}),
+      dot(front, {x: "x", y: "y", r: 6, symbol: "diamond", fill: lineColors[1], title: (r) => planName(r.trial)}),
+      dot(rows.filter((r) => r.id === selection.get()), {x: "x", y: "y", r: 10, stroke: "#000", strokeWidth: 2}),
+      text(front, {x: "x", y: "y", dy: -13, text: (r) => `plan ${r.trial.plan.rank}`, fontWeight: "bold"}),
+    ],
+  });
+  const shown = figure(
+    el("span", {}, el("b", {}, "Pareto front"), `: filled diamonds are plans that no other beats in both force and reach margin (target radius ${number(goal)} mm less the tip's distance). Bars are numerical errors, where estimated; the ring is the chosen plan.`),
+    make,
+    numbersOf("Pareto front", ["Plan", "Largest contact [N]", "Reach margin [mm]"],
+      front.map((r) => [`${r.trial.plan.rank}: ${planName(r.trial)}`, withError(r.x, r.xError), withError(r.y, r.yError)])));
+  selection.follow(() => shown.draw());
+  return shown.node;
+};
+
+// ---- Success rates.
+const successFigure = (page) => {
+  const rows = page.report.ranking
+    .filter((p) => p.success_rate !== null && p.success_rate !== undefined)
+    .map((p) => ({rank: `plan ${p.rank}`, rate: p.success_rate, low: p.success_rate_interval[0], high: p.success_rate_interval[1], trial: page.trials[p.trial]}));
+  if (!rows.length) {
+    const reason = page.report.ranking[0]?.null_reasons?.success_rate;
+    return el("figure", {}, el("p", {class: "missing"},
+      el("b", {}, "Success rates: "),
+      `none. No plan was repeated with disturbed angles, friction and wall${reason ? ` (${reason})` : ""}, so how robust they are is not known. A case asks for repeats with robustness.repeats.`));
+  }
+  const make = (width) => chart("Success rate of each repeated plan with its interval", {
+    width,
+    height: 60 + 26 * rows.length,
+    marginLeft: 76,
+    x: {label: "success rate [%] \u2192", domain: [0, 100]},
+    y: {label: null, domain: rows.map((r) => r.rank)},
+    marks: [
+      gridX(), frame({stroke: "#bbb"}),
+      ruleY(rows, {y: "rank", x1: (r) => 100 * r.low, x2: (r) => 100 * r.high, stroke: lineColors[0], strokeWidth: 3}),
+      dot(rows, {x: (r) => 100 * r.rate, y: "rank", r: 6, fill: lineColors[1]}),
+    ],
+  });
+  return figure(
+    el("span", {}, el("b", {}, "Success rates"), " over repeats with disturbed angles, friction and wall; bars are their intervals."),
+    make,
+    numbersOf("Success rates", ["Plan", "Success rate", "Interval"],
+      rows.map((r) => [`${r.rank}: ${planName(r.trial)}`, percent(r.rate), `${percent(r.low)} to ${percent(r.high)}`]))).node;
+};
+
+// ---- Error against run time.
+const numericsFigure = (page) => {
+  const times = new Map((page.timing.numerics ?? []).map((r) => [`${r.trial} ${r.element_length_mm}`, r.cpu_s]));
+  const rows = page.report.numerics.rows
+    .map((r) => ({...r, cpu: times.get(`${r.trial} ${r.element_length_mm}`) ?? null, name: page.trials[r.trial].plan ? `plan ${page.trials[r.trial].plan.rank}` : `trial ${r.trial}`}));
+  const drawn = rows.filter((r) => r.cpu > 0 && r.position_error_mm > 0);
+  if (!drawn.length) return el("p", {}, "Error against run time: no plan was run with finer and coarser elements.");
+  const names = [...new Set(drawn.map((r) => r.name))];
+  const make = (width) => chart("Position error against run time for elements of several lengths", {
+    width,
+    x: {label: "processor time of one insertion [s] \u2192", type: "log", nice: true},
+    y: {label: "\u2191 position error [mm]", type: "log", nice: true},
+    marks: [
+      gridX(), gridY(),
+      names.map((name, k) => [
+        line(drawn.filter((r) => r.name === name), {x: "cpu", y: "position_error_mm", stroke: lineColors[k % lineColors.length], strokeWidth: 1.5}),
+        dot(drawn.filter((r) => r.name === name), {x: "cpu", y: "position_error_mm", r: 5, fill: lineColors[k % lineColors.length], symbol: ["circle", "square", "triangle", "diamond", "star"][k % 5]}),
+      ]),
+      text(drawn, {x: "cpu", y: "position_error_mm", dx: 8, textAnchor: "start", text: (r) => `${number(r.element_length_mm)} mm`}),
+    ],
+  });
+  return figure(
+    el("span", {}, el("b", {}, "Error against run time"), ` of this case: position error of the final shape by element length (${names.map((name, k) => `${["circle", "square", "triangle", "diamond", "star"][k % 5]} ${name}`).join(", ")}).`),
+    make,
+    numbersOf("Error against run time", ["Plan", "Element length [mm]", "Position error [mm]", "Largest contact [N]", "Processor time [s]"],
+      rows.map((r) => [r.name, number(r.element_length_mm), number(r.position_error_mm), number(r.peak_contact_force_n), number(r.cpu)]))).node;
+};
+
+export const chartSection = (page, selection) =>
+  section("charts", "Charts",
+    el("div", {class: "figures"},
+      forceFigure(page, selection), paretoFigure(page, selection), successFigure(page), numericsFigure(page)));

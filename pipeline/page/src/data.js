@@ -1,0 +1,102 @@
+// What the program put into the page, decoded.
+
+const parse = (id) => JSON.parse(document.getElementById(id).textContent);
+
+const bytes = (text) => {
+  const binary = atob(text);
+  const array = new Uint8Array(binary.length);
+  for (let k = 0; k < binary.length; ++k) array[k] = binary.charCodeAt(k);
+  return array.buffer;
+};
+
+/** Decoded when first asked for. */
+const lazy = (make) => {
+  let value;
+  return () => (value ??= make());
+};
+
+export const readPage = () => {
+  const report = parse("data-report");
+  const scene = parse("data-scene");
+  const timing = parse("data-timing");
+
+  // Points are 16 bit numbers over the scene's box.
+  const {low_mm: low, size_mm: size} = scene.box;
+  const points = (text) => {
+    const steps = new Uint16Array(bytes(text));
+    const values = new Float32Array(steps.length);
+    for (let k = 0; k < steps.length; ++k) values[k] = low[k % 3] + (steps[k] / 65535) * size[k % 3];
+    return values;
+  };
+  const floats = (text) => new Float32Array(bytes(text));
+  const indices = (text) => new Uint32Array(bytes(text));
+
+  // Errors that refining found, and ranks, by trial.
+  const errors = new Map(report.numerics.plans.map((row) => [row.trial, row]));
+  const ranked = new Map(report.ranking.map((plan) => [plan.trial, plan]));
+  const excluded = new Map(report.excluded.map((row) => [row.trial, row.reason]));
+
+  const trials = report.trials.map((row, k) => {
+    const stored = scene.trials[k];
+    return {
+      ...row,
+      errors: errors.get(row.id) ?? {},
+      plan: ranked.get(row.id) ?? null,
+      excluded: excluded.get(row.id) ?? null,
+      direction: stored.direction,
+      nodes: lazy(() => points(stored.nodes)),
+      pushes: lazy(() => {
+        const values = floats(stored.push);
+        return Array.from({length: values.length / 5}, (_, i) => {
+          const [insertion, push, tip, peak, total] = values.subarray(5 * i, 5 * i + 5);
+          return {insertion, push, tip, peak, total};
+        });
+      }),
+    };
+  });
+
+  const insertions = new Map(
+    scene.insertions.map((row) => [
+      row.trial,
+      {
+        shapes: lazy(() =>
+          row.shapes.map((shape) => ({
+            insertion: shape.insertion_mm,
+            nodes: points(shape.nodes),
+            force: floats(shape.force_n),
+          })),
+        ),
+        wallTriangle: lazy(() => indices(row.wall_triangle)),
+        wallForce: lazy(() => floats(row.wall_force_n)),
+      },
+    ]),
+  );
+
+  return {
+    report,
+    timing,
+    trials,
+    insertions,
+    access: scene.access_mm,
+    target: scene.target_mm,
+    targetRadius: scene.target_radius_mm,
+    surface: {
+      vertices: points(scene.surface.vertices),
+      triangles: indices(scene.surface.triangles),
+      peakForce: floats(scene.surface.peak_force_n),
+    },
+    path: points(scene.path),
+    slices: scene.slices && {
+      ...scene.slices,
+      places: scene.slices.places.map((place) => ({
+        ...place,
+        cuts: place.cuts.map((cut) => ({
+          plane: cut.plane,
+          image: `data:image/jpeg;base64,${cut.jpeg}`,
+          outline: lazy(() => floats(cut.outline_mm)),
+        })),
+      })),
+    },
+    picture: `data:image/png;base64,${scene.picture_png}`,
+  };
+};

@@ -1,0 +1,42 @@
+// report.html: puts the sections together.
+import {el} from "./dom.js";
+import {readPage} from "./data.js";
+import {shown} from "./format.js";
+import {makeSelection} from "./selection.js";
+import {answerSection, askedSection, provenanceSection, uncertainSection, warningSection} from "./texts.js";
+import {rankingSection} from "./ranking.js";
+import {vesselSection} from "./player.js";
+import {heatSection} from "./heatmap.js";
+import {chartSection} from "./charts.js";
+import {sliceSection} from "./slices.js";
+
+const page = readPage();
+const first = page.report.ranking[0]?.trial ?? page.insertions.keys().next().value ?? 0;
+const selection = makeSelection(first);
+document.title = `${shown(page.report.name)}: wireplan report`;
+
+const notice = () => el("p", {class: "notice"}, el("strong", {}, page.report.statement));
+const vessel = vesselSection(page, selection);
+const sections = [
+  answerSection(page),
+  askedSection(page),
+  rankingSection(page, selection),
+  vessel.node,
+  heatSection(page, selection),
+  chartSection(page, selection),
+  uncertainSection(page),
+  sliceSection(page),
+  warningSection(page),
+  provenanceSection(page),
+];
+document.getElementById("page").append(
+  el("header", {},
+    el("h1", {}, "Guidewire plan: ", el("bdi", {}, shown(page.report.name))),
+    notice(),
+    el("nav", {"aria-label": "Contents"},
+      el("ul", {}, sections.map((s) => el("li", {}, el("a", {href: `#${s.id}`}, s.querySelector("h2").textContent)))))),
+  ...sections,
+  notice());
+vessel.start();
+// For who waits until the page can be used.
+document.documentElement.dataset.ready = "true";

@@ -1,0 +1,124 @@
+// What was asked, the answer, what is uncertain, and where it all comes from.
+import {el, facts, name, section, table} from "./dom.js";
+import {degrees, number, outcomeWord, percent, planName, plural, shown, withError} from "./format.js";
+
+const list = (values, text) => values.map(text).join(", ");
+const point = (p) => `(${p.map((x) => number(x)).join(", ")})\u00a0mm`;
+
+export const askedSection = (page) => {
+  const {report, trials} = page;
+  const asked = report.provenance.parameters;
+  const [input] = report.provenance.inputs;
+  return section("asked", "What was asked",
+    el("p", {}, "Which of these wires, pushed in at which of these angles, reaches the target with the least force on the wall?"),
+    facts([
+      ["Case", name(shown(report.name))],
+      ["Input", name(shown(input.name))],
+      ["Access", point(page.access)],
+      ["Target", `${point(page.target)}, reached within ${number(page.targetRadius)}\u00a0mm`],
+      ["Way", `${withError(report.vessel.branches[0].length_mm, null).split("\u00a0")[0]}\u00a0mm along the middle of the lumen, ${number(report.vessel.branches[0].min_diameter_mm)} to ${number(report.vessel.branches[0].max_diameter_mm)}\u00a0mm wide`],
+      ["Wires", list(asked.wires, (w) => shown(w.name))],
+      ["Entry", `inclination ${list(asked.access.inclination_deg, degrees)}; azimuth ${list(asked.access.azimuth_deg, degrees)}`],
+      ["Roll of the tip", list(asked.tip_roll_deg, degrees)],
+      ["Friction", `coefficient ${number(asked.friction)}`],
+      ["Wall", report.vessel.wall_model === "rigid" ? "rigid" : `yields, ${number(report.vessel.wall_stiffness_kpa_per_mm)}\u00a0kPa/mm`],
+      ["Tried", plural(trials.length, "insertion")],
+    ]));
+};
+
+export const answerSection = (page) => {
+  const {report, trials} = page;
+  const [best] = report.ranking;
+  if (!best) {
+    const counts = new Map();
+    for (const t of trials) counts.set(t.outcome, (counts.get(t.outcome) ?? 0) + 1);
+    return section("answer", "The answer",
+      el("p", {class: "answer"}, `No plan reaches the target within the limits: of ${plural(trials.length, "trial")} `,
+        [...counts].map(([outcome, count]) => `${count} ${outcomeWord(outcome)}`).join(", "), "."));
+  }
+  const t = trials[best.trial], errors = t.errors;
+  const ties = best.tied_with.length;
+  const rate = best.success_rate === null || best.success_rate === undefined
+    ? "How often it succeeds when angles, friction and wall differ was not asked."
+    : `With angles, friction and wall disturbed it succeeds in ${percent(best.success_rate)} of repeats (${percent(best.success_rate_interval[0])} to ${percent(best.success_rate_interval[1])}).`;
+  return section("answer", "The answer",
+    el("p", {class: "answer"},
+      "Best of ", plural(report.ranking.length, "plan"), ` that reach, out of ${trials.length} tried: `,
+      el("strong", {}, el("bdi", {}, planName(t))),
+      `. Its tip ends ${withError(t.tip_to_target_mm, errors.position_error_mm)}\u00a0mm from the target's middle, with at most ` +
+      `${withError(t.peak_contact_force_n, errors.peak_contact_force_error_n)}\u00a0N at one contact and ${withError(t.peak_tip_force_n, errors.peak_tip_force_error_n)}\u00a0N at the tip.`),
+    el("p", {}, ties ? `${plural(ties, "other plan")} cannot be told apart from it: ${best.tied_with.map((id) => `plan ${trials[id].plan?.rank ?? "?"}`).join(", ")}. ` : "No other plan is as good within the errors. ", rate),
+    el("p", {class: "note"}, "\u00b1 is the estimated numerical error alone; see what is uncertain below."));
+};
+
+const rangeOf = (values) => values.length ? `${number(Math.min(...values))} to ${number(Math.max(...values))}` : "\u2013";
+
+/** What turning one angle of the best plan does, told by the trials that differ in it alone. */
+const sensitivity = (page, best, key, title) => {
+  const keys = ["wire", "inclination_deg", "azimuth_deg", "roll_deg"].filter((k) => k !== key);
+  const others = page.trials.filter((t) => t.id !== best.id && t[key] !== best[key] && keys.every((k) => t[k] === best[k]));
+  if (!others.length) return [title, "only one value was tried", "not known"];
+  const reached = others.filter((t) => t.reached);
+  return [title, `${plural(others.length, "other value")} tried`,
+    `${reached.length} of them reach` + (reached.length ? `, with a largest contact of ${rangeOf(reached.map((t) => t.peak_contact_force_n))}\u00a0N against ${number(best.peak_contact_force_n)}\u00a0N` : "")];
+};
+
+export const uncertainSection = (page) => {
+  const {report, trials} = page;
+  const [first] = report.ranking;
+  const rows = [];
+  if (first) {
+    const best = trials[first.trial], e = best.errors;
+    rows.push(["Length of the wire's elements", e.position_error_mm === undefined || e.position_error_mm === null ? "error not estimated" : `best plan run with elements twice and half as long`,
+      e.position_error_mm === undefined || e.position_error_mm === null ? "not known" :
+      `position \u00b1\u00a0${number(e.position_error_mm)}\u00a0mm, largest contact \u00b1\u00a0${number(e.peak_contact_force_error_n)}\u00a0N; score \u00b1\u00a0${number(first.score_error)}, which ties ${plural(first.tied_with.length, "plan")} with the best`]);
+    rows.push(sensitivity(page, best, "inclination_deg", "Inclination of the introducer"));
+    rows.push(sensitivity(page, best, "azimuth_deg", "Azimuth of the introducer"));
+    rows.push(sensitivity(page, best, "roll_deg", "Roll of the tip"));
+    rows.push(first.success_rate === null || first.success_rate === undefined
+      ? ["Friction, wall stiffness and small errors of the angles", "not varied: the case asked for no repeats", "not known"]
+      : ["Friction, wall stiffness and small errors of the angles", "best plans repeated with these disturbed", `best plan: success rate ${percent(first.success_rate)}, interval ${percent(first.success_rate_interval[0])} to ${percent(first.success_rate_interval[1])}`]);
+  }
+  rows.push(["Shape of the lumen in the simulation", `smooth field on a grid of ${number(report.numerics.lumen_grid_mm)}\u00a0mm`,
+    `off the surface by ${number(report.numerics.lumen_mean_deviation_mm)}\u00a0mm on average, ${number(report.numerics.lumen_max_deviation_mm)}\u00a0mm at most`]);
+  const beyond = trials.filter((t) => t.beyond_linear_theory === true).length;
+  if (report.vessel.wall_model !== "rigid") {
+    const bestBeyond = first && trials[first.trial].beyond_linear_theory;
+    rows.push(["Wall by linear theory", `${beyond} of ${plural(trials.length, "trial")} moved it further than the theory holds`,
+      first ? `the best plan ${bestBeyond ? "did: its forces are rough" : "did not"}` : "forces of those are rough"]);
+  }
+  rows.push(["Segmentation, wire data, blood flow, breathing", "not varied", "not known; see the limits"]);
+  return section("uncertain", "What is uncertain, and how much it matters",
+    table("Uncertainties", ["What", "How it was looked at", "What it changes"], rows));
+};
+
+export const warningSection = (page) => {
+  const {warnings} = page.report.provenance;
+  return section("warnings", "Warnings and limits",
+    el("h3", {}, "Warnings of this run"),
+    warnings.length ? el("ul", {}, warnings.map((w) => el("li", {}, shown(w)))) : el("p", {}, "None."),
+    el("h3", {}, "Limits of validity"),
+    el("ul", {}, page.report.limits.map((limit) => el("li", {}, shown(limit)))));
+};
+
+export const provenanceSection = (page) => {
+  const {report, timing} = page;
+  const {program, inputs, parameters, stages, terms} = report.provenance;
+  const seconds = (timing.stages ?? []).map((s) => [s.stage, `${number(s.seconds)}\u00a0s`]);
+  return section("provenance", "Where it comes from",
+    facts([
+      ["Program", `${program.name} ${program.version} (${program.revision}), ${program.compiler}, ${program.build_type}`],
+      ["Libraries", Object.entries(program.libraries).map(([k, v]) => `${k} ${v}`).join(", ")],
+      ...inputs.map((input) => ["Input", el("span", {}, name(shown(input.name)), ", SHA-256 ", el("code", {}, input.sha256))]),
+      ["Parameters", el("span", {}, "SHA-256 ", el("code", {}, report.provenance.parameters_sha256))],
+      ["Seed", report.provenance.seed === null ? report.provenance.null_reasons?.seed ?? "none" : String(report.provenance.seed)],
+      ["Stages", stages.join(", ")],
+      ["Energy terms", terms.join(", ")],
+    ]),
+    el("details", {}, el("summary", {}, "All parameters"),
+      el("pre", {tabindex: "0"}, shown("").concat(JSON.stringify(parameters, null, 1).split("\n").map(shown).join("\n")))),
+    el("details", {}, el("summary", {}, "Files beside this page"),
+      table("Files", ["File", "Content"], report.artifacts.map((a) => [a.file, a.content]))),
+    el("details", {}, el("summary", {}, `Run times (${plural(timing.threads ?? 0, "thread")})`),
+      table("Run times", ["Stage", "Time"], seconds)));
+};

@@ -1,0 +1,270 @@
+// The vessel, a wire in it, entry and target, in 3D. Drawn only when something changed.
+import {
+  BufferAttribute, BufferGeometry, ColorManagement, ConeGeometry, DoubleSide, DynamicDrawUsage,
+  Group, Line, LineBasicMaterial, LinearSRGBColorSpace, Mesh, MeshBasicMaterial, OrthographicCamera,
+  RingGeometry, Scene, ShaderMaterial, SphereGeometry, Vector3, WebGLRenderer,
+} from "three";
+import {OrbitControls} from "three/addons/controls/OrbitControls.js";
+import {Line2} from "three/addons/lines/Line2.js";
+import {LineGeometry} from "three/addons/lines/LineGeometry.js";
+import {LineMaterial} from "three/addons/lines/LineMaterial.js";
+import {forceRgb} from "./colors.js";
+import {el} from "./dom.js";
+
+const kPaper = 0x141a24;
+const kEntryLength = 40; // mm
+const kEntryColor = 0xffffff, kTargetColor = 0xff9ecb;
+const kTurn = Math.PI / 24, kZoom = 1.15; // of one key press
+
+// Where the camera stands, in LPS; the head is up, and from the feet the front is.
+const kViews = {front: [0, -1, 0], left: [1, 0, 0], feet: [0, -1e-3, -1]};
+
+// Colors go to the screen as they are written.
+ColorManagement.enabled = false;
+
+// Seen from its side the vessel is more opaque, as in an x-ray; a forced triangle is more opaque
+// from everywhere and takes the color of its force.
+const kVertexShader = `
+attribute vec4 force;
+varying vec3 vNormal;
+varying vec4 vForce;
+void main() {
+  vNormal = normalMatrix * normal;
+  vForce = force;
+  gl_Position = projectionMatrix * modelViewMatrix * vec4(position, 1.0);
+}`;
+const kFragmentShader = `
+varying vec3 vNormal;
+varying vec4 vForce;
+void main() {
+  float facing = abs(normalize(vNormal).z);
+  vec3 tissue = vec3(0.86, 0.66, 0.60) * (0.55 + 0.45 * facing);
+  float alpha = 0.05 + 0.45 * pow(1.0 - facing, 2.0);
+  gl_FragColor = vec4(mix(tissue, vForce.rgb, vForce.a), max(alpha, 0.85 * vForce.a));
+}`;
+
+const makeVesselMesh = ({vertices, triangles}) => {
+  const geometry = new BufferGeometry();
+  geometry.setAttribute("position", new BufferAttribute(vertices, 3));
+  geometry.setIndex(new BufferAttribute(triangles, 1));
+  geometry.computeVertexNormals();
+  const force = new BufferAttribute(new Float32Array((vertices.length / 3) * 4), 4);
+  force.setUsage(DynamicDrawUsage);
+  geometry.setAttribute("force", force);
+  const material = new ShaderMaterial({
+    vertexShader: kVertexShader,
+    fragmentShader: kFragmentShader,
+    transparent: true,
+    depthWrite: false,
+    side: DoubleSide,
+  });
+  return new Mesh(geometry, material);
+};
+
+/** Colors each corner by the largest force of its triangles. */
+const colorVessel = (mesh, forces, scale) => {
+  const attribute = mesh.geometry.getAttribute("force");
+  const index = mesh.geometry.getIndex().array;
+  const corner = new Float32Array(attribute.count);
+  for (let k = 0; k < index.length; ++k) corner[index[k]] = Math.max(corner[index[k]], forces[(k / 3) | 0]);
+  for (let k = 0; k < corner.length; ++k) {
+    const part = scale > 0 ? Math.min(1, corner[k] / scale) : 0;
+    const [r, g, b] = forceRgb(part);
+    // Even a small force shows where the wire touched.
+    attribute.setXYZW(k, r, g, b, corner[k] > 0 ? 0.35 + 0.65 * part : 0);
+  }
+  attribute.needsUpdate = true;
+};
+
+const makeTarget = (target, radius) => {
+  const group = new Group();
+  group.add(new Mesh(new SphereGeometry(Math.max(0.6, 0.2 * radius), 24, 16), new MeshBasicMaterial({color: kTargetColor})));
+  const ring = new Mesh(
+    new RingGeometry(0.92 * radius, radius, 48),
+    new MeshBasicMaterial({color: kTargetColor, side: DoubleSide}),
+  );
+  ring.name = "ring";
+  group.add(ring);
+  group.position.set(...target);
+  return group;
+};
+
+const makeEntry = (access, direction) => {
+  const group = new Group();
+  const tip = new Vector3(...access), along = new Vector3(...direction).normalize();
+  const start = tip.clone().addScaledVector(along, -kEntryLength);
+  const shaft = new LineGeometry();
+  shaft.setPositions([...start.toArray(), ...tip.toArray()]);
+  group.add(new Line2(shaft, new LineMaterial({color: kEntryColor, linewidth: 2.5})));
+  const cone = new Mesh(new ConeGeometry(2, 7, 24), new MeshBasicMaterial({color: kEntryColor}));
+  cone.quaternion.setFromUnitVectors(new Vector3(0, 1, 0), along);
+  cone.position.copy(tip).addScaledVector(along, -3.5);
+  group.add(cone);
+  return group;
+};
+
+const dispose = (object) =>
+  object.traverse((part) => {
+    part.geometry?.dispose();
+    part.material?.dispose();
+  });
+
+/** Letters of the patient's sides at the right and at the top of the view. */
+const sideLetter = (v) => {
+  const size = [Math.abs(v.x), Math.abs(v.y), Math.abs(v.z)];
+  const axis = size.indexOf(Math.max(...size));
+  return ["RL", "AP", "IS"][axis][v.getComponent(axis) > 0 ? 1 : 0];
+};
+
+/** Throws where the browser has no WebGL. */
+export const makeVessel = (frame, page) => {
+  const canvas = el("canvas", {
+    tabindex: "0",
+    role: "img",
+    "aria-label":
+      "The vessel in 3D with the chosen wire. Arrow keys turn it, plus and minus zoom; the numbers are in the text below.",
+    "aria-describedby": "vessel-help",
+  });
+  const renderer = new WebGLRenderer({canvas, antialias: true, preserveDrawingBuffer: true});
+  renderer.outputColorSpace = LinearSRGBColorSpace;
+  renderer.setClearColor(kPaper);
+  renderer.setPixelRatio(Math.min(2, window.devicePixelRatio));
+  const labels = el("div", {class: "labels", "aria-hidden": "true"});
+  frame.append(canvas, labels);
+
+  // The scene.
+  const scene = new Scene();
+  const vessel = makeVesselMesh(page.surface);
+  scene.add(vessel);
+  const target = makeTarget(page.target, page.targetRadius);
+  scene.add(target);
+  const pathGeometry = new BufferGeometry();
+  pathGeometry.setAttribute("position", new BufferAttribute(page.path, 3));
+  scene.add(new Line(pathGeometry, new LineBasicMaterial({color: 0x8794a8})));
+  let wire = null, entry = null;
+
+  // The camera looks at the middle of the vessel.
+  vessel.geometry.computeBoundingSphere();
+  const {center, radius} = vessel.geometry.boundingSphere;
+  const camera = new OrthographicCamera(-1, 1, 1, -1, 0.1, 20 * radius);
+  camera.up.set(0, 0, 1);
+  const controls = new OrbitControls(camera, canvas);
+
+  const place = (text, point) => {
+    const node = el("span", {}, text);
+    labels.append(node);
+    return {node, point: new Vector3(...point)};
+  };
+  const marks = [place("access", page.access), place("target", page.target)];
+  const sides = {right: el("span", {class: "side right"}), top: el("span", {class: "side top"}),
+                 left: el("span", {class: "side left"}), bottom: el("span", {class: "side bottom"})};
+  labels.append(...Object.values(sides));
+
+  const draw = () => {
+    const width = frame.clientWidth, height = frame.clientHeight;
+    target.getObjectByName("ring").quaternion.copy(camera.quaternion);
+    renderer.render(scene, camera);
+    for (const {node, point} of marks) {
+      const seen = point.clone().project(camera);
+      node.style.transform = `translate(${((seen.x + 1) / 2) * width + 10}px, ${((1 - seen.y) / 2) * height - 10}px)`;
+    }
+    const right = new Vector3().setFromMatrixColumn(camera.matrixWorld, 0);
+    const up = new Vector3().setFromMatrixColumn(camera.matrixWorld, 1);
+    sides.right.textContent = sideLetter(right);
+    sides.left.textContent = sideLetter(right.negate());
+    sides.top.textContent = sideLetter(up);
+    sides.bottom.textContent = sideLetter(up.negate());
+  };
+  let asked = false;
+  const redraw = () => {
+    if (asked) return;
+    asked = true;
+    requestAnimationFrame(() => {
+      asked = false;
+      draw();
+    });
+  };
+  controls.addEventListener("change", redraw);
+
+  const resize = () => {
+    const width = Math.max(1, frame.clientWidth), height = Math.max(1, frame.clientHeight);
+    renderer.setSize(width, height, false);
+    const half = 1.05 * radius, wide = width / height;
+    camera.left = -half * Math.max(1, wide);
+    camera.right = half * Math.max(1, wide);
+    camera.top = half * Math.max(1, 1 / wide);
+    camera.bottom = -camera.top;
+    camera.updateProjectionMatrix();
+    draw();
+  };
+  const view = (name) => {
+    camera.position.copy(center).addScaledVector(new Vector3(...kViews[name]), 6 * radius);
+    camera.zoom = 1;
+    camera.updateProjectionMatrix();
+    controls.target.copy(center);
+    controls.update();
+    redraw();
+  };
+  const zoom = (factor) => {
+    camera.zoom = Math.min(40, Math.max(0.5, camera.zoom * factor));
+    camera.updateProjectionMatrix();
+    redraw();
+  };
+  const turn = (across, upward) => {
+    const right = new Vector3().setFromMatrixColumn(camera.matrixWorld, 0);
+    const offset = camera.position.clone().sub(controls.target);
+    const turned = offset.clone().applyAxisAngle(camera.up, across).applyAxisAngle(right, upward);
+    // Never over the pole.
+    if (Math.abs(turned.clone().normalize().dot(camera.up)) > 0.995) return;
+    camera.position.copy(controls.target).add(turned);
+    controls.update();
+    redraw();
+  };
+  const keys = {
+    ArrowLeft: () => turn(-kTurn, 0), ArrowRight: () => turn(kTurn, 0),
+    ArrowUp: () => turn(0, -kTurn), ArrowDown: () => turn(0, kTurn),
+    "+": () => zoom(kZoom), "=": () => zoom(kZoom), "-": () => zoom(1 / kZoom),
+  };
+  canvas.addEventListener("keydown", (event) => {
+    if (!keys[event.key] || event.ctrlKey || event.metaKey || event.altKey) return;
+    event.preventDefault();
+    keys[event.key]();
+  });
+
+  new ResizeObserver(resize).observe(frame);
+  resize();
+  view("front");
+
+  return {
+    view,
+    zoom,
+    /** Shows a wire: points x, y, z in turn, a force per point or none, and the scale's end [N]. */
+    setWire: (nodes, force, scale) => {
+      if (wire) scene.remove(wire), dispose(wire);
+      wire = null;
+      if (nodes.length >= 6) {
+        const geometry = new LineGeometry();
+        geometry.setPositions(nodes);
+        const colors = new Float32Array(nodes.length);
+        for (let k = 0; k < nodes.length / 3; ++k) {
+          colors.set(forceRgb(force && scale > 0 ? force[k] / scale : 0), 3 * k);
+        }
+        geometry.setColors(colors);
+        wire = new Line2(geometry, new LineMaterial({linewidth: 4.5, vertexColors: true}));
+        scene.add(wire);
+      }
+      redraw();
+    },
+    /** Shows forces per triangle. */
+    setWall: (forces, scale) => {
+      colorVessel(vessel, forces, scale);
+      redraw();
+    },
+    setEntry: (direction) => {
+      if (entry) scene.remove(entry), dispose(entry);
+      entry = makeEntry(page.access, direction);
+      scene.add(entry);
+      redraw();
+    },
+  };
+};
