@@ -40,7 +40,8 @@ class Quantiser {
     }
   }
 
-  /// Columns as unsigned 16 bit numbers, x, y, z in turn. What is not finite goes to the low corner.
+  /// Columns as unsigned 16 bit numbers, x, y, z in turn. What is not finite goes to the low
+  /// corner.
   template <typename Points>
   std::string encode_points(const Points& points) const {
     std::vector<std::uint16_t> steps;
@@ -171,10 +172,9 @@ PageTrial page_trial(const simulate::TrialResult& trial, const Vec3& direction) 
   kept.push.resize(5, static_cast<Eigen::Index>(trial.pushes.size()));
   for (std::size_t k = 0; k < trial.pushes.size(); ++k) {
     const simulate::Push& push = trial.pushes[k];
-    kept.push.col(static_cast<Eigen::Index>(k))
-        << static_cast<float>(push.insertion), static_cast<float>(push.push_force),
-        static_cast<float>(push.tip_force), static_cast<float>(push.peak_contact_force),
-        static_cast<float>(push.total_contact_force);
+    kept.push.col(static_cast<Eigen::Index>(k)) << static_cast<float>(push.insertion),
+        static_cast<float>(push.push_force), static_cast<float>(push.tip_force),
+        static_cast<float>(push.peak_contact_force), static_cast<float>(push.total_contact_force);
   }
   return kept;
 }

@@ -32,9 +32,10 @@ std::vector<Place> list_places(Workspace& work, const std::vector<double>& peak_
     Eigen::Index at = 0;
     (path.arc_length.array() - wanted).abs().minCoeff(&at);
     const auto rounded = static_cast<long>(std::lround(path.arc_length(at)));
-    stops.push_back(
-        {path.arc_length(at),
-         {"on the way, " + std::to_string(rounded) + " mm from the access", path.points.col(at), {}}});
+    stops.push_back({path.arc_length(at),
+                     {"on the way, " + std::to_string(rounded) + " mm from the access",
+                      path.points.col(at),
+                      {}}});
   }
   const auto worst = std::max_element(peak_force.begin(), peak_force.end());
   if (worst != peak_force.end() && *worst > 0.0) {

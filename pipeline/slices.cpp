@@ -25,8 +25,8 @@ Slice cut_slice(const preprocess::Image& image, const Surface& surface, Plane pl
   const double scale = 255.0 / (options.window_high - options.window_low);
   for (int row = 0; row < options.size; ++row) {
     for (int column = 0; column < options.size; ++column) {
-      const Vec3 point = middle + spacing * ((column - half) * right_of(plane) +
-                                             (row - half) * down_of(plane));
+      const Vec3 point =
+          middle + spacing * ((column - half) * right_of(plane) + (row - half) * down_of(plane));
       const double value = sample(image, point);
       const double level =
           std::isnan(value) ? 0.0 : std::clamp(scale * (value - options.window_low), 0.0, 255.0);
@@ -78,8 +78,7 @@ double sample(const preprocess::Image& image, const Vec3& point) {
       voxel[axis] = std::min(voxel[axis] + (upper ? 1 : 0), grid.size[axis] - 1);
     }
     if (weight == 0.0) continue;
-    sum += weight *
-           static_cast<double>(image.values[grid.index(voxel[0], voxel[1], voxel[2])]);
+    sum += weight * static_cast<double>(image.values[grid.index(voxel[0], voxel[1], voxel[2])]);
   }
   return sum;
 }
@@ -98,7 +97,8 @@ Eigen::Matrix4Xf cut_outline(const Surface& surface, Plane plane, const Vec3& mi
       const double height_a = normal.dot(a), height_b = normal.dot(b);
       if ((height_a < 0.0) == (height_b < 0.0)) continue;
       const Vec3 cross = a + height_a / (height_a - height_b) * (b - a);
-      segment.segment<2>(2 * ends++) = Eigen::Vector2d(right.dot(cross), down.dot(cross)).cast<float>();
+      segment.segment<2>(2 * ends++) =
+          Eigen::Vector2d(right.dot(cross), down.dot(cross)).cast<float>();
     }
     const auto reach = static_cast<float>(0.5 * field);
     if (ends == 2 && segment.cwiseAbs().minCoeff() <= reach &&

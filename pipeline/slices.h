@@ -30,14 +30,14 @@ struct Slice {
 };
 
 struct Place {
-  std::string name;            // "access", "target", "42 mm from the access", ...
-  Vec3 point = Vec3::Zero();   // middle of its slices                                     [mm]
+  std::string name;           // "access", "target", "42 mm from the access", ...
+  Vec3 point = Vec3::Zero();  // middle of its slices                                     [mm]
   std::array<Slice, 3> slices;
 };
 
 struct Slices {
-  int size = 0;                             // pixels along each side
-  double spacing = 0.0;                     // of a pixel                                 [mm]
+  int size = 0;                                // pixels along each side
+  double spacing = 0.0;                        // of a pixel                                 [mm]
   double window_low = 0.0, window_high = 0.0;  // shown as black and as white             [HU]
   std::vector<Place> places;
 };

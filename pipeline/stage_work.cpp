@@ -445,7 +445,8 @@ Picture draw_overview(Workspace& work, const ReportInput& report, const PageInpu
                        .target_radius = report.study.goal.radius});
 }
 
-/// What the page shows of the vessel and of where to; trials and insertions are added by the caller.
+/// What the page shows of the vessel and of where to; trials and insertions are added by the
+/// caller.
 PageInput start_page(Workspace& work) {
   const plan::Study& study = work.study();
   PageInput page;

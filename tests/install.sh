@@ -11,22 +11,29 @@ if ! { command -v apt-get && command -v dpkg-query; } >/dev/null; then
   exit 1
 fi
 
-# What the list names and dpkg does not have.
-mapfile -t listed < <(sed 's/#.*//' packages.txt | xargs -n 1 | sort -u)
-# A name with a "?" counts unless apt knows packages (clang), but none of that name.
-is_unknown() {
-  ! dpkg-query -W "$1" >/dev/null 2>&1 && apt-cache show clang >/dev/null 2>&1 &&
-    ! apt-cache show "$1" >/dev/null 2>&1
-}
-wanted=()
-for package in "${listed[@]}"; do
-  if [[ $package == *\? ]] && is_unknown "${package%\?}"; then continue; fi
-  wanted+=("${package%\?}")
-done
-present=$(dpkg-query -W -f '${Package} ${db:Status-Status}\n' "${wanted[@]}" 2>/dev/null |
-  sed -n 's/ installed$//p' | sort -u) || true
+# What the list names and no installed package is or provides (that of Node's makers has npm in it).
+mapfile -t wanted < <(sed 's/#.*//' packages.txt | xargs -n 1 | sort -u)
+present=$(dpkg-query -W -f '${db:Status-Status} ${Package}, ${Provides}\n' 2>/dev/null |
+  sed -n 's/^installed //p' | sed 's/([^)]*)//g' | tr -s ', ' '\n' | sort -u) || true
 mapfile -t missing < <(comm -23 <(printf '%s\n' "${wanted[@]}") <(echo "$present"))
 ((${#missing[@]} == 0)) && exit 0
+
+# What may be left out: optional ones, where no source that apt has read knows them.
+is_optional() { grep -q "^$1 .*# optional" packages.txt; }
+is_known() { apt-cache show "$1" 2>/dev/null | grep -q '^Filename:'; }
+drop_unknown() {
+  local kept=() package
+  for package in "${missing[@]}"; do
+    if is_optional "$package" && ! is_known "$package"; then
+      echo "install: $package is not among this system's packages; going on without" >&2
+    else
+      kept+=("$package")
+    fi
+  done
+  missing=("${kept[@]}")
+  ((${#missing[@]})) || exit 0
+}
+is_known cmake && drop_unknown  # the sources were read before
 
 as_root=()
 if [[ $EUID -ne 0 ]]; then
@@ -48,9 +55,7 @@ apt() {
     </dev/null >>"$log" 2>&1
 }
 apt update || true  # a broken source that has none of our packages does not matter
-for k in "${!missing[@]}"; do
-  if grep -q "^${missing[k]}?" packages.txt && is_unknown "${missing[k]}"; then unset "missing[k]"; fi
-done
+drop_unknown
 if ! apt install --no-install-recommends "${missing[@]}"; then
   tail -n 30 "$log" >&2
   echo "install: apt-get failed (see above); expected network access and Debian 12, Ubuntu 22.04" \

@@ -72,12 +72,29 @@ run_real_case() {
   XDG_CACHE_HOME=$case_cache build/release/pipeline/wireplan run cases/aorta-iliac-mra
 }
 
+# The pages of these cases' reports in a browser.
+check_pages() {
+  local pages=() name
+  for name in abdomen aorta-iliac-mra; do
+    [[ -f wireplan-out/$name/report.html ]] && pages+=("wireplan-out/$name/report.html")
+  done
+  if ((${#pages[@]} == 0)); then
+    echo "not run: the reports have no page (see their warnings)"
+    return 0
+  fi
+  local status=0
+  WIREPLAN_PAGE_MODULES=$PWD/build/release/pipeline/page \
+    node tests/page/test_page.mjs "${pages[@]}" || status=$?
+  ((status == 0 || status == 77))  # 77: no browser, which it says
+}
+
 step "install packages" bash tests/install.sh
 step "formatting" check_formatting
 step "release build" bash tests/build.sh release
 step "tests" run_suite release
 step "bundled case" run_bundled_case
 step "aorta-iliac-mra" run_real_case
+step "pages in a browser" check_pages
 step "build without ITK" bash tests/build.sh surface-only
 step "tests without ITK" run_suite surface-only
 step "simulate and plan with Clang and clang-tidy" build_tidy

@@ -26,10 +26,15 @@ const chart = (label, options) => {
     height: kHeight,
     marginLeft: 56,
     marginBottom: 44,
-    marginRight: 24,
+    marginRight: 30,
     style: {fontSize: "13px", background: "transparent", color: "#1b1b1b"},
     ...options,
   });
+  // One picture with one name: its parts have no roles, so their names are taken off.
+  for (const part of node.querySelectorAll("[aria-label], [aria-description]")) {
+    part.removeAttribute("aria-label");
+    part.removeAttribute("aria-description");
+  }
   node.setAttribute("role", "img");
   node.setAttribute("aria-label", label);
   return node;
@@ -159,6 +164,13 @@ const successFigure = (page) => {
 };
 
 // ---- Error against run time.
+/** The powers of ten round the values, as the domain of a logarithmic axis. */
+const span = (values) => ({
+  domain: [10 ** Math.floor(Math.log10(Math.min(...values))), 10 ** Math.ceil(Math.log10(Math.max(...values)) + 1e-9)],
+});
+/** 1, 2 and 5 of every power of ten have a number, what is between them has none. */
+const decade = (value) => ([1, 2, 5].includes(Math.round(value / 10 ** Math.floor(Math.log10(value) + 1e-9))) ? number(value) : "");
+
 const numericsFigure = (page) => {
   const times = new Map((page.timing.numerics ?? []).map((r) => [`${r.trial} ${r.element_length_mm}`, r.cpu_s]));
   const rows = page.report.numerics.rows
@@ -168,15 +180,18 @@ const numericsFigure = (page) => {
   const names = [...new Set(drawn.map((r) => r.name))];
   const make = (width) => chart("Position error against run time for elements of several lengths", {
     width,
-    x: {label: "processor time of one insertion [s] \u2192", type: "log", nice: true},
-    y: {label: "\u2191 position error [mm]", type: "log", nice: true},
+    x: {label: "processor time of one insertion [s] \u2192", type: "log", tickFormat: decade, ...span(drawn.map((r) => r.cpu))},
+    y: {label: "\u2191 position error [mm]", type: "log", tickFormat: decade, ...span(drawn.map((r) => r.position_error_mm))},
     marks: [
       gridX(), gridY(),
       names.map((name, k) => [
         line(drawn.filter((r) => r.name === name), {x: "cpu", y: "position_error_mm", stroke: lineColors[k % lineColors.length], strokeWidth: 1.5}),
         dot(drawn.filter((r) => r.name === name), {x: "cpu", y: "position_error_mm", r: 5, fill: lineColors[k % lineColors.length], symbol: ["circle", "square", "triangle", "diamond", "star"][k % 5]}),
       ]),
-      text(drawn, {x: "cpu", y: "position_error_mm", dx: 8, textAnchor: "start", text: (r) => `${number(r.element_length_mm)} mm`}),
+      // Names of neighbouring lines on different sides.
+      names.map((name, k) => text(drawn.filter((r) => r.name === name), {
+        x: "cpu", y: "position_error_mm", dx: k % 2 ? -9 : 9, dy: 12 * (Math.floor(k / 2) % 2),
+        textAnchor: k % 2 ? "end" : "start", text: (r) => `${number(r.element_length_mm)} mm`})),
     ],
   });
   return figure(

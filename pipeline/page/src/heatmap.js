@@ -40,7 +40,7 @@ export const heatSection = (page, selection) => {
     el("tr", {},
       el("th", {scope: "row"}, `${degrees(first.inclination_deg)} / ${degrees(first.azimuth_deg)}`),
       [...columns.keys()].map((column) => makeCell(cells.get(`${entry}\n${column}`)))));
-  const grid = el("table", {class: "heat", id: "heat"},
+  const grid = el("table", {class: "heat", id: "heat-grid"},
     el("thead", {},
       el("tr", {}, el("th", {scope: "col"}, "Wire"),
         wires.map((wire) => el("th", {scope: "colgroup", colspan: rollsOf(wire).length}, el("bdi", {}, shown(wire))))),

@@ -169,7 +169,7 @@ export const vesselSection = (page, selection) => {
     el("p", {class: "note", id: "vessel-help"},
       "Drag or use the arrow keys to turn, wheel or + and \u2212 to zoom. Letters name the patient's sides (R, L, A, P, S, I). " +
       "The white arrow is the introducer, the ring the target, the thin line the middle of the lumen. " +
-      "The wire is drawn wider than it is; points are shown to 0.01\u00a0mm."),
+      "The wire is drawn wider than it is; points are shown to 0.01\u00a0mm. Colors are forces of single nodes and triangles; a contact that the numbers tell spreads over several."),
     buttons,
     legend,
     el("div", {class: "controls player"}, play, el("label", {for: "insertion"}, "Insertion"), slider),

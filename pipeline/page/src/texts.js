@@ -51,7 +51,7 @@ export const answerSection = (page) => {
     el("p", {class: "note"}, "\u00b1 is the estimated numerical error alone; see what is uncertain below."));
 };
 
-const rangeOf = (values) => values.length ? `${number(Math.min(...values))} to ${number(Math.max(...values))}` : "\u2013";
+const rangeOf = (values) => [...new Set([Math.min(...values), Math.max(...values)].map(number))].join(" to ");
 
 /** What turning one angle of the best plan does, told by the trials that differ in it alone. */
 const sensitivity = (page, best, key, title) => {

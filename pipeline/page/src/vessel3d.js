@@ -13,6 +13,7 @@ import {el} from "./dom.js";
 
 const kPaper = 0x141a24;
 const kEntryLength = 40; // mm
+const kMargin = 1.15; // of the frame over the vessel, room for the introducer
 const kEntryColor = 0xffffff, kTargetColor = 0xff9ecb;
 const kTurn = Math.PI / 24, kZoom = 1.15; // of one key press
 
@@ -38,8 +39,8 @@ varying vec3 vNormal;
 varying vec4 vForce;
 void main() {
   float facing = abs(normalize(vNormal).z);
-  vec3 tissue = vec3(0.86, 0.66, 0.60) * (0.55 + 0.45 * facing);
-  float alpha = 0.05 + 0.45 * pow(1.0 - facing, 2.0);
+  vec3 tissue = vec3(0.98, 0.76, 0.68) * (0.6 + 0.4 * facing);
+  float alpha = 0.10 + 0.55 * pow(1.0 - facing, 1.5);
   gl_FragColor = vec4(mix(tissue, vForce.rgb, vForce.a), max(alpha, 0.85 * vForce.a));
 }`;
 
@@ -144,8 +145,10 @@ export const makeVessel = (frame, page) => {
   let wire = null, entry = null;
 
   // The camera looks at the middle of the vessel.
-  vessel.geometry.computeBoundingSphere();
-  const {center, radius} = vessel.geometry.boundingSphere;
+  vessel.geometry.computeBoundingBox();
+  const box = vessel.geometry.boundingBox;
+  const center = box.getCenter(new Vector3()), extent = box.getSize(new Vector3());
+  const radius = Math.max(1, extent.length() / 2);
   const camera = new OrthographicCamera(-1, 1, 1, -1, 0.1, 20 * radius);
   camera.up.set(0, 0, 1);
   const controls = new OrbitControls(camera, canvas);
@@ -189,20 +192,28 @@ export const makeVessel = (frame, page) => {
   const resize = () => {
     const width = Math.max(1, frame.clientWidth), height = Math.max(1, frame.clientHeight);
     renderer.setSize(width, height, false);
-    const half = 1.05 * radius, wide = width / height;
-    camera.left = -half * Math.max(1, wide);
-    camera.right = half * Math.max(1, wide);
-    camera.top = half * Math.max(1, 1 / wide);
+    camera.top = radius * Math.max(1, height / width);
     camera.bottom = -camera.top;
+    camera.right = (camera.top * width) / height;
+    camera.left = -camera.right;
     camera.updateProjectionMatrix();
     draw();
   };
+  /** So that the vessel's box fills the frame, as the camera sees it now. */
+  const fit = () => {
+    const half = (column) => {
+      const axis = new Vector3().setFromMatrixColumn(camera.matrixWorld, column);
+      return (Math.abs(axis.x) * extent.x + Math.abs(axis.y) * extent.y + Math.abs(axis.z) * extent.z) / 2;
+    };
+    camera.updateMatrixWorld();
+    camera.zoom = Math.min(camera.right / half(0), camera.top / half(1)) / kMargin;
+    camera.updateProjectionMatrix();
+  };
   const view = (name) => {
     camera.position.copy(center).addScaledVector(new Vector3(...kViews[name]), 6 * radius);
-    camera.zoom = 1;
-    camera.updateProjectionMatrix();
     controls.target.copy(center);
     controls.update();
+    fit();
     redraw();
   };
   const zoom = (factor) => {

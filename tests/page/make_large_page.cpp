@@ -1,0 +1,196 @@
+// make_large_page OUT.html NAME: a page, of a case called NAME, as large as a case of 25 000
+// triangles, 300 trials and 20 stored insertions makes it, of made-up results, for the tests in a
+// browser.
+#include <cmath>
+#include <iostream>
+#include <random>
+
+#include "pipeline/page.h"
+#include "pipeline/report.h"
+#include "tests/shapes.h"
+
+namespace wireplan::pipeline {
+namespace {
+
+constexpr double kRadius = 6.0, kLength = 250.0;  // of the vessel, along z            [mm]
+constexpr int kPushes = 300, kShapes = 60, kInsertions = 20;
+
+double draw(std::mt19937_64& random) { return static_cast<double>(random() >> 11U) * 0x1p-53; }
+
+plan::Study make_study() {
+  plan::Study study;
+  for (const char* name : {"soft", "medium", "stiff"}) {
+    study.wires.push_back(
+        {.name = name,
+         .radius = 0.445,
+         .sections = {{.length = 500.0, .bending_stiffness = 50.0, .rest_curvature = 0.04}}});
+  }
+  for (int k = 0; k < 4; ++k) study.inclinations.push_back(kRadPerDeg * (5.0 + 10.0 * k));
+  for (int k = 0; k < 5; ++k) study.azimuths.push_back(kRadPerDeg * 72.0 * k);
+  for (int k = 0; k < 5; ++k) study.rolls.push_back(kRadPerDeg * 72.0 * k);
+  study.access = {0.0, 0.0, 5.0};
+  study.goal = {.point = {0.0, 0.0, kLength - 10.0}, .radius = 4.0};
+  return study;
+}
+
+/// A wire of nodes 1 mm apart, bent to and fro in the vessel.
+Eigen::Matrix3Xd bent_wire(double length, double phase) {
+  Eigen::Matrix3Xd nodes(3, std::max(2, static_cast<int>(length)));
+  for (Eigen::Index k = 0; k < nodes.cols(); ++k) {
+    const double z = 5.0 + static_cast<double>(k) * (kLength - 20.0) / kPushes;
+    nodes.col(k) << 4.0 * std::sin(0.05 * z + phase), 4.0 * std::cos(0.03 * z + phase), z;
+  }
+  return nodes;
+}
+
+simulate::TrialResult make_trial(const Surface& surface, std::mt19937_64& random) {
+  simulate::TrialResult trial;
+  const bool reached = draw(random) < 0.5;
+  trial.outcome = reached ? simulate::Outcome::kReached : simulate::Outcome::kStuck;
+  trial.reason = reached ? "" : "pushing no longer advances the tip";
+  trial.terms = {"stretch", "bend"};
+  const double phase = 6.0 * draw(random), force = 0.05 + draw(random);
+  for (int k = 1; k <= kPushes; ++k) {
+    const double part = static_cast<double>(k) / kPushes;
+    trial.pushes.push_back({.insertion = static_cast<double>(k),
+                            .push_force = 0.3 * force * part,
+                            .tip = {0.0, 0.0, kLength * part},
+                            .tip_force = 0.1 * force * part,
+                            .peak_contact_force = force * part,
+                            .total_contact_force = 2.0 * force * part});
+  }
+  trial.pushes.back().tip = make_study().goal.point + Vec3(0.0, 0.0, 3.0 * draw(random));
+  trial.nodes = bent_wire(kPushes, phase);
+  for (int k = 1; k <= kShapes; ++k) {
+    simulate::Shape shape;
+    shape.insertion = static_cast<double>(kPushes * k) / kShapes;
+    shape.nodes = bent_wire(shape.insertion, phase);
+    shape.contact_force = shape.nodes.row(0).cwiseAbs() * force / 4.0;
+    trial.shapes.push_back(shape);
+  }
+  for (int k = 0; k < surface.triangles.cols(); k += 10) {
+    trial.peak_forces.push_back({k, force * draw(random)});
+  }
+  return trial;
+}
+
+/// A bright vessel in soft tissue, 256^2 x 128 voxels.
+preprocess::Image make_volume() {
+  preprocess::Image image;
+  image.grid.size = {256, 256, 128};
+  image.grid.spacing = {0.7, 0.7, 2.0};
+  image.grid.origin = {-89.25, -89.25, 0.0};
+  std::mt19937_64 random(3);
+  image.values.resize(image.grid.voxels());
+  for (int k = 0; k < 128; ++k) {
+    for (int j = 0; j < 256; ++j) {
+      for (int i = 0; i < 256; ++i) {
+        const Vec3 p = image.grid.lps_from_ijk(Vec3(i, j, k));
+        const double bright = p.head<2>().norm() < kRadius ? 350.0 : 40.0;
+        image.values[image.grid.index(i, j, k)] =
+            static_cast<float>(bright + 60.0 * (draw(random) - 0.5));
+      }
+    }
+  }
+  return image;
+}
+
+Json figures(const Surface& surface) {
+  const Json none = Json::array();
+  return {{"surface",
+           {{"warnings", none},
+            {"volume_mm3", 1.0},
+            {"area_mm2", 1.0},
+            {"triangles", surface.triangles.cols()},
+            {"euler_number", 2},
+            {"openings", none}}},
+          {"centerline",
+           {{"warnings", none},
+            {"length_mm", kLength},
+            {"mean_diameter_mm", 12.0},
+            {"min_diameter_mm", 12.0},
+            {"max_diameter_mm", 12.0},
+            {"tortuosity", 1.0}}},
+          {"wall",
+           {{"warnings", none},
+            {"tetrahedra", surface.triangles.cols()},
+            {"thickness_mm", 1.0},
+            {"young_modulus_kpa", 56.0},
+            {"normal_stiffness_kpa_per_mm", 25.0}}},
+          {"trials",
+           {{"warnings", none},
+            {"lumen_grid_mm", 1.0},
+            {"lumen_max_deviation_mm", 0.1},
+            {"lumen_mean_deviation_mm", 0.01}}}};
+}
+
+Json parameters() {
+  return {
+      {"wall", {{"model", "elastic"}}},
+      {"access", {{"inclination_deg", {5, 15, 25, 35}}, {"azimuth_deg", {0, 72, 144, 216, 288}}}},
+      {"wires", {{{"name", "soft"}}, {{"name", "medium"}}, {{"name", "stiff"}}}},
+      {"tip_roll_deg", {0, 72, 144, 216, 288}},
+      {"friction", 0.04},
+      {"limits", {{"tip_force_warn_n", 0.3}}}};
+}
+
+std::string make_page(const std::string& name) {
+  const Surface surface = shapes::straight_tube(kRadius, kLength, 0.93);
+  Centerline path;
+  path.points.resize(3, 2);
+  path.points << 0.0, 0.0, 0.0, 0.0, 5.0, kLength - 10.0;
+  path.radius = Eigen::Vector2d(kRadius, kRadius);
+  path.arc_length = Eigen::Vector2d(0.0, kLength - 15.0);
+
+  ReportInput report;
+  report.name = name;
+  report.input_name = "made-up";
+  report.input_sha256 = std::string(64, '0');
+  report.parameters = parameters();
+  report.stages = {"surface", "centerline", "wall", "trials"};
+  report.figures = figures(surface);
+  report.study = make_study();
+  report.candidates = plan::list_candidates(report.study);
+
+  PageInput page;
+  page.surface = surface;
+  page.path = path;
+  page.access = report.study.access;
+  page.target = report.study.goal.point;
+  page.target_radius = report.study.goal.radius;
+  std::mt19937_64 random(1);
+  for (std::size_t id = 0; id < report.candidates.size(); ++id) {
+    simulate::TrialResult trial = make_trial(surface, random);
+    report.metrics.push_back(plan::compute_metrics(trial, report.study, path));
+    page.trials.push_back(
+        page_trial(trial, plan::make_introducer(report.study, report.candidates[id]).direction));
+    if (id < kInsertions) {
+      page.insertions.push_back({static_cast<int>(id), trial.shapes, trial.peak_forces});
+    }
+    report.trials.push_back(std::move(trial));
+  }
+  report.ranking =
+      plan::rank(report.study, report.candidates, report.trials, report.metrics, {}, {});
+  report.timing = {{"threads", 1}, {"stages", Json::array()}, {"numerics", Json::array()}};
+  for (Eigen::Index k = 0; k < surface.triangles.cols(); ++k)
+    page.peak_force.push_back(draw(random));
+
+  std::vector<Place> places;
+  for (int k = 0; k <= 12; ++k) {
+    places.push_back({"place " + std::to_string(k), {0.0, 0.0, 5.0 + 19.0 * k}, {}});
+  }
+  page.slices =
+      cut_slices(make_volume(), surface, places, {.window_low = -200.0, .window_high = 500.0});
+  std::cerr << surface.triangles.cols() << " triangles, " << report.trials.size() << " trials, "
+            << page.insertions.size() << " insertions\n";
+  return build_page(build_report(report), page);
+}
+
+}  // namespace
+}  // namespace wireplan::pipeline
+
+int main(int argc, char** argv) {
+  wireplan::expects(argc == 3);
+  wireplan::pipeline::write_file(wireplan::pipeline::make_page(argv[2]), argv[1]);
+  return 0;
+}
