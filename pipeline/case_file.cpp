@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cctype>
 #include <cstdlib>
+#include <limits>
 #include <set>
 #include <string_view>
 #include <system_error>
@@ -296,6 +297,53 @@ void read_weights(JsonReader& root, plan::Weights& weight) {
   }
 }
 
+/// Two factors, the lower first.
+void read_factors(JsonReader& reader, const std::string& key, double& low, double& high) {
+  const std::size_t problems_before = reader.problems().count();
+  const std::vector<double> factors =
+      reader.numbers(key, std::vector<double>{low, high}, {.min = 0.01, .max = 100.0});
+  if (reader.problems().count() > problems_before) return;
+  if (factors.size() != 2 || factors[0] > factors[1]) {
+    reader.problems().add(reader.path_of(key), Json(factors).dump(),
+                          "two factors, the smaller one first", "[1, 1] leaves the value alone");
+    return;
+  }
+  low = factors[0];
+  high = factors[1];
+}
+
+void read_robustness(JsonReader& root, Case& input) {
+  JsonReader reader = root.object("robustness", false);
+  plan::RobustnessOptions& options = input.robustness;
+  options.repeats = reader.integer("repeats", options.repeats, 0, 100000);
+  options.plans = reader.integer("plans", options.plans, 1, 1000);
+  options.seed = static_cast<std::uint64_t>(
+      reader.integer("seed", static_cast<int>(options.seed), 0, std::numeric_limits<int>::max()));
+  plan::Unknowns& unknowns = options.unknowns;
+  read_factors(reader, "friction_factor", unknowns.friction_low, unknowns.friction_high);
+  read_factors(reader, "wall_factor", unknowns.wall_low, unknowns.wall_high);
+  unknowns.angle =
+      reader.number("angle_deg", clean(unknowns.angle / kRadPerDeg), {.min = 0.0, .max = 45.0}) *
+      kRadPerDeg;
+  unknowns.entry =
+      reader.number("entry_mm", unknowns.entry, {.min = 0.0, .max = 50.0}, "given in m?");
+  unknowns.lumen = reader.number("lumen_mm", 0.0, {.min = 0.0, .max = 10.0}, "0 chooses it");
+  reader.finish();
+}
+
+Json robustness_json(const Case& input) {
+  const plan::RobustnessOptions& options = input.robustness;
+  const plan::Unknowns& unknowns = options.unknowns;
+  return {{"repeats", options.repeats},
+          {"plans", options.plans},
+          {"seed", options.seed},
+          {"friction_factor", {unknowns.friction_low, unknowns.friction_high}},
+          {"wall_factor", {unknowns.wall_low, unknowns.wall_high}},
+          {"angle_deg", clean(unknowns.angle / kRadPerDeg)},
+          {"entry_mm", unknowns.entry},
+          {"lumen_mm", unknowns.lumen}};
+}
+
 Json degrees(const std::vector<double>& angles) {
   Json list = Json::array();
   for (const double angle : angles) list.push_back(clean(angle / kRadPerDeg));
@@ -409,7 +457,7 @@ Case read_case(const std::filesystem::path& path, const std::vector<std::string>
   read_limits(root, input.limits);
   read_weights(root, input.weights);
   input.study.insertion.friction = read_friction(root, kFriction);
-  refuse(root, "robustness", "perturbed repeats are");
+  read_robustness(root, input);
   root.finish();
   problems.throw_if_any();
   return input;
@@ -442,6 +490,7 @@ Json case_parameters(const Case& input) {
                     {"tip_force_fail_n", input.limits.tip_force_fail},
                     {"penetration_fail_mm", input.limits.penetration_fail},
                     {"off_path_fail_mm", input.limits.off_path_fail}};
+  json["robustness"] = robustness_json(input);
   json["ranking"] = {{"weights",
                       {{"reach", input.weights.reach},
                        {"peak_force", input.weights.peak_force},

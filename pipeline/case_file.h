@@ -10,6 +10,7 @@
 #include "pipeline/json_reader.h"
 #include "plan/candidates.h"
 #include "plan/ranking.h"
+#include "plan/robustness.h"
 #include "preprocess/surface.h"
 #include "preprocess/wall.h"
 
@@ -55,6 +56,8 @@ struct Case {
   plan::Study study;
   plan::Limits limits;
   plan::Weights weights;
+  /// unknowns.lumen 0: chosen by the report stage, half a voxel of a volume, 0.25 mm of a surface.
+  plan::RobustnessOptions robustness;
 };
 
 /// Reads CASE (a file, or a folder with a case.json), applies `overrides` ("wall.thickness_mm=2":

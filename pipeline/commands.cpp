@@ -76,7 +76,9 @@ class ProgressBar {
     std::cerr << "\r[" << std::string(filled, '#') << std::string(kWidth - filled, '.') << "]  "
               << done << "/" << total << format("  about %.0f s to go   ", to_go) << std::flush;
     shown_ = true;
-    if (done == total) clear();
+    if (done < total) return;
+    clear();
+    first_ = -1;  // of the next work
   }
 
  private:

@@ -15,7 +15,7 @@ constexpr const char* kStatement =
     "Research use only. Not a medical device. Not for diagnosis or treatment decisions.";
 
 constexpr const char* kRigidWall = "the wall is rigid";
-constexpr const char* kNoRepeats = "no perturbed repeats are run in this version";
+constexpr const char* kNoRepeats = "only the best plans are repeated, and the best of each wire";
 
 bool is_rigid(const ReportInput& input) {
   return input.parameters.at("wall").at("model") == "rigid";
@@ -104,7 +104,7 @@ Json provenance_json(const ReportInput& input) {
   row.put("inputs", Json::array({{{"name", input.input_name}, {"sha256", input.input_sha256}}}));
   row.put("parameters_sha256", hash_text(input.parameters.dump()));
   row.put("program", build_info());
-  row.put_optional("seed", {}, "no random numbers are drawn in this version");
+  row.put("seed", input.robustness.at("seed"));
   row.put("stages", input.stages);
   row.put("terms", terms);
   row.put("parameters", input.parameters);
@@ -212,6 +212,19 @@ Json trial_json(const ReportInput& input, std::size_t k) {
   return row.finish();
 }
 
+void put_repeats(Row& row, const ReportInput& input, int trial) {
+  const auto& plans = input.robustness.at("plans");
+  const auto found = std::find_if(plans.begin(), plans.end(),
+                                  [&](const Json& plan) { return plan.at("trial") == trial; });
+  for (const char* key : {"mean_score", "success_rate", "success_rate_interval"}) {
+    if (found == plans.end()) {
+      row.put_optional(key, {}, kNoRepeats);
+    } else {
+      row.put(key, found->at(key));
+    }
+  }
+}
+
 Json ranked_json(const ReportInput& input, std::size_t k) {
   const plan::RankedPlan& plan = input.ranking.plans[k];
   Row row;
@@ -224,8 +237,7 @@ Json ranked_json(const ReportInput& input, std::size_t k) {
                                {"mean_force", plan.score.mean_force},
                                {"margin", plan.score.margin}});
   row.put("score_error", plan.score_error);
-  row.put_optional("success_rate", {}, kNoRepeats);
-  row.put_optional("success_rate_interval", {}, kNoRepeats);
+  put_repeats(row, input, plan.trial);
   row.put("tied_with", plan.tied_with);
   row.put("sentence", plan.sentence);
   return row.finish();
@@ -355,6 +367,7 @@ Json build_report(const ReportInput& input) {
   report["excluded"] = std::move(excluded);
   report["wires"] = std::move(wires);
   report["pareto"] = input.ranking.pareto;
+  report["robustness"] = input.robustness;
   report["numerics"] = numerics_json(input);
   report["trials"] = std::move(trials);
   report["timing"] = input.timing;

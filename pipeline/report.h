@@ -29,7 +29,8 @@ struct ReportInput {
   std::vector<plan::Metrics> metrics;
   plan::Ranking ranking;
   std::vector<plan::Refinement> refinements;
-  Json timing;  // all that differs between equal runs
+  Json robustness;  // of repeats.h
+  Json timing;      // all that differs between equal runs
 };
 
 Json build_report(const ReportInput& input);

@@ -9,6 +9,7 @@
 
 #include "pipeline/catalogue.h"
 #include "pipeline/picture.h"
+#include "pipeline/repeats.h"
 #include "pipeline/report.h"
 #include "pipeline/report_page.h"
 #include "pipeline/trial_file.h"
@@ -30,6 +31,9 @@ namespace fs = std::filesystem;
 constexpr double kTangentSpan = 10.0;
 // Wire that is brought along where the case leaves it open: a wire does not keep to the middle.
 constexpr double kInsertionFactor = 1.25, kInsertionExtra = 20.0;
+
+// Plans that fall behind under disturbances let others up, which are repeated next.
+constexpr int kRepeatRounds = 3;
 
 constexpr std::array kStagesBeforeReport = {"volume",     "segment", "surface",
                                             "centerline", "wall",    "trials"};
@@ -500,17 +504,30 @@ void make_report(Workspace& work, const fs::path& folder) {
 
   // Rank, find the errors of the best by refining them, and rank again with these.
   const Case& given = work.given();
-  const auto rank = [&](const std::vector<std::optional<plan::NumericalError>>& errors) {
-    return plan::rank(study, candidates, report.trials, report.metrics, given.limits, given.weights,
-                      errors);
+  plan::Findings findings;
+  const auto rank = [&] {
+    report.ranking = plan::rank(study, candidates, report.trials, report.metrics, given.limits,
+                                given.weights, findings);
   };
-  report.ranking = rank({});
+  rank();
   const plan::BatchOptions batch{
       .threads = work.options().threads, .progress = {}, .cancelled = work.options().cancelled};
   report.refinements = plan::refine_plans(study, candidates, report.metrics, report.ranking,
                                           work.model(), {.batch = batch});
-  report.ranking =
-      rank(plan::errors_by_trial(report.refinements, static_cast<int>(candidates.size())));
+  findings.errors = plan::errors_by_trial(report.refinements, static_cast<int>(candidates.size()));
+  rank();
+
+  // Repeat the best under disturbances until the best are repeated ones.
+  Repeats repeats = prepare_repeats(work);
+  for (int round = 0; round < kRepeatRounds && repeats.options.repeats > 0; ++round) {
+    const std::vector<int> chosen =
+        plan::choose_plans_to_repeat(report.ranking, repeats.plans, repeats.options);
+    if (chosen.empty()) break;
+    add_repeats(work, candidates, chosen, repeats);
+    findings.repeated = repeats.plans;
+    rank();
+  }
+  report.robustness = robustness_json(repeats);
 
   // The largest forces on the wall.
   std::vector<preprocess::NamedArray> forces = {{"peak_force_n", all_forces.values()}};
@@ -550,6 +567,7 @@ void make_report(Workspace& work, const fs::path& folder) {
     page.picture_png = encode_png(overview);
   }
   report.timing = timing_json(work, report.refinements);
+  report.timing["repeats"] = {{"cpu_s", repeats.cpu_seconds}};
   report.timing["report_s"] =
       std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   const Json result = build_report(report);

@@ -147,7 +147,7 @@ std::vector<Stage> stages_of(const Case& given) {
   if (given.wall.elastic) trials.after.push_back("wall");  // a rigid one does not act
   stages.push_back(trials);
   Stage report{.name = "report",
-               .version = 2,
+               .version = 3,
                .reads_input = true,
                .after = {},
                .parameters = {""},

@@ -95,13 +95,9 @@ std::vector<bool> for_each_slot(int count, const std::function<void(int slot)>& 
   return finished;
 }
 
-simulate::TrialResult run_candidate(const Study& study, const Candidate& candidate,
-                                    const simulate::VesselModel& vessel) {
+simulate::TrialResult run_guarded(const std::function<simulate::TrialResult()>& run) {
   try {
-    expects(candidate.wire >= 0 && candidate.wire < std::ssize(study.wires));
-    simulate::TrialResult trial =
-        simulate::run_trial(study.wires[candidate.wire], make_introducer(study, candidate),
-                            study.goal, vessel, study.insertion, candidate.moves);
+    simulate::TrialResult trial = run();
     if (!is_finite(trial)) throw LogicError("the trial has a number that is not finite");
     return trial;
   } catch (const std::exception& exception) {
@@ -110,6 +106,15 @@ simulate::TrialResult run_candidate(const Study& study, const Candidate& candida
     failed.reason = std::string("internal error: ") + exception.what();
     return failed;
   }
+}
+
+simulate::TrialResult run_candidate(const Study& study, const Candidate& candidate,
+                                    const simulate::VesselModel& vessel) {
+  return run_guarded([&] {
+    expects(candidate.wire >= 0 && candidate.wire < std::ssize(study.wires));
+    return simulate::run_trial(study.wires[candidate.wire], make_introducer(study, candidate),
+                               study.goal, vessel, study.insertion, candidate.moves);
+  });
 }
 
 BatchResult run_batch(const Study& study, const std::vector<Candidate>& candidates,

@@ -27,8 +27,10 @@ struct BatchResult {
 BatchResult run_batch(const Study& study, const std::vector<Candidate>& candidates,
                       const simulate::VesselModel& vessel, const BatchOptions& options);
 
-/// One trial of the batch: what it throws, or a number that is not finite, becomes
-/// Outcome::kFailed.
+/// One trial: what it throws, or a number that is not finite, becomes Outcome::kFailed.
+simulate::TrialResult run_guarded(const std::function<simulate::TrialResult()>& run);
+
+/// One trial of the batch, guarded.
 simulate::TrialResult run_candidate(const Study& study, const Candidate& candidate,
                                     const simulate::VesselModel& vessel);
 

@@ -6,6 +6,8 @@
 #include <cstdio>
 #include <tuple>
 
+#include "plan/statistics.h"
+
 namespace wireplan::plan {
 namespace {
 
@@ -79,49 +81,48 @@ std::string broken_limits(const Metrics& metrics, const Limits& limits) {
   return reason;
 }
 
-/// Why the trial is no plan; empty if it is one.
-std::string exclusion_reason(const simulate::TrialResult& trial, const Metrics& metrics,
-                             const Study& study, const Limits& limits) {
-  using simulate::Outcome;
-  const std::string place = "at " + one_decimal(metrics.insertion) + " mm of wire, tip " +
-                            one_decimal(metrics.tip_to_target) + " mm from the target";
-  switch (trial.outcome) {
-    case Outcome::kReached:
-      return broken_limits(metrics, limits);
-    case Outcome::kMissed:
-      return "missed: tip ended " + one_decimal(metrics.tip_to_target) +
-             " mm from the target and came no nearer than " +
-             one_decimal(metrics.nearest_to_target) + " mm, expected within " +
-             four_digits(study.goal.radius) + " mm";
-    case Outcome::kStuck:
-      return with_reason("stuck " + place, trial);
-    case Outcome::kProlapsed:
-      return with_reason("prolapsed " + place, trial);
-    case Outcome::kLeftOpening:
-      return with_reason("left the vessel " + place, trial);
-    case Outcome::kLeftLumen:
-      return with_reason("left the lumen " + place, trial);
-    case Outcome::kNotConverged:
-      return with_reason("did not converge " + place, trial);
-    case Outcome::kFailed:
-      return trial.reason.empty() ? "failed" : trial.reason;
-  }
-  throw LogicError("an outcome without a reason");
+double mean_score(const RepeatedPlan& plan) {
+  double sum = 0.0;
+  for (const Repeat& repeat : plan.repeats) sum += repeat.score;
+  return sum / static_cast<double>(plan.repeats.size());
+}
+
+const RepeatedPlan* find_repeated(const std::vector<RepeatedPlan>& repeated, int trial) {
+  const auto found = std::find_if(repeated.begin(), repeated.end(),
+                                  [&](const RepeatedPlan& plan) { return plan.trial == trial; });
+  return found == repeated.end() ? nullptr : &*found;
 }
 
 void sort_plans(std::vector<RankedPlan>& plans) {
-  std::sort(plans.begin(), plans.end(), [](const RankedPlan& a, const RankedPlan& b) {
-    return std::tie(a.score.total, a.trial) < std::tie(b.score.total, b.trial);
-  });
+  const auto key = [](const RankedPlan& plan) {
+    return std::tuple(!plan.robust_score, plan.robust_score.value_or(plan.score.total), plan.trial);
+  };
+  std::sort(plans.begin(), plans.end(),
+            [&](const RankedPlan& a, const RankedPlan& b) { return key(a) < key(b); });
 }
 
-void find_ties(std::vector<RankedPlan>& plans) {
+/// Whether the unknowns decide which of the two is better.
+bool tied_over_repeats(const RepeatedPlan& a, const RepeatedPlan& b, double error) {
+  expects(a.repeats.size() == b.repeats.size());
+  std::vector<double> differences;
+  for (std::size_t k = 0; k < a.repeats.size(); ++k) {
+    differences.push_back(a.repeats[k].score - b.repeats[k].score);
+  }
+  const Spread spread = find_spread(differences);
+  return spread.low - error <= 0.0 && spread.high + error >= 0.0;
+}
+
+void find_ties(std::vector<RankedPlan>& plans, const std::vector<RepeatedPlan>& repeated) {
   for (RankedPlan& a : plans) {
+    const RepeatedPlan* repeats_a = find_repeated(repeated, a.trial);
     for (const RankedPlan& b : plans) {
-      const double difference = std::abs(a.score.total - b.score.total);
-      if (a.trial != b.trial && difference <= a.score_error + b.score_error) {
-        a.tied_with.push_back(b.trial);
-      }
+      if (a.trial == b.trial) continue;
+      const double error = a.score_error + b.score_error;
+      const RepeatedPlan* repeats_b = find_repeated(repeated, b.trial);
+      const bool by_error = std::abs(a.score.total - b.score.total) <= error;
+      const bool by_repeats = repeats_a != nullptr && repeats_b != nullptr &&
+                              tied_over_repeats(*repeats_a, *repeats_b, error);
+      if (by_error || by_repeats) a.tied_with.push_back(b.trial);
     }
   }
 }
@@ -176,10 +177,14 @@ std::string compare_with_first(const RankedPlan& plan, const RankedPlan& first,
                      compare_forces(metrics[plan.trial].peak_contact_force,
                                     metrics[first.trial].peak_contact_force) +
                      " the first plan";
-  if (largest->size > 0.0) text += std::string("; behind it mostly by ") + largest->name;
+  if (largest->size > 0.0) {
+    text += std::string("; behind it mostly by ") + largest->name;
+  } else if (plan.robust_score) {
+    text += "; behind it under the perturbations alone";
+  }
   const auto& ties = plan.tied_with;
   if (std::find(ties.begin(), ties.end(), first.trial) != ties.end()) {
-    text += "; the error estimate cannot tell the two apart";
+    text += "; error and unknowns do not tell the two apart";
   }
   return text;
 }
@@ -201,9 +206,16 @@ std::string warnings_of(const Metrics& m, const Limits& limits) {
   return text;
 }
 
+std::string success_of(const RepeatedPlan& plan) {
+  const auto successes = std::count_if(plan.repeats.begin(), plan.repeats.end(),
+                                       [](const Repeat& repeat) { return repeat.success; });
+  return "; works in " + std::to_string(successes) + " of " + std::to_string(plan.repeats.size()) +
+         " perturbed repeats";
+}
+
 void write_sentences(Ranking& ranking, const Study& study, const std::vector<Candidate>& candidates,
                      const std::vector<Metrics>& metrics, const Limits& limits,
-                     const Weights& weights) {
+                     const Weights& weights, const std::vector<RepeatedPlan>& repeated) {
   for (RankedPlan& plan : ranking.plans) {
     const Metrics& m = metrics[plan.trial];
     const RankedPlan& first = ranking.plans.front();
@@ -213,14 +225,10 @@ void write_sentences(Ranking& ranking, const Study& study, const std::vector<Can
     plan.sentence += plan.trial == first.trial
                          ? compare_with_next_wire(ranking.plans, study, candidates, metrics)
                          : compare_with_first(plan, first, metrics, weights);
+    const RepeatedPlan* repeats = find_repeated(repeated, plan.trial);
+    if (repeats != nullptr) plan.sentence += success_of(*repeats);
     plan.sentence += warnings_of(m, limits);
   }
-}
-
-double median(std::vector<double> values) {
-  std::sort(values.begin(), values.end());
-  const std::size_t half = values.size() / 2;
-  return values.size() % 2 == 1 ? values[half] : 0.5 * (values[half - 1] + values[half]);
 }
 
 std::vector<WireSummary> summarise_wires(const Study& study,
@@ -240,7 +248,7 @@ std::vector<WireSummary> summarise_wires(const Study& study,
     summary.wire = wire;
     summary.reached = static_cast<int>(forces[wire].size());
     if (!forces[wire].empty()) {
-      summary.median_peak_force = median(forces[wire]);
+      summary.median_peak_force = find_spread(forces[wire]).median;
       summary.worst_peak_force = *std::max_element(forces[wire].begin(), forces[wire].end());
     }
     const auto best = std::find_if(plans.begin(), plans.end(), [&](const RankedPlan& plan) {
@@ -311,10 +319,39 @@ double compute_score_error(const Metrics& metrics, const NumericalError& error,
   return weighted_mean(change, weights);
 }
 
+std::string exclusion_reason(const simulate::TrialResult& trial, const Metrics& metrics,
+                             const Study& study, const Limits& limits) {
+  using simulate::Outcome;
+  const std::string place = "at " + one_decimal(metrics.insertion) + " mm of wire, tip " +
+                            one_decimal(metrics.tip_to_target) + " mm from the target";
+  switch (trial.outcome) {
+    case Outcome::kReached:
+      return broken_limits(metrics, limits);
+    case Outcome::kMissed:
+      return "missed: tip ended " + one_decimal(metrics.tip_to_target) +
+             " mm from the target and came no nearer than " +
+             one_decimal(metrics.nearest_to_target) + " mm, expected within " +
+             four_digits(study.goal.radius) + " mm";
+    case Outcome::kStuck:
+      return with_reason("stuck " + place, trial);
+    case Outcome::kProlapsed:
+      return with_reason("prolapsed " + place, trial);
+    case Outcome::kLeftOpening:
+      return with_reason("left the vessel " + place, trial);
+    case Outcome::kLeftLumen:
+      return with_reason("left the lumen " + place, trial);
+    case Outcome::kNotConverged:
+      return with_reason("did not converge " + place, trial);
+    case Outcome::kFailed:
+      return trial.reason.empty() ? "failed" : trial.reason;
+  }
+  throw LogicError("an outcome without a reason");
+}
+
 Ranking rank(const Study& study, const std::vector<Candidate>& candidates,
              const std::vector<simulate::TrialResult>& trials, const std::vector<Metrics>& metrics,
-             const Limits& limits, const Weights& weights,
-             const std::vector<std::optional<NumericalError>>& errors) {
+             const Limits& limits, const Weights& weights, const Findings& findings) {
+  const std::vector<std::optional<NumericalError>>& errors = findings.errors;
   expects(trials.size() == candidates.size() && metrics.size() == candidates.size());
   expects(errors.empty() || errors.size() == candidates.size());
   expects_valid(limits, weights);
@@ -334,13 +371,15 @@ Ranking rank(const Study& study, const std::vector<Candidate>& candidates,
     if (known) plan.position_error = known->position;
     plan.score_error = compute_score_error(metrics[k], known.value_or(assumed_error(metrics[k])),
                                            study.goal, limits, weights);
+    const RepeatedPlan* repeated = find_repeated(findings.repeated, k);
+    if (repeated != nullptr) plan.robust_score = mean_score(*repeated);
     ranking.plans.push_back(plan);
   }
 
   // The order, and then all that is said relative to the others.
   sort_plans(ranking.plans);
-  find_ties(ranking.plans);
-  write_sentences(ranking, study, candidates, metrics, limits, weights);
+  find_ties(ranking.plans, findings.repeated);
+  write_sentences(ranking, study, candidates, metrics, limits, weights, findings.repeated);
   ranking.wires = summarise_wires(study, candidates, metrics, ranking.plans);
   ranking.pareto = find_pareto_front(ranking.plans, metrics);
   return ranking;

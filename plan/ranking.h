@@ -61,13 +61,27 @@ double compute_score_error(const Metrics& metrics, const NumericalError& error,
                            const simulate::Goal& goal, const Limits& limits,
                            const Weights& weights);
 
+/// A trial of a plan under a disturbance (robustness.h).
+struct Repeat {
+  bool success = false;  // it is a plan under the disturbance too
+  double score = 1.0;    // its total; 1, the worst there is, where it is no plan
+  double peak_contact_force = 0.0, mean_contact_force = 0.0, peak_tip_force = 0.0;  //       [N]
+  std::string reason = {};  // why it is no plan; else empty
+};
+
+struct RepeatedPlan {
+  int trial = 0;                // index of the candidate
+  std::vector<Repeat> repeats;  // under the same disturbances for all plans
+};
+
 struct RankedPlan {
   int trial = 0;  // index of the candidate
   Score score;
   double score_error = 0.0;              // from the known error, else from the assumed one
   std::optional<double> position_error;  // from halving the elements; empty if not known   [mm]
-  std::vector<int> tied_with;  // trials whose score differs by no more than both errors, best first
-  std::string sentence;        // why it stands here
+  std::optional<double> robust_score;    // mean over the repeats; empty without them
+  std::vector<int> tied_with;            // trials that cannot be told from it, best first
+  std::string sentence;                  // why it stands here
 };
 
 struct ExcludedTrial {
@@ -92,12 +106,24 @@ struct Ranking {
   std::vector<int> pareto;
 };
 
-/// Orders by score, then by index of the candidate. `errors` holds what refining has found, per
-/// trial; empty if nothing was refined. Of a trial only its outcome and reason are looked at.
+/// What was found out about single plans besides their trials.
+struct Findings {
+  std::vector<std::optional<NumericalError>> errors = {};  // per trial; empty: nothing was refined
+  std::vector<RepeatedPlan> repeated = {};                 // of equally many repeats
+};
+
+/// Plans with repeats come first, by their mean score over the repeats, in which a failure costs 1;
+/// after them the others by their score, which knows no disturbance; equals by index of the
+/// candidate. Two plans are tied if their scores differ by no more than both errors, or if the
+/// central 90 % of their paired differences over the repeats, widened by both errors, holds 0: then
+/// the unknowns decide which is better. Of a trial only its outcome and reason are looked at.
 /// Expects one trial and one Metrics per candidate, and positive limits.
 Ranking rank(const Study& study, const std::vector<Candidate>& candidates,
              const std::vector<simulate::TrialResult>& trials, const std::vector<Metrics>& metrics,
-             const Limits& limits, const Weights& weights,
-             const std::vector<std::optional<NumericalError>>& errors = {});
+             const Limits& limits, const Weights& weights, const Findings& findings = {});
+
+/// Why a trial is no plan, in a sentence; empty if it is one.
+std::string exclusion_reason(const simulate::TrialResult& trial, const Metrics& metrics,
+                             const Study& study, const Limits& limits);
 
 }  // namespace wireplan::plan

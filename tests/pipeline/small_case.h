@@ -66,7 +66,7 @@ inline void write_stl(const Surface& surface, const std::filesystem::path& file)
 }
 
 /// A tube of radius 4 mm and length 36 mm along z as tube.stl, and case.json with one wire pushed
-/// in at two angles for 30 mm. Returns the case file's contents.
+/// in at two angles for 30 mm; a plan is repeated four times. Returns the case file's contents.
 inline Json write_tube_case(const std::filesystem::path& folder) {
   write_stl(shapes::straight_tube(4.0, 36.0, 1.5), folder / "tube.stl");
   const Json wire = {
@@ -82,6 +82,7 @@ inline Json write_tube_case(const std::filesystem::path& folder) {
   file["target"] = {{"point_mm", {0, 0, 28}}, {"radius_mm", 4}};
   file["wires"] = Json::array({wire});
   file["insertion"] = {{"length_mm", 30}, {"step_mm", 2}, {"element_length_mm", 2}};
+  file["robustness"] = {{"repeats", 4}};
   write_json(file, folder / "case.json");
   return file;
 }

@@ -129,6 +129,14 @@ Json full_case(Json json) {
                     {"tip_force_fail_n", 1},
                     {"penetration_fail_mm", 0.5},
                     {"off_path_fail_mm", 20}};
+  json["robustness"] = {{"repeats", 32},
+                        {"plans", 3},
+                        {"seed", 7},
+                        {"friction_factor", {0.25, 4}},
+                        {"wall_factor", {1, 1}},
+                        {"angle_deg", 3},
+                        {"entry_mm", 0.5},
+                        {"lumen_mm", 0.1}};
   json["ranking"]["weights"] = {{"reach", 2}, {"peak_force", 3}, {"mean_force", 0}, {"margin", 1}};
   return json;
 }
@@ -223,7 +231,12 @@ TEST_F(CaseFile, NamesEachMistakeWithItsRemedy) {
       {"wall.thickness_mm=0.001", {"wall.thickness_mm is 0.001", "given in m?"}},
       {"wall.model=stiff", {"wall.model is \"stiff\"", "\"elastic\"", "\"rigid\""}},
       {"friction=4", {"friction is 4", "from 0", "0.04 hydrophilic"}},
-      {"robustness={\"repeats\": 16}", {"robustness is given", "not in this version"}},
+      {"robustness.repeats=1.5", {"robustness.repeats is 1.5", "a whole number"}},
+      {"robustness.wall_factor=[2, 0.5]",
+       {"robustness.wall_factor is [2.0,0.5]", "two factors, the smaller one first"}},
+      {"robustness.wall_factor=[1]", {"robustness.wall_factor is [1.0]", "two factors"}},
+      {"robustness.friction_factor=[0, 2]", {"robustness.friction_factor[0] is 0"}},
+      {"robustness.angle_deg=90", {"robustness.angle_deg is 90", "from 0 to 45"}},
       {"insertion.length_mm=2000", {"insertion.length_mm is 2000", "\"amplatz\" has 1500"}},
       {"insertion.length_mm=0.25", {"insertion.length_mm is 0.25", "0 or at least 1", "in m?"}},
       {"limits.tip_force_warn_n=2", {"limits.tip_force_warn_n is 2", "at most"}},

@@ -96,6 +96,49 @@ TEST(Report, MapsTheForcesOnTheWall) {
   EXPECT_NE(bytes.find("Name=\"peak_force_best_plan_n\""), std::string::npos);
 }
 
+TEST(Report, TellsHowThePlansFareUnderDisturbances) {
+  const TemporaryFolder folder;
+  write_tube_case(folder.path());
+  const Json report =
+      run_to_report(folder / "case.json", folder / "cache", 0, {"robustness.repeats=12"});
+  const Json& robustness = report.at("robustness");
+  EXPECT_EQ(report.at("provenance").at("seed"), robustness.at("seed"));
+  EXPECT_EQ(robustness.at("unknowns").at("lumen_mm"), 0.25) << "chosen for a surface";
+  ASSERT_EQ(robustness.at("disturbances").size(), 12u);
+  ASSERT_EQ(robustness.at("plans").size(), report.at("ranking").size()) << "fewer than five";
+  for (const Json& plan : report.at("ranking")) {
+    EXPECT_FALSE(plan.at("mean_score").is_null());
+    const double rate = plan.at("success_rate");
+    EXPECT_LT(plan.at("success_rate_interval")[0], rate);
+    EXPECT_GE(plan.at("success_rate_interval")[1], rate);
+  }
+  for (const Json& plan : robustness.at("plans")) {
+    const Json& force = plan.at("peak_contact_force_n");
+    EXPECT_LE(force.at("low"), force.at("median"));  // straight in, it may not touch at all
+    EXPECT_LE(force.at("median"), force.at("high"));
+    EXPECT_LT(force.at("low"), force.at("high"));
+    EXPECT_EQ(plan.at("scores").size(), 12u);
+    EXPECT_EQ(plan.at("successes").get<std::size_t>() + plan.at("failures").size(), 12u);
+  }
+  double sum = 0.0;
+  for (const Json& share : robustness.at("sensitivity").at("shares")) {
+    sum += share.at("share").get<double>();
+  }
+  EXPECT_NEAR(sum, 1.0, 1e-12);
+  expect_valid(report, folder.path());
+}
+
+TEST(Report, RanksWithoutRepeatsWhereTheCaseAsksForNone) {
+  const TemporaryFolder folder;
+  write_tube_case(folder.path());
+  const Json report =
+      run_to_report(folder / "case.json", folder / "cache", 0, {"robustness.repeats=0"});
+  ASSERT_FALSE(report.at("ranking").empty());
+  EXPECT_TRUE(report.at("ranking")[0].at("success_rate").is_null());
+  EXPECT_TRUE(report.at("robustness").at("plans").empty());
+  expect_valid(report, folder.path());
+}
+
 TEST(Report, KeepsToItsSchemaWithoutPlans) {
   // 12 mm of wire do not come to a target 22 mm away.
   const TemporaryFolder folder;
@@ -113,7 +156,7 @@ TEST(Report, IsTheSameOutsideTimingAtAnyThreadCount) {
   const TemporaryFolder folder;
   write_tube_case(folder.path());
   std::string first;
-  for (const int threads : {1, 2, 8}) {
+  for (const int threads : {1, 2, 3, 8}) {
     SCOPED_TRACE(threads);
     Json report =
         run_to_report(folder / "case.json", folder / ("cache" + std::to_string(threads)), threads);

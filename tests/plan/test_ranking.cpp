@@ -46,7 +46,7 @@ struct Bench {
   }
 
   Ranking ranked() const {
-    return rank(study, candidates, trials, metrics, limits, weights, errors);
+    return rank(study, candidates, trials, metrics, limits, weights, {.errors = errors});
   }
 };
 
@@ -273,7 +273,7 @@ TEST(Rank, TiesPlansThatTheErrorsCannotTellApart) {
   EXPECT_EQ(ranking.plans[0].tied_with, std::vector<int>{1});
   EXPECT_EQ(ranking.plans[1].tied_with, std::vector<int>{0});
   EXPECT_TRUE(ranking.plans[2].tied_with.empty());
-  EXPECT_NE(ranking.plans[1].sentence.find("the error estimate cannot tell the two apart"),
+  EXPECT_NE(ranking.plans[1].sentence.find("error and unknowns do not tell the two apart"),
             std::string::npos);
 }
 

@@ -1,0 +1,30 @@
+#pragma once
+/// The perturbed repeats of a case's best plans, and what the report says of them.
+#include <vector>
+
+#include "pipeline/stage_work.h"
+#include "plan/batch.h"
+#include "plan/robustness.h"
+
+namespace wireplan::pipeline {
+
+struct Repeats {
+  plan::RobustnessOptions options;  // as used: no unknown beyond what a trial can take
+  std::vector<plan::Disturbance> disturbances;
+  std::vector<plan::RepeatedPlan> plans;
+  double cpu_seconds = 0.0;  // of those run this time; timing                             [s]
+};
+
+/// The case's unknowns with what it leaves open, and their disturbances. No plan is repeated yet.
+Repeats prepare_repeats(Workspace& work);
+
+/// Repeats the plans of these trials and adds them. Each repeat is a file in the stage's unfinished
+/// folder as soon as it is done, and is read from there if an interrupted run left it. Throws
+/// Interrupted.
+void add_repeats(Workspace& work, const std::vector<plan::Candidate>& candidates,
+                 const std::vector<int>& trials, Repeats& repeats);
+
+/// The report's "robustness".
+Json robustness_json(const Repeats& repeats);
+
+}  // namespace wireplan::pipeline
