@@ -75,8 +75,9 @@ void write_with(vtkDataObject* data, const std::filesystem::path& path) {
   writer->EncodeAppendedDataOff();
   writer->SetByteOrderToLittleEndian();
   if (writer->Write() != 1 || errors.any()) {
-    throw DiskError(path.string() + ": cannot be written (" + errors.text() +
-                "); check that the folder exists, may be written to and that the disk is not full");
+    throw DiskError(path.string() +
+                    ": cannot be written; check that the folder exists, may be written to and that "
+                    "the disk is not full");
   }
 }
 
@@ -238,9 +239,10 @@ void write_time_series(const std::vector<std::filesystem::path>& files,
   out << "</Collection>\n</VTKFile>\n";
   out.close();
   if (!out) {
-    throw DiskError(path.string() +
-                ": cannot be written; check that the folder exists, may be written to and that the "
-                "disk is not full");
+    throw DiskError(
+        path.string() +
+        ": cannot be written; check that the folder exists, may be written to and that the "
+        "disk is not full");
   }
 }
 

@@ -62,7 +62,7 @@ TEST_F(Faults, AWriteThatFailsIsToldAndSpoilsNothing) {
     bool stays;
   };
   const std::vector<Fault> faults = {{ENOSPC, true}, {EIO, false}, {EROFS, true}, {EACCES, false}};
-  const long step = long_tests() ? 1 : writes / 16;
+  const long step = long_tests() ? 1 : writes / 9;
   long tried = 0, told = 0;
   for (long at = 1; at <= writes; at += step) {
     for (std::size_t kind = 0; kind < faults.size(); ++kind) {
