@@ -74,7 +74,9 @@ double choose_insertion(const Centerline& path, const plan::Study& study) {
 // All that one trial reads: what its stage reads, but of the lists only its own entry.
 std::string trial_key_text(const Workspace& work, const plan::Study& study,
                            const plan::Candidate& candidate) {
-  const auto& [wire, inclination, azimuth, roll] = candidate;
+  const auto& [wire, inclination, azimuth, roll, moves] = candidate;
+  Json script = Json::array();
+  for (const auto& [push, turn] : moves) script.push_back({push, turn});
   const std::string shared =
       without_parameters(work.key_text, {"wires", "access.inclination_deg", "access.azimuth_deg",
                                          "tip_roll_deg", "insertion.length_mm"});
@@ -82,6 +84,7 @@ std::string trial_key_text(const Workspace& work, const plan::Study& study,
                             {"inclination", Json(inclination).dump()},
                             {"azimuth", Json(azimuth).dump()},
                             {"roll", Json(roll).dump()},
+                            {"moves", script.dump()},
                             {"length", Json(study.insertion.length).dump()}});
 }
 
