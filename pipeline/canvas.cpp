@@ -18,6 +18,21 @@
 
 namespace wireplan::pipeline {
 
+Color force_color(double part) {
+  // Viridis (S. van der Walt, N. Smith, 2015, CC0) at 0.25, 0.375, ... 1.
+  static const std::array<Color, 7> kViridis{{{0.231F, 0.322F, 0.545F},
+                                              {0.173F, 0.447F, 0.557F},
+                                              {0.129F, 0.569F, 0.549F},
+                                              {0.157F, 0.682F, 0.502F},
+                                              {0.369F, 0.788F, 0.384F},
+                                              {0.678F, 0.863F, 0.188F},
+                                              {0.992F, 0.906F, 0.145F}}};
+  const double place = std::clamp(part, 0.0, 1.0) * (kViridis.size() - 1);
+  const auto first = std::min(static_cast<std::size_t>(place), kViridis.size() - 2);
+  const auto between = static_cast<float>(place - static_cast<double>(first));
+  return (1.0F - between) * kViridis[first] + between * kViridis[first + 1];
+}
+
 Picture blank_picture(int width, int height) {
   Picture picture{width, height, {}};
   picture.rgb.resize(3UL * width * height);
@@ -33,6 +48,12 @@ void fill_box(Picture& picture, int x_0, int y_0, int width, int height, const C
         picture.rgb[3 * pixel + k] = static_cast<std::uint8_t>(std::lround(255.0F * color[k]));
       }
     }
+  }
+}
+
+void draw_force_bar(Picture& picture, int x, int y, int width, int height) {
+  for (int k = 0; k < width; ++k) {
+    fill_box(picture, x + k, y, 1, height, force_color((k + 0.5) / width));
   }
 }
 

@@ -22,6 +22,7 @@
 #include "pipeline/catalogue.h"
 #include "pipeline/check.h"
 #include "pipeline/phantom_file.h"
+#include "pipeline/render.h"
 #include "pipeline/report.h"
 #include "pipeline/scene_run.h"
 #include "pipeline/stages.h"
@@ -308,6 +309,11 @@ int simulate_file(const std::string& path, const std::string& given_output) {
   return answer.solved ? kDone : kNoPlan;
 }
 
+int render_pictures(const std::string& report, const std::string& output) {
+  for (const std::string& line : render_report(report, output)) std::cout << line << "\n";
+  return kDone;
+}
+
 int make_phantom_files(const std::string& path, const std::string& output) {
   const preprocess::PhantomSpec spec = read_phantom_spec(path);
   write_phantom(preprocess::make_phantom(spec), output);
@@ -473,6 +479,16 @@ int run_command(int argc, const char* const* argv) {
   phantom->add_option("-o,--output", phantom_output, "Folder for volume and truth")->required();
   phantom->footer("Example: wireplan phantom cases/abdomen/phantom.json -o cases/abdomen/data");
   phantom->callback([&] { code = make_phantom_files(spec_path, phantom_output); });
+
+  std::string report_path, render_output;
+  CLI::App* render = app.add_subcommand("render", "Pictures of a report, without a display");
+  render->add_option("REPORT", report_path, "report.json among the files of its run")->required();
+  render->add_option("-o,--output", render_output, "Folder for the pictures")->required();
+  render->footer(
+      "Writes vessel.png (the best plans), forces.png (the largest force on the wall),\n"
+      "angles.png (every trial) and numerics.png (error against run time).\n"
+      "Example: wireplan render wireplan-out/abdomen/report.json -o pictures");
+  render->callback([&] { code = render_pictures(report_path, render_output); });
 
   std::string bench_name, bench_output = "wireplan-out/bench";
   BenchOptions bench_options;

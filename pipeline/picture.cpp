@@ -78,8 +78,10 @@ void draw_bar(Panel& panel, const Vec3& a, const Vec3& b, double radius, const C
 
 /// One translucent triangle of the vessel, `p` in samples and `normal` per corner in view axes.
 /// The more a layer is seen from its side the more opaque it is, so outlines show as in an x-ray.
-/// Blending does not depend on the order of triangles. Solid things must have been drawn before.
-void draw_layer(Panel& panel, const std::array<Vec3, 3>& p, const std::array<Vec3, 3>& normal) {
+/// Where it is painted it is as opaque as `painted` at least. Blending does not depend on the order
+/// of triangles. Solid things must have been drawn before.
+void draw_layer(Panel& panel, const std::array<Vec3, 3>& p, const std::array<Vec3, 3>& normal,
+                const Color& color, float painted) {
   const Eigen::Vector2d u = (p[1] - p[0]).head<2>(), v = (p[2] - p[0]).head<2>();
   const double area = u.x() * v.y() - u.y() * v.x();
   if (std::abs(area) < 1e-12) return;
@@ -96,9 +98,10 @@ void draw_layer(Panel& panel, const std::array<Vec3, 3>& p, const std::array<Vec
       if (z < panel.depth[i]) continue;  // hidden behind a wire
       Vec3 n = ((1.0 - b - c) * normal[0] + b * normal[1] + c * normal[2]).normalized();
       if (n.z() < 0.0) n = -n;
-      const auto opacity = static_cast<float>(0.08 + 0.62 * std::pow(1.0 - n.z(), 2.5));
+      const float opacity =
+          std::max(painted, static_cast<float>(0.08 + 0.62 * std::pow(1.0 - n.z(), 2.5)));
       panel.transmittance[i] *= 1.0F - opacity;
-      panel.layers[i] += opacity * shade(n) * kVessel;
+      panel.layers[i] += opacity * shade(n) * color;
       panel.layer_weight[i] += opacity;
     }
   }
@@ -257,15 +260,28 @@ void draw_marks(Panel& panel, const Projection& project, const PictureMarks& mar
   for (int k = 0; k < kSides; ++k) draw_bar(panel, corner(k), corner(k + 1), kSamples, kTarget);
 }
 
-void draw_vessel(Panel& panel, const Projection& project, const Surface& vessel) {
+double largest_wall_force(const PictureMarks& marks) {
+  return marks.wall_force.empty()
+             ? 0.0
+             : *std::max_element(marks.wall_force.begin(), marks.wall_force.end());
+}
+
+void draw_vessel(Panel& panel, const Projection& project, const Surface& vessel,
+                 const PictureMarks& marks) {
   const Eigen::Matrix3Xd normals = vertex_normals(vessel);
-  for (const Eigen::Vector3i& t : vessel.triangles.colwise()) {
+  const double scale = largest_wall_force(marks);
+  for (Eigen::Index m = 0; m < vessel.triangles.cols(); ++m) {
     std::array<Vec3, 3> corners, corner_normals;
     for (int k = 0; k < 3; ++k) {
-      corners[k] = project(vessel.vertices.col(t[k]));
-      corner_normals[k] = project.axes * normals.col(t[k]);
+      const int vertex = vessel.triangles(k, m);
+      corners[k] = project(vessel.vertices.col(vertex));
+      corner_normals[k] = project.axes * normals.col(vertex);
     }
-    draw_layer(panel, corners, corner_normals);
+    const double force = scale > 0.0 ? marks.wall_force[static_cast<std::size_t>(m)] : 0.0;
+    // Even a small force shows where a wire touched.
+    const float painted = force > 0.0 ? static_cast<float>(0.5 + 0.45 * force / scale) : 0.0F;
+    draw_layer(panel, corners, corner_normals, force > 0.0 ? force_color(force / scale) : kVessel,
+               painted);
   }
 }
 
@@ -275,6 +291,15 @@ void draw_legend(Picture& picture, const std::vector<PictureWire>& wires, const 
   const int left = line, text_size = line * 6 / 10;
   draw_text(picture, marks.title, picture.width / 2, picture.height - line, line * 8 / 10,
             Align::kCenter);
+
+  // What the vessel's colors tell.
+  if (const double force = largest_wall_force(marks); force > 0.0) {
+    const int width = 6 * line, x = picture.width / 2 - width / 2,
+              y = picture.height - line * 37 / 20;
+    draw_text(picture, "force on the wall: 0", x - line / 2, y, text_size, Align::kRight);
+    draw_force_bar(picture, x, y - line / 4, width, line / 2);
+    draw_text(picture, format("%.3g N", force), x + width + line / 2, y, text_size, Align::kLeft);
+  }
 
   // The scale bar and the notice share the lowest line.
   const double length = round_length(0.2 * picture.width / pixels_per_mm);
@@ -328,6 +353,8 @@ Picture draw_picture(const Surface& vessel, const std::vector<PictureWire>& wire
   expects(size.width >= 200 && size.height >= 200);
   const Box box = scene_box(vessel, wires, marks);
   expects(box.low.allFinite() && box.high.allFinite());
+  expects(marks.wall_force.empty() ||
+          static_cast<Eigen::Index>(marks.wall_force.size()) == vessel.triangles.cols());
   for (const PictureWire& wire : wires) {
     expects(wire.nodes.cols() >= 2 && wire.nodes.allFinite());
     expects(wire.contact_force.size() == 0 || wire.contact_force.size() == wire.nodes.cols());
@@ -355,7 +382,7 @@ Picture draw_picture(const Surface& vessel, const std::vector<PictureWire>& wire
                              0.5 * Vec3(panel.width, panel.height, 0.0)};
     for (const PictureWire& wire : wires) draw_wire(panel, project, wire, largest_force(wires));
     draw_marks(panel, project, marks);
-    draw_vessel(panel, project, vessel);
+    draw_vessel(panel, project, vessel, marks);
     resolve(panel, picture, k * width, bottom);
     draw_sides(picture, views[k], k * width, bottom, width, height, line);
   }

@@ -33,6 +33,9 @@ struct PictureMarks {
   std::optional<Vec3> access = {};  // blue ball                                         [mm]
   std::optional<Vec3> target = {};  // green ball in a ring of the target's radius       [mm]
   double target_radius = 4.0;       //                                                        [mm]
+  /// Painted on the vessel by force_color up to the largest, which the legend tells; one value per
+  /// triangle, or empty.                                                                     [N]
+  std::vector<double> wall_force = {};
 };
 
 struct PictureSize {

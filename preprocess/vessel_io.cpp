@@ -225,6 +225,13 @@ Wall read_wall(const std::filesystem::path& path) {
   return wall;
 }
 
+std::vector<double> read_wall_array(const std::filesystem::path& path, const std::string& name) {
+  const vtkSmartPointer<vtkUnstructuredGrid> data = read_with<vtkXMLUnstructuredGridReader>(path);
+  const Eigen::VectorXd values =
+      values_of(data->GetCellData(), name, data->GetNumberOfCells(), path);
+  return {values.begin(), values.end()};
+}
+
 void write_time_series(const std::vector<std::filesystem::path>& files,
                        const std::vector<double>& times, const std::filesystem::path& path) {
   expects(files.size() == times.size());

@@ -31,6 +31,9 @@ void write_wall(const Surface& surface, const Wall& wall, const std::filesystem:
                 const std::vector<NamedArray>& arrays = {});
 Wall read_wall(const std::filesystem::path& path);
 
+/// One of the cell arrays that write_wall was given: a value per triangle.
+std::vector<double> read_wall_array(const std::filesystem::path& path, const std::string& name);
+
 /// A polyline with named point arrays, for wires: .vtp.
 void write_polyline(const Eigen::Matrix3Xd& points, const std::vector<NamedArray>& arrays,
                     const std::filesystem::path& path);
