@@ -20,7 +20,7 @@ struct Study {
 struct Candidate {
   int wire = 0;                                         // index into Study::wires
   double inclination = 0.0, azimuth = 0.0, roll = 0.0;  //                          [rad]
-  std::vector<simulate::Move> moves = {};               // of a manoeuvre; empty: one straight push
+  std::vector<simulate::Move> moves = {};               // before the last push
 };
 
 /// All combinations, wires outermost, roll innermost. What cannot differ is listed once: at

@@ -29,7 +29,7 @@ constexpr std::size_t kKept = 3;     // scripts per start
 
 /// A script on its way, and what came of it.
 struct Branch {
-  std::vector<Move> moves;
+  std::vector<Move> moves;  // before the last push
   double progress = 0.0;    // along the path                                              [mm]
   double depth = 0.0;       // at which it came so far                                     [mm]
   double peak_force = 0.0;  // of a single contact on the way                              [N]
@@ -94,8 +94,7 @@ class Search {
   /// Where `stops` is given, keeps states along the way.
   Branch push_on(const std::vector<Move>& moves, std::vector<Stop>* stops) {
     ++branches_;
-    const double start = trial_.depth();
-    Branch branch{.moves = moves, .progress = progress_here(), .depth = start};
+    Branch branch{.moves = moves, .progress = progress_here(), .depth = trial_.depth()};
     double last_stop = -kMarkEvery;
     while (trial_.depth() - branch.depth < std::max(kAstray, stops != nullptr ? kMarksOn : 0.0)) {
       if (stops != nullptr && trial_.depth() > 0.0 && trial_.depth() - last_stop >= kMarkEvery) {
@@ -110,7 +109,6 @@ class Search {
         branch.depth = trial_.depth();
       }
     }
-    branch.moves = joined(moves, {.push = trial_.depth() - start});
     branch.reached = trial_.ended() && trial_.result().outcome == simulate::Outcome::kReached;
     for (const simulate::Push& push : trial_.result().pushes) {
       branch.peak_force = std::max(branch.peak_force, push.peak_contact_force);
@@ -129,8 +127,7 @@ class Search {
   void expand(const Branch& branch, std::vector<Branch>& kept) {
     // The branch again, with the states of its last push.
     trial_.restore(begin_);
-    std::vector<Move> before = branch.moves;
-    before.pop_back();
+    const std::vector<Move>& before = branch.moves;
     for (const Move& move : before) trial_.make(move);
     if (trial_.ended()) return;
     std::vector<Stop> stops;
@@ -242,20 +239,21 @@ Manoeuvres find_manoeuvres(const Study& study, const std::vector<Candidate>& sta
   return all;
 }
 
-std::string describe_moves(const std::vector<simulate::Move>& moves) {
+std::string describe_moves(const std::vector<simulate::Move>& moves, double insertion) {
   std::string text;
+  char part[60];
   for (const Move& move : moves) {
-    char part[60];
     if (move.turn != 0.0) {
-      std::snprintf(part, sizeof part, "turn %.0f deg %s", std::abs(move.turn) / kRadPerDeg,
+      std::snprintf(part, sizeof part, "turn %.0f deg %s, ", std::abs(move.turn) / kRadPerDeg,
                     move.turn > 0.0 ? "clockwise" : "counterclockwise");
     } else {
-      std::snprintf(part, sizeof part, "%s %.1f mm", move.push > 0.0 ? "push" : "pull back",
+      std::snprintf(part, sizeof part, "%s %.1f mm, ", move.push > 0.0 ? "push" : "pull back",
                     std::abs(move.push));
     }
-    text += (text.empty() ? "" : ", ") + std::string(part);
+    text += part;
   }
-  return text;
+  std::snprintf(part, sizeof part, "%spush on to %.1f mm", moves.empty() ? "" : "then ", insertion);
+  return text + part;
 }
 
 }  // namespace wireplan::plan

@@ -19,7 +19,7 @@ std::vector<int> choose_starts(const Study& study, const std::vector<Candidate>&
 double find_progress(const simulate::TrialResult& trial, const Centerline& path);
 
 struct Manoeuvres {
-  std::vector<Candidate> found;  // with the moves that reach the target; may be empty
+  std::vector<Candidate> found;  // with the moves that let a push reach the target; may be empty
   long branches = 0;             // that were tried
 };
 
@@ -31,8 +31,8 @@ Manoeuvres find_manoeuvres(const Study& study, const std::vector<Candidate>& sta
                            const Centerline& path, const simulate::VesselModel& vessel,
                            const BatchOptions& options);
 
-/// "push 112 mm, turn 90 deg clockwise, pull back 10 mm, push 35 mm": as the hand does it, seen
-/// from the hub toward the patient.
-std::string describe_moves(const std::vector<simulate::Move>& moves);
+/// "push 112.0 mm, turn 90 deg clockwise, pull back 10.0 mm, then push on to 140.0 mm": as the hand
+/// does it, seen from the hub toward the patient; the last as deep as the trial went in [mm].
+std::string describe_moves(const std::vector<simulate::Move>& moves, double insertion);
 
 }  // namespace wireplan::plan

@@ -211,12 +211,16 @@ void Trial::restore(const Mark& mark) {
 TrialResult run_trial(const Wire& wire, const Introducer& introducer, const Goal& goal,
                       const VesselModel& vessel, const InsertionOptions& options,
                       const std::vector<Move>& moves) {
-  Trial trial(wire, introducer, goal, vessel, options);
-  if (moves.empty()) {
-    while (trial.step({.push = options.step})) {
-    }
+  // The moves may bring in more wire than stays there.
+  InsertionOptions with_moves = options;
+  double depth = 0.0;
+  for (const Move& move : moves) {
+    depth += move.push;
+    with_moves.length = std::max(with_moves.length, depth);
   }
+  Trial trial(wire, introducer, goal, vessel, with_moves);
   for (const Move& move : moves) trial.make(move);
+  trial.make({.push = options.length - trial.depth()});
   return trial.finish();
 }
 

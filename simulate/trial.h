@@ -54,7 +54,7 @@ struct Move {
 /// An insertion step by step, to its outcome. Never throws for what the physics does.
 class Trial {
  public:
-  /// Keeps references to vessel and options. Expects a unit direction and positive lengths.
+  /// Keeps a reference to the vessel. Expects a unit direction and positive lengths.
   Trial(const Wire& wire, const Introducer& introducer, const Goal& goal, const VesselModel& vessel,
         const InsertionOptions& options);
 
@@ -88,7 +88,7 @@ class Trial {
 
   Goal goal_;
   const VesselModel& vessel_;
-  const InsertionOptions& options_;
+  InsertionOptions options_;
   Insertion insertion_;
   Insertion::Snapshot before_;
   TrialResult result_;
@@ -98,8 +98,8 @@ class Trial {
   bool ended_ = false;
 };
 
-/// Pushes the wire in along the introducer, or makes the moves, until the tip reaches the goal, all
-/// wire is in, the moves are made, or a named failure.
+/// Makes the moves, none for a straight push, then pushes the wire in until the tip reaches the
+/// goal, all wire is in, or a named failure.
 TrialResult run_trial(const Wire& wire, const Introducer& introducer, const Goal& goal,
                       const VesselModel& vessel, const InsertionOptions& options,
                       const std::vector<Move>& moves = {});

@@ -103,21 +103,22 @@ TEST(Manoeuvres, FindTheWayPastADecoyIntoABranchAtARightAngle) {
   const Manoeuvres search = find_manoeuvres(study, pushes.starts, path, side_branches(), {});
   ASSERT_FALSE(search.found.empty());
   for (const Candidate& candidate : search.found) {
-    SCOPED_TRACE(describe_moves(candidate.moves));
+    SCOPED_TRACE(describe_moves(candidate.moves, 0.0));
     // From start to end in one go, not from where the search went on.
     const simulate::TrialResult trial = run_candidate(study, candidate, side_branches());
     EXPECT_EQ(trial.outcome, Outcome::kReached) << trial.reason;
-    EXPECT_GE(candidate.moves.size(), 3u);
+    EXPECT_GE(candidate.moves.size(), 2u);
   }
   EXPECT_GT(search.branches, 100);
 
-  // The same on any number of threads.
+  // The same on any number of threads, and whatever else is searched.
   const Manoeuvres alone =
-      find_manoeuvres(study, pushes.starts, path, side_branches(), {.threads = 1});
-  ASSERT_EQ(alone.found.size(), search.found.size());
-  EXPECT_EQ(alone.branches, search.branches);
+      find_manoeuvres(study, {pushes.starts[0]}, path, side_branches(), {.threads = 1});
+  ASSERT_LE(alone.found.size(), search.found.size());
+  EXPECT_LT(alone.branches, search.branches);
   for (std::size_t k = 0; k < alone.found.size(); ++k) {
-    EXPECT_EQ(describe_moves(alone.found[k].moves), describe_moves(search.found[k].moves));
+    EXPECT_EQ(describe_moves(alone.found[k].moves, 0.0),
+              describe_moves(search.found[k].moves, 0.0));
   }
 }
 
@@ -147,14 +148,11 @@ TEST(Manoeuvres, GoOnFromThePushesThatCameFurthest) {
 
 TEST(Manoeuvres, AreToldAsTheHandDoesThem) {
   EXPECT_EQ(
-      describe_moves({{.push = 112.04},
-                      {.turn = 0.5 * kPi},
-                      {.push = -10.0},
-                      {.turn = -0.25 * kPi},
-                      {.push = 3.5}}),
+      describe_moves(
+          {{.push = 112.04}, {.turn = 0.5 * kPi}, {.push = -10.0}, {.turn = -0.25 * kPi}}, 105.5),
       "push 112.0 mm, turn 90 deg clockwise, pull back 10.0 mm, turn 45 deg counterclockwise, "
-      "push 3.5 mm");
-  EXPECT_EQ(describe_moves({}), "");
+      "then push on to 105.5 mm");
+  EXPECT_EQ(describe_moves({}, 60.0), "push on to 60.0 mm");
 }
 
 TEST(PathPlace, TellsArcRadiusAndDistances) {

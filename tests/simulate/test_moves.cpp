@@ -44,7 +44,9 @@ InsertionOptions options(double friction = 0.0) {
 
 TrialResult make_moves(const Wire& wire, const VesselModel& vessel, const std::vector<Move>& moves,
                        const InsertionOptions& with = options(), double roll = 0.0) {
-  return run_trial(wire, along_z(roll), kNowhere, vessel, with, moves);
+  Trial trial(wire, along_z(roll), kNowhere, vessel, with);
+  for (const Move& move : moves) trial.make(move);
+  return trial.finish();
 }
 
 double largest_difference(const TrialResult& a, const TrialResult& b) {
@@ -53,13 +55,19 @@ double largest_difference(const TrialResult& a, const TrialResult& b) {
   return (a.nodes - b.nodes).colwise().norm().maxCoeff();
 }
 
-TEST(Moves, OnePushIsWhatATrialDoesByItself) {
+TEST(Moves, ComeBeforeTheLastPushOfATrial) {
   InsertionOptions some = options(0.1);
   some.length = 70.0;
-  const TrialResult whole = make_moves(curved_wire(), bend(), {}, some);
-  const TrialResult moved = make_moves(curved_wire(), bend(), {{.push = 70.0}}, some);
-  EXPECT_EQ(whole.nodes, moved.nodes);
-  EXPECT_EQ(whole.pushes.size(), moved.pushes.size());
+  const auto trial_with = [&](const std::vector<Move>& moves) {
+    return run_trial(curved_wire(), along_z(), kNowhere, bend(), some, moves);
+  };
+  EXPECT_EQ(trial_with({}).nodes, make_moves(curved_wire(), bend(), {{.push = 70.0}}, some).nodes);
+  // They may go deeper than the trial ends.
+  const TrialResult back = trial_with({{.push = 80.0}, {.turn = 0.5}, {.push = -30.0}});
+  EXPECT_NEAR(back.pushes.back().insertion, 70.0, 1e-9);
+  EXPECT_NEAR(back.pushes[79].insertion, 80.0, 1e-9);
+  EXPECT_NEAR(back.pushes.back().hub_angle, 0.5, 1e-12);
+  EXPECT_EQ(back.outcome, Outcome::kMissed);
 }
 
 TEST(Moves, PullingBackUndoesAPushWithoutFriction) {
@@ -130,9 +138,8 @@ TEST(Moves, TurnedWireComesBackIntoTheIntroducerAndOutAgainAsTurned) {
   const double angle = 0.5 * kPi;
   const TrialResult once =
       make_moves(curved_wire(), bend(), {{.push = 50.0}, {.turn = angle}, {.push = 30.0}});
-  const TrialResult again =
-      make_moves(curved_wire(), bend(),
-                 {{.push = 80.0}, {.turn = angle}, {.push = -70.0}, {.push = 70.0}});
+  const TrialResult again = make_moves(
+      curved_wire(), bend(), {{.push = 80.0}, {.turn = angle}, {.push = -70.0}, {.push = 70.0}});
   EXPECT_LT(largest_difference(once, again), 0.05);
   EXPECT_GT(once.pushes.back().stored_energy, 0.01);
   EXPECT_NEAR(once.pushes.back().stored_energy, again.pushes.back().stored_energy,
