@@ -1,12 +1,14 @@
 #include "pipeline/case_file.h"
 
 #include <algorithm>
+#include <array>
 #include <cctype>
 #include <cstdlib>
 #include <limits>
 #include <set>
 #include <string_view>
 #include <system_error>
+#include <utility>
 
 #include "pipeline/catalogue.h"
 
@@ -181,6 +183,26 @@ void read_access_and_target(JsonReader& root, plan::Study& study) {
                         "a point further than target.radius_mm from access.point_mm",
                         "a wire would be there before it is pushed");
   }
+}
+
+constexpr std::array kManoeuvrings = {std::pair("never", Manoeuvring::kNever),
+                                      std::pair("when_needed", Manoeuvring::kWhenNeeded),
+                                      std::pair("always", Manoeuvring::kAlways)};
+
+Manoeuvring read_manoeuvring(JsonReader& root) {
+  const std::string name =
+      root.choice("manoeuvres", "when_needed", {"never", "when_needed", "always"});
+  for (const auto& [known, value] : kManoeuvrings) {
+    if (name == known) return value;
+  }
+  return Manoeuvring::kWhenNeeded;  // a problem was noted
+}
+
+const char* manoeuvring_name(Manoeuvring value) {
+  for (const auto& [name, known] : kManoeuvrings) {
+    if (value == known) return name;
+  }
+  throw LogicError("a Manoeuvring without a name");
 }
 
 /// The wire under a name of the catalogue; a wire without sections where there is none.
@@ -456,6 +478,7 @@ Case read_case(const std::filesystem::path& path, const std::vector<std::string>
   read_insertion(root, input.study);
   read_limits(root, input.limits);
   read_weights(root, input.weights);
+  input.manoeuvres = read_manoeuvring(root);
   input.study.insertion.friction = read_friction(root, kFriction);
   read_robustness(root, input);
   root.finish();
@@ -478,6 +501,7 @@ Json case_parameters(const Case& input) {
   json["wires"] = Json::array();
   for (const simulate::Wire& wire : study.wires) json["wires"].push_back(wire_json(wire));
   json["tip_roll_deg"] = degrees(study.rolls);
+  json["manoeuvres"] = manoeuvring_name(input.manoeuvres);
   json["friction"] = study.insertion.friction;
   json["insertion"] = {{"length_mm", study.insertion.length},
                        {"step_mm", study.insertion.step},

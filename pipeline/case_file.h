@@ -43,6 +43,9 @@ struct WallInput {
   preprocess::WallOptions extrusion;  // young_modulus 0: chosen by the wall stage
 };
 
+/// When scripts of pushes, pulls and turns are searched.
+enum class Manoeuvring { kNever, kWhenNeeded, kAlways };  // when needed: no straight push reaches
+
 struct Case {
   std::filesystem::path file;  // the case file itself
   std::string name;
@@ -54,6 +57,7 @@ struct Case {
   /// Its tangent is found later, from the centerline. insertion.length 0: chosen from the path's
   /// length by the trials stage, 1.25 times it and 20 mm more.
   plan::Study study;
+  Manoeuvring manoeuvres = Manoeuvring::kWhenNeeded;
   plan::Limits limits;
   plan::Weights weights;
   /// unknowns.lumen 0: chosen by the report stage, half a voxel of a volume, 0.25 mm of a surface.

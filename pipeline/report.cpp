@@ -7,6 +7,8 @@
 
 #include "pipeline/hash.h"
 #include "pipeline/page.h"
+#include "pipeline/trial_file.h"
+#include "plan/manoeuvre.h"
 
 namespace wireplan::pipeline {
 namespace {
@@ -65,11 +67,14 @@ class Row {
   Json row_, reasons_;
 };
 
-void put_candidate(Row& row, const plan::Study& study, const plan::Candidate& candidate) {
-  row.put("wire", study.wires[static_cast<std::size_t>(candidate.wire)].name);
+void put_candidate(Row& row, const ReportInput& input, std::size_t trial) {
+  const plan::Candidate& candidate = input.candidates[trial];
+  row.put("wire", input.study.wires[static_cast<std::size_t>(candidate.wire)].name);
   row.put("inclination_deg", clean(candidate.inclination / kRadPerDeg));
   row.put("azimuth_deg", clean(candidate.azimuth / kRadPerDeg));
   row.put("roll_deg", clean(candidate.roll / kRadPerDeg));
+  row.put("moves", moves_json(candidate.moves));
+  row.put("script", plan::describe_moves(candidate.moves, input.metrics[trial].insertion));
 }
 
 const plan::Refinement* find_refinement(const ReportInput& input, int trial) {
@@ -180,7 +185,7 @@ Json trial_json(const ReportInput& input, std::size_t k) {
                             (trial.reason.empty() ? "" : ": " + trial.reason);
   Row row;
   row.put("id", k);
-  put_candidate(row, input.study, input.candidates[k]);
+  put_candidate(row, input, k);
   row.put("outcome", outcome_name(trial.outcome));
   row.put("reason", trial.reason);
   row.put("reached", m.reached);
@@ -230,7 +235,7 @@ Json ranked_json(const ReportInput& input, std::size_t k) {
   Row row;
   row.put("rank", k + 1);
   row.put("trial", plan.trial);
-  put_candidate(row, input.study, input.candidates[static_cast<std::size_t>(plan.trial)]);
+  put_candidate(row, input, static_cast<std::size_t>(plan.trial));
   row.put("score", plan.score.total);
   row.put("score_components", {{"reach", plan.score.reach},
                                {"peak_force", plan.score.peak_force},
@@ -416,11 +421,12 @@ std::string describe_best(const Json& report) {
            " trials; the report says why for each";
   }
   const Json& best = ranking.front();
+  const std::string script = best.value("script", "");
   return "best plan of " + std::to_string(ranking.size()) + " that reach, out of " +
          std::to_string(trials.size()) + " tried: " + best.at("wire").get<std::string>() +
          ", inclination " + best.at("inclination_deg").dump() + " deg, azimuth " +
          best.at("azimuth_deg").dump() + " deg, roll " + best.at("roll_deg").dump() + " deg, " +
-         best.at("sentence").get<std::string>();
+         (script.empty() ? "" : script + ", ") + best.at("sentence").get<std::string>();
 }
 
 }  // namespace wireplan::pipeline

@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "pipeline/catalogue.h"
+#include "pipeline/manoeuvres.h"
 #include "pipeline/picture.h"
 #include "pipeline/repeats.h"
 #include "pipeline/report.h"
@@ -35,17 +36,9 @@ constexpr double kInsertionFactor = 1.25, kInsertionExtra = 20.0;
 // Plans that fall behind under disturbances let others up, which are repeated next.
 constexpr int kRepeatRounds = 3;
 
-constexpr std::array kStagesBeforeReport = {"volume",     "segment", "surface",
-                                            "centerline", "wall",    "trials"};
+constexpr std::array kStagesBeforeReport = {"volume", "segment", "surface",   "centerline",
+                                            "wall",   "trials",  "manoeuvres"};
 constexpr const char* kTimingSchema = "wireplan.timing/1";
-
-Json figures_of(const std::string& stage) {
-  return {{"schema", "wireplan." + stage + "/1"}, {"warnings", Json::array()}};
-}
-
-void write_figures(const Json& figures, const fs::path& folder) {
-  write_json(figures, folder / kFiguresFile);
-}
 
 #ifndef WIREPLAN_IMAGING
 [[noreturn]] void throw_no_imaging() {
@@ -111,13 +104,6 @@ class ForceMap {
   std::vector<double> force_;  // [N]
 };
 
-simulate::TrialResult read_trial(const Workspace& work, std::size_t id) {
-  std::optional<simulate::TrialResult> trial =
-      find_trial(work.artifact("trials").folder / trial_file_name(static_cast<int>(id)));
-  expects(trial.has_value());
-  return std::move(*trial);
-}
-
 // All of the report that the stages before it tell.
 ReportInput describe_run(Workspace& work) {
   const Case& given = work.given();
@@ -126,7 +112,7 @@ ReportInput describe_run(Workspace& work) {
   report.input_name = work.input.filename().string();
   report.input_sha256 = work.input_sha256;
   report.study = work.study();
-  report.candidates = plan::list_candidates(report.study);
+  report.candidates = list_tried(work);
   for (const char* stage : kStagesBeforeReport) {
     if (!work.has(stage)) continue;
     report.stages.push_back(stage);
@@ -163,6 +149,14 @@ Json timing_json(const Workspace& work, const std::vector<plan::Refinement>& ref
 }
 
 }  // namespace
+
+Json figures_of(const std::string& stage) {
+  return {{"schema", "wireplan." + stage + "/1"}, {"warnings", Json::array()}};
+}
+
+void write_figures(const Json& figures, const fs::path& folder) {
+  write_json(figures, folder / kFiguresFile);
+}
 
 Workspace::Workspace(Case given, WorkOptions options, Store store)
     : given_(std::move(given)), options_(std::move(options)), store_(std::move(store)) {

@@ -75,6 +75,10 @@ class Workspace {
   std::unique_ptr<const simulate::VesselModel> model_;
 };
 
+/// The start of a stage's figures.json, and its end.
+Json figures_of(const std::string& stage);
+void write_figures(const Json& figures, const std::filesystem::path& folder);
+
 /// Each fills `folder` with the artifact of its stage. All but the report write figures.json,
 /// numbers for the report with a list of warnings.
 void make_volume(Workspace& work, const std::filesystem::path& folder);
@@ -83,6 +87,7 @@ void make_surface(Workspace& work, const std::filesystem::path& folder);
 void make_centerline(Workspace& work, const std::filesystem::path& folder);
 void make_wall(Workspace& work, const std::filesystem::path& folder);
 void make_trials(Workspace& work, const std::filesystem::path& folder);
+void make_manoeuvres(Workspace& work, const std::filesystem::path& folder);
 void make_report(Workspace& work, const std::filesystem::path& folder);
 
 }  // namespace wireplan::pipeline

@@ -146,6 +146,13 @@ std::vector<Stage> stages_of(const Case& given) {
                .make = make_trials};
   if (given.wall.elastic) trials.after.push_back("wall");  // a rigid one does not act
   stages.push_back(trials);
+  Stage manoeuvres = trials;
+  manoeuvres.name = "manoeuvres";
+  manoeuvres.version = 1;
+  manoeuvres.after.push_back("trials");
+  manoeuvres.parameters.push_back("/manoeuvres");
+  manoeuvres.make = make_manoeuvres;
+  stages.push_back(manoeuvres);
   Stage report{.name = "report",
                .version = 3,
                .reads_input = true,

@@ -26,7 +26,9 @@ constexpr std::array kOutcomes = {
     Outcome::kLeftOpening, Outcome::kLeftLumen, Outcome::kNotConverged, Outcome::kFailed};
 
 // The numbers of a push, each a column of the file.
-constexpr std::array<std::pair<const char*, double Push::*>, 13> kColumns = {{
+constexpr std::array<std::pair<const char*, double Push::*>, 15> kColumns = {{
+    {"hub_angle_rad", &Push::hub_angle},
+    {"hub_torque_n_mm", &Push::hub_torque},
     {"insertion_mm", &Push::insertion},
     {"push_force_n", &Push::push_force},
     {"tip_force_n", &Push::tip_force},
@@ -166,6 +168,7 @@ std::string trial_text(const plan::Study& study, const plan::Candidate& candidat
   file["inclination_deg"] = clean(candidate.inclination / kRadPerDeg);
   file["azimuth_deg"] = clean(candidate.azimuth / kRadPerDeg);
   file["roll_deg"] = clean(candidate.roll / kRadPerDeg);
+  if (!candidate.moves.empty()) file["moves"] = moves_json(candidate.moves);
   file["outcome"] = simulate::outcome_name(trial.outcome);
   file["reason"] = trial.reason;
   file["terms"] = trial.terms;
@@ -174,6 +177,27 @@ std::string trial_text(const plan::Study& study, const plan::Candidate& candidat
   file["contacts"] = contacts_to_json(trial.contacts);
   file["peak_forces"] = peaks_to_json(trial.peak_forces);
   return to_lines(file);
+}
+
+Json moves_json(const std::vector<simulate::Move>& moves) {
+  Json list = Json::array();
+  for (const simulate::Move& move : moves) {
+    if (move.turn != 0.0) {
+      list.push_back({{"turn_deg", clean(move.turn / kRadPerDeg)}});
+    } else {
+      list.push_back({{"push_mm", clean(move.push)}});
+    }
+  }
+  return list;
+}
+
+std::vector<simulate::Move> moves_of(const Json& list) {
+  std::vector<simulate::Move> moves;
+  for (const Json& move : list) {
+    moves.push_back(
+        {.push = move.value("push_mm", 0.0), .turn = move.value("turn_deg", 0.0) * kRadPerDeg});
+  }
+  return moves;
 }
 
 std::optional<TrialResult> find_trial(const std::filesystem::path& path) {

@@ -6,6 +6,7 @@
 #include <optional>
 #include <string>
 
+#include "pipeline/json_reader.h"
 #include "plan/candidates.h"
 
 namespace wireplan::pipeline {
@@ -21,6 +22,10 @@ std::string trial_text(const plan::Study& study, const plan::Candidate& candidat
 /// Reads such a file, bit for bit but for `shapes`, which is empty. Nothing where the
 /// file is absent or cut.
 std::optional<simulate::TrialResult> find_trial(const std::filesystem::path& path);
+
+/// [{"push_mm": 40.0}, {"turn_deg": 90.0}], negative pushes pull; and back.
+Json moves_json(const std::vector<simulate::Move>& moves);
+std::vector<simulate::Move> moves_of(const Json& list);
 
 /// The shapes on the way as FOLDER/NAME/K.vtp, with the contact force at each node, and
 /// FOLDER/NAME.pvd, a time series over the insertion [mm] that ParaView plays.

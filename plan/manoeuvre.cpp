@@ -240,6 +240,7 @@ Manoeuvres find_manoeuvres(const Study& study, const std::vector<Candidate>& sta
 }
 
 std::string describe_moves(const std::vector<simulate::Move>& moves, double insertion) {
+  if (moves.empty()) return {};
   std::string text;
   char part[60];
   for (const Move& move : moves) {
@@ -252,7 +253,7 @@ std::string describe_moves(const std::vector<simulate::Move>& moves, double inse
     }
     text += part;
   }
-  std::snprintf(part, sizeof part, "%spush on to %.1f mm", moves.empty() ? "" : "then ", insertion);
+  std::snprintf(part, sizeof part, "then push on to %.1f mm", insertion);
   return text + part;
 }
 

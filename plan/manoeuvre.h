@@ -32,7 +32,8 @@ Manoeuvres find_manoeuvres(const Study& study, const std::vector<Candidate>& sta
                            const BatchOptions& options);
 
 /// "push 112.0 mm, turn 90 deg clockwise, pull back 10.0 mm, then push on to 140.0 mm": as the hand
-/// does it, seen from the hub toward the patient; the last as deep as the trial went in [mm].
+/// does it, seen from the hub toward the patient; the last as deep as the trial went in [mm]. Empty
+/// for a straight push.
 std::string describe_moves(const std::vector<simulate::Move>& moves, double insertion);
 
 }  // namespace wireplan::plan

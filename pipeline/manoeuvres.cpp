@@ -1,0 +1,104 @@
+#include "pipeline/manoeuvres.h"
+
+#include <algorithm>
+#include <utility>
+
+#include "pipeline/disk.h"
+#include "pipeline/trial_file.h"
+#include "plan/manoeuvre.h"
+
+namespace wireplan::pipeline {
+namespace {
+
+namespace fs = std::filesystem;
+
+// Straight pushes of each wire that a search goes on from.
+constexpr int kStartsPerWire = 2;
+
+simulate::TrialResult read_trial_file(const fs::path& file) {
+  std::optional<simulate::TrialResult> trial = find_trial(file);
+  expects(trial.has_value());
+  return std::move(*trial);
+}
+
+// The straight pushes that a search goes on from; none where the case wants no search.
+std::vector<plan::Candidate> find_starts(Workspace& work,
+                                         const std::vector<plan::Candidate>& straight) {
+  const Manoeuvring wanted = work.given().manoeuvres;
+  if (wanted == Manoeuvring::kNever) return {};
+  std::vector<double> progress;
+  std::vector<simulate::Outcome> outcomes;
+  const fs::path& folder = work.artifact("trials").folder;
+  for (int id = 0; id < std::ssize(straight); ++id) {
+    const simulate::TrialResult trial = read_trial_file(folder / trial_file_name(id));
+    progress.push_back(plan::find_progress(trial, work.path()));
+    outcomes.push_back(trial.outcome);
+  }
+  const bool reached =
+      std::find(outcomes.begin(), outcomes.end(), simulate::Outcome::kReached) != outcomes.end();
+  if (reached && wanted == Manoeuvring::kWhenNeeded) return {};
+  std::vector<plan::Candidate> starts;
+  for (const int id :
+       plan::choose_starts(work.study(), straight, progress, outcomes, kStartsPerWire)) {
+    starts.push_back(straight[static_cast<std::size_t>(id)]);
+  }
+  return starts;
+}
+
+}  // namespace
+
+std::vector<plan::Candidate> list_tried(Workspace& work) {
+  std::vector<plan::Candidate> tried = plan::list_candidates(work.study());
+  const std::size_t straight = tried.size();
+  for (const Json& script : work.figures("manoeuvres").at("scripts")) {
+    plan::Candidate candidate = tried.at(script.at("start"));
+    expects(script.at("start") < straight);
+    candidate.moves = moves_of(script.at("moves"));
+    tried.push_back(std::move(candidate));
+  }
+  return tried;
+}
+
+simulate::TrialResult read_trial(const Workspace& work, std::size_t id) {
+  const std::string name = trial_file_name(static_cast<int>(id));
+  const fs::path straight = work.artifact("trials").folder / name;
+  return read_trial_file(fs::exists(straight) ? straight
+                                              : work.artifact("manoeuvres").folder / name);
+}
+
+void make_manoeuvres(Workspace& work, const fs::path& folder) {
+  plan::Study study = work.study();
+  study.insertion.record_every = study.insertion.length;  // shapes on the way are not kept
+  const std::vector<plan::Candidate> straight = plan::list_candidates(study);
+  const std::vector<plan::Candidate> starts = find_starts(work, straight);
+  plan::Manoeuvres search;
+  if (!starts.empty()) {
+    search = plan::find_manoeuvres(study, starts, work.path(), work.model(),
+                                   {.threads = work.options().threads,
+                                    .progress = work.options().progress,
+                                    .cancelled = work.options().cancelled});
+  }
+  if (work.options().cancelled && work.options().cancelled()) throw Interrupted();
+
+  // Each script from start to end, as it is written down.
+  Json figures = figures_of("manoeuvres");
+  figures["starts"] = starts.size();
+  figures["branches"] = search.branches;
+  figures["scripts"] = Json::array();
+  if (!search.found.empty()) fs::create_directories(folder / "trials");
+  for (plan::Candidate candidate : search.found) {
+    const Json moves = moves_json(candidate.moves);
+    candidate.moves = moves_of(moves);
+    const auto start = std::find_if(straight.begin(), straight.end(), [&](const auto& other) {
+      return other.wire == candidate.wire && other.inclination == candidate.inclination &&
+             other.azimuth == candidate.azimuth && other.roll == candidate.roll;
+    });
+    const std::size_t id = straight.size() + figures["scripts"].size();
+    figures["scripts"].push_back({{"start", start - straight.begin()}, {"moves", moves}});
+    write_whole(trial_text(study, candidate, plan::run_candidate(study, candidate, work.model())),
+                folder / trial_file_name(static_cast<int>(id)));
+  }
+  write_figures(figures, folder);
+}
+
+}  // namespace wireplan::pipeline
