@@ -1,298 +1,23 @@
 #include "preprocess/segment.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <cstddef>
-#include <cstdlib>
-#include <iomanip>
 #include <limits>
 #include <optional>
-#include <sstream>
 #include <string>
+#include <utility>
+
+#include "preprocess/voxels.h"
 
 namespace wireplan::preprocess {
 namespace {
 
-using Voxel = std::array<int, 3>;
-using Labels = std::vector<std::uint8_t>;
-
-// ---- grids --------------------------------------------------------------------------------------
-
-Voxel voxel_at(const Grid& grid, std::size_t index) {
-  const auto nx = static_cast<std::size_t>(grid.size[0]);
-  const auto ny = static_cast<std::size_t>(grid.size[1]);
-  return {static_cast<int>(index % nx), static_cast<int>(index / nx % ny),
-          static_cast<int>(index / (nx * ny))};
-}
-
-std::size_t index_of(const Grid& grid, const Voxel& v) { return grid.index(v[0], v[1], v[2]); }
-
-/// The voxel nearest to a point [mm], if the point lies in the grid (half a voxel round the outer
-/// centres included).
-std::optional<Voxel> nearest_voxel(const Grid& grid, const Vec3& point) {
-  const Vec3 rounded = grid.ijk_from_lps(point).array().round();
-  Voxel voxel;
-  for (int axis = 0; axis < 3; ++axis) {
-    if (!(rounded[axis] >= 0.0 && rounded[axis] < grid.size[axis])) {
-      return std::nullopt;
-    }
-    voxel[axis] = static_cast<int>(rounded[axis]);
-  }
-  return voxel;
-}
-
-/// Voxels first to last, both included.
-struct Box {
-  Voxel first, last;
-};
-
-Box grown(Box box, const Voxel& margin, const Grid& grid) {
-  for (int axis = 0; axis < 3; ++axis) {
-    box.first[axis] = std::max(0, box.first[axis] - margin[axis]);
-    box.last[axis] = std::min(grid.size[axis] - 1, box.last[axis] + margin[axis]);
-  }
-  return box;
-}
-
-Box united(Box a, const Box& b) {
-  for (int axis = 0; axis < 3; ++axis) {
-    a.first[axis] = std::min(a.first[axis], b.first[axis]);
-    a.last[axis] = std::max(a.last[axis], b.last[axis]);
-  }
-  return a;
-}
-
-/// Box of the labelled voxels; `box` where there are none.
-Box bounding_box(const Grid& grid, const Labels& labels, Box box) {
-  for (std::size_t n = 0; n < labels.size(); ++n) {
-    if (labels[n] != 0) {
-      const Voxel v = voxel_at(grid, n);
-      box = united(box, {v, v});
-    }
-  }
-  return box;
-}
-
-/// The grid of the box alone.
-Grid cropped(const Grid& grid, const Box& box) {
-  Grid crop = grid;
-  for (int axis = 0; axis < 3; ++axis) {
-    crop.size[axis] = box.last[axis] - box.first[axis] + 1;
-  }
-  crop.origin = grid.lps_from_ijk(Vec3(box.first[0], box.first[1], box.first[2]));
-  return crop;
-}
-
-/// Index in the whole grid of the first voxel of each row (along i) of the box, in crop order.
-template <typename Row>
-void for_each_row(const Grid& grid, const Box& box, Row row) {
-  for (int k = box.first[2]; k <= box.last[2]; ++k) {
-    for (int j = box.first[1]; j <= box.last[1]; ++j) {
-      row(grid.index(box.first[0], j, k));
-    }
-  }
-}
-
-// ---- filters ------------------------------------------------------------------------------------
-
-/// Weights of the discrete Gaussian of variance t [voxels^2] for 0, 1, ..., radius: e^-t I_n(t),
-/// whose variance is t also where a sampled Gaussian would miss it (Lindeberg 1990).
-std::vector<double> gaussian_weights(double t, int radius) {
-  std::vector<double> weights;
-  double sum = 0.0;
-  for (int n = 0; n <= radius; ++n) {
-    weights.push_back(std::exp(-t) * std::cyl_bessel_i(n, t));
-    sum += (n == 0 ? 1.0 : 2.0) * weights.back();
-  }
-  for (double& weight : weights) {
-    weight /= sum;
-  }
-  return weights;
-}
-
-/// How far the smoothing reaches along an axis [voxels].
-int smoothing_radius(double sigma, double spacing) {
-  return sigma > 0.0 ? 1 + static_cast<int>(std::ceil(4.0 * sigma / spacing)) : 0;
-}
-
-/// Runs a filter along one axis: each voxel of the result is what `add(sum, value, n)` makes of
-/// `initial` and the voxels n = -radius to radius steps away. Beyond the border the outermost
-/// values go on.
-template <typename Add>
-void filter_along(const Grid& grid, int axis, int radius, double initial, Add add,
-                  std::vector<float>& values) {
-  const int nx = grid.size[0], last = grid.size[axis] - 1;
-  std::vector<float> result(values.size());
-  std::vector<float> padded(static_cast<std::size_t>(nx + 2 * radius));
-  std::vector<double> row(static_cast<std::size_t>(nx));
-  for (int k = 0; k < grid.size[2]; ++k) {
-    for (int j = 0; j < grid.size[1]; ++j) {
-      // a row of the result comes from whole rows: shifted ones along i, else neighbours
-      if (axis == 0) {
-        for (int i = -radius; i < nx + radius; ++i) {
-          padded[static_cast<std::size_t>(i + radius)] =
-              values[grid.index(std::clamp(i, 0, last), j, k)];
-        }
-      }
-      const auto source = [&](int n) -> const float* {
-        return axis == 0   ? padded.data() + radius + n
-               : axis == 1 ? values.data() + grid.index(0, std::clamp(j + n, 0, last), k)
-                           : values.data() + grid.index(0, j, std::clamp(k + n, 0, last));
-      };
-      std::fill(row.begin(), row.end(), initial);
-      for (int n = -radius; n <= radius; ++n) {
-        const float* from = source(n);
-        for (std::size_t i = 0; i < row.size(); ++i) {
-          add(row[i], static_cast<double>(from[i]), n);
-        }
-      }
-      float* to = result.data() + grid.index(0, j, k);
-      std::transform(row.begin(), row.end(), to, [](double v) { return static_cast<float>(v); });
-    }
-  }
-  values.swap(result);
-}
-
-/// Gaussian of sigma [mm].
-void smooth(const Grid& grid, double sigma, std::vector<float>& values) {
-  for (int axis = 0; axis < 3; ++axis) {
-    const int radius = smoothing_radius(sigma, grid.spacing[axis]);
-    const std::vector<double> weights =
-        gaussian_weights(std::pow(sigma / grid.spacing[axis], 2), radius);
-    filter_along(
-        grid, axis, radius, 0.0,
-        [&](double& sum, double value, int n) {
-          sum += weights[static_cast<std::size_t>(std::abs(n))] * value;
-        },
-        values);
-  }
-}
-
-/// Distance [mm] from each voxel's centre to the nearest centre of a voxel that holds `label`;
-/// exact up to `limit`, beyond it too large or infinite.
-std::vector<float> distance_to(std::uint8_t label, const Grid& grid, const Labels& labels,
-                               double limit) {
-  // squared distance axis by axis: the smallest of what the neighbours have plus the way there
-  std::vector<float> distance(labels.size());
-  std::transform(labels.begin(), labels.end(), distance.begin(), [&](std::uint8_t l) {
-    return l == label ? 0.0F : std::numeric_limits<float>::infinity();
-  });
-  for (int axis = 0; axis < 3; ++axis) {
-    const double h = grid.spacing[axis];
-    filter_along(
-        grid, axis, static_cast<int>(std::ceil(limit / h)), std::numeric_limits<double>::infinity(),
-        [&](double& nearest, double value, int n) {
-          nearest = std::min(nearest, value + n * n * h * h);
-        },
-        distance);
-  }
-  std::transform(distance.begin(), distance.end(), distance.begin(),
-                 [](float squared) { return std::sqrt(squared); });
-  return distance;
-}
-
-/// Labels what is reached from the start voxels (whatever they hold) through voxel faces, over
-/// voxels for which `inside(index)` holds. Nearer voxels, counted in steps, come first.
-template <typename Inside>
-Labels flood(const Grid& grid, std::vector<std::size_t> queue, Inside inside) {
-  Labels reached(grid.voxels(), 0);
-  for (const std::size_t n : queue) {
-    reached[n] = 1;
-  }
-  const std::array<std::size_t, 3> stride = {1, grid.index(0, 1, 0), grid.index(0, 0, 1)};
-  for (std::size_t next = 0; next < queue.size(); ++next) {
-    const std::size_t n = queue[next];
-    const Voxel v = voxel_at(grid, n);
-    const auto visit = [&](std::size_t m) {
-      if (reached[m] == 0 && inside(m)) {
-        reached[m] = 1;
-        queue.push_back(m);
-      }
-    };
-    for (int axis = 0; axis < 3; ++axis) {
-      if (v[axis] > 0) {
-        visit(n - stride[axis]);
-      }
-      if (v[axis] + 1 < grid.size[axis]) {
-        visit(n + stride[axis]);
-      }
-    }
-  }
-  return reached;
-}
-
-std::size_t count(const Labels& labels) {
-  return static_cast<std::size_t>(std::count(labels.begin(), labels.end(), 1));
-}
-
-bool on_border(const Grid& grid, const Voxel& v) {
-  for (int axis = 0; axis < 3; ++axis) {
-    if (v[axis] == 0 || v[axis] == grid.size[axis] - 1) {
-      return true;
-    }
-  }
-  return false;
-}
-
-/// Labels each part of the background that does not reach the border of the grid through voxel
-/// faces and has at most `largest` voxels.
-void fill_cavities(const Grid& grid, Labels& labels, double largest) {
-  // what the border reaches is no cavity
-  std::vector<std::size_t> border;
-  for (int k = 0; k < grid.size[2]; ++k) {
-    for (int j = 0; j < grid.size[1]; ++j) {
-      const bool all = k == 0 || k == grid.size[2] - 1 || j == 0 || j == grid.size[1] - 1;
-      for (int i = 0; i < grid.size[0]; i += all ? 1 : std::max(1, grid.size[0] - 1)) {
-        if (labels[grid.index(i, j, k)] == 0) {
-          border.push_back(grid.index(i, j, k));
-        }
-      }
-    }
-  }
-  Labels seen = flood(grid, std::move(border), [&](std::size_t n) { return labels[n] == 0; });
-
-  // collect each cavity on its own
-  std::vector<std::size_t> cavity;
-  const std::array<std::size_t, 3> stride = {1, grid.index(0, 1, 0), grid.index(0, 0, 1)};
-  for (std::size_t n = 0; n < labels.size(); ++n) {
-    if (labels[n] != 0 || seen[n] != 0) {
-      continue;
-    }
-    cavity.assign(1, n);
-    seen[n] = 1;
-    for (std::size_t next = 0; next < cavity.size(); ++next) {
-      for (const std::size_t step : stride) {
-        for (const std::size_t m : {cavity[next] - step, cavity[next] + step}) {  // never border
-          if (labels[m] == 0 && seen[m] == 0) {
-            seen[m] = 1;
-            cavity.push_back(m);
-          }
-        }
-      }
-    }
-    if (static_cast<double>(cavity.size()) <= largest) {
-      for (const std::size_t m : cavity) {
-        labels[m] = 1;
-      }
-    }
-  }
-}
+constexpr double kTargetReachMm = 3.0;  // how far beside the mask a target may lie
+constexpr double kWayMm = 3.0;          // round the way to the target, where way_hu is enough
+constexpr double kMostBright = 0.3;     // of the boundary; more is the inside of a bone
 
 // ---- seeds --------------------------------------------------------------------------------------
-
-std::string to_text(const Vec3& v) {
-  std::ostringstream text;
-  text << std::fixed << std::setprecision(1) << "(" << v.x() << ", " << v.y() << ", " << v.z()
-       << ")";
-  return text.str();
-}
-
-std::string to_text(double value) {
-  std::ostringstream text;
-  text << value;
-  return text.str();
-}
 
 /// The seeds' voxels. Points of another frame are the usual mistake, so the message looks for it.
 std::vector<Voxel> seed_voxels(const Grid& grid, const std::vector<Vec3>& seeds) {
@@ -321,21 +46,9 @@ std::vector<Voxel> seed_voxels(const Grid& grid, const std::vector<Vec3>& seeds)
   return voxels;
 }
 
-/// Voxels within `reach` steps along each axis, the voxel itself included.
-std::vector<std::size_t> neighbourhood(const Grid& grid, const Voxel& v, int reach) {
-  const Box box = grown({v, v}, {reach, reach, reach}, grid);
-  std::vector<std::size_t> all;
-  for_each_row(grid, box, [&](std::size_t start) {
-    for (int i = 0; i <= box.last[0] - box.first[0]; ++i) {
-      all.push_back(start + static_cast<std::size_t>(i));
-    }
-  });
-  return all;
-}
-
 /// What a value outside the band tells, in words one can act on.
-std::string advice(double value, const SegmentOptions& options) {
-  if (value > options.upper_hu) {
+std::string advice(double value, const Band& band) {
+  if (value > band.upper_hu) {
     return "brighter than the band: bone, calcium or metal, or very dense contrast; move the seed "
            "into the lumen or raise upper_hu";
   }
@@ -345,108 +58,178 @@ std::string advice(double value, const SegmentOptions& options) {
   if (value < -20.0) {
     return "in CT this is fat; move the seed into the lumen and check its frame (LPS mm)";
   }
-  if (value < 100.0 && options.lower_hu >= 100.0) {
+  if (value < 100.0 && band.connect_hu >= 100.0) {
     return "in CT this is soft tissue or blood without contrast; move the seed into the lumen, or "
            "take the phase with contrast-filled arteries";
   }
   return "darker than the band; move the seed into the lumen or lower lower_hu";
 }
 
+bool in_band(const Band& band, double value) {
+  return value >= band.connect_hu && value <= band.upper_hu;
+}
+
+/// "160 to 300 HU"
+std::string band_text(const Band& band) {
+  return to_text(band.connect_hu) + " to " + to_text(band.upper_hu) + " HU";
+}
+
 /// Throws unless the value that the band is applied to lies in it at the seed.
 void require_in_band(const Image& image, const Vec3& seed, const Voxel& voxel,
-                     double smoothed_value, const SegmentOptions& options) {
-  if (smoothed_value >= options.lower_hu && smoothed_value <= options.upper_hu) {
+                     double smoothed_value, const Band& band) {
+  const bool on_way = !band.way.empty() && seed == band.way.back();
+  if (smoothed_value >= (on_way ? band.way_hu : band.connect_hu) &&
+      smoothed_value <= band.upper_hu) {
     return;
   }
   const std::vector<std::size_t> around = neighbourhood(image.grid, voxel, 1);
   double sum = 0.0;
   for (const std::size_t n : around) {
-    sum += image.values[n];
+    sum += static_cast<double>(image.values[n]);
   }
   const double mean = std::round(sum / static_cast<double>(around.size()));
-  std::string message = "seed " + to_text(seed) + " mm lies outside the band " +
-                        to_text(options.lower_hu) + " to " + to_text(options.upper_hu) +
-                        " HU: there the volume has " +
-                        to_text(std::round(image.values[index_of(image.grid, voxel)])) +
-                        " HU (mean of its neighbourhood " + to_text(mean);
-  if (options.smoothing_mm > 0.0) {
+  std::string message =
+      "seed " + to_text(seed) + " mm lies outside the band " + band_text(band) +
+      ": there the volume has " +
+      to_text(std::round(static_cast<double>(image.values[index_of(image.grid, voxel)]))) +
+      " HU (mean of its neighbourhood " + to_text(mean);
+  if (band.smoothing_mm > 0.0) {
     message += ", smoothed " + to_text(std::round(smoothed_value));
   }
-  throw Error(message + "): " + advice(smoothed_value, options));
+  throw Error(message + "): " + advice(smoothed_value, band));
 }
 
 // ---- steps --------------------------------------------------------------------------------------
+
+/// What is looked for, with all choices made.
+struct Task {
+  Band band;
+  std::vector<Vec3> seeds;
+  std::optional<Vec3> target;
+  std::vector<LumenSample> samples;
+};
+
+Task make_task(const Image& image, const SegmentOptions& options) {
+  Task task{.band = {}, .seeds = options.seeds, .target = options.target, .samples = {}};
+  std::vector<Vec3> points = options.seeds;
+  if (options.target) {
+    points.push_back(*options.target);
+  }
+  for (const Vec3& point : points) {
+    task.samples.push_back(sample_lumen(image, point));
+  }
+  if (options.lower_hu) {
+    task.band = {.lower_hu = *options.lower_hu,
+                 .connect_hu = *options.lower_hu,
+                 .upper_hu = *options.upper_hu,
+                 .smoothing_mm = options.smoothing_mm.value_or(0.0),
+                 .neck_mm = options.neck_opening_mm.value_or(0.0),
+                 .way_hu = *options.lower_hu,
+                 .way = {}};
+  } else {
+    task.band = choose_band(image, task.samples, options.target.has_value(), options.smoothing_mm,
+                            options.neck_opening_mm);
+  }
+  for (Vec3& seed : task.seeds) {
+    seed = find_lumen_near(image, seed, task.band).value_or(seed);
+  }
+  if (!task.band.way.empty()) {
+    task.seeds.front() = task.band.way.back();
+    task.target = task.band.way.front();
+  }
+  return task;
+}
 
 /// The part of the volume that is worked on, and the region found in it.
 struct Region {
   Box box;
   Grid grid;
   Labels labels;
+  std::vector<float> values;  // smoothed                                                  [HU]
   std::vector<std::size_t> seeds;
 };
 
 /// Box of what the band alone, without smoothing, connects to the seeds: a first guess.
-Box first_box(const Image& image, const std::vector<Voxel>& seeds, const SegmentOptions& options) {
-  const auto in_band = [&](std::size_t n) {
-    return image.values[n] >= options.lower_hu && image.values[n] <= options.upper_hu;
+Box first_box(const Image& image, const std::vector<Voxel>& seeds, const Band& band) {
+  const auto bright = [&](std::size_t n) {
+    return in_band(band, static_cast<double>(image.values[n]));
   };
   Box box = {seeds.front(), seeds.front()};
+  for (const Vec3& point : band.way) {
+    const Voxel v = *nearest_voxel(image.grid, point);
+    box = united(box, grown({v, v}, kWayMm, image.grid));
+  }
   std::vector<std::size_t> start;
   for (const Voxel& seed : seeds) {
     box = united(box, {seed, seed});
     for (const std::size_t n : neighbourhood(image.grid, seed, 1)) {
-      if (in_band(n)) {
+      if (bright(n)) {
         start.push_back(n);
       }
     }
   }
-  return bounding_box(image.grid, flood(image.grid, std::move(start), in_band), box);
+  return bounding_box(image.grid, flood(image.grid, std::move(start), bright), box);
+}
+
+/// Labels the voxels within `reach` [mm] of any of the points.
+Labels mark_near(const Grid& grid, const std::vector<Vec3>& points, double reach) {
+  Labels near(grid.voxels(), 0);
+  for (const Vec3& point : points) {
+    for (const std::size_t n : voxels_in_ball(grid, point, reach)) {
+      near[n] = 1;
+    }
+  }
+  return near;
 }
 
 Region find_in_box(const Image& image, const Box& box, const std::vector<Voxel>& seeds,
-                   const SegmentOptions& options) {
-  Region region{.box = box, .grid = cropped(image.grid, box), .labels = {}, .seeds = {}};
-  std::vector<float> values;
-  values.reserve(region.grid.voxels());
-  for_each_row(image.grid, box, [&](std::size_t start) {
-    const float* first = image.values.data() + start;
-    values.insert(values.end(), first, first + region.grid.size[0]);
-  });
-  if (options.smoothing_mm > 0.0) {
-    smooth(region.grid, options.smoothing_mm, values);
+                   const Task& task) {
+  Region region{.box = box,
+                .grid = cropped(image.grid, box),
+                .labels = {},
+                .values = crop_values(image.grid, box, image.values),
+                .seeds = {}};
+  if (task.band.smoothing_mm > 0.0) {
+    smooth(region.grid, task.band.smoothing_mm, region.values);
   }
+  const auto value_at = [&](std::size_t n) { return static_cast<double>(region.values[n]); };
   for (std::size_t s = 0; s < seeds.size(); ++s) {
     const Voxel v = {seeds[s][0] - box.first[0], seeds[s][1] - box.first[1],
                      seeds[s][2] - box.first[2]};
     region.seeds.push_back(index_of(region.grid, v));
-    require_in_band(image, options.seeds[s], seeds[s], values[region.seeds.back()], options);
+    require_in_band(image, task.seeds[s], seeds[s], value_at(region.seeds.back()), task.band);
   }
+  const Labels near_way = mark_near(region.grid, task.band.way, kWayMm);
   region.labels = flood(region.grid, region.seeds, [&](std::size_t n) {
-    return values[n] >= options.lower_hu && values[n] <= options.upper_hu;
+    return value_at(n) >= (near_way[n] != 0 ? task.band.way_hu : task.band.connect_hu) &&
+           value_at(n) <= task.band.upper_hu;
   });
   return region;
 }
 
+/// Box in the whole grid of what the region holds.
+Box found_box(const Region& region) {
+  const Voxel seed = voxel_at(region.grid, region.seeds[0]);
+  Box found = bounding_box(region.grid, region.labels, {seed, seed});
+  for (int axis = 0; axis < 3; ++axis) {
+    found.first[axis] += region.box.first[axis];
+    found.last[axis] += region.box.first[axis];
+  }
+  return found;
+}
+
 /// Smoothed band, connected to the seeds. The box grows until what was found keeps the reach of
 /// the smoothing from its faces, so that the answer is that of the whole volume.
-Region find_connected(const Image& image, const SegmentOptions& options) {
-  const std::vector<Voxel> seeds = seed_voxels(image.grid, options.seeds);
+Region find_connected(const Image& image, const Task& task) {
+  const std::vector<Voxel> seeds = seed_voxels(image.grid, task.seeds);
   Voxel margin;
   for (int axis = 0; axis < 3; ++axis) {
-    margin[axis] = 1 + smoothing_radius(options.smoothing_mm, image.grid.spacing[axis]);
+    margin[axis] = 1 + smoothing_radius(task.band.smoothing_mm, image.grid.spacing[axis]);
   }
-  Box box = grown(first_box(image, seeds, options), margin, image.grid);
+  Box box = grown(first_box(image, seeds, task.band), margin, image.grid);
   for (int doubling = 0;; ++doubling) {
-    Region region = find_in_box(image, box, seeds, options);
-    Box found = bounding_box(
-        region.grid, region.labels,
-        {voxel_at(region.grid, region.seeds[0]), voxel_at(region.grid, region.seeds[0])});
-    for (int axis = 0; axis < 3; ++axis) {
-      found.first[axis] += box.first[axis];
-      found.last[axis] += box.first[axis];
-    }
-    const Box needed = grown(found, margin, image.grid);
-    const Box both = united(box, needed);
+    Region region = find_in_box(image, box, seeds, task);
+    const Box both = united(box, grown(found_box(region), margin, image.grid));
     if (both.first == box.first && both.last == box.last) {
       return region;
     }
@@ -465,18 +248,22 @@ void cut_necks(Region& region, double neck, const std::vector<Vec3>& seeds) {
 
   // depth counts from the face between two voxels, half a voxel before the background's centre
   const double core = neck + 0.5 * region.grid.spacing.minCoeff();
-  const std::vector<float> depth = distance_to(0, region.grid, region.labels, core);
-  const auto is_core = [&](std::size_t n) { return depth[n] >= core; };
+  Labels deep(region.labels.size());
+  {
+    const std::vector<float> depth = distance_to(0, region.grid, region.labels);
+    std::transform(depth.begin(), depth.end(), deep.begin(),
+                   [&](float d) { return static_cast<double>(d) >= core ? 1 : 0; });
+  }
 
   // the core nearest to each seed, and all that is connected to it
   std::vector<std::size_t> start;
   for (const std::size_t seed : region.seeds) {
     std::optional<std::size_t> nearest;
-    if (is_core(seed)) {
+    if (deep[seed] != 0) {
       nearest = seed;
     } else {
       flood(region.grid, {seed}, [&](std::size_t n) {
-        if (!nearest && is_core(n)) {
+        if (!nearest && deep[n] != 0) {
           nearest = n;
         }
         return !nearest && region.labels[n] != 0;
@@ -486,13 +273,14 @@ void cut_necks(Region& region, double neck, const std::vector<Vec3>& seeds) {
       start.push_back(*nearest);
     }
   }
-  const Labels kept = flood(region.grid, start, is_core);
+  const Labels kept = flood(region.grid, start, [&](std::size_t n) { return deep[n] != 0; });
 
   // grow back inside the region
   const double reach = neck + region.grid.spacing.maxCoeff();
-  const std::vector<float> away = distance_to(1, region.grid, kept, reach);
-  region.labels = flood(region.grid, start,
-                        [&](std::size_t n) { return region.labels[n] != 0 && away[n] <= reach; });
+  const std::vector<float> away = distance_to(1, region.grid, kept);
+  region.labels = flood(region.grid, start, [&](std::size_t n) {
+    return region.labels[n] != 0 && static_cast<double>(away[n]) <= reach;
+  });
   for (std::size_t s = 0; s < seeds.size(); ++s) {
     if (start.empty() || region.labels[region.seeds[s]] == 0) {
       throw Error("seed " + to_text(seeds[s]) +
@@ -502,46 +290,181 @@ void cut_necks(Region& region, double neck, const std::vector<Vec3>& seeds) {
   }
 }
 
-}  // namespace
-
-Segmentation segment(const Image& image, const SegmentOptions& options) {
-  expects(options.lower_hu < options.upper_hu);
-  expects(!options.seeds.empty());
-  expects(options.smoothing_mm >= 0.0 && options.neck_opening_mm >= 0.0);
-  expects(image.values.size() == image.grid.voxels() && !image.values.empty());
-
-  Region region = find_connected(image, options);
-  Segmentation result;
-  SegmentStatistics& statistics = result.statistics;
-  const double voxel_mm3 = image.grid.spacing.prod();
-  if (options.neck_opening_mm > 0.0) {
-    const std::size_t before = count(region.labels);
-    cut_necks(region, options.neck_opening_mm, options.seeds);
-    const std::size_t after = count(region.labels);
-    statistics.removed_by_opening_mm3 =
-        before > after ? static_cast<double>(before - after) * voxel_mm3 : 0.0;
+/// The region in a box no larger than its voxels need, and one more on all sides.
+Region shrunk(const Region& region, const Grid& whole) {
+  const Box box = grown(found_box(region), {1, 1, 1}, whole);
+  Box inner = box;
+  for (int axis = 0; axis < 3; ++axis) {
+    inner.first[axis] = std::max(0, box.first[axis] - region.box.first[axis]);
+    inner.last[axis] =
+        std::min(region.grid.size[axis] - 1, box.last[axis] - region.box.first[axis]);
   }
-  fill_cavities(region.grid, region.labels, std::numeric_limits<double>::infinity());
+  Region small{.box = {},
+               .grid = cropped(region.grid, inner),
+               .labels = crop_values(region.grid, inner, region.labels),
+               .values = crop_values(region.grid, inner, region.values),
+               .seeds = {}};
+  for (int axis = 0; axis < 3; ++axis) {
+    small.box.first[axis] = region.box.first[axis] + inner.first[axis];
+    small.box.last[axis] = region.box.first[axis] + inner.last[axis];
+  }
+  for (const std::size_t seed : region.seeds) {
+    const Voxel v = voxel_at(region.grid, seed);
+    small.seeds.push_back(
+        small.grid.index(v[0] - inner.first[0], v[1] - inner.first[1], v[2] - inner.first[2]));
+  }
+  return small;
+}
 
-  // back to the full grid
-  result.mask.grid = image.grid;
-  result.mask.labels.assign(image.grid.voxels(), 0);
+/// The region's voxel at the target; throws where it is not connected with the first seed.
+std::size_t require_connected(const Image& image, const Region& region, const Task& task,
+                              const SegmentOptions& options) {
+  const Labels reached = flood(region.grid, {region.seeds.front()},
+                               [&](std::size_t n) { return region.labels[n] != 0; });
+  std::size_t nearest = region.seeds.front();
+  double distance = std::numeric_limits<double>::infinity();
+  for (std::size_t n = 0; n < reached.size(); ++n) {
+    const double here =
+        reached[n] != 0 ? (center_of(region.grid, n) - *task.target).norm() : distance;
+    if (here < distance) {
+      distance = here;
+      nearest = n;
+    }
+  }
+  if (distance <= kTargetReachMm) {
+    return nearest;
+  }
+  const std::optional<Voxel> at = nearest_voxel(image.grid, *options.target);
+  throw Error("target " + to_text(*options.target) + " mm is not connected with the access " +
+              to_text(options.seeds.front()) + " mm: the nearest point that the lumen reaches is " +
+              to_text(center_of(region.grid, nearest)) + " mm, " +
+              to_text(std::round(10.0 * distance) / 10.0) + " mm away (values there " +
+              band_text(task.band) + ", at the target " +
+              to_text(std::round(static_cast<double>(image.values[index_of(image.grid, *at)]))) +
+              " HU); if the artery is open between them, lower segmentation.lower_hu or "
+              "neck_opening_mm, else take another access or target");
+}
+
+/// Adds the voxels next to the region that are at least half as bright as the lumen: what connects
+/// is asked for more, so that veins stay out, but the lumen ends at half.
+void add_rim(Region& region, const Band& band) {
+  std::vector<std::size_t> rim;
+  for (std::size_t n = 0; n < region.labels.size(); ++n) {
+    const auto value = static_cast<double>(region.values[n]);
+    if (region.labels[n] != 0 || value < band.lower_hu || value >= band.connect_hu) {
+      continue;
+    }
+    bool beside = false;
+    for_each_face_neighbour(region.grid, n,
+                            [&](std::size_t m) { beside = beside || region.labels[m] != 0; });
+    if (beside) {
+      rim.push_back(n);
+    }
+  }
+  for (const std::size_t n : rim) {
+    region.labels[n] = 1;
+  }
+}
+
+/// Fills pits (five of six neighbours inside) and takes off spikes (at most one inside), twice:
+/// what noise leaves on the boundary, and what a surface would fold on.
+void smooth_boundary(Region& region) {
+  for (int round = 0; round < 2; ++round) {
+    const Labels before = region.labels;
+    for (std::size_t n = 0; n < before.size(); ++n) {
+      int inside = 0, all = 0;
+      for_each_face_neighbour(region.grid, n, [&](std::size_t m) {
+        inside += before[m];
+        ++all;
+      });
+      if (before[n] == 0 && inside >= 5) {
+        region.labels[n] = 1;
+      } else if (before[n] != 0 && inside <= 1 && all == 6) {
+        region.labels[n] = 0;
+      }
+    }
+  }
+}
+
+/// An artery with plaque or a stent has a few bright neighbours; the inside of a bone, many.
+void require_no_bone(const SegmentStatistics& statistics, const Task& task) {
+  if (statistics.bright_boundary <= kMostBright) {
+    return;
+  }
+  throw Error("what is connected with " + to_text(task.samples.front().point) + " mm within " +
+              band_text(task.band) + " looks like the inside of a bone: " +
+              to_text(std::round(100.0 * statistics.bright_boundary)) +
+              " % of its surface lies against brighter voxels; move the points into a "
+              "contrast-filled artery (the volume may have none)");
+}
+
+/// The mask on the full grid, with its statistics.
+Mask whole_mask(const Image& image, const Region& region, SegmentStatistics& statistics) {
+  Mask mask{.grid = image.grid, .labels = Labels(image.grid.voxels(), 0)};
   std::size_t n = 0, inside = 0;
   double sum = 0.0;
   for_each_row(image.grid, region.box, [&](std::size_t start) {
     for (int i = 0; i < region.grid.size[0]; ++i, ++n) {
       if (region.labels[n] != 0) {
         const std::size_t whole = start + static_cast<std::size_t>(i);
-        result.mask.labels[whole] = 1;
-        sum += image.values[whole];
+        mask.labels[whole] = 1;
+        sum += static_cast<double>(image.values[whole]);
         ++inside;
         statistics.touches_border =
             statistics.touches_border || on_border(image.grid, voxel_at(image.grid, whole));
       }
     }
   });
-  statistics.volume_mm3 = static_cast<double>(inside) * voxel_mm3;
+  statistics.volume_mm3 = static_cast<double>(inside) * image.grid.spacing.prod();
   statistics.mean_hu = sum / static_cast<double>(inside);
+  return mask;
+}
+
+}  // namespace
+
+Segmentation segment(const Image& image, const SegmentOptions& options) {
+  expects(options.lower_hu.has_value() == options.upper_hu.has_value());
+  expects(!options.lower_hu || *options.lower_hu < *options.upper_hu);
+  expects(!options.seeds.empty());
+  expects(options.smoothing_mm.value_or(0.0) >= 0.0 &&
+          options.neck_opening_mm.value_or(0.0) >= 0.0);
+  expects(image.values.size() == image.grid.voxels() && !image.values.empty());
+  seed_voxels(image.grid, options.seeds);
+  if (options.target) {
+    seed_voxels(image.grid, {*options.target});
+  }
+
+  const Task task = make_task(image, options);
+  Region region = find_connected(image, task);
+  Segmentation result;
+  SegmentStatistics& statistics = result.statistics;
+  statistics.samples = task.samples;
+  statistics.band = task.band;
+  if (task.band.neck_mm > 0.0) {
+    const std::size_t before = count(region.labels);
+    cut_necks(region, task.band.neck_mm, task.seeds);
+    const std::size_t after = count(region.labels);
+    statistics.removed_by_opening_mm3 =
+        before > after ? static_cast<double>(before - after) * image.grid.spacing.prod() : 0.0;
+  }
+
+  region = shrunk(region, image.grid);
+  fill_cavities(region.grid, region.labels, std::numeric_limits<double>::infinity());
+  std::vector<std::size_t> trusted = region.seeds;
+  if (task.target) {
+    trusted.push_back(require_connected(image, region, task, options));
+  }
+  statistics.search =
+      cut_leaks(region.grid, region.values, task.band.upper_hu, trusted, region.labels);
+  add_rim(region, task.band);
+  if (!options.lower_hu) {
+    smooth_boundary(region);
+  }
+  fill_cavities(region.grid, region.labels, std::numeric_limits<double>::infinity());
+  statistics.bright_boundary =
+      bright_boundary(region.grid, region.values, task.band.upper_hu, region.labels);
+  require_no_bone(statistics, task);
+  result.mask = whole_mask(image, region, statistics);
   return result;
 }
 
