@@ -137,20 +137,27 @@ void read_segmentation(JsonReader& root, Case& input) {
     return;
   }
   const std::size_t problems_before = root.problems().count();
-  JsonReader reader = root.object("segmentation", true);
-  const Range band{.min = -1100.0, .max = 65535.0};
+  JsonReader reader = root.object("segmentation", false);
+  const Range band{.min = -1100.0, .max = 65535.0}, length{.min = 0.0, .max = 5.0};
+  const auto given = [&](const std::string& key, Range range) {
+    return reader.has(key) ? std::optional<double>(reader.number(key, std::nullopt, range))
+                           : std::nullopt;
+  };
   SegmentationInput& segmentation = input.segmentation;
-  segmentation.lower_hu = reader.number("lower_hu", std::nullopt, band);
-  segmentation.upper_hu = reader.number("upper_hu", std::nullopt, band);
-  if (root.problems().count() == problems_before &&
-      segmentation.lower_hu >= segmentation.upper_hu) {
-    root.problems().add("segmentation.lower_hu", Json(segmentation.lower_hu).dump(),
-                        "less than segmentation.upper_hu, " + Json(segmentation.upper_hu).dump());
+  segmentation.lower_hu = given("lower_hu", band);
+  segmentation.upper_hu = given("upper_hu", band);
+  if (segmentation.lower_hu.has_value() != segmentation.upper_hu.has_value()) {
+    root.problems().add(segmentation.lower_hu ? "segmentation.upper_hu" : "segmentation.lower_hu",
+                        "missing",
+                        "both ends of the band, or none: then it is chosen from the volume");
+  } else if (segmentation.lower_hu && root.problems().count() == problems_before &&
+             *segmentation.lower_hu >= *segmentation.upper_hu) {
+    root.problems().add("segmentation.lower_hu", Json(*segmentation.lower_hu).dump(),
+                        "less than segmentation.upper_hu, " + Json(*segmentation.upper_hu).dump());
   }
   segmentation.seeds = reader.points("seeds_mm", false);
-  if (segmentation.seeds.empty()) segmentation.seeds = {input.study.access};
-  segmentation.smoothing_mm = reader.number("smoothing_mm", 0.0, {.min = 0.0, .max = 5.0});
-  segmentation.neck_opening_mm = reader.number("neck_opening_mm", 0.0, {.min = 0.0, .max = 5.0});
+  segmentation.smoothing_mm = given("smoothing_mm", length);
+  segmentation.neck_opening_mm = given("neck_opening_mm", length);
   reader.finish();
 }
 
@@ -379,11 +386,14 @@ Json input_json(const Case& input) {
     Json seeds = Json::array();
     for (const Vec3& seed : segmentation.seeds) seeds.push_back(to_json(seed));
     json["volume"] = {{"path", input.volume->given}};
-    json["segmentation"] = {{"lower_hu", segmentation.lower_hu},
-                            {"upper_hu", segmentation.upper_hu},
+    const auto value = [](const std::optional<double>& given) {
+      return given ? Json(*given) : Json(nullptr);
+    };
+    json["segmentation"] = {{"lower_hu", value(segmentation.lower_hu)},
+                            {"upper_hu", value(segmentation.upper_hu)},
                             {"seeds_mm", seeds},
-                            {"smoothing_mm", segmentation.smoothing_mm},
-                            {"neck_opening_mm", segmentation.neck_opening_mm}};
+                            {"smoothing_mm", value(segmentation.smoothing_mm)},
+                            {"neck_opening_mm", value(segmentation.neck_opening_mm)}};
   }
   if (input.surface_input) {
     json["surface"] = {{"path", input.surface_input->given},

@@ -32,9 +32,9 @@ struct SurfaceInput {
 
 /// Mirrors preprocess::SegmentOptions, which exists only where imaging is built.
 struct SegmentationInput {
-  double lower_hu = 0.0, upper_hu = 0.0;
-  std::vector<Vec3> seeds;  // the access point where the case gives none                 [mm]
-  double smoothing_mm = 0.0, neck_opening_mm = 0.0;
+  std::optional<double> lower_hu, upper_hu;  // both or none: chosen from the volume
+  std::vector<Vec3> seeds;                   // besides the access point; may be empty     [mm]
+  std::optional<double> smoothing_mm, neck_opening_mm;  // chosen with the band, else 0
 };
 
 /// The vessel's wall. A rigid one has the other values too: the wall's files are made of them.

@@ -47,6 +47,58 @@ constexpr const char* kTimingSchema = "wireplan.timing/1";
 }
 #endif
 
+#ifdef WIREPLAN_IMAGING
+// What was cut, in words; the largest leaks only.
+std::string leak_warning(const preprocess::Leak& leak) {
+  const auto rounded = [](double value) { return Json(std::round(value * 10.0) / 10.0).dump(); };
+  const Vec3& at = leak.place;
+  return "segment: cut a leak at (" + rounded(at.x()) + ", " + rounded(at.y()) + ", " +
+         rounded(at.z()) + ") mm: behind a neck of " + rounded(leak.neck_radius_mm) +
+         " mm radius lay " + rounded(leak.volume_mm3 / 1000.0) + " cm3, up to " +
+         rounded(leak.radius_mm) + " mm in radius, of " + rounded(leak.mean_hu) +
+         " HU in the mean" + (leak.bright_fraction > 0.2 ? ", much of it against bone" : "") +
+         "; if that is artery, add a point in it to segmentation.seeds_mm";
+}
+
+// Figures of the segment stage. What was chosen for the case is told as the report prints it.
+void add_segmentation(const preprocess::SegmentStatistics& statistics, bool chosen, Json& figures) {
+  constexpr std::size_t kLeaksTold = 5;
+  const preprocess::Band& band = statistics.band;
+  figures["band"] = {{"chosen", chosen},
+                     {"lower_hu", band.lower_hu},
+                     {"connect_hu", band.connect_hu},
+                     {"upper_hu", band.upper_hu},
+                     {"way_hu", band.way_hu},
+                     {"smoothing_mm", band.smoothing_mm},
+                     {"neck_opening_mm", band.neck_mm}};
+  figures["samples"] = Json::array();
+  for (const preprocess::LumenSample& sample : statistics.samples) {
+    figures["samples"].push_back({{"point_mm", to_json(sample.point)},
+                                  {"level_hu", sample.level_hu},
+                                  {"noise_hu", sample.noise_hu}});
+  }
+  figures["volume_mm3"] = statistics.volume_mm3;
+  figures["mean_hu"] = statistics.mean_hu;
+  figures["removed_by_opening_mm3"] = statistics.removed_by_opening_mm3;
+  figures["bright_boundary_fraction"] = statistics.bright_boundary;
+  figures["touches_border"] = statistics.touches_border;
+  figures["narrowest_radius_mm"] = statistics.search.route.narrowest_radius_mm;
+  figures["narrowest_mm"] = to_json(statistics.search.route.narrowest);
+  figures["leaks"] = Json::array();
+  for (const preprocess::Leak& leak : statistics.search.leaks) {
+    figures["leaks"].push_back({{"place_mm", to_json(leak.place)},
+                                {"neck_radius_mm", leak.neck_radius_mm},
+                                {"radius_mm", leak.radius_mm},
+                                {"volume_mm3", leak.volume_mm3},
+                                {"mean_hu", leak.mean_hu},
+                                {"bright_fraction", leak.bright_fraction}});
+    if (figures["leaks"].size() <= kLeaksTold) {
+      figures["warnings"].push_back(leak_warning(leak));
+    }
+  }
+}
+#endif
+
 void require_inside(const Surface& surface, const std::string& key, const Vec3& point) {
   const preprocess::InsideAnswer answer = preprocess::locate_point(surface, point);
   if (answer.inside) return;
@@ -122,6 +174,12 @@ ReportInput describe_run(Workspace& work) {
   // The values that stages chose where the case left them open.
   report.parameters = work.parameters;
   report.parameters["insertion"]["length_mm"] = report.study.insertion.length;
+  if (work.has("segment")) {
+    const Json& band = report.figures.at("segment").at("band");
+    for (const char* key : {"lower_hu", "upper_hu", "smoothing_mm", "neck_opening_mm"}) {
+      report.parameters["segmentation"][key] = band.at(key);
+    }
+  }
   report.parameters["wall"]["young_modulus_kpa"] =
       report.figures.at("wall").at("young_modulus_kpa");
   return report;
@@ -249,10 +307,13 @@ void make_volume(Workspace& work, const fs::path& folder) {
 void make_segment([[maybe_unused]] Workspace& work, [[maybe_unused]] const fs::path& folder) {
 #ifdef WIREPLAN_IMAGING
   const SegmentationInput& asked = work.given().segmentation;
+  std::vector<Vec3> seeds = {work.given().study.access};
+  seeds.insert(seeds.end(), asked.seeds.begin(), asked.seeds.end());
   const preprocess::Segmentation segmentation =
       preprocess::segment(work.image(), {.lower_hu = asked.lower_hu,
                                          .upper_hu = asked.upper_hu,
-                                         .seeds = asked.seeds,
+                                         .seeds = std::move(seeds),
+                                         .target = work.given().study.goal.point,
                                          .smoothing_mm = asked.smoothing_mm,
                                          .neck_opening_mm = asked.neck_opening_mm});
   work.drop_image();
@@ -260,10 +321,7 @@ void make_segment([[maybe_unused]] Workspace& work, [[maybe_unused]] const fs::p
 
   const preprocess::SegmentStatistics& statistics = segmentation.statistics;
   Json figures = figures_of("segment");
-  figures["volume_mm3"] = statistics.volume_mm3;
-  figures["mean_hu"] = statistics.mean_hu;
-  figures["removed_by_opening_mm3"] = statistics.removed_by_opening_mm3;
-  figures["touches_border"] = statistics.touches_border;
+  add_segmentation(statistics, !asked.lower_hu.has_value(), figures);
   if (statistics.touches_border) {
     figures["warnings"].push_back(
         "segment: the vessel touches the border of the volume and is closed there by a flat cap");

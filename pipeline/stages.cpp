@@ -114,8 +114,9 @@ std::vector<Stage> stages_of(const Case& given) {
   if (from_volume) {
     stages.push_back({.name = "volume", .reads_input = true, .make = make_volume});
     stages.push_back({.name = "segment",
+                      .version = 2,
                       .reads_input = true,
-                      .parameters = {"/segmentation"},
+                      .parameters = {"/segmentation", "/access/point_mm", "/target/point_mm"},
                       .make = make_segment});
     stages.push_back({.name = "surface",
                       .version = 2,

@@ -152,8 +152,8 @@ TEST_F(CaseFile, GivesEveryMissingKeyItsDefault) {
   EXPECT_EQ(input.name, folder_.filename().string());
   EXPECT_EQ(input.volume->path, folder_ / "ct.nrrd");
   EXPECT_FALSE(input.surface_input);
-  ASSERT_EQ(input.segmentation.seeds.size(), 1u);
-  EXPECT_EQ(input.segmentation.seeds[0], Vec3(1, 2, 3)) << "the access point";
+  EXPECT_TRUE(input.segmentation.seeds.empty()) << "access and target are enough";
+  EXPECT_FALSE(input.segmentation.smoothing_mm || input.segmentation.neck_opening_mm);
   EXPECT_EQ(input.study.inclinations.size(), 3u);
   EXPECT_EQ(input.study.azimuths.size(), 4u);
   EXPECT_EQ(input.study.insertion.length, 0.0) << "0: chosen from the path's length";
@@ -267,9 +267,16 @@ TEST_F(CaseFile, NeedsExactlyOneInput) {
   json = surface_case();
   json["segmentation"] = {{"lower_hu", 100}, {"upper_hu", 200}};
   expect_mentions(problem(json), {"segmentation is given with a surface as input"});
-  json = volume_case();
+}
+
+TEST_F(CaseFile, TakesNoBandOrBothEndsOfOne) {
+  Json json = volume_case();
   json.erase("segmentation");
-  expect_mentions(problem(json), {"segmentation is missing"});
+  const Case input = read(json);
+  EXPECT_FALSE(input.segmentation.lower_hu || input.segmentation.upper_hu);
+  EXPECT_TRUE(case_parameters(input).at("segmentation").at("lower_hu").is_null());
+  json["segmentation"] = {{"lower_hu", 100}};
+  expect_mentions(problem(json), {"segmentation.upper_hu is missing", "both ends", "or none"});
 }
 
 TEST_F(CaseFile, AsksForUnitAndFrameWhereTheFileHasNone) {

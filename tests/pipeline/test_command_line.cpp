@@ -294,10 +294,10 @@ TEST_F(CommandLine, RefusesAVolumeThatIsNoneAndPointsThatAreNotInTheVessel) {
   // The other tube is no part of what the seed lies in.
   Json other = good;
   other["target"]["point_mm"] = {30, 20, 30};
-  expect_refused(other, "target.point_mm");
-  // With a seed in both, one of the two pieces is left out of the surface.
+  expect_refused(other, "target (30.0, 20.0, 30.0) mm is not connected");
+  // Nor does a seed in both join them.
   other["segmentation"]["seeds_mm"] = Json::array({{10, 20, 18}, {30, 20, 18}});
-  expect_refused(other, "point_mm");
+  expect_refused(other, "target (30.0, 20.0, 30.0) mm is not connected");
 }
 
 #else
