@@ -316,7 +316,6 @@ void make_segment([[maybe_unused]] Workspace& work, [[maybe_unused]] const fs::p
                                          .target = work.given().study.goal.point,
                                          .smoothing_mm = asked.smoothing_mm,
                                          .neck_opening_mm = asked.neck_opening_mm});
-  work.drop_image();
   preprocess::write_mask(segmentation.mask, folder / "mask.nrrd");
 
   const preprocess::SegmentStatistics& statistics = segmentation.statistics;
@@ -336,6 +335,7 @@ void make_surface(Workspace& work, const fs::path& folder) {
   // From the mask, or from the case's file, which must be sound before anything mends it.
   const Case& given = work.given();
   Surface surface;
+  [[maybe_unused]] preprocess::FitStatistics fit;
   if (given.surface_input) {
     surface =
         preprocess::read_surface(work.input, given.surface_input->unit, given.surface_input->frame);
@@ -343,8 +343,10 @@ void make_surface(Workspace& work, const fs::path& folder) {
     surface = preprocess::remesh(surface, given.surface.edge_length_mm);
   } else {
 #ifdef WIREPLAN_IMAGING
-    surface = preprocess::surface_from_mask(
-        preprocess::read_mask(work.artifact("segment").folder / "mask.nrrd"), given.surface);
+    surface = preprocess::surface_from_image(
+        work.image(), preprocess::read_mask(work.artifact("segment").folder / "mask.nrrd"),
+        given.surface, &fit);
+    work.drop_image();
 #else
     throw_no_imaging();
 #endif
@@ -361,6 +363,13 @@ void make_surface(Workspace& work, const fs::path& folder) {
   figures["euler_number"] = check.euler_number;
   figures["mean_edge_mm"] = check.mean_edge_mm;
   figures["min_angle_deg"] = check.min_angle_deg;
+  figures["self_intersections"] = check.self_intersections;
+  if (given.volume) {
+    figures["fit"] = {{"lumen_value", fit.lumen_value},
+                      {"outside_value", fit.outside_value},
+                      {"mean_shift_mm", fit.mean_shift_mm},
+                      {"fitted_fraction", fit.fitted_fraction}};
+  }
   figures["openings"] = openings_json(simulate::find_openings(surface));
   if (check.euler_number != 2) {
     figures["warnings"].push_back("surface: it has " +

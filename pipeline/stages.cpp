@@ -119,13 +119,14 @@ std::vector<Stage> stages_of(const Case& given) {
                       .parameters = {"/segmentation", "/access/point_mm", "/target/point_mm"},
                       .make = make_segment});
     stages.push_back({.name = "surface",
-                      .version = 2,
+                      .version = 3,
+                      .reads_input = true,
                       .after = {"segment"},
                       .parameters = {"/surface/edge_length_mm"},
                       .make = make_surface});
   } else {
     stages.push_back({.name = "surface",
-                      .version = 2,
+                      .version = 3,
                       .reads_input = true,
                       .parameters = {"/surface/unit", "/surface/frame", "/surface/edge_length_mm"},
                       .make = make_surface});

@@ -1,10 +1,5 @@
 #include "preprocess/centerline.h"
 
-#include <CGAL/AABB_traits.h>
-#include <CGAL/AABB_tree.h>
-#include <CGAL/AABB_triangle_primitive.h>
-#include <CGAL/Exact_predicates_inexact_constructions_kernel.h>
-
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <array>
@@ -18,14 +13,11 @@
 #include <vector>
 
 #include "preprocess/surface.h"
+#include "preprocess/wall_distance.h"
 
 namespace wireplan::preprocess {
 namespace {
 
-using Kernel = CGAL::Exact_predicates_inexact_constructions_kernel;
-using Triangles = std::vector<Kernel::Triangle_3>;
-using Primitive = CGAL::AABB_triangle_primitive<Kernel, Triangles::const_iterator>;
-using Tree = CGAL::AABB_tree<CGAL::AABB_traits<Kernel, Primitive>>;
 using Points = std::vector<Vec3>;
 
 // The search grid starts with about this many nodes in the lumen, within these spacings [mm], and
@@ -41,53 +33,6 @@ constexpr int kClimbSteps = 25;
 constexpr double kSmoothing = 0.2;
 
 // ---------------------------------------------------------------------------------- the wall
-
-/// The place of the wall nearest to some point.
-struct Nearest {
-  Vec3 foot = Vec3::Zero();
-  double distance = 0.0;
-  Triangles::const_iterator triangle;
-};
-
-/// Exact distance to the triangles.
-class WallDistance {
- public:
-  explicit WallDistance(const Surface& surface) {
-    triangles_.reserve(static_cast<std::size_t>(surface.triangles.cols()));
-    for (Eigen::Index k = 0; k < surface.triangles.cols(); ++k) {
-      const auto corner = [&](int i) {
-        const Vec3 p = surface.vertices.col(surface.triangles(i, k));
-        return Kernel::Point_3(p.x(), p.y(), p.z());
-      };
-      const Kernel::Triangle_3 triangle(corner(0), corner(1), corner(2));
-      if (!triangle.is_degenerate()) triangles_.push_back(triangle);
-    }
-    expects(!triangles_.empty());
-    tree_.rebuild(triangles_.cbegin(), triangles_.cend());
-    tree_.build();
-  }
-  WallDistance(const WallDistance&) = delete;  // the tree points into triangles_
-  WallDistance& operator=(const WallDistance&) = delete;
-
-  Nearest find(const Vec3& p) const {
-    const auto first = triangles_.cbegin();
-    const Kernel::Point_3& corner = first->vertex(0);
-    return find(p, {.foot = Vec3(corner.x(), corner.y(), corner.z()), .triangle = first});
-  }
-
-  /// The same answer, sooner: from the answer for a point close by.
-  Nearest find(const Vec3& p, const Nearest& near) const {
-    const auto point = [](const Vec3& q) { return Kernel::Point_3(q.x(), q.y(), q.z()); };
-    const auto [foot, triangle] =
-        tree_.closest_point_and_primitive(point(p), {point(near.foot), near.triangle});
-    const Vec3 q(foot.x(), foot.y(), foot.z());
-    return {.foot = q, .distance = (p - q).norm(), .triangle = triangle};
-  }
-
- private:
-  Triangles triangles_;
-  Tree tree_;
-};
 
 /// From a point near the wall straight away from it, as far as the distance grows and at most to
 /// `depth`: there the ball is large enough to meet the grid.

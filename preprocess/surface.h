@@ -2,14 +2,16 @@
 /// Mask or surface file -> closed, oriented, checked triangles.
 #include <filesystem>
 #include <string>
+#include <vector>
 
 #include "preprocess/image.h"
+#include "preprocess/surface_fit.h"
 #include "preprocess/vessel.h"
 
 namespace wireplan::preprocess {
 
 struct SurfaceOptions {
-  double edge_length_mm = 1.0;  // of the isotropic remesh                               [mm]
+  double edge_length_mm = 1.0;  // of the remesh; shorter where a vessel is thin         [mm]
 };
 
 /// What a surface is, as measured. A sound surface: one piece, closed, manifold, normals outward,
@@ -36,6 +38,12 @@ struct SurfaceCheck {
 /// where no sound surface is found.
 Surface surface_from_mask(const Mask& mask, const SurfaceOptions& options);
 
+/// The same, then fitted to the image before the remesh: its edge lies where the grey value passes
+/// half way between lumen and surroundings, not where the mask's stairs are. Image and mask share
+/// one grid. Fills `statistics` where it is not null.
+Surface surface_from_image(const Image& image, const Mask& mask, const SurfaceOptions& options,
+                           FitStatistics* statistics = nullptr);
+
 /// Reads STL, PLY, OBJ or VTP. `unit` is "mm", "cm" or "m"; `frame` is "LPS" or "RAS" (x, y
 /// flipped). Turns normals to agree and outward, merges equal vertices, drops triangles that this
 /// collapses, keeps the largest piece. Throws `Error` where the file is missing or no surface; it
@@ -43,13 +51,17 @@ Surface surface_from_mask(const Mask& mask, const SurfaceOptions& options);
 Surface read_surface(const std::filesystem::path& path, const std::string& unit,
                      const std::string& frame);
 
-/// Remesh isotropically to the edge length, coarser or finer; checks for self-intersections the
-/// remesh brought in and retries finer (prototypes B). An edge length that the surface already has
-/// (mean within 10 %, none over twice as long) leaves it as it is. Expects a sound surface; throws
-/// `Error` where none of the tries gives one.
+/// Remeshes isotropically to the edge length, or to half of the local inscribed radius where that
+/// is less, so that thin branches and their caps keep their shape. Checks for self-intersections
+/// the remesh brought in and retries finer where they are (prototypes B). A surface that already
+/// has such edges (mean within 10 %, none over twice as long) is left as it is. Expects a sound
+/// surface; throws `Error` where none of the tries gives one.
 Surface remesh(const Surface& surface, double edge_length_mm);
 
 SurfaceCheck check_surface(const Surface& surface);
+
+/// Triangles that cut another one, ascending. Expects a manifold, oriented surface.
+std::vector<int> find_self_intersections(const Surface& surface);
 
 bool is_sound(const SurfaceCheck& check);
 

@@ -132,13 +132,16 @@ void measure_triangles(const Surface& surface, SurfaceCheck& check) {
   check.mean_edge_mm = edge_sum / static_cast<double>(3 * surface.triangles.cols());
 }
 
-int count_self_intersections(const Surface& surface) {
+using FacePairs = std::vector<std::pair<CgalMesh::Face_index, CgalMesh::Face_index>>;
+
+/// Pairs of triangles that cut each other.
+FacePairs cutting_pairs(const Surface& surface) {
   const CgalMesh mesh = cgal_mesh_from(surface);
-  std::vector<std::pair<CgalMesh::Face_index, CgalMesh::Face_index>> pairs;
+  FacePairs pairs;
   CGAL::Polygon_mesh_processing::self_intersections(mesh, std::back_inserter(pairs));
   // A pair of a face with itself is a degenerate one, which has a count of its own.
-  return static_cast<int>(
-      std::count_if(pairs.begin(), pairs.end(), [](const auto& p) { return p.first != p.second; }));
+  std::erase_if(pairs, [](const auto& p) { return p.first == p.second; });
+  return pairs;
 }
 
 /// Squared distance from a point to a triangle: to the plane where the foot lies inside, else to
@@ -257,9 +260,20 @@ SurfaceCheck check_surface(const Surface& surface) {
   check.volume_mm3 = signed_volume(surface);
   check.outward = check.volume_mm3 > 0.0;
   if (check.non_manifold_edges + check.misoriented_edges + check.non_manifold_vertices == 0) {
-    check.self_intersections = count_self_intersections(surface);
+    check.self_intersections = static_cast<int>(cutting_pairs(surface).size());
   }
   return check;
+}
+
+std::vector<int> find_self_intersections(const Surface& surface) {
+  std::vector<int> triangles;
+  for (const auto& [a, b] : cutting_pairs(surface)) {
+    triangles.push_back(static_cast<int>(a));
+    triangles.push_back(static_cast<int>(b));
+  }
+  std::sort(triangles.begin(), triangles.end());
+  triangles.erase(std::unique(triangles.begin(), triangles.end()), triangles.end());
+  return triangles;
 }
 
 bool is_sound(const SurfaceCheck& check) {

@@ -6,8 +6,10 @@
 
 #include <algorithm>
 #include <array>
+#include <vector>
 
 #include "preprocess/surface.h"
+#include "preprocess/vertex_graph.h"
 #include "preprocess/vtk_mesh.h"
 
 namespace wireplan::preprocess {
@@ -106,17 +108,60 @@ Surface smoothed(vtkPolyData* stairs, double passband) {
   return largest_piece(surface_from(smooth->GetOutput()));
 }
 
-}  // namespace
-
-Surface surface_from_mask(const Mask& mask, const SurfaceOptions& options) {
-  expects(mask.labels.size() == mask.grid.voxels() && options.edge_length_mm > 0.0);
+void require_labels(const Mask& mask) {
+  expects(mask.labels.size() == mask.grid.voxels());
   if (std::none_of(mask.labels.begin(), mask.labels.end(), [](auto label) { return label != 0; })) {
     throw Error("surface: the mask is empty; check the segmentation's band and seeds");
   }
+}
+
+/// Takes vertices of triangles that cut each other, and their neighbours, back toward where they
+/// were before the fit: half way at first, then all of it.
+Surface without_cuts(Surface fitted, const Surface& base) {
+  constexpr int kTries = 6, kRings = 3;
+  const Neighbours neighbours = find_neighbours(base);
+  for (int k = 0; k < kTries; ++k) {
+    const std::vector<int> cut = find_self_intersections(fitted);
+    if (cut.empty()) break;
+    Eigen::VectorXd near = Eigen::VectorXd::Zero(base.vertices.cols());
+    for (const int t : cut) {
+      for (int c = 0; c < 3; ++c) near(base.triangles(c, t)) = 1.0;
+    }
+    Eigen::VectorXd weight = Eigen::VectorXd::Ones(near.size());
+    average(neighbours, kRings, near, weight);
+    for (Eigen::Index v = 0; v < near.size(); ++v) {
+      if (near(v) <= 0.0) continue;
+      const double keep = k == 0 ? 0.5 : 0.0;
+      const Vec3 before = base.vertices.col(v), after = fitted.vertices.col(v);
+      fitted.vertices.col(v) = before + keep * (after - before);
+    }
+  }
+  return fitted;
+}
+
+}  // namespace
+
+Surface surface_from_mask(const Mask& mask, const SurfaceOptions& options) {
+  expects(options.edge_length_mm > 0.0);
+  require_labels(mask);
   const vtkSmartPointer<vtkPolyData> stairs = contour_lps(mask);
   Surface surface;
   for (const double passband : kPassbands) {
     surface = smoothed(stairs, passband);
+    if (is_sound(check_surface(surface))) break;
+  }
+  return remesh(surface, options.edge_length_mm);
+}
+
+Surface surface_from_image(const Image& image, const Mask& mask, const SurfaceOptions& options,
+                           FitStatistics* statistics) {
+  expects(options.edge_length_mm > 0.0 && image.values.size() == mask.labels.size());
+  require_labels(mask);
+  const vtkSmartPointer<vtkPolyData> stairs = contour_lps(mask);
+  Surface surface;
+  for (const double passband : kPassbands) {
+    const Surface base = smoothed(stairs, passband);
+    surface = without_cuts(fit_to_image(base, image, statistics), base);
     if (is_sound(check_surface(surface))) break;
   }
   return remesh(surface, options.edge_length_mm);

@@ -1,0 +1,174 @@
+#include "preprocess/surface_fit.h"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <limits>
+#include <optional>
+#include <vector>
+
+#include "preprocess/vertex_graph.h"
+
+namespace wireplan::preprocess {
+namespace {
+
+// Distances along the normal, in voxels (geometric mean of the spacing).
+constexpr double kReach = 1.2;           // the edge is sought this far on either side
+constexpr double kStep = 0.2;            // of the search
+constexpr double kInside = 1.5;          // the lumen's value is taken here, and a step deeper
+constexpr double kOutside = 1.2;         // the surroundings' value is the least up to here
+constexpr double kSmoothing = 2.0;       // shifts are averaged over this far along the surface
+constexpr double kLevelSmoothing = 2.5;  // and the lumen's value over this
+// A step less than this part of the usual one is no edge that a level could be put on.
+constexpr double kLeastContrast = 0.35;
+// How strongly a vertex without an edge is held where the mask has it, against one with an edge.
+constexpr double kHold = 0.15;
+constexpr int kRounds = 2;
+
+/// Values between voxels.
+class Interpolated {
+ public:
+  explicit Interpolated(const Image& image) : image_(image) {}
+
+  /// Trilinear; beyond the outermost centres their values go on.
+  double at(const Vec3& point) const {
+    const Vec3 p = image_.grid.ijk_from_lps(point);
+    std::array<int, 3> low{}, high{};
+    Vec3 f;
+    for (int a = 0; a < 3; ++a) {
+      const double x = std::clamp(p[a], 0.0, image_.grid.size[a] - 1.0);
+      low[a] = std::min(static_cast<int>(x), std::max(0, image_.grid.size[a] - 2));
+      high[a] = std::min(low[a] + 1, image_.grid.size[a] - 1);
+      f[a] = x - low[a];
+    }
+    const auto value = [&](int i, int j, int k) {
+      return static_cast<double>(image_.values[image_.grid.index(i, j, k)]);
+    };
+    const auto row = [&](int j, int k) {
+      return (1.0 - f[0]) * value(low[0], j, k) + f[0] * value(high[0], j, k);
+    };
+    const auto plane = [&](int k) {
+      return (1.0 - f[1]) * row(low[1], k) + f[1] * row(high[1], k);
+    };
+    return (1.0 - f[2]) * plane(low[2]) + f[2] * plane(high[2]);
+  }
+
+  /// Within a voxel of the outermost centres, where a cut vessel is capped.
+  bool at_border(const Vec3& point) const {
+    const Vec3 p = image_.grid.ijk_from_lps(point);
+    for (int a = 0; a < 3; ++a) {
+      if (p[a] < 1.0 || p[a] > image_.grid.size[a] - 2.0) return true;
+    }
+    return false;
+  }
+
+ private:
+  const Image& image_;
+};
+
+double median(std::vector<double> values) {
+  if (values.empty()) return 0.0;
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+/// Where the values along a normal pass the level nearest to 0 [in steps], rising or falling
+/// outward as asked.
+std::optional<double> crossing(const std::vector<double>& profile, double level, bool falling) {
+  std::optional<double> best;
+  const auto middle = static_cast<double>(profile.size() / 2);
+  for (std::size_t k = 0; k + 1 < profile.size(); ++k) {
+    const double a = profile[k] - level, b = profile[k + 1] - level;
+    if (falling ? !(a > 0.0 && b <= 0.0) : !(a < 0.0 && b >= 0.0)) continue;
+    const double at = static_cast<double>(k) + a / (a - b) - middle;
+    if (!best || std::abs(at) < std::abs(*best)) best = at;
+  }
+  return best;
+}
+
+}  // namespace
+
+Surface fit_to_image(const Surface& surface, const Image& image, FitStatistics* statistics) {
+  expects(image.values.size() == image.grid.voxels() && surface.triangles.cols() > 0);
+  const Eigen::Index n = surface.vertices.cols();
+  const Interpolated grey(image);
+  const Neighbours neighbours = find_neighbours(surface);
+  const double voxel = std::cbrt(image.grid.spacing.prod()), edge = mean_edge(surface);
+  const int half = static_cast<int>(std::lround(kReach / kStep));
+
+  std::vector<char> fixed(static_cast<std::size_t>(n));
+  for (Eigen::Index v = 0; v < n; ++v) fixed[v] = grey.at_border(surface.vertices.col(v)) ? 1 : 0;
+
+  Surface fitted = surface;
+  Eigen::VectorXd total = Eigen::VectorXd::Zero(n);
+  for (int round = 0; round < kRounds; ++round) {
+    const Eigen::Matrix3Xd normals = vertex_normals(fitted);
+
+    // What the lumen holds near each vertex, and what lies just outside.
+    Eigen::VectorXd lumen(n), outside(n), beyond(n), weight = Eigen::VectorXd::Ones(n);
+#pragma omp parallel for schedule(static)
+    for (Eigen::Index v = 0; v < n; ++v) {
+      const Vec3 p = fitted.vertices.col(v), out = voxel * normals.col(v);
+      lumen(v) = std::max(grey.at(p - kInside * out), grey.at(p - (kInside + 0.5) * out));
+      beyond(v) = grey.at(p + kOutside * out);
+      outside(v) = beyond(v);
+      for (double way = kStep; way < kOutside; way += kStep) {
+        outside(v) = std::min(outside(v), grey.at(p + way * out));
+      }
+    }
+    const double usual_lumen = median({lumen.begin(), lumen.end()});
+    const double usual_outside = median({outside.begin(), outside.end()});
+    const double contrast = usual_lumen - usual_outside;
+    average(neighbours, passes_for(kLevelSmoothing * voxel, edge), lumen, weight);
+    if (statistics) {
+      statistics->lumen_value = usual_lumen;
+      statistics->outside_value = usual_outside;
+    }
+
+    // The edge along each normal.
+    Eigen::VectorXd shift = Eigen::VectorXd::Zero(n), certainty(n);
+#pragma omp parallel
+    {
+      std::vector<double> profile(static_cast<std::size_t>(2 * half + 1));
+#pragma omp for schedule(static)
+      for (Eigen::Index v = 0; v < n; ++v) {
+        certainty(v) = kHold;
+        shift(v) = -total(v);
+        // Darker outside, if only between the lumen and a bone; else brighter, or no edge.
+        const double least = kLeastContrast * std::abs(contrast);
+        const bool falls = lumen(v) - outside(v) >= least;
+        if (!falls && beyond(v) - lumen(v) < least) continue;
+        const Vec3 p = fitted.vertices.col(v), out = kStep * voxel * normals.col(v);
+        for (int k = -half; k <= half; ++k) {
+          profile[static_cast<std::size_t>(k + half)] = grey.at(p + k * out);
+        }
+        const double level = 0.5 * (lumen(v) + (falls ? outside(v) : beyond(v)));
+        const std::optional<double> at = crossing(profile, level, falls);
+        if (!at) continue;
+        shift(v) = *at * kStep * voxel;
+        certainty(v) = 1.0;
+      }
+    }
+    if (statistics) {
+      statistics->fitted_fraction =
+          static_cast<double>((certainty.array() == 1.0).count()) / static_cast<double>(n);
+    }
+
+    // Against noise and gaps: the average of the neighbourhood.
+    average(neighbours, passes_for(kSmoothing * voxel, edge), shift, certainty);
+    for (Eigen::Index v = 0; v < n; ++v) {
+      if (fixed[v] != 0) continue;
+      const double most = kReach * voxel;
+      const double move = std::clamp(total(v) + shift(v), -most, most) - total(v);
+      total(v) += move;
+      fitted.vertices.col(v) += move * normals.col(v);
+    }
+  }
+  if (statistics) statistics->mean_shift_mm = total.cwiseAbs().mean();
+  return fitted;
+}
+
+}  // namespace wireplan::preprocess
