@@ -182,6 +182,8 @@ int run_case(const RunArguments& arguments) {
   const fs::path file = output / "report.json";
   const Json report = read_report(file);
   std::cout << describe_best(report) << "\nreport: " << file.string() << "\n";
+  const fs::path page = output / "report.html";
+  if (fs::exists(page)) std::cout << "page: " << page.string() << "\n";
   return report.at("ranking").empty() ? kNoPlan : kDone;
 }
 

@@ -91,13 +91,14 @@ std::optional<Slices> cut_case_slices(Workspace& work, const std::vector<double>
   if (!given.volume) return {};
   const preprocess::Image& image = work.image();
 
-  // From the band of the lumen down by its width, where soft tissue is; never past the values there
+  // The lumen's mean bright, as far below the threshold as above it; never past the values there
   // are.
-  const double lower = given.segmentation.lower_hu, upper = given.segmentation.upper_hu;
+  const double threshold = given.segmentation.lower_hu;
+  const double span = 2.0 * (work.figures("segment").at("mean_hu").get<double>() - threshold);
   const auto [least, most] = std::minmax_element(image.values.begin(), image.values.end());
   SliceOptions options;
-  options.window_low = std::max(lower - (upper - lower), static_cast<double>(*least));
-  options.window_high = std::min(upper, static_cast<double>(*most));
+  options.window_low = std::max(threshold - span, static_cast<double>(*least));
+  options.window_high = std::min(threshold + span, static_cast<double>(*most));
   if (options.window_high <= options.window_low) options.window_high = options.window_low + 1.0;
   Slices slices = cut_slices(image, work.surface(), list_places(work, peak_force), options);
   work.drop_image();

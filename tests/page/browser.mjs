@@ -13,7 +13,9 @@ const kArguments = ["--no-sandbox", "--disable-dev-shm-usage"];
 const kSoftware3d = ["--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"];
 const kNo3d = ["--disable-3d-apis"];
 
-const require = createRequire(join(process.env.WIREPLAN_PAGE_MODULES ?? process.cwd(), "package.json"));
+const modules = process.env.WIREPLAN_PAGE_MODULES ?? process.cwd();
+export const hasModules = existsSync(join(modules, "template.html"));
+const require = createRequire(join(modules, "package.json"));
 const axeSource = () => readFileSync(require.resolve("axe-core/axe.min.js"), "utf8");
 
 export const launch = (webgl = true) =>

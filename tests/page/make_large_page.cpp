@@ -5,6 +5,7 @@
 #include <iostream>
 #include <random>
 
+#include "pipeline/disk.h"
 #include "pipeline/page.h"
 #include "pipeline/report.h"
 #include "tests/shapes.h"
@@ -191,6 +192,6 @@ std::string make_page(const std::string& name) {
 
 int main(int argc, char** argv) {
   wireplan::expects(argc == 3);
-  wireplan::pipeline::write_file(wireplan::pipeline::make_page(argv[2]), argv[1]);
+  wireplan::pipeline::write_whole(wireplan::pipeline::make_page(argv[2]), argv[1]);
   return 0;
 }

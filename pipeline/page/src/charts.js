@@ -139,10 +139,9 @@ const successFigure = (page) => {
     .filter((p) => p.success_rate !== null && p.success_rate !== undefined)
     .map((p) => ({rank: `plan ${p.rank}`, rate: p.success_rate, low: p.success_rate_interval[0], high: p.success_rate_interval[1], trial: page.trials[p.trial]}));
   if (!rows.length) {
-    const reason = page.report.ranking[0]?.null_reasons?.success_rate;
     return el("figure", {}, el("p", {class: "missing"},
       el("b", {}, "Success rates: "),
-      `none. No plan was repeated with disturbed angles, friction and wall${reason ? ` (${reason})` : ""}, so how robust they are is not known. A case asks for repeats with robustness.repeats.`));
+      `none. No plan was repeated with disturbed angles, friction and wall, so how robust they are is not known. A case asks for repeats with robustness.repeats.`));
   }
   const make = (width) => chart("Success rate of each repeated plan with its interval", {
     width,

@@ -2,12 +2,15 @@
 import {el, section} from "./dom.js";
 import {degrees, number, outcomeWord, percent, plural, shown, withError} from "./format.js";
 
-const success = (trial) => {
-  const plan = trial.plan;
-  if (!plan || plan.success_rate === null || plan.success_rate === undefined) return "not asked";
+const success = ({plan}) => {
+  if (!plan || plan.success_rate === null || plan.success_rate === undefined) return "not repeated";
   const [low, high] = plan.success_rate_interval;
   return `${percent(plan.success_rate)} (${percent(low)} to ${percent(high)})`;
 };
+
+/** A number of a trial with its error; of a coarse one it is rough. */
+const told = (trial, value, error) =>
+  trial.level === "scout" && value !== null ? `\u2248\u00a0${number(value)}` : withError(value, error);
 
 // Title, what to sort by, what to show.
 const kColumns = [
@@ -16,10 +19,10 @@ const kColumns = [
   ["Inclination", (t) => t.inclination_deg, (t) => degrees(t.inclination_deg)],
   ["Azimuth", (t) => t.azimuth_deg, (t) => degrees(t.azimuth_deg)],
   ["Roll", (t) => t.roll_deg, (t) => degrees(t.roll_deg)],
-  ["Tip to target [mm]", (t) => t.tip_to_target_mm, (t) => withError(t.tip_to_target_mm, t.errors.position_error_mm)],
-  ["Largest contact [N]", (t) => t.peak_contact_force_n, (t) => withError(t.peak_contact_force_n, t.errors.peak_contact_force_error_n)],
-  ["Mean contact [N]", (t) => t.mean_contact_force_n, (t) => withError(t.mean_contact_force_n, t.errors.mean_contact_force_error_n)],
-  ["Tip force [N]", (t) => t.peak_tip_force_n, (t) => withError(t.peak_tip_force_n, t.errors.peak_tip_force_error_n)],
+  ["Tip to target [mm]", (t) => t.tip_to_target_mm, (t) => told(t, t.tip_to_target_mm, t.errors.position_error_mm)],
+  ["Largest contact [N]", (t) => t.peak_contact_force_n, (t) => told(t, t.peak_contact_force_n, t.errors.peak_contact_force_error_n)],
+  ["Mean contact [N]", (t) => t.mean_contact_force_n, (t) => told(t, t.mean_contact_force_n, t.errors.mean_contact_force_error_n)],
+  ["Tip force [N]", (t) => t.peak_tip_force_n, (t) => told(t, t.peak_tip_force_n, t.errors.peak_tip_force_error_n)],
   ["Score, 0 best", (t) => t.plan?.score ?? Infinity, (t) => (t.plan ? withError(t.plan.score, t.plan.score_error) : "\u2013")],
   ["Success rate", (t) => t.plan?.success_rate ?? -1, success],
   ["Why", (t) => t.plan?.sentence ?? t.excluded ?? "", (t) => shown(t.plan ? t.plan.sentence : t.excluded ?? outcomeWord(t.outcome))],
@@ -91,5 +94,6 @@ export const rankingSection = (page, selection) => {
         body)),
     el("p", {class: "note"},
       "\u00b1 is the estimated error of the simulation's finite elements; \u00b1\u00a0? where it was not estimated, as only the best plans are run again with finer elements. " +
-      "It does not hold errors of the wire's, the wall's and the image's data. Plans whose scores differ by less than their errors are ties."));
+      (trials.some((t) => t.level === "scout") ? "\u2248 marks coarse trials, with long elements in a rigid wall. " : "") +
+      "Errors of the wire's, the wall's and the image's data are not in it. Plans that the errors cannot tell apart are ties."));
 };

@@ -63,24 +63,59 @@ const sensitivity = (page, best, key, title) => {
     `${reached.length} of them reach` + (reached.length ? `, with a largest contact of ${rangeOf(reached.map((t) => t.peak_contact_force_n))}\u00a0N against ${number(best.peak_contact_force_n)}\u00a0N` : "")];
 };
 
+/** How far each unknown may be off, and its share in what moves the plans against each other. */
+const unknownRows = (robustness) => {
+  const {unknowns, sensitivity, repeats} = robustness;
+  const names = {
+    friction: ["Friction", `times ${(unknowns.friction_factor ?? []).map(number).join(" to ")}`],
+    wall: ["Stiffness of the wall", `times ${(unknowns.wall_factor ?? []).map(number).join(" to ")}`],
+    angle: ["Angle of the introducer", `\u00b1\u00a0${degrees(unknowns.angle_deg)}`],
+    entry: ["Place of entry", `\u00b1\u00a0${number(unknowns.entry_mm)}\u00a0mm`],
+    lumen: ["Width of the lumen", `wall moved by \u00b1\u00a0${number(unknowns.lumen_mm)}\u00a0mm`],
+  };
+  const shares = new Map((sensitivity?.shares ?? []).map(({unknown, share}) => [unknown, share]));
+  return Object.entries(names).map(([key, [title, range]]) =>
+    [title, `${range}, in ${plural(repeats, "repeat")} of each of the best plans`,
+     shares.has(key) ? `${percent(shares.get(key))} of what moves these plans against each other` : "no share found"]);
+};
+
+/** What the repeats made of the best plan. */
+const spreadRow = (robustness, trial, first) => {
+  const row = robustness.plans.find((plan) => plan.trial === trial);
+  if (!row) return null;
+  const {low, median, high} = row.peak_contact_force_n;
+  return ["All of these together, best plan",
+    `succeeds in ${row.successes} of ${robustness.repeats}: ${percent(first.success_rate)}, interval ${first.success_rate_interval.map(percent).join(" to ")}`,
+    `largest contact ${number(median)}\u00a0N in the middle, ${number(low)} to ${number(high)}\u00a0N in 90\u00a0% of repeats` +
+      (row.failures.length ? `; fails because: ${[...new Set(row.failures.map((f) => shown(f.reason)))].slice(0, 3).join("; ")}` : "")];
+};
+
+const scoutRow = (scout) => ["Coarse trials that sorted out the rest",
+  `${plural(scout.trials, "trial")} with elements of ${number(scout.element_length_mm)}\u00a0mm in a rigid wall, ${scout.compared} of them run in full too`,
+  `score off by ${number(scout.median_score_error)} in the middle; ${plural(scout.missed, "plan")} seen as failing that reach, ${scout.false_reached} the other way`];
+
 export const uncertainSection = (page) => {
   const {report, trials} = page;
   const [first] = report.ranking;
   const rows = [];
   if (first) {
     const best = trials[first.trial], e = best.errors;
-    rows.push(["Length of the wire's elements", e.position_error_mm === undefined || e.position_error_mm === null ? "error not estimated" : `best plan run with elements twice and half as long`,
+    rows.push(["Length of the wire's elements", e.position_error_mm === undefined || e.position_error_mm === null ? `error not estimated${e.null_reasons?.position_error_mm ? `: ${shown(e.null_reasons.position_error_mm)}` : ""}` : `best plan run with elements twice and half as long`,
       e.position_error_mm === undefined || e.position_error_mm === null ? "not known" :
       `position \u00b1\u00a0${number(e.position_error_mm)}\u00a0mm, largest contact \u00b1\u00a0${number(e.peak_contact_force_error_n)}\u00a0N; score \u00b1\u00a0${number(first.score_error)}, which ties ${plural(first.tied_with.length, "plan")} with the best`]);
     rows.push(sensitivity(page, best, "inclination_deg", "Inclination of the introducer"));
     rows.push(sensitivity(page, best, "azimuth_deg", "Azimuth of the introducer"));
     rows.push(sensitivity(page, best, "roll_deg", "Roll of the tip"));
-    rows.push(first.success_rate === null || first.success_rate === undefined
-      ? ["Friction, wall stiffness and small errors of the angles", "not varied: the case asked for no repeats", "not known"]
-      : ["Friction, wall stiffness and small errors of the angles", "best plans repeated with these disturbed", `best plan: success rate ${percent(first.success_rate)}, interval ${percent(first.success_rate_interval[0])} to ${percent(first.success_rate_interval[1])}`]);
+    const {robustness} = report;
+    if (robustness?.repeats > 0) {
+      rows.push(...unknownRows(robustness), spreadRow(robustness, best.id, first));
+    } else {
+      rows.push(["Friction, wall stiffness and small errors of the angles", "not varied: the case asked for no repeats", "not known"]);
+    }
   }
   rows.push(["Shape of the lumen in the simulation", `smooth field on a grid of ${number(report.numerics.lumen_grid_mm)}\u00a0mm`,
     `off the surface by ${number(report.numerics.lumen_mean_deviation_mm)}\u00a0mm on average, ${number(report.numerics.lumen_max_deviation_mm)}\u00a0mm at most`]);
+  if (report.numerics.scout) rows.push(scoutRow(report.numerics.scout));
   const beyond = trials.filter((t) => t.beyond_linear_theory === true).length;
   if (report.vessel.wall_model !== "rigid") {
     const bestBeyond = first && trials[first.trial].beyond_linear_theory;
@@ -89,7 +124,7 @@ export const uncertainSection = (page) => {
   }
   rows.push(["Segmentation, wire data, blood flow, breathing", "not varied", "not known; see the limits"]);
   return section("uncertain", "What is uncertain, and how much it matters",
-    table("Uncertainties", ["What", "How it was looked at", "What it changes"], rows));
+    table("Uncertainties", ["What", "How it was looked at", "What it changes"], rows.filter(Boolean)));
 };
 
 export const warningSection = (page) => {

@@ -12,7 +12,7 @@ import {forceRgb} from "./colors.js";
 import {el} from "./dom.js";
 
 const kPaper = 0x141a24;
-const kEntryLength = 40; // mm
+const kEntryLength = 40; // mm at most
 const kMargin = 1.15; // of the frame over the vessel, room for the introducer
 const kEntryColor = 0xffffff, kTargetColor = 0xff9ecb;
 const kTurn = Math.PI / 24, kZoom = 1.15; // of one key press
@@ -90,16 +90,16 @@ const makeTarget = (target, radius) => {
   return group;
 };
 
-const makeEntry = (access, direction) => {
+const makeEntry = (access, direction, length) => {
   const group = new Group();
   const tip = new Vector3(...access), along = new Vector3(...direction).normalize();
-  const start = tip.clone().addScaledVector(along, -kEntryLength);
+  const start = tip.clone().addScaledVector(along, -length);
   const shaft = new LineGeometry();
   shaft.setPositions([...start.toArray(), ...tip.toArray()]);
   group.add(new Line2(shaft, new LineMaterial({color: kEntryColor, linewidth: 2.5})));
-  const cone = new Mesh(new ConeGeometry(2, 7, 24), new MeshBasicMaterial({color: kEntryColor}));
+  const cone = new Mesh(new ConeGeometry(0.05 * length, 0.17 * length, 24), new MeshBasicMaterial({color: kEntryColor}));
   cone.quaternion.setFromUnitVectors(new Vector3(0, 1, 0), along);
-  cone.position.copy(tip).addScaledVector(along, -3.5);
+  cone.position.copy(tip).addScaledVector(along, -0.085 * length);
   group.add(cone);
   return group;
 };
@@ -242,9 +242,13 @@ export const makeVessel = (frame, page) => {
     keys[event.key]();
   });
 
+  // First from where most of the vessel is seen.
+  const {x, y, z} = extent;
+  const seen = {front: x * z, left: y * z, feet: x * y};
+  const widest = Object.keys(seen).reduce((a, b) => (seen[b] > seen[a] ? b : a));
   new ResizeObserver(resize).observe(frame);
   resize();
-  view("front");
+  view(widest);
 
   return {
     view,
@@ -273,7 +277,7 @@ export const makeVessel = (frame, page) => {
     },
     setEntry: (direction) => {
       if (entry) scene.remove(entry), dispose(entry);
-      entry = makeEntry(page.access, direction);
+      entry = makeEntry(page.access, direction, Math.min(kEntryLength, 0.35 * radius));
       scene.add(entry);
       redraw();
     },
