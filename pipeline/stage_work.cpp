@@ -82,6 +82,7 @@ void add_segmentation(const preprocess::SegmentStatistics& statistics, bool chos
   figures["removed_by_opening_mm3"] = statistics.removed_by_opening_mm3;
   figures["bright_boundary_fraction"] = statistics.bright_boundary;
   figures["touches_border"] = statistics.touches_border;
+  figures["way_length_mm"] = statistics.search.route.length_mm;
   figures["narrowest_radius_mm"] = statistics.search.route.narrowest_radius_mm;
   figures["narrowest_mm"] = to_json(statistics.search.route.narrowest);
   figures["leaks"] = Json::array();

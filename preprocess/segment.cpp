@@ -345,24 +345,29 @@ std::size_t require_connected(const Image& image, const Region& region, const Ta
               "neck_opening_mm, else take another access or target");
 }
 
-/// Adds the voxels next to the region that are at least half as bright as the lumen: what connects
-/// is asked for more, so that veins stay out, but the lumen ends at half.
-void add_rim(Region& region, const Band& band) {
-  std::vector<std::size_t> rim;
-  for (std::size_t n = 0; n < region.labels.size(); ++n) {
-    const auto value = static_cast<double>(region.values[n]);
-    if (region.labels[n] != 0 || value < band.lower_hu || value >= band.connect_hu) {
-      continue;
+/// Adds two layers of voxels next to the region that are at least half as bright as the lumen: what
+/// connects is asked for more, so that veins stay out, but the lumen ends at half. Smoothing
+/// darkens thin vessels, so the volume's own values count.
+void add_rim(const Image& image, Region& region, const Band& band) {
+  const std::vector<float> values = crop_values(image.grid, region.box, image.values);
+  for (int layer = 0; layer < 2; ++layer) {
+    std::vector<std::size_t> rim;
+    for (std::size_t n = 0; n < region.labels.size(); ++n) {
+      const auto value = static_cast<double>(values[n]);
+      if (region.labels[n] != 0 || value < band.lower_hu || value > band.upper_hu) {
+        continue;
+      }
+      bool below = false;
+      for_each_face_neighbour(region.grid, n, [&](std::size_t m) {
+        below = below || (region.labels[m] != 0 && region.values[m] >= region.values[n]);
+      });
+      if (below) {
+        rim.push_back(n);
+      }
     }
-    bool beside = false;
-    for_each_face_neighbour(region.grid, n,
-                            [&](std::size_t m) { beside = beside || region.labels[m] != 0; });
-    if (beside) {
-      rim.push_back(n);
+    for (const std::size_t n : rim) {
+      region.labels[n] = 1;
     }
-  }
-  for (const std::size_t n : rim) {
-    region.labels[n] = 1;
   }
 }
 
@@ -456,7 +461,9 @@ Segmentation segment(const Image& image, const SegmentOptions& options) {
   }
   statistics.search =
       cut_leaks(region.grid, region.values, task.band.upper_hu, trusted, region.labels);
-  add_rim(region, task.band);
+  if (!options.lower_hu) {
+    add_rim(image, region, task.band);
+  }
   if (!options.lower_hu) {
     smooth_boundary(region);
   }

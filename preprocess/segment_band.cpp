@@ -12,7 +12,8 @@ namespace wireplan::preprocess {
 namespace {
 
 constexpr double kSurroundingsHu = 50.0;
-constexpr double kLeastLevelHu = 120.0;  // 70 HU of contrast; arterial phases have 200 and more
+constexpr double kLeastLevelHu = 150.0;  // 100 HU of contrast; arterial phases have 200 and more
+constexpr double kMostNoisePart = 0.35;  // of the contrast; more is marrow, or no image to plan on
 constexpr double kCalciumHu = 800.0;     // references B5: arterial phase, calcium above
 constexpr double kSnapMm = 2.5;          // how far a point may lie beside the lumen it means
 constexpr double kNoiseMm = 10.0;        // ball in which noise is measured
@@ -20,7 +21,7 @@ constexpr double kApartMm = 1.2;
 constexpr double kLumenMm = 4.0;  // ball in which the lumen's values are taken
 constexpr std::size_t kLeastSample = 30;
 constexpr double kSearchMm = 60.0;  // round the ends, for the way between them
-constexpr double kConnectPart = 0.75, kLeastConnectPart = 0.3, kUpperPart = 0.4, kNoisePart = 0.07;
+constexpr double kConnectPart = 0.75, kLeastConnectPart = 0.3, kUpperPart = 0.4, kNoisePart = 0.05;
 constexpr double kNeckMm = 0.5;
 
 double median_of(std::vector<double> values) {
@@ -260,6 +261,13 @@ Band choose_band(const Image& image, const std::vector<LumenSample>& samples, bo
   }
 
   const double contrast = level - kSurroundingsHu;
+  if (noise > kMostNoisePart * contrast) {
+    throw Error("the values round " + to_text(samples.front().point) + " mm scatter by " +
+                to_text(std::round(noise)) + " HU round " + to_text(std::round(level)) +
+                " HU, expected at most " + to_text(100.0 * kMostNoisePart) +
+                " % of the contrast: the texture of bone, or too much noise; move the point into "
+                "a contrast-filled artery, or give segmentation.lower_hu and upper_hu");
+  }
   Band band{.lower_hu = std::round(kSurroundingsHu + 0.5 * contrast),
             .connect_hu = std::round(kSurroundingsHu + kConnectPart * contrast),
             .upper_hu = std::round(level + kUpperPart * contrast + 3.0 * noise),
@@ -267,7 +275,7 @@ Band choose_band(const Image& image, const std::vector<LumenSample>& samples, bo
             .neck_mm = neck_mm.value_or(neck_of(image.grid)),
             .way_hu = 0.0,
             .way = {}};
-  for (const double sigma : {0.4, 0.8}) {
+  for (const double sigma : {0.4, 0.6, 0.8}) {
     if (noise * smoothed_noise(image.grid, band.smoothing_mm) > kNoisePart * contrast) {
       band.smoothing_mm = sigma;
     }

@@ -41,13 +41,15 @@ LumenSample sample_lumen(const Image& image, const Vec3& point);
 /// blood without contrast have 20 to 70, references B5), the lumen as the brightest of the samples
 /// (in thin vessels the wall's share darkens it).
 /// - lower: half way; upper: 40 % of the contrast and three sigma above the lumen;
-/// - smoothing: the least of 0, 0.4 and 0.8 mm that brings the noise under 7 % of the contrast;
+/// - smoothing: the least of 0, 0.4, 0.6 and 0.8 mm that brings the noise under 5 % of the
+/// contrast;
 /// - neck: half a millimetre, or as much as it takes to ask for the nearest neighbours as well: a
 ///   vessel is three voxels wide at least, and rims of bone and of brighter veins are not;
 /// - connect: 75 % of the contrast. With `to_target` the way from the first sample to the last is
 ///   looked for that nowhere needs less than it must, within 60 mm of both, but not below 30 %:
 ///   along it way_hu is enough, so that a narrow place does not lower the bar for veins elsewhere.
-/// Throws `Error` with the measured HU where there is no contrast (below 120 HU).
+/// Throws `Error` with the measured HU where there is no contrast (below 150 HU) or where the
+/// noise is more than 35 % of it.
 /// `smoothing_mm` and `neck_mm` are used where they are given.
 Band choose_band(const Image& image, const std::vector<LumenSample>& samples, bool to_target,
                  std::optional<double> smoothing_mm, std::optional<double> neck_mm);

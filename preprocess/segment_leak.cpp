@@ -63,6 +63,32 @@ std::size_t climb(const Inside& inside, std::size_t n) {
   }
 }
 
+/// A line of neighbouring voxels without its zigzag: each point is thrice replaced by the mean of
+/// the seven round it, the ends stay.
+std::vector<Vec3> smooth_line(std::vector<Vec3> points) {
+  constexpr std::size_t kReach = 3;
+  for (int round = 0; round < 3; ++round) {
+    const std::vector<Vec3> before = points;
+    for (std::size_t n = 1; n + 1 < points.size(); ++n) {
+      const std::size_t reach = std::min({kReach, n, points.size() - 1 - n});
+      Vec3 sum = Vec3::Zero();
+      for (std::size_t m = n - reach; m <= n + reach; ++m) {
+        sum += before[m];
+      }
+      points[n] = sum / static_cast<double>(2 * reach + 1);
+    }
+  }
+  return points;
+}
+
+double length_of(const std::vector<Vec3>& points) {
+  double length = 0.0;
+  for (std::size_t n = 1; n < points.size(); ++n) {
+    length += (points[n] - points[n - 1]).norm();
+  }
+  return length;
+}
+
 /// Voxels on the ways from the first seed to the others, each as short and as far from the wall as
 /// it can be (cost 1 / depth^2 per length). Every seed's own middle is among them.
 std::vector<std::size_t> find_ways(const Inside& inside, const std::vector<std::size_t>& seeds,
@@ -103,12 +129,15 @@ std::vector<std::size_t> find_ways(const Inside& inside, const std::vector<std::
     if (cost[end] == kFar) {
       continue;
     }
-    route.length_mm = 0.0;
+    std::vector<Vec3> points = {center_of(inside.grid, end)};
     for (std::size_t n = end; n != ends.front(); n = before[n]) {
-      route.length_mm += (center_of(inside.grid, n) - center_of(inside.grid, before[n])).norm();
+      points.push_back(center_of(inside.grid, before[n]));
       ways.push_back(before[n]);
       narrowest = inside.depth[n] < inside.depth[narrowest] ? n : narrowest;
     }
+    std::reverse(points.begin(), points.end());
+    route.points = smooth_line(std::move(points));
+    route.length_mm = length_of(route.points);
   }
   route.narrowest_radius_mm = static_cast<double>(inside.depth[narrowest]);
   route.narrowest = center_of(inside.grid, narrowest);

@@ -19,7 +19,8 @@ struct Leak {
 
 /// The way from the first seed to the others through the middle of the vessel.
 struct Route {
-  double length_mm = 0.0;            // from the first seed to the last
+  std::vector<Vec3> points;          // from the first seed to the last, smoothed          [mm]
+  double length_mm = 0.0;            // of these
   double narrowest_radius_mm = 0.0;  // least inscribed radius on all ways
   Vec3 narrowest = Vec3::Zero();     // where                                                [mm]
 };

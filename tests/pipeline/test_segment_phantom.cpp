@@ -1,0 +1,96 @@
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <filesystem>
+
+#include "pipeline/phantom_file.h"
+#include "preprocess/segment.h"
+
+#ifdef WIREPLAN_IMAGING
+namespace wireplan::pipeline {
+namespace {
+
+using preprocess::Phantom;
+using preprocess::PhantomSpec;
+using preprocess::Segmentation;
+
+const std::filesystem::path kAbdomen =
+    std::filesystem::path(WIREPLAN_SOURCE_DIR) / "cases" / "abdomen";
+
+/// The part of the bundled abdomen above the aneurysm, up to the coeliac trunk: aorta, renal
+/// arteries, SMA, coeliac trunk with its branches; vertebrae that touch, veins and kidneys beside
+/// them.
+PhantomSpec upper_abdomen(double spacing, double noise) {
+  PhantomSpec spec = read_phantom_spec(kAbdomen / "phantom.json");
+  const Vec3 low(-50, -46, 58), high(64, 60, 134);
+  spec.grid.spacing = Vec3::Constant(spacing);
+  spec.grid.origin = low;
+  for (int axis = 0; axis < 3; ++axis) {
+    spec.grid.size[axis] = static_cast<int>((high - low)[axis] / spacing);
+  }
+  spec.noise_hu = noise;
+  return spec;
+}
+
+double dice(const preprocess::Mask& a, const preprocess::Mask& b) {
+  double both = 0.0, sum = 0.0;
+  for (std::size_t n = 0; n < a.labels.size(); ++n) {
+    both += 2.0 * (a.labels[n] & b.labels[n]);
+    sum += a.labels[n] + b.labels[n];
+  }
+  return both / sum;
+}
+
+class SegmentPhantom : public ::testing::TestWithParam<std::pair<double, double>> {};
+
+TEST_P(SegmentPhantom, IsFoundFromTwoPointsWithAllItsBranchesAndNothingElse) {
+  const auto [spacing, noise] = GetParam();
+  const Phantom phantom = make_phantom(upper_abdomen(spacing, noise));
+  // aorta below the renal arteries, and the left one's point of the case; the rest is chosen
+  const Segmentation found =
+      segment(phantom.image, {.seeds = {Vec3(12, 3, 64)}, .target = Vec3(30, 16, 84)});
+  EXPECT_GT(dice(found.mask, phantom.lumen), 0.97);
+  EXPECT_TRUE(found.statistics.search.leaks.empty());
+
+  // every artery over 4 mm in diameter, a voxel off the border of the volume and outside plaque
+  int on_axis = 0;
+  for (std::size_t artery = 0; artery < phantom.names.size(); ++artery) {
+    const Centerline& axis = phantom.centerlines[artery];
+    for (Eigen::Index n = 0; n < axis.points.cols(); ++n) {
+      if (axis.radius(n) > 2.0 && preprocess::contains(phantom.lumen, axis.points.col(n))) {
+        EXPECT_TRUE(preprocess::contains(found.mask, axis.points.col(n)))
+            << phantom.names[artery] << " at " << axis.points.col(n).transpose();
+        ++on_axis;
+      }
+    }
+  }
+  EXPECT_GT(on_axis, 600);  // 300 mm of arteries, every half millimetre
+
+  // no vein, no bone, no kidney: nothing lies more than two millimetres off the true lumen
+  for (std::size_t n = 0; n < found.mask.labels.size(); ++n) {
+    if (found.mask.labels[n] != 0 && phantom.lumen.labels[n] == 0) {
+      const preprocess::Grid& grid = found.mask.grid;
+      const auto nx = static_cast<std::size_t>(grid.size[0]);
+      const auto ny = static_cast<std::size_t>(grid.size[1]);
+      const Vec3 point =
+          grid.lps_from_ijk(Vec3(static_cast<double>(n % nx), static_cast<double>(n / nx % ny),
+                                 static_cast<double>(n / (nx * ny))));
+      bool near = false;
+      for (int m = 0; m < 27 && !near; ++m) {
+        const Vec3 offset = Vec3(m % 3 - 1, m / 3 % 3 - 1, m / 9 - 1) * 2.0;
+        near = preprocess::contains(phantom.lumen, point + offset) ||
+               preprocess::contains(phantom.lumen, point + 0.5 * offset);
+      }
+      EXPECT_TRUE(near) << point.transpose();
+    }
+  }
+}
+
+// 22 HU is the bundled case's noise, 40 HU that of a fast low-dose scan
+INSTANTIATE_TEST_SUITE_P(VoxelsAndNoise, SegmentPhantom,
+                         ::testing::Values(std::pair(0.9, 22.0), std::pair(0.9, 40.0),
+                                           std::pair(0.6, 22.0), std::pair(0.6, 40.0)));
+
+}  // namespace
+}  // namespace wireplan::pipeline
+#endif
