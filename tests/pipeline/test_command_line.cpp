@@ -6,6 +6,7 @@
 #include <functional>
 
 #include "pipeline/catalogue.h"
+#include "tests/dicom.h"
 #include "tests/pipeline/program.h"
 
 namespace wireplan::pipeline {
@@ -275,6 +276,42 @@ TEST_F(CommandLine, SegmentsAVolumeAndPlansInIt) {
   const Json report = read_json(folder_ / "results" / "report.json", "wireplan.report/1");
   // One tube of radius 6 and length 36: 4072 mm^3, of which voxels keep all but some per cent.
   EXPECT_NEAR(report.at("vessel").at("volume_mm3").get<double>(), 4072.0, 300.0);
+}
+
+TEST_F(CommandLine, NoNameIdentityOrDateOfAPatientEntersAnyFile) {
+  // a tube of 12 mm in a DICOM series of 40 x 40 x 36 mm
+  fs::create_directories(folder_ / "series");
+  for (int k = 0; k < 36; ++k) {
+    dicom_files::DicomSlice slice{.position = Vec3(0, 0, k), .columns = 40, .rows = 40};
+    for (int n = 0; n < 1600; ++n) {
+      const bool lumen = std::hypot(n % 40 - 10.0, n / 40 - 20.0) < 6.0;
+      slice.values.push_back(lumen ? 300 : 40);
+    }
+    slice.first_value = static_cast<std::int16_t>(k);
+    write_text(dicom_files::dicom(slice), folder_ / "series" / ("IM" + std::to_string(k)));
+  }
+  Json file = volume_case(case_);
+  file["volume"]["path"] = "series";
+  file.erase("segmentation");
+  write_json(file, folder_ / "case.json");
+  const Answer answer = call("run case.json -o results");
+  ASSERT_EQ(answer.code, 0) << answer.log;
+
+  int files = 0;
+  for (const char* place : {"results", "cache"}) {
+    for (const fs::directory_entry& entry : fs::recursive_directory_iterator(folder_ / place)) {
+      if (!entry.is_regular_file()) continue;
+      ++files;
+      const std::string bytes = read_text(entry.path());
+      for (const std::string& word : dicom_files::kPatient) {
+        EXPECT_EQ(bytes.find(word), std::string::npos) << word << " in " << entry.path();
+      }
+    }
+  }
+  EXPECT_GT(files, 20);
+  for (const std::string& word : dicom_files::kPatient) {
+    EXPECT_EQ((answer.out + answer.log).find(word), std::string::npos) << word;
+  }
 }
 
 TEST_F(CommandLine, RefusesAVolumeThatIsNoneAndPointsThatAreNotInTheVessel) {

@@ -9,10 +9,17 @@
 #include <sstream>
 #include <string>
 
+#include "gdcmImageChangeTransferSyntax.h"
+#include "gdcmImageReader.h"
+#include "gdcmImageWriter.h"
 #include "preprocess/image.h"
+#include "tests/dicom.h"
 
 namespace wireplan::preprocess {
 namespace {
+
+using dicom_files::dicom;
+using dicom_files::DicomSlice;
 
 namespace fs = std::filesystem;
 
@@ -261,132 +268,6 @@ TEST_F(ImageFile, SingleSliceIsRefused) {
 
 // ---- DICOM --------------------------------------------------------------------------------------
 
-struct DicomSlice {
-  std::string series = "1.2.3.4", number = "3";
-  Vec3 position = Vec3::Zero();
-  Mat3 direction = Mat3::Identity();
-  double slope = 1.0, intercept = 0.0;
-  std::int16_t first_value = 0;  // of 3 columns x 2 rows, each voxel one more than the last
-  bool compressed = false;       // run lengths
-};
-
-template <typename T>
-void append(std::string& bytes, T value) {
-  bytes.append(reinterpret_cast<const char*>(&value), sizeof value);
-}
-
-/// One data element, explicit VR little endian (DICOM part 5, 7.1.2).
-void element(std::string& bytes, std::uint16_t group, std::uint16_t number, const std::string& vr,
-             std::string value) {
-  if (value.size() % 2 == 1) {
-    value += vr == "UI" ? '\0' : ' ';
-  }
-  append(bytes, group);
-  append(bytes, number);
-  bytes += vr;
-  if (vr == "OB" || vr == "OW") {
-    append(bytes, std::uint16_t{0});
-    append(bytes, static_cast<std::uint32_t>(value.size()));
-  } else {
-    append(bytes, static_cast<std::uint16_t>(value.size()));
-  }
-  bytes += value;
-}
-
-std::string short_value(std::uint16_t value) {
-  std::string bytes;
-  append(bytes, value);
-  return bytes;
-}
-
-std::string decimals(const Eigen::VectorXd& values) {
-  std::ostringstream text;
-  text.precision(10);  // a decimal string has at most 16 characters
-  for (Eigen::Index n = 0; n < values.size(); ++n) {
-    text << (n == 0 ? "" : "\\") << values[n];
-  }
-  return text.str();
-}
-
-/// 16 bit voxels as run lengths: high bytes, then low ones, each as one literal run (DICOM part 5,
-/// annex G), in the only fragment after an empty offset table (A.4).
-std::string compressed_pixels(const std::string& voxels) {
-  const std::size_t count = voxels.size() / 2, segment = (count + 2) / 2 * 2;
-  std::string fragment;
-  for (const std::size_t word : {std::size_t{2}, std::size_t{64}, 64 + segment}) {
-    append(fragment, static_cast<std::uint32_t>(word));
-  }
-  fragment.resize(64);
-  for (const std::size_t byte : {1, 0}) {
-    fragment += static_cast<char>(count - 1);
-    for (std::size_t n = 0; n < count; ++n) {
-      fragment += voxels[2 * n + byte];
-    }
-    fragment.resize(64 + segment * (2 - byte));
-  }
-
-  std::string bytes;
-  const auto item = [&](std::uint16_t number, const std::string& value) {
-    append(bytes, std::uint16_t{0xfffe});
-    append(bytes, number);
-    append(bytes, static_cast<std::uint32_t>(value.size()));
-    bytes += value;
-  };
-  item(0xe000, "");
-  item(0xe000, fragment);
-  item(0xe0dd, "");
-  return bytes;
-}
-
-std::string dicom(const DicomSlice& slice) {
-  const std::string ct = "1.2.840.10008.5.1.4.1.1.2";
-  const std::string instance = slice.series + "." + std::to_string(slice.first_value);
-  std::string meta;
-  element(meta, 2, 0x01, "OB", std::string("\0\1", 2));
-  element(meta, 2, 0x02, "UI", ct);
-  element(meta, 2, 0x03, "UI", instance);
-  element(meta, 2, 0x10, "UI", slice.compressed ? "1.2.840.10008.1.2.5" : "1.2.840.10008.1.2.1");
-  std::string length;
-  append(length, static_cast<std::uint32_t>(meta.size()));
-  std::string bytes = std::string(128, '\0') + "DICM";
-  element(bytes, 2, 0x00, "UL", length);
-  bytes += meta;
-
-  Eigen::VectorXd axes(6);
-  axes << slice.direction.col(0), slice.direction.col(1);
-  element(bytes, 0x08, 0x16, "UI", ct);
-  element(bytes, 0x08, 0x18, "UI", instance);
-  element(bytes, 0x08, 0x60, "CS", "CT");
-  element(bytes, 0x10, 0x10, "PN", "DOE^JANE");
-  element(bytes, 0x20, 0x0d, "UI", "1.2.3");
-  element(bytes, 0x20, 0x0e, "UI", slice.series);
-  element(bytes, 0x20, 0x11, "IS", slice.number);
-  element(bytes, 0x20, 0x32, "DS", decimals(slice.position));
-  element(bytes, 0x20, 0x37, "DS", decimals(axes));
-  element(bytes, 0x28, 0x02, "US", short_value(1));
-  element(bytes, 0x28, 0x04, "CS", "MONOCHROME2");
-  element(bytes, 0x28, 0x10, "US", short_value(2));
-  element(bytes, 0x28, 0x11, "US", short_value(3));
-  element(bytes, 0x28, 0x30, "DS", "0.8\\0.6");  // between rows, then between columns
-  element(bytes, 0x28, 0x100, "US", short_value(16));
-  element(bytes, 0x28, 0x101, "US", short_value(16));
-  element(bytes, 0x28, 0x102, "US", short_value(15));
-  element(bytes, 0x28, 0x103, "US", short_value(1));
-  element(bytes, 0x28, 0x1052, "DS", decimals(Eigen::VectorXd::Constant(1, slice.intercept)));
-  element(bytes, 0x28, 0x1053, "DS", decimals(Eigen::VectorXd::Constant(1, slice.slope)));
-  std::string voxels;
-  for (std::int16_t n = 0; n < 6; ++n) {
-    append(voxels, static_cast<std::int16_t>(slice.first_value + n));
-  }
-  if (slice.compressed) {
-    element(bytes, 0x7fe0, 0x10, "OB", "");
-    bytes.replace(bytes.size() - 4, 4, "\xff\xff\xff\xff");  // length: up to the end mark
-    return bytes + compressed_pixels(voxels);
-  }
-  element(bytes, 0x7fe0, 0x10, "OW", voxels);
-  return bytes;
-}
-
 class DicomFolder : public ImageFile {
  protected:
   /// Writes slices at the places [mm] along the normal, under names in another order.
@@ -480,6 +361,42 @@ TEST_F(DicomFolder, SliceCutShortIsAnErrorThatNamesIt) {
       const std::string error = read_error(folder_);
       EXPECT_TRUE(has(error, path.string()) && has(error, "cut short")) << error;
       EXPECT_FALSE(has(error, "DOE")) << error;
+    }
+  }
+}
+
+TEST_F(DicomFolder, CompressedSlicesHoldTheSameValues) {
+  // a slice of 24 x 16 pixels, smooth and with a step, below and above zero
+  std::vector<std::int16_t> values;
+  for (int n = 0; n < 24 * 16; ++n) {
+    values.push_back(static_cast<std::int16_t>(n % 24 < 12 ? 5 * n - 1000 : 300 - n));
+  }
+  using gdcm::TransferSyntax;
+  for (const TransferSyntax::TSType syntax :
+       {TransferSyntax::RLELossless, TransferSyntax::JPEGLosslessProcess14_1,
+        TransferSyntax::JPEGLSLossless, TransferSyntax::JPEG2000Lossless}) {
+    SCOPED_TRACE(TransferSyntax::GetTSString(syntax));
+    for (const int k : {0, 1, 2}) {
+      const fs::path path = write(
+          "slice" + std::to_string(k),
+          dicom({.position = Vec3(0, 0, 2.0 * k), .columns = 24, .rows = 16, .values = values}));
+      gdcm::ImageReader reader;
+      reader.SetFileName(path.c_str());
+      ASSERT_TRUE(reader.Read());
+      gdcm::ImageChangeTransferSyntax change;
+      change.SetTransferSyntax(syntax);
+      change.SetInput(reader.GetImage());
+      ASSERT_TRUE(change.Change());
+      gdcm::ImageWriter writer;
+      writer.SetFile(reader.GetFile());
+      writer.SetImage(change.GetOutput());
+      writer.SetFileName(path.c_str());
+      ASSERT_TRUE(writer.Write());
+    }
+    const Image image = read_image(folder_);
+    ASSERT_EQ(image.grid.size, (std::array<int, 3>{24, 16, 3}));
+    for (std::size_t n = 0; n < image.values.size(); ++n) {
+      ASSERT_EQ(image.values[n], values[n % values.size()]) << n;
     }
   }
 }
