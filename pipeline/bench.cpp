@@ -93,13 +93,15 @@ int run_bench(const std::string& name, const std::filesystem::path& folder,
   const auto make_report = name == "accuracy"     ? bench_accuracy
                            : name == "stability"  ? bench_stability
                            : name == "throughput" ? bench_throughput
+                           : name == "preprocess" ? bench_preprocess
                                                   : nullptr;
   if (make_report == nullptr) {
-    throw Error("bench: NAME is '" + name + "', expected accuracy, stability or throughput");
+    throw Error("bench: NAME is '" + name +
+                "', expected accuracy, stability, throughput or preprocess");
   }
   if (make_report != bench_throughput && !options.case_path.empty()) {
     throw Error("bench: --case is '" + options.case_path +
-                "', expected none: accuracy and stability have scenes of their own");
+                "', expected none: only throughput takes a case");
   }
   std::filesystem::create_directories(folder);
   const BenchReport report = make_report(options);

@@ -1,5 +1,6 @@
 #pragma once
-/// `wireplan bench NAME`: error against run time, stability and throughput (design section 8).
+/// `wireplan bench NAME`: error against run time, stability, throughput and the cost of the
+/// preprocessing (design section 8).
 /// Every bench writes NAME.json, NAME.csv and NAME.png into its folder and prints what it found.
 #include <filesystem>
 #include <string>
@@ -16,8 +17,8 @@ struct BenchOptions {
   std::filesystem::path cache = {};
 };
 
-/// Names: "accuracy", "stability", "throughput". Returns the exit code, kDone. Throws Error for
-/// another name and where a file cannot be written.
+/// Names: "accuracy", "stability", "throughput", "preprocess". Returns the exit code, kDone. Throws
+/// Error for another name and where a file cannot be written.
 int run_bench(const std::string& name, const std::filesystem::path& folder,
               const BenchOptions& options);
 

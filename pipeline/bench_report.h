@@ -30,6 +30,7 @@ struct BenchReport {
 BenchReport bench_accuracy(const BenchOptions& options);
 BenchReport bench_stability(const BenchOptions& options);
 BenchReport bench_throughput(const BenchOptions& options);
+BenchReport bench_preprocess(const BenchOptions& options);
 
 /// Rows as a table for people: columns aligned, numbers with 4 digits.
 std::string table_text(const std::vector<Json>& rows);

@@ -192,6 +192,21 @@ TEST(Bench, TubeOfTheFigureCaseIsThatOfTheBench) {
   EXPECT_EQ(make_paper_tube().surface.triangles.cols(), 1160);  // as in the paper's Fig. 5
 }
 
+TEST(Bench, PreprocessTellsTimeMemoryAndErrorOfEachStep) {
+  const QuickRun preprocess("preprocess");
+  const Json& rows = preprocess.result.at("rows");
+  ASSERT_EQ(rows.size(), 7u);  // six steps and their sum
+  double wall = 0.0;
+  for (std::size_t k = 0; k < 6; ++k) wall += rows[k].at("wall_s").get<double>();
+  EXPECT_NEAR(rows[6].at("wall_s").get<double>(), wall, 1e-9);
+  EXPECT_TRUE(rows[1].at("surface_error_mm").is_null());  // no surface yet
+  // Voxels of 1.4 mm: a tenth of them, where the full size promises 0.15 mm at 0.7 mm.
+  EXPECT_LT(rows[6].at("surface_error_mm").get<double>(), 0.25);
+  EXPECT_EQ(preprocess.result.at("results").at("euler_number"), 2);
+  EXPECT_EQ(preprocess.result.at("results").at("self_intersections"), 0);
+  expect_written(preprocess, "preprocess", "surface_error_mm");
+}
+
 TEST(Bench, CaseIsForThroughputAlone) {
   const TemporaryFolder folder;
   EXPECT_THROW(run_bench("accuracy", folder.path(), {.case_path = "cases/abdomen"}), Error);
@@ -204,7 +219,7 @@ TEST(Bench, UnknownNameIsToldWithTheKnownOnes) {
     FAIL() << "no error";
   } catch (const Error& error) {
     EXPECT_EQ(std::string(error.what()),
-              "bench: NAME is 'speed', expected accuracy, stability or throughput");
+              "bench: NAME is 'speed', expected accuracy, stability, throughput or preprocess");
   }
 }
 
