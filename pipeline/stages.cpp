@@ -156,7 +156,7 @@ std::vector<Stage> stages_of(const Case& given) {
   manoeuvres.make = make_manoeuvres;
   stages.push_back(manoeuvres);
   Stage report{.name = "report",
-               .version = 3,
+               .version = 4,
                .reads_input = true,
                .after = {},
                .parameters = {""},

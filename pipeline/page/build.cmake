@@ -3,7 +3,7 @@
 # header without a template, so that wireplan is built all the same; the next build tries again.
 #   cmake -DSOURCE=... -DWORK=... -DHEADER=... -DSTAMP=... -DNODE=... -DNPM=... -P build.cmake
 set(missing "")
-file(COPY ${SOURCE}/ DESTINATION ${WORK})
+file(COPY ${SOURCE}/ DESTINATION ${WORK} PATTERN node_modules EXCLUDE)
 # The packages stay where they are until the list of them changes.
 set(failed 0)
 set(installed "")

@@ -23,6 +23,9 @@ export const askedSection = (page) => {
       ["Friction", `coefficient ${number(asked.friction)}`],
       ["Wall", report.vessel.wall_model === "rigid" ? "rigid" : `yields, ${number(report.vessel.wall_stiffness_kpa_per_mm)}\u00a0kPa/mm`],
       ["Tried", plural(trials.length, "insertion")],
+      ["Repeats", report.robustness?.repeats > 0
+        ? `${report.robustness.repeats} of each of the best plans, disturbed in angle, friction, wall and lumen`
+        : "none asked: how robust a plan is, is not known"],
     ]));
 };
 
