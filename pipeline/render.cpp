@@ -141,9 +141,15 @@ Picture draw_angles(const Json& report) {
         rows.at(degrees(trial.at("inclination_deg")) + " / " + degrees(trial.at("azimuth_deg")));
     const std::size_t column =
         columns.at(trial.at("wire").get<std::string>() + "\n" + degrees(trial.at("roll_deg")));
-    trials[{row, column}] = &trial;
     const Json& force = trial.at("peak_contact_force_n");
-    if (trial.at("reached") && !force.is_null()) scale = std::max(scale, force.get<double>());
+    const bool reached = trial.at("reached") && !force.is_null();
+    if (reached) scale = std::max(scale, force.get<double>());
+    // Of several ways to move one wire at one angle, the gentlest that reaches.
+    const Json*& shown = trials[{row, column}];
+    const bool gentler =
+        shown == nullptr ||
+        (reached && (!shown->at("reached") || force < shown->at("peak_contact_force_n")));
+    if (gentler) shown = &trial;
   }
 
   constexpr int kLeft = 150, kWidth = 72, kHeight = 34, kTop = 170, kBottom = 60, kText = 15;

@@ -93,8 +93,9 @@ std::optional<Slices> cut_case_slices(Workspace& work, const std::vector<double>
 
   // The lumen's mean bright, as far below the threshold as above it; never past the values there
   // are.
-  const double threshold = given.segmentation.lower_hu;
-  const double span = 2.0 * (work.figures("segment").at("mean_hu").get<double>() - threshold);
+  const Json segment = work.figures("segment");
+  const double threshold = segment.at("band").at("lower_hu");
+  const double span = 2.0 * (segment.at("mean_hu").get<double>() - threshold);
   const auto [least, most] = std::minmax_element(image.values.begin(), image.values.end());
   SliceOptions options;
   options.window_low = std::max(threshold - span, static_cast<double>(*least));

@@ -58,10 +58,10 @@ const forceFigure = (page, selection) => {
     const trial = page.trials[selection.get()];
     const pushes = trial.pushes();
     if (!pushes.length) return el("p", {}, "This wire never entered the vessel.");
-    const rows = kForces.flatMap(({key, name}) => pushes.map((p) => ({x: p.insertion, y: p[key], name})));
+    const rows = kForces.flatMap(({key, name}) => pushes.map((p) => ({x: p.way, y: p[key], name})));
     return chart(`Forces over the insertion of ${planName(trial)}`, {
       width,
-      x: {label: "insertion [mm] \u2192", nice: true},
+      x: {label: `${trial.script ? "way of the hand, in and back" : "insertion"} [mm] \u2192`, nice: true},
       y: {label: "\u2191 force [N]", nice: true},
       marks: [
         gridX(), gridY(), ruleY([0]),
@@ -89,7 +89,7 @@ const forceFigure = (page, selection) => {
     const trial = page.trials[id];
     const {peak_contact_force_error_n: error} = trial.errors;
     title.textContent = `${planName(trial)}; largest contact ${withError(trial.peak_contact_force_n, error)}\u00a0N.`;
-    const every = trial.pushes().filter((p, k, all) => k === all.length - 1 || Math.floor(p.insertion / 10) > Math.floor((all[k - 1]?.insertion ?? 0) / 10));
+    const every = trial.pushes().filter((p, k, all) => k === all.length - 1 || Math.floor(p.way / 10) > Math.floor((all[k - 1]?.way ?? 0) / 10));
     details.replaceChildren(details.firstChild,
       table("Force over insertion", ["Insertion [mm]", ...kForces.map(({name}) => `${name} [N]`)],
         every.map((p) => [number(p.insertion), ...kForces.map(({key}) => number(p[key]))])));

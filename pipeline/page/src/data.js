@@ -9,6 +9,17 @@ const bytes = (text) => {
   return array.buffer;
 };
 
+/** With the way that the hand has gone so far, in and back, which never falls. */
+const alongWay = (steps) => {
+  let way = 0, last = 0;
+  for (const step of steps) {
+    way += Math.abs(step.insertion - last);
+    last = step.insertion;
+    step.way = way;
+  }
+  return steps;
+};
+
 /** Decoded when first asked for. */
 const lazy = (make) => {
   let value;
@@ -47,10 +58,10 @@ export const readPage = () => {
       nodes: lazy(() => points(stored.nodes)),
       pushes: lazy(() => {
         const values = floats(stored.push);
-        return Array.from({length: values.length / 5}, (_, i) => {
+        return alongWay(Array.from({length: values.length / 5}, (_, i) => {
           const [insertion, push, tip, peak, total] = values.subarray(5 * i, 5 * i + 5);
           return {insertion, push, tip, peak, total};
-        });
+        }));
       }),
     };
   });
@@ -60,11 +71,11 @@ export const readPage = () => {
       row.trial,
       {
         shapes: lazy(() =>
-          row.shapes.map((shape) => ({
+          alongWay(row.shapes.map((shape) => ({
             insertion: shape.insertion_mm,
             nodes: points(shape.nodes),
             force: floats(shape.force_n),
-          })),
+          }))),
         ),
         wallTriangle: lazy(() => indices(row.wall_triangle)),
         wallForce: lazy(() => floats(row.wall_force_n)),

@@ -49,7 +49,8 @@ export const outcomeWord = (outcome) => kOutcomes[outcome]?.word ?? shown(outcom
 export const outcomeMark = (outcome) => kOutcomes[outcome]?.mark ?? "?";
 export const outcomes = Object.keys(kOutcomes);
 
-/** "amplatz-stiff, inclination 10\u00b0, azimuth 90\u00b0, roll 0\u00b0" */
+/** "amplatz-stiff, inclination 10\u00b0, azimuth 90\u00b0, roll 0\u00b0", and the moves where it is no straight push. */
 export const planName = (trial) =>
   `${shown(trial.wire)}, inclination ${degrees(trial.inclination_deg)}, azimuth ` +
-  `${degrees(trial.azimuth_deg)}, roll ${degrees(trial.roll_deg)}`;
+  `${degrees(trial.azimuth_deg)}, roll ${degrees(trial.roll_deg)}` +
+  (trial.script ? `; ${shown(trial.script)}` : "");

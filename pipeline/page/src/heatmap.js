@@ -16,7 +16,12 @@ export const heatSection = (page, selection) => {
   // Rows and columns in the order of the trials.
   const entries = new Map(trials.map((t) => [entryKey(t), t]));
   const columns = new Map(trials.map((t) => [columnKey(t), t]));
-  const cells = new Map(trials.map((t) => [`${entryKey(t)}\n${columnKey(t)}`, t]));
+  // Of several ways to move one wire at one angle, the best ranked.
+  const cells = new Map();
+  for (const t of trials) {
+    const key = `${entryKey(t)}\n${columnKey(t)}`, shown = cells.get(key);
+    if (!shown || (t.plan && (!shown.plan || t.plan.rank < shown.plan.rank))) cells.set(key, t);
+  }
   const wires = distinct(trials.map((t) => t.wire));
   const rollsOf = (wire) => [...columns.values()].filter((t) => t.wire === wire);
 

@@ -4,7 +4,7 @@ import {el, section} from "./dom.js";
 import {number, outcomeWord, planName} from "./format.js";
 import {makeVessel} from "./vessel3d.js";
 
-const kSpeed = 40; // mm of insertion per second
+const kSpeed = 40; // mm of the hand's way per second
 
 /** The wire between two stored shapes, nodes paired from the tip backwards. */
 const between = (a, b, part) => {
@@ -23,17 +23,23 @@ const between = (a, b, part) => {
   return {nodes, force};
 };
 
-const shapeAt = (shapes, insertion) => {
-  const next = shapes.findIndex((shape) => shape.insertion >= insertion);
-  if (next < 0) return shapes[shapes.length - 1];
-  if (next === 0) return shapes[0];
+/** The shape at a part, 0 to 1, of the hand's way. */
+const shapeAt = (shapes, part) => {
+  const way = part * shapes[shapes.length - 1].way;
+  const next = shapes.findIndex((shape) => shape.way >= way);
+  if (next <= 0) return shapes[Math.max(0, next)];
   const a = shapes[next - 1], b = shapes[next];
-  const span = b.insertion - a.insertion;
-  return span > 0 ? between(a, b, (insertion - a.insertion) / span) : b;
+  // Pulled back, the wire is paired from its tip too.
+  const [short, long] = a.nodes.length <= b.nodes.length ? [a, b] : [b, a];
+  const gone = b.way > a.way ? (way - a.way) / (b.way - a.way) : 1;
+  return between(short, long, short === a ? gone : 1 - gone);
 };
 
-const pushAt = (pushes, insertion) =>
-  pushes.find((push) => push.insertion >= insertion - 1e-3) ?? pushes[pushes.length - 1];
+/** The push that ends at a part of the hand's way. */
+const pushAt = (pushes, part) => {
+  const way = part * (pushes[pushes.length - 1]?.way ?? 0);
+  return pushes.find((push) => push.way >= way - 1e-3) ?? pushes[pushes.length - 1];
+};
 
 /** Forces per triangle of one trial. */
 const wallOf = (insertion, triangles) => {
@@ -71,7 +77,7 @@ export const vesselSection = (page, selection) => {
     el("option", {value: "all"}, "largest force of any trial"),
     el("option", {value: "none"}, "no forces"));
   const play = el("button", {type: "button", id: "play"}, "Play");
-  const slider = el("input", {type: "range", id: "insertion", min: "0", step: "0.5"});
+  const slider = el("input", {type: "range", id: "insertion", min: "0"});
   const state = el("output", {for: "insertion", id: "insertion-state"});
   const note = el("p", {class: "note"});
   const scaleEnd = el("span", {});
@@ -108,14 +114,17 @@ export const vesselSection = (page, selection) => {
   // What is shown now.
   let trial = null, shapes = null, scale = 0;
   const showWire = () => {
-    const insertion = Number(slider.value);
-    const push = pushAt(trial.pushes(), insertion);
-    const shape = shapes ? shapeAt(shapes, insertion) : {nodes: trial.nodes(), force: null};
+    const way = Number(slider.value), end = Number(slider.max);
+    const part = end > 0 ? way / end : 1;
+    const push = pushAt(trial.pushes(), part);
+    const insertion = part > 0 ? push?.insertion ?? 0 : 0;
+    const shape = shapes ? shapeAt(shapes, part) : {nodes: trial.nodes(), force: null};
     vessel?.setWire(shape.nodes, shape.force, scale);
     const forces = push
       ? `hand ${number(push.push)}\u00a0N, tip ${number(push.tip)}\u00a0N, largest contact ${number(push.peak)}\u00a0N, all contacts ${number(push.total)}\u00a0N`
       : "never entered the vessel";
-    state.textContent = `${number(insertion)}\u00a0mm of ${number(Number(slider.max))}\u00a0mm inserted: ${forces}`;
+    const last = trial.pushes()[trial.pushes().length - 1]?.insertion ?? 0;
+    state.textContent = `${number(insertion)}\u00a0mm of ${number(last)}\u00a0mm inserted: ${forces}`;
     slider.setAttribute("aria-valuetext", `${number(insertion)} mm inserted`);
   };
   const show = () => {
@@ -184,8 +193,9 @@ export const vesselSection = (page, selection) => {
       shapes = stored ? stored.shapes() : null;
       pick.value = String(id);
       const pushes = trial.pushes();
-      const end = pushes.length ? pushes[pushes.length - 1].insertion : 0;
+      const end = pushes.length ? pushes[pushes.length - 1].way : 0;
       slider.max = String(end);
+      slider.step = String(end > 0 ? end / 256 : 1); // a power of two: the end is a step
       slider.value = String(end);
       slider.disabled = play.disabled = !shapes;
       note.textContent = shapes ? ""

@@ -19,6 +19,7 @@ const kColumns = [
   ["Inclination", (t) => t.inclination_deg, (t) => degrees(t.inclination_deg)],
   ["Azimuth", (t) => t.azimuth_deg, (t) => degrees(t.azimuth_deg)],
   ["Roll", (t) => t.roll_deg, (t) => degrees(t.roll_deg)],
+  ["Moves", (t) => t.script ?? "", (t) => (t.script ? shown(t.script) : "one push")],
   ["Tip to target [mm]", (t) => t.tip_to_target_mm, (t) => told(t, t.tip_to_target_mm, t.errors.position_error_mm)],
   ["Largest contact [N]", (t) => t.peak_contact_force_n, (t) => told(t, t.peak_contact_force_n, t.errors.peak_contact_force_error_n)],
   ["Mean contact [N]", (t) => t.mean_contact_force_n, (t) => told(t, t.mean_contact_force_n, t.errors.mean_contact_force_error_n)],
