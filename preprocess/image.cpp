@@ -9,6 +9,7 @@
 #include <cstdlib>
 #include <fstream>
 #include <limits>
+#include <set>
 #include <sstream>
 #include <string>
 #include <system_error>
@@ -20,6 +21,7 @@
 #include "itkMetaImageIO.h"
 #include "itkNiftiImageIO.h"
 #include "itkNrrdImageIO.h"
+#include "preprocess/dicom_check.h"
 
 namespace wireplan::preprocess {
 namespace {
@@ -264,6 +266,27 @@ void require_whole_nifti(const itk::ImageIOBase& io, const fs::path& path) {
   }
 }
 
+/// MetaIO frees what it read twice where a header breaks off in the middle of it, so the lines are
+/// looked through first: "Key = value" of plain text, no key twice, to ElementDataFile.
+void require_meta_header(const fs::path& path) {
+  std::ifstream file(path, std::ios::binary);
+  std::set<std::string> keys;
+  for (std::string line; keys.count("ElementDataFile") == 0 && std::getline(file, line);) {
+    const std::size_t end = line.find_first_of(" =");
+    const std::string key = line.substr(0, end);
+    const bool plain = std::all_of(line.begin(), line.end(), [](char c) {
+      return (c >= ' ' && c <= '~') || c == '\t' || c == '\r';
+    });
+    if (!plain || end == std::string::npos ||
+        line.find('=', end) > line.find_first_not_of(' ', end) || !keys.insert(key).second) {
+      throw Error(path.string() + ": " + damaged("MetaImage"));
+    }
+  }
+  for (const char* key : {"NDims", "DimSize", "ElementType", "ElementDataFile"}) {
+    if (keys.count(key) == 0) throw Error(path.string() + ": " + damaged("MetaImage"));
+  }
+}
+
 /// The same for MetaImage, where MetaIO only prints a line when a file is cut short.
 void require_whole_meta(const itk::ImageIOBase& io, const fs::path& path) {
   double needed = static_cast<double>(io.GetImageSizeInBytes());
@@ -308,7 +331,7 @@ Image read_volume(itk::ImageIOBase& io, const fs::path& path) {
 FileFormat open_file(const fs::path& path) {
   FileFormat format = format_of(path);
   if (!format.io) {
-    if (itk::GDCMImageIO::New()->CanReadFile(path.c_str())) {
+    if (check_dicom(path) != DicomForm::kNone) {
       throw Error(path.string() +
                   ": a single DICOM file; give the folder that holds the whole series");
     }
@@ -316,6 +339,7 @@ FileFormat open_file(const fs::path& path) {
   }
   const std::string no_image = "not a " + format.name + " image, or damaged; " + kFormats;
   call_itk(path, no_image, [&] {
+    if (format.name == "MetaImage") require_meta_header(path);
     format.io->SetFileName(path.string());
     if (!format.io->CanReadFile(path.c_str())) {
       throw Error(path.string() + ": " + no_image);
@@ -369,9 +393,16 @@ std::vector<Series> find_series(const fs::path& folder) {
 
   std::vector<Series> all;
   for (const fs::path& file : files) {
+    const DicomForm form = check_dicom(file);
+    if (form == DicomForm::kNone) continue;  // folders also hold notes and pictures
+    if (form == DicomForm::kDamaged) {
+      throw Error(file.string() +
+                  ": a damaged DICOM file, expected elements that end within it; copy the series "
+                  "again, or take the file out if it is no slice");
+    }
     Slice slice{.io = itk::GDCMImageIO::New(), .series_uid = {}, .series_number = {}, .grid = {}};
     if (!slice.io->CanReadFile(file.c_str())) {
-      continue;  // folders also hold DICOMDIR, reports, notes
+      continue;  // such as DICOMDIR and reports
     }
     slice.io->SetFileName(file.string());
     slice.io->ReadImageInformation();

@@ -36,6 +36,30 @@ vtkSmartPointer<vtkPolyData> read_with(const std::filesystem::path& path) {
   return reader->GetOutput();
 }
 
+/// VTK takes room for as many triangles as the header of a binary STL promises, whatever the file
+/// holds. It takes for binary what has 5 % of other bytes than text in its first 256.
+void require_whole_stl(const std::filesystem::path& path) {
+  constexpr std::size_t kHead = 84, kTriangle = 50;
+  std::ifstream stream(path, std::ios::binary);
+  std::array<char, 256> head{};
+  stream.read(head.data(), head.size());
+  const auto length = static_cast<std::size_t>(stream.gcount());
+  const auto text = std::count_if(head.begin(), head.begin() + length, [](char c) {
+    return (c >= 0x20 && c <= 0x7F) || c == '\n' || c == '\r' || c == '\t';
+  });
+  if (20 * (length - static_cast<std::size_t>(text)) < length) return;
+  std::uint32_t triangles = 0;
+  for (std::size_t k = 4; k-- > 0;) {
+    triangles = triangles << 8U | static_cast<unsigned char>(head[kHead - 4 + k]);
+  }
+  const std::uintmax_t bytes = std::filesystem::file_size(path);
+  if (length >= kHead && kHead + kTriangle * std::uintmax_t{triangles} <= bytes) return;
+  throw Error(path.string() + ": a binary STL of " + std::to_string(bytes) + " bytes, expected " +
+              std::to_string(kHead + kTriangle * std::uintmax_t{triangles}) + " for the " +
+              std::to_string(triangles) +
+              " triangles of its header; copy or export the surface again");
+}
+
 // ---- PLY by hand: VTK's reader ends the program where a file is cut short ---------------------
 
 enum class PlyFormat { kAscii, kLittleEndian, kBigEndian };
@@ -220,7 +244,10 @@ vtkSmartPointer<vtkPolyData> read_any(const std::filesystem::path& path) {
   std::string ending = path.extension().string();
   std::transform(ending.begin(), ending.end(), ending.begin(),
                  [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  if (ending == ".stl") return read_with<vtkSTLReader>(path);
+  if (ending == ".stl") {
+    require_whole_stl(path);
+    return read_with<vtkSTLReader>(path);
+  }
   if (ending == ".ply") return read_ply(path);
   if (ending == ".obj") return read_with<vtkOBJReader>(path);
   if (ending == ".vtp") return read_with<vtkXMLPolyDataReader>(path);

@@ -238,6 +238,16 @@ std::string nifti(const NiftiHeader& header) {
   return bytes;
 }
 
+TEST_F(ImageFile, AMetaImageWhoseHeaderBreaksOffIsRefusedBeforeItsLibraryReadsIt) {
+  const std::string head = "ObjectType = Image\nNDims = 3\n";
+  const std::string tail =
+      "DimSize = 2 2 2\nElementType = MET_CHAR\nElementDataFile = LOCAL\n12345678";
+  read_image(write("sound.mha", head + tail));
+  for (const std::string middle : {"sizes: 2 2 2\n", "\n", "Off\xff = 0 0 0\n", "NDims = 3\n"}) {
+    EXPECT_TRUE(has(read_error(write("broken.mha", head + middle + tail)), "broken.mha: "));
+  }
+}
+
 TEST_F(ImageFile, NiftiIsScaledAndTurnedFromRasToLps) {
   const Image image =
       read_image(write("scaled.nii", nifti({.slope = 2.0F, .intercept = -1000.0F})));

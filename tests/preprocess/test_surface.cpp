@@ -397,6 +397,17 @@ TEST_F(SurfaceFile, WhatIsNoSurfaceIsRefusedWithItsName) {
             std::string::npos);
 }
 
+TEST_F(SurfaceFile, ABinaryStlThatPromisesMoreTrianglesThanItHoldsTakesNoMemoryForThem) {
+  std::string bytes(84 + 50, '\0');
+  bytes.replace(80, 4, "\xff\xff\xff\x7f");  // 2^31 - 1 triangles, 100 GB
+  const fs::path file = write("promise.stl", bytes);
+  EXPECT_EQ(
+      message_of([&] { read_surface(file, "mm", "LPS"); }),
+      file.string() +
+          ": a binary STL of 134 bytes, expected 107374182434 for the 2147483647 triangles of "
+          "its header; copy or export the surface again");
+}
+
 TEST_F(SurfaceFile, UnknownUnitAndFrameAreRefused) {
   const fs::path path = write("box.stl", ascii_stl(shapes::box({0, 0, 0}, {1, 1, 1})));
   EXPECT_NE(message_of([&] { read_surface(path, "inch", "LPS"); }).find("expected mm, cm or m"),

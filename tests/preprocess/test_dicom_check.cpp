@@ -1,0 +1,71 @@
+// What stands between a damaged DICOM file and a library that would end the program on it.
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <fstream>
+#include <iterator>
+#include <string>
+
+#include "preprocess/dicom_check.h"
+
+namespace wireplan::preprocess {
+namespace {
+
+namespace fs = std::filesystem;
+
+class DicomCheck : public testing::Test {
+ protected:
+  DicomCheck()
+      : file_(fs::temp_directory_path() / ("wireplan-dicom-" + std::to_string(::getpid()))) {
+    std::ifstream stream(fs::path(WIREPLAN_SOURCE_DIR) / "tests/fuzz/corpus/dicom/series.dcm",
+                         std::ios::binary);
+    const std::string two_slices(std::istreambuf_iterator<char>(stream), {});
+    slice_ = two_slices.substr(0, two_slices.size() / 2);
+  }
+  ~DicomCheck() override { fs::remove(file_); }
+
+  DicomForm form_of(const std::string& bytes) const {
+    std::ofstream(file_, std::ios::binary) << bytes;
+    return check_dicom(file_);
+  }
+
+  fs::path file_;
+  std::string slice_;
+};
+
+TEST_F(DicomCheck, AWholeSliceIsSoundAndACutOneIsNot) {
+  ASSERT_GT(slice_.size(), 400u);
+  EXPECT_EQ(form_of(slice_), DicomForm::kSound);
+  const std::size_t data_set = slice_.find("1.2.840.10008.1.2.1") + 20;
+  int between_elements = 0;
+  for (std::size_t length = 0; length < slice_.size(); ++length) {
+    const DicomForm form = form_of(slice_.substr(0, length));
+    EXPECT_EQ(form == DicomForm::kNone, length < 132) << length;
+    // A cut between two elements leaves a sound file of fewer, which has no pixels.
+    between_elements += form == DicomForm::kSound;
+    if (form == DicomForm::kSound) EXPECT_GE(length, data_set);
+  }
+  EXPECT_LE(between_elements, 20);  // as many as the slice has elements after its head
+}
+
+TEST_F(DicomCheck, LengthsBeyondTheEndAndUnknownRepresentationsAreDamage) {
+  const std::size_t rows = slice_.find(std::string("\x28\x00\x10\x00US", 6));
+  ASSERT_NE(rows, std::string::npos);
+  std::string changed = slice_;
+  changed[rows + 7] = '\x7f';  // 32 kB of rows
+  EXPECT_EQ(form_of(changed), DicomForm::kDamaged);
+  changed = slice_;
+  changed[rows + 4] = 'X';
+  EXPECT_EQ(form_of(changed), DicomForm::kDamaged);
+}
+
+TEST_F(DicomCheck, SamplesPerPixelThatNoImageHasAreDamage) {
+  const std::size_t samples = slice_.find(std::string("\x28\x00\x02\x00US", 6));
+  ASSERT_NE(samples, std::string::npos);
+  std::string changed = slice_;
+  changed[samples + 8] = 2;
+  EXPECT_EQ(form_of(changed), DicomForm::kDamaged);
+}
+
+}  // namespace
+}  // namespace wireplan::preprocess
