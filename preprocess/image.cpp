@@ -1,9 +1,12 @@
 #include "preprocess/image.h"
 
+#include <zlib.h>
+
 #include <Eigen/Eigenvalues>  // before ITK, which would bring in its own older copy
 #include <Eigen/SVD>
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cctype>
 #include <cmath>
 #include <cstdlib>
@@ -266,9 +269,33 @@ void require_whole_nifti(const itk::ImageIOBase& io, const fs::path& path) {
   }
 }
 
+/// ITK's matrices end the program on what is not finite, so the spacing and the two transforms of
+/// a NIfTI-1 header are looked at first (offsets: nifti1.h). Other headers are for the reader to
+/// judge.
+void require_finite_nifti(const fs::path& path) {
+  std::array<unsigned char, 348> header{};
+  const gzFile file = gzopen(path.c_str(), "rb");  // reads what is not compressed too
+  const int count = file == nullptr ? 0 : gzread(file, header.data(), header.size());
+  if (file != nullptr) gzclose(file);
+  const bool swapped = header[0] == 0 && header[3] == 0x5C;
+  if (count != static_cast<int>(header.size()) || (header[0] != 0x5C && !swapped)) return;
+  constexpr std::array<std::array<std::size_t, 2>, 2> kFloats = {{{76, 108}, {256, 328}}};
+  for (const auto& [begin, end] : kFloats) {
+    for (std::size_t at = begin; at < end; at += sizeof(float)) {
+      std::array<unsigned char, sizeof(float)> bytes{};
+      for (std::size_t k = 0; k < bytes.size(); ++k) {
+        bytes[k] = header[at + (swapped ? bytes.size() - 1 - k : k)];
+      }
+      constexpr float kLargest = 1e12F;  // of a place in mm, with room to spare
+      if (std::abs(std::bit_cast<float>(bytes)) <= kLargest) continue;
+      throw Error(path.string() + ": " + damaged("NIfTI"));
+    }
+  }
+}
+
 /// MetaIO frees what it read twice where a header breaks off in the middle of it, so the lines are
 /// looked through first: "Key = value" of plain text, no key twice, to ElementDataFile.
-void require_meta_header(const fs::path& path) {
+void require_meta_header(const fs::path& path, const std::string& no_image) {
   std::ifstream file(path, std::ios::binary);
   std::set<std::string> keys;
   for (std::string line; keys.count("ElementDataFile") == 0 && std::getline(file, line);) {
@@ -279,11 +306,11 @@ void require_meta_header(const fs::path& path) {
     });
     if (!plain || end == std::string::npos ||
         line.find('=', end) > line.find_first_not_of(' ', end) || !keys.insert(key).second) {
-      throw Error(path.string() + ": " + damaged("MetaImage"));
+      throw Error(path.string() + ": " + no_image);
     }
   }
   for (const char* key : {"NDims", "DimSize", "ElementType", "ElementDataFile"}) {
-    if (keys.count(key) == 0) throw Error(path.string() + ": " + damaged("MetaImage"));
+    if (keys.count(key) == 0) throw Error(path.string() + ": " + no_image);
   }
 }
 
@@ -339,7 +366,8 @@ FileFormat open_file(const fs::path& path) {
   }
   const std::string no_image = "not a " + format.name + " image, or damaged; " + kFormats;
   call_itk(path, no_image, [&] {
-    if (format.name == "MetaImage") require_meta_header(path);
+    if (format.name == "MetaImage") require_meta_header(path, no_image);
+    if (format.name == "NIfTI") require_finite_nifti(path);
     format.io->SetFileName(path.string());
     if (!format.io->CanReadFile(path.c_str())) {
       throw Error(path.string() + ": " + no_image);
@@ -396,9 +424,10 @@ std::vector<Series> find_series(const fs::path& folder) {
     const DicomForm form = check_dicom(file);
     if (form == DicomForm::kNone) continue;  // folders also hold notes and pictures
     if (form == DicomForm::kDamaged) {
-      throw Error(file.string() +
-                  ": a damaged DICOM file, expected elements that end within it; copy the series "
-                  "again, or take the file out if it is no slice");
+      throw Error(
+          file.string() +
+          ": a DICOM file that is damaged or cut short; copy or export the series again, or "
+          "take the file out if it is no slice");
     }
     Slice slice{.io = itk::GDCMImageIO::New(), .series_uid = {}, .series_number = {}, .grid = {}};
     if (!slice.io->CanReadFile(file.c_str())) {

@@ -45,7 +45,8 @@ void require_whole_stl(const std::filesystem::path& path) {
   stream.read(head.data(), head.size());
   const auto length = static_cast<std::size_t>(stream.gcount());
   const auto text = std::count_if(head.begin(), head.begin() + length, [](char c) {
-    return (c >= 0x20 && c <= 0x7F) || c == '\n' || c == '\r' || c == '\t';
+    const auto byte = static_cast<unsigned char>(c);
+    return (byte >= 0x20 && byte <= 0x7F) || c == '\n' || c == '\r' || c == '\t';
   });
   if (20 * (length - static_cast<std::size_t>(text)) < length) return;
   std::uint32_t triangles = 0;

@@ -259,6 +259,12 @@ TEST_F(ImageFile, NiftiIsScaledAndTurnedFromRasToLps) {
   EXPECT_LT((image.grid.lps_from_ijk(Vec3(1, 2, 3)) - Vec3(-68, 34, 512)).norm(), 1e-4);
 }
 
+TEST_F(ImageFile, NiftiWhoseTransformIsNoNumberIsRefusedBeforeItsLibraryReadsIt) {
+  std::string bytes = nifti({});
+  bytes.replace(280, 4, "\xff\xff\xff\xff");  // a NaN in the first row
+  EXPECT_TRUE(has(read_error(write("nan.nii", bytes)), "nan.nii: its header reads as NIfTI"));
+}
+
 TEST_F(ImageFile, NiftiSlopeOfZeroMeansUnscaled) {
   const Image image = read_image(write("plain.nii", nifti({.slope = 0.0F, .intercept = 7.0F})));
   EXPECT_EQ(image.values[5], 5.0F);
