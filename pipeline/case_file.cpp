@@ -491,6 +491,9 @@ Case read_case(const std::filesystem::path& path, const std::vector<std::string>
   input.manoeuvres = read_manoeuvring(root);
   input.study.insertion.friction = read_friction(root, kFriction);
   read_robustness(root, input);
+  JsonReader search = root.object("search", false);
+  input.exhaustive = search.boolean("exhaustive", false);
+  search.finish();
   root.finish();
   problems.throw_if_any();
   return input;
@@ -524,6 +527,7 @@ Json case_parameters(const Case& input) {
                     {"tip_force_fail_n", input.limits.tip_force_fail},
                     {"penetration_fail_mm", input.limits.penetration_fail},
                     {"off_path_fail_mm", input.limits.off_path_fail}};
+  json["search"] = {{"exhaustive", input.exhaustive}};
   json["robustness"] = robustness_json(input);
   json["ranking"] = {{"weights",
                       {{"reach", input.weights.reach},

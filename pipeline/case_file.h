@@ -62,6 +62,7 @@ struct Case {
   plan::Weights weights;
   /// unknowns.lumen 0: chosen by the report stage, half a voxel of a volume, 0.25 mm of a surface.
   plan::RobustnessOptions robustness;
+  bool exhaustive = false;  // all candidates are run in full, none is only scouted
 };
 
 /// Reads CASE (a file, or a folder with a case.json), applies `overrides` ("wall.thickness_mm=2":

@@ -390,6 +390,10 @@ int run_command(int argc, const char* const* argv) {
   run->add_option("-o,--output", run_arguments.output, "Results [wireplan-out/CASE NAME]");
   run->add_option("-j,--threads", run_arguments.threads, "Threads of the trials [all cores]")
       ->check(CLI::Range(1, 4096));
+  run->add_flag(
+      "--exhaustive",
+      [&](std::int64_t) { run_arguments.overrides.push_back("search.exhaustive=true"); },
+      "Run all candidates in full, not only those that a coarse trial lets hope");
   run->add_flag("--dry-run", run_arguments.dry_run, "Only say which stages would run, and why");
   run->add_flag("--explain", run_arguments.explain, "Say why each stage runs");
   run->footer("Example: wireplan run cases/abdomen -o out -j 2");

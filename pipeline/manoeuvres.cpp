@@ -21,6 +21,13 @@ simulate::TrialResult read_trial_file(const fs::path& file) {
   return std::move(*trial);
 }
 
+// Of a straight push: in full, or else the scout's.
+fs::path straight_file(const Workspace& work, int id) {
+  const fs::path& folder = work.artifact("trials").folder;
+  const fs::path full = folder / trial_file_name(id);
+  return fs::exists(full) ? full : folder / kScoutFolder / trial_file_name(id);
+}
+
 // The straight pushes that a search goes on from; none where the case wants no search.
 std::vector<plan::Candidate> find_starts(Workspace& work,
                                          const std::vector<plan::Candidate>& straight) {
@@ -28,9 +35,8 @@ std::vector<plan::Candidate> find_starts(Workspace& work,
   if (wanted == Manoeuvring::kNever) return {};
   std::vector<double> progress;
   std::vector<simulate::Outcome> outcomes;
-  const fs::path& folder = work.artifact("trials").folder;
   for (int id = 0; id < std::ssize(straight); ++id) {
-    const simulate::TrialResult trial = read_trial_file(folder / trial_file_name(id));
+    const simulate::TrialResult trial = read_trial_file(straight_file(work, id));
     progress.push_back(plan::find_progress(trial, work.path()));
     outcomes.push_back(trial.outcome);
   }
@@ -60,10 +66,15 @@ std::vector<plan::Candidate> list_tried(Workspace& work) {
 }
 
 simulate::TrialResult read_trial(const Workspace& work, std::size_t id) {
-  const std::string name = trial_file_name(static_cast<int>(id));
-  const fs::path straight = work.artifact("trials").folder / name;
+  const fs::path straight = straight_file(work, static_cast<int>(id));
   return read_trial_file(fs::exists(straight) ? straight
-                                              : work.artifact("manoeuvres").folder / name);
+                                              : work.artifact("manoeuvres").folder /
+                                                    trial_file_name(static_cast<int>(id)));
+}
+
+bool is_scouted(const Workspace& work, std::size_t id) {
+  const fs::path file = straight_file(work, static_cast<int>(id));
+  return file.parent_path().parent_path().filename() == kScoutFolder && fs::exists(file);
 }
 
 void make_manoeuvres(Workspace& work, const fs::path& folder) {

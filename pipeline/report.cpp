@@ -17,6 +17,7 @@ constexpr const char* kStatement =
     "Research use only. Not a medical device. Not for diagnosis or treatment decisions.";
 
 constexpr const char* kRigidWall = "the wall is rigid";
+constexpr const char* kRigidScout = "a scout's wall is rigid";
 constexpr const char* kNoRepeats = "only the best plans are repeated, and the best of each wire";
 
 bool is_rigid(const ReportInput& input) {
@@ -159,11 +160,11 @@ Json vessel_json(const ReportInput& input) {
   return row.finish();
 }
 
-void put_wall_motion(Row& row, const ReportInput& input, const plan::Metrics& m,
+void put_wall_motion(Row& row, const ReportInput& input, const plan::Metrics& m, bool scouted,
                      const std::string& ended) {
-  if (is_rigid(input)) {
+  if (is_rigid(input) || scouted) {
     for (const char* key : {"peak_wall_displacement_mm", "beyond_linear_theory", "wall_motion"}) {
-      row.put_optional(key, {}, kRigidWall);
+      row.put_optional(key, {}, scouted ? kRigidScout : kRigidWall);
     }
     return;
   }
@@ -186,6 +187,7 @@ Json trial_json(const ReportInput& input, std::size_t k) {
   Row row;
   row.put("id", k);
   put_candidate(row, input, k);
+  row.put("level", input.scouted[k] ? "scout" : "full");
   row.put("outcome", outcome_name(trial.outcome));
   row.put("reason", trial.reason);
   row.put("reached", m.reached);
@@ -199,7 +201,7 @@ Json trial_json(const ReportInput& input, std::size_t k) {
   row.put_number("push_work_n_mm", m.push_work, ended);
   row.put_number("friction_work_n_mm", m.friction_work, ended);
   row.put_number("energy_released_n_mm", m.energy_released, ended);
-  put_wall_motion(row, input, m, ended);
+  put_wall_motion(row, input, m, input.scouted[k], ended);
   row.put_number("peak_curvature_per_mm", m.peak_curvature, ended);
   row.put_number("centerline_deviation_mm", m.centerline_deviation, ended);
   row.put_number("off_path_mm", m.off_path, ended);
@@ -299,6 +301,7 @@ Json numerics_json(const ReportInput& input) {
   return {{"lumen_grid_mm", trials.at("lumen_grid_mm")},
           {"lumen_max_deviation_mm", trials.at("lumen_max_deviation_mm")},
           {"lumen_mean_deviation_mm", trials.at("lumen_mean_deviation_mm")},
+          {"scout", trials.at("scout")},
           {"plans", std::move(plans)},
           {"rows", std::move(rows)},
           {"rows_time", "cpu_s of each row stands in timing.numerics"}};

@@ -27,6 +27,7 @@ struct ReportInput {
   std::vector<plan::Candidate> candidates;
   std::vector<simulate::TrialResult> trials;  // outcome, reason and terms; the rest may be empty
   std::vector<plan::Metrics> metrics;
+  std::vector<bool> scouted;  // per trial: it is a scout's, on a rigid wall with long elements
   plan::Ranking ranking;
   std::vector<plan::Refinement> refinements;
   Json robustness;  // of repeats.h

@@ -4,6 +4,7 @@
 #include <array>
 #include <chrono>
 #include <cmath>
+#include <numeric>
 #include <thread>
 #include <utility>
 
@@ -17,6 +18,7 @@
 #include "pipeline/viewer_files.h"
 #include "plan/batch.h"
 #include "plan/metrics.h"
+#include "plan/search.h"
 #include "preprocess/centerline.h"
 #include "preprocess/segment.h"
 #include "preprocess/surface.h"
@@ -123,9 +125,9 @@ std::string trial_key_text(const Workspace& work, const plan::Study& study,
   const auto& [wire, inclination, azimuth, roll, moves] = candidate;
   Json script = Json::array();
   for (const auto& [push, turn] : moves) script.push_back({push, turn});
-  const std::string shared =
-      without_parameters(work.key_text, {"wires", "access.inclination_deg", "access.azimuth_deg",
-                                         "tip_roll_deg", "insertion.length_mm"});
+  const std::string shared = without_parameters(
+      work.key_text, {"wires", "access.inclination_deg", "access.azimuth_deg", "tip_roll_deg",
+                      "insertion.length_mm", "search", "limits", "ranking"});
   return shared + key_text({{"wire", wire_json(study.wires[static_cast<std::size_t>(wire)]).dump()},
                             {"inclination", Json(inclination).dump()},
                             {"azimuth", Json(azimuth).dump()},
@@ -140,6 +142,83 @@ void take_piece(const fs::path& piece, const fs::path& to) {
   fs::create_hard_link(piece, to, cannot_link);
   if (cannot_link) fs::copy_file(piece, to);
 }
+
+// Trials of one level. Each is kept as soon as it is finished: a run goes on where it was stopped,
+// and a case that has a trial in common with another takes it from there.
+class TrialLevel {
+ public:
+  TrialLevel(Workspace& work, const char* level, plan::Study study, fs::path folder)
+      : work_(work), level_(level), study_(std::move(study)), folder_(std::move(folder)) {
+    study_.insertion.record_every = study_.insertion.length;  // shapes on the way are not kept
+    fs::create_directories(folder_ / "trials");
+  }
+
+  // Puts the trials of these candidates into the folder, from the store or by running them. Throws
+  // Interrupted.
+  void run(const std::vector<plan::Candidate>& candidates, const std::vector<int>& wanted,
+           const simulate::VesselModel& vessel) {
+    std::vector<int> ids;
+    std::vector<std::string> keys;
+    for (const int id : wanted) {
+      const std::string key = key_of(candidates[static_cast<std::size_t>(id)]);
+      const std::optional<fs::path> kept = work_.store().find_piece(key);
+      if (kept) {
+        take_piece(*kept, folder_ / trial_file_name(id));
+      } else {
+        ids.push_back(id);
+        keys.push_back(key);
+      }
+    }
+    const int kept = static_cast<int>(wanted.size() - ids.size());
+    const WorkOptions& options = work_.options();
+    plan::BatchOptions batch{
+        .threads = options.threads, .progress = {}, .cancelled = options.cancelled};
+    if (options.progress) {
+      batch.progress = [&](int done, int count) { options.progress(kept + done, kept + count); };
+    }
+    std::vector<double> cpu_seconds(ids.size());
+    const std::vector<bool> finished = plan::for_each_slot(
+        static_cast<int>(ids.size()),
+        [&](int slot) {
+          const double start = plan::thread_cpu_seconds();
+          const int id = ids[static_cast<std::size_t>(slot)];
+          const plan::Candidate& candidate = candidates[static_cast<std::size_t>(id)];
+          const simulate::TrialResult trial = plan::run_candidate(study_, candidate, vessel);
+          const fs::path piece = work_.store().keep_piece(keys[static_cast<std::size_t>(slot)],
+                                                          trial_text(study_, candidate, trial));
+          take_piece(piece, folder_ / trial_file_name(id));
+          cpu_seconds[static_cast<std::size_t>(slot)] = plan::thread_cpu_seconds() - start;
+        },
+        batch);
+    if (std::find(finished.begin(), finished.end(), false) != finished.end()) throw Interrupted();
+    for (const double seconds : cpu_seconds) cpu_seconds_ += seconds;
+    trials_run_ += static_cast<int>(ids.size());
+  }
+
+  const plan::Study& study() const { return study_; }
+  simulate::TrialResult read(int id) const {
+    std::optional<simulate::TrialResult> trial = find_trial(folder_ / trial_file_name(id));
+    expects(trial.has_value());
+    return std::move(*trial);
+  }
+  Json timing() const {
+    return {{"level", level_}, {"trials_run", trials_run_}, {"cpu_s", cpu_seconds_}};
+  }
+
+ private:
+  // The elements of a scout follow from all wires of the study.
+  std::string key_of(const plan::Candidate& candidate) const {
+    return trial_key_text(work_, study_, candidate) +
+           key_text({{"level", level_}, {"element", Json(study_.insertion.element_length).dump()}});
+  }
+
+  Workspace& work_;
+  const char* level_;
+  plan::Study study_;
+  fs::path folder_;
+  int trials_run_ = 0;        // this time
+  double cpu_seconds_ = 0.0;  // of these                                                  [s]
+};
 
 // Largest force on each triangle, over trials.
 class ForceMap {
@@ -263,12 +342,22 @@ const Wall& Workspace::wall() {
   return *wall_;
 }
 
-const simulate::VesselModel& Workspace::model() {
+const simulate::VesselModel& Workspace::rigid_model() {
   if (!model_) {
-    const simulate::LumenOptions options{.openings = simulate::find_openings(surface())};
-    model_ = given_.wall.elastic
-                 ? std::make_unique<simulate::VesselModel>(surface(), wall(), options)
-                 : std::make_unique<simulate::VesselModel>(surface(), options);
+    // The field as a yielding wall needs it, since the wall may come later.
+    simulate::LumenOptions options{.openings = simulate::find_openings(surface())};
+    if (given_.wall.elastic) options.band = simulate::VesselModel::kYieldingBand;
+    model_ = std::make_unique<simulate::VesselModel>(surface(), options);
+  }
+  expects(!model_->compliance);
+  return *model_;
+}
+
+const simulate::VesselModel& Workspace::model() {
+  if (model_ && model_->compliance) return *model_;
+  rigid_model();
+  if (given_.wall.elastic) {
+    model_->compliance = std::make_unique<simulate::WallCompliance>(surface(), wall());
   }
   return *model_;
 }
@@ -426,49 +515,73 @@ void make_wall(Workspace& work, const fs::path& folder) {
   write_figures(figures, folder);
 }
 
+namespace {
+
+// Scouts all candidates on a rigid wall and runs in full those that may be among the best. Returns
+// what the report tells of the levels.
+Json search_candidates(Workspace& work, const std::vector<plan::Candidate>& candidates,
+                       TrialLevel& full, const fs::path& folder) {
+  const Case& given = work.given();
+  TrialLevel scout(work, "scout", plan::scout_study(work.study()), folder / kScoutFolder);
+  const auto look = [&](const TrialLevel& level, int id) {
+    const simulate::TrialResult trial = level.read(id);
+    return plan::look_at(trial, plan::compute_metrics(trial, level.study(), work.path()),
+                         level.study(), given.limits, given.weights);
+  };
+
+  std::vector<int> all(candidates.size());
+  std::iota(all.begin(), all.end(), 0);
+  scout.run(candidates, all, work.rigid_model());
+  std::vector<plan::Sighting> scouts;
+  for (const int id : all) scouts.push_back(look(scout, id));
+
+  std::vector<std::optional<plan::Sighting>> known(candidates.size());
+  for (;;) {
+    const std::vector<int> next = plan::choose_next(work.study(), candidates, scouts, known);
+    if (next.empty()) break;
+    full.run(candidates, next, work.model());
+    for (const int id : next) known[static_cast<std::size_t>(id)] = look(full, id);
+  }
+
+  const plan::ScoutError error = plan::find_scout_error(scouts, known);
+  const auto number = [](const std::optional<double>& value) {
+    return value ? Json(*value) : Json(nullptr);
+  };
+  return {{"element_length_mm", scout.study().insertion.element_length},
+          {"step_mm", scout.study().insertion.step},
+          {"wall", "rigid"},
+          {"trials", candidates.size()},
+          {"compared", error.compared},
+          {"both_reached", error.both_reached},
+          {"median_score_error", number(error.median_score)},
+          {"largest_score_error", number(error.largest_score)},
+          {"missed", error.missed},
+          {"false_reached", error.false_reached},
+          {"timing", scout.timing()}};
+}
+
+}  // namespace
+
 void make_trials(Workspace& work, const fs::path& folder) {
-  plan::Study study = work.study();
-  study.insertion.record_every = study.insertion.length;  // shapes on the way are not kept
+  const plan::Study& study = work.study();
   const std::vector<plan::Candidate> candidates = plan::list_candidates(study);
+  TrialLevel full(work, "full", study, folder);
+  Json scout = nullptr, timing = Json::array();
+  if (plan::needs_search(study, work.given().exhaustive)) {
+    scout = search_candidates(work, candidates, full, folder);
+    timing.push_back(scout.at("timing"));
+    scout.erase("timing");
+  } else {
+    std::vector<int> all(candidates.size());
+    std::iota(all.begin(), all.end(), 0);
+    full.run(candidates, all, work.model());
+  }
+  timing.push_back(full.timing());
   const simulate::VesselModel& vessel = work.model();
 
-  // Each trial is kept as soon as it is finished: a run goes on where it was stopped, and a case
-  // that has a trial in common with another takes it from there.
-  fs::create_directories(folder / "trials");
-  std::vector<std::string> keys;
-  std::vector<int> ids;
-  for (const plan::Candidate& candidate : candidates) {
-    const int id = static_cast<int>(keys.size());
-    keys.push_back(trial_key_text(work, study, candidate));
-    const std::optional<fs::path> kept = work.store().find_piece(keys.back());
-    if (kept) take_piece(*kept, folder / trial_file_name(id));
-    if (!kept) ids.push_back(id);
-  }
-  const int total = static_cast<int>(candidates.size());
-  const int kept = total - static_cast<int>(ids.size());
-  plan::BatchOptions batch{
-      .threads = work.options().threads, .progress = {}, .cancelled = work.options().cancelled};
-  if (work.options().progress) {
-    batch.progress = [&](int done, int) { work.options().progress(kept + done, total); };
-  }
-  std::vector<double> cpu_seconds(ids.size());
-  const std::vector<bool> finished = plan::for_each_slot(
-      static_cast<int>(ids.size()),
-      [&](int slot) {
-        const double start = plan::thread_cpu_seconds();
-        const int id = ids[static_cast<std::size_t>(slot)];
-        const plan::Candidate& candidate = candidates[static_cast<std::size_t>(id)];
-        const simulate::TrialResult trial = plan::run_candidate(study, candidate, vessel);
-        const fs::path piece = work.store().keep_piece(keys[static_cast<std::size_t>(id)],
-                                                       trial_text(study, candidate, trial));
-        take_piece(piece, folder / trial_file_name(id));
-        cpu_seconds[static_cast<std::size_t>(slot)] = plan::thread_cpu_seconds() - start;
-      },
-      batch);
-  if (std::find(finished.begin(), finished.end(), false) != finished.end()) throw Interrupted();
-
   Json figures = figures_of("trials");
-  figures["trials"] = total;
+  figures["trials"] = candidates.size();
+  figures["scout"] = std::move(scout);
   figures["tangent"] = to_json(study.tangent);
   figures["insertion_length_mm"] = study.insertion.length;
   figures["lumen_grid_mm"] = vessel.lumen.grid_spacing();
@@ -482,9 +595,16 @@ void make_trials(Workspace& work, const fs::path& folder) {
     figures["warnings"].push_back("trials: rigid wall: contact forces are upper bounds");
   }
   write_figures(figures, folder);
+  int trials_run = 0;
   double cpu_sum = 0.0;
-  for (const double seconds : cpu_seconds) cpu_sum += seconds;
-  write_json({{"schema", kTimingSchema}, {"trials_run", ids.size()}, {"cpu_s", cpu_sum}},
+  for (const Json& level : timing) {
+    trials_run += level.at("trials_run").get<int>();
+    cpu_sum += level.at("cpu_s").get<double>();
+  }
+  write_json({{"schema", kTimingSchema},
+              {"trials_run", trials_run},
+              {"cpu_s", cpu_sum},
+              {"levels", std::move(timing)}},
              folder / kTimingFile);
 }
 
@@ -557,8 +677,10 @@ void make_report(Workspace& work, const fs::path& folder) {
   ForceMap all_forces(work.surface().triangles.cols());
   for (std::size_t id = 0; id < candidates.size(); ++id) {
     const simulate::TrialResult trial = read_trial(work, id);
+    const bool scouted = is_scouted(work, id);
+    report.scouted.push_back(scouted);
     report.metrics.push_back(plan::compute_metrics(trial, study, work.path()));
-    all_forces.add(trial);
+    if (!scouted) all_forces.add(trial);
     page.trials.push_back(
         page_trial(trial, plan::make_introducer(study, candidates[id]).direction));
     simulate::TrialResult& end = report.trials.emplace_back();
@@ -570,6 +692,7 @@ void make_report(Workspace& work, const fs::path& folder) {
   // Rank, find the errors of the best by refining them, and rank again with these.
   const Case& given = work.given();
   plan::Findings findings;
+  findings.scouted = report.scouted;
   const auto rank = [&] {
     report.ranking = plan::rank(study, candidates, report.trials, report.metrics, given.limits,
                                 given.weights, findings);

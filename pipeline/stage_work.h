@@ -52,6 +52,8 @@ class Workspace {
   const Wall& wall();
   /// The vessel as the trials feel it: with the wall only where it yields.
   const simulate::VesselModel& model();
+  /// The same with a wall that does not yield. It becomes model(), so its use ends before that.
+  const simulate::VesselModel& rigid_model();
   /// The case's study with what the centerline tells: the tangent at the access, and the insertion
   /// length where the case leaves it open.
   const plan::Study& study();
@@ -72,7 +74,7 @@ class Workspace {
   std::optional<Centerline> path_;
   std::optional<Wall> wall_;
   std::optional<plan::Study> study_;
-  std::unique_ptr<const simulate::VesselModel> model_;
+  std::unique_ptr<simulate::VesselModel> model_;
 };
 
 /// The start of a stage's figures.json, and its end.

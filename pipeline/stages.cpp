@@ -6,6 +6,7 @@
 
 #include "pipeline/hash.h"
 #include "pipeline/report.h"
+#include "plan/search.h"
 
 namespace wireplan::pipeline {
 namespace {
@@ -141,12 +142,15 @@ std::vector<Stage> stages_of(const Case& given) {
        .parameters = {"/wall/thickness_mm", "/wall/young_modulus_kpa", "/wall/poisson_ratio"},
        .make = make_wall});
   Stage trials{.name = "trials",
-               .version = 3,
+               .version = 4,
                .after = {"surface", "centerline"},
                .parameters = {"/access", "/target", "/wires", "/tip_roll_deg", "/friction",
                               "/wall/model", "/insertion"},
                .make = make_trials};
   if (given.wall.elastic) trials.after.push_back("wall");  // a rigid one does not act
+  if (plan::needs_search(given.study, given.exhaustive)) {
+    for (const char* key : {"/search", "/limits", "/ranking"}) trials.parameters.push_back(key);
+  }
   stages.push_back(trials);
   Stage manoeuvres = trials;
   manoeuvres.name = "manoeuvres";

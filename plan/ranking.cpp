@@ -206,6 +206,13 @@ std::string warnings_of(const Metrics& m, const Limits& limits) {
   return text;
 }
 
+/// Why a candidate that was scouted only is no plan; `failure` is empty where the scout reached.
+std::string scouted_reason(const Score& score, const std::string& failure) {
+  if (!failure.empty()) return "scouted only: " + failure;
+  return "scouted only: reaches with a score of " + four_digits(score.total) +
+         ", behind the best plan by more than the scout was found to be off";
+}
+
 std::string success_of(const RepeatedPlan& plan) {
   const auto successes = std::count_if(plan.repeats.begin(), plan.repeats.end(),
                                        [](const Repeat& repeat) { return repeat.success; });
@@ -354,12 +361,16 @@ Ranking rank(const Study& study, const std::vector<Candidate>& candidates,
   const std::vector<std::optional<NumericalError>>& errors = findings.errors;
   expects(trials.size() == candidates.size() && metrics.size() == candidates.size());
   expects(errors.empty() || errors.size() == candidates.size());
+  expects(findings.scouted.empty() || findings.scouted.size() == candidates.size());
   expects_valid(limits, weights);
 
   // A trial is a plan or has a reason.
   Ranking ranking;
   for (int k = 0; k < std::ssize(candidates); ++k) {
-    const std::string reason = exclusion_reason(trials[k], metrics[k], study, limits);
+    std::string reason = exclusion_reason(trials[k], metrics[k], study, limits);
+    if (!findings.scouted.empty() && findings.scouted[k]) {
+      reason = scouted_reason(compute_score(metrics[k], study.goal, limits, weights), reason);
+    }
     if (!reason.empty()) {
       ranking.excluded.push_back({k, reason});
       continue;

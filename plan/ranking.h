@@ -110,14 +110,16 @@ struct Ranking {
 struct Findings {
   std::vector<std::optional<NumericalError>> errors = {};  // per trial; empty: nothing was refined
   std::vector<RepeatedPlan> repeated = {};                 // of equally many repeats
+  std::vector<bool> scouted = {};  // per trial: its numbers are a scout's (search.h); empty: none
 };
 
 /// Plans with repeats come first, by their mean score over the repeats, in which a failure costs 1;
 /// after them the others by their score, which knows no disturbance; equals by index of the
 /// candidate. Two plans are tied if their scores differ by no more than both errors, or if the
 /// central 90 % of their paired differences over the repeats, widened by both errors, holds 0: then
-/// the unknowns decide which is better. Of a trial only its outcome and reason are looked at.
-/// Expects one trial and one Metrics per candidate, and positive limits.
+/// the unknowns decide which is better. A trial that was only scouted is no plan. Of a trial only
+/// its outcome and reason are looked at. Expects one trial and one Metrics per candidate, and
+/// positive limits.
 Ranking rank(const Study& study, const std::vector<Candidate>& candidates,
              const std::vector<simulate::TrialResult>& trials, const std::vector<Metrics>& metrics,
              const Limits& limits, const Weights& weights, const Findings& findings = {});

@@ -129,6 +129,7 @@ Json full_case(Json json) {
                     {"tip_force_fail_n", 1},
                     {"penetration_fail_mm", 0.5},
                     {"off_path_fail_mm", 20}};
+  json["search"] = {{"exhaustive", true}};
   json["robustness"] = {{"repeats", 32},
                         {"plans", 3},
                         {"seed", 7},

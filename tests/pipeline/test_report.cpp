@@ -96,6 +96,40 @@ TEST(Report, MapsTheForcesOnTheWall) {
   EXPECT_NE(bytes.find("Name=\"peak_force_best_plan_n\""), std::string::npos);
 }
 
+TEST(Report, ScoutedCandidatesLeaveTheBestPlansAsTheyAre) {
+  // 13 ways in; behind a narrow lean all is alike, so that the scout saves some.
+  const TemporaryFolder folder;
+  write_tube_case(folder.path());
+  const std::vector<std::string> ways = {"access.inclination_deg=[0, 10, 20, 30]",
+                                         "access.azimuth_deg=[0, 90, 180, 270]",
+                                         "robustness.repeats=0"};
+  std::vector<std::string> all = ways;
+  all.push_back("search.exhaustive=true");
+  const Json some = run_to_report(folder / "case.json", folder / "cache", 0, ways);
+  const Json every = run_to_report(folder / "case.json", folder / "cache", 0, all);
+  EXPECT_TRUE(every.at("numerics").at("scout").is_null());
+  const Json& scout = some.at("numerics").at("scout");
+  EXPECT_EQ(scout.at("trials"), 13);
+  const int compared = scout.at("compared");
+  EXPECT_GE(compared, 5);
+  EXPECT_LT(compared, 13);
+  EXPECT_EQ(some.at("timing").at("trials").at("levels").size(), 2u);
+
+  ASSERT_FALSE(every.at("ranking").empty());
+  EXPECT_EQ(some.at("ranking")[0].at("trial"), every.at("ranking")[0].at("trial"));
+  EXPECT_EQ(some.at("ranking")[0].at("score"), every.at("ranking")[0].at("score"));
+  int scouted = 0;
+  for (const Json& trial : some.at("trials")) {
+    scouted += trial.at("level") == "scout" ? 1 : 0;
+    if (trial.at("level") == "full") {
+      EXPECT_EQ(trial.at("peak_contact_force_n"),
+                every.at("trials")[trial.at("id").get<std::size_t>()].at("peak_contact_force_n"));
+    }
+  }
+  EXPECT_EQ(scouted, 13 - compared);
+  expect_valid(some, folder.path());
+}
+
 TEST(Report, TellsHowThePlansFareUnderDisturbances) {
   const TemporaryFolder folder;
   write_tube_case(folder.path());
@@ -114,9 +148,13 @@ TEST(Report, TellsHowThePlansFareUnderDisturbances) {
   }
   for (const Json& plan : robustness.at("plans")) {
     const Json& force = plan.at("peak_contact_force_n");
-    EXPECT_LE(force.at("low"), force.at("median"));  // straight in, it may not touch at all
+    EXPECT_LE(force.at("low"), force.at("median"));
     EXPECT_LE(force.at("median"), force.at("high"));
-    EXPECT_LT(force.at("low"), force.at("high"));
+    // Straight in, it does not touch at all.
+    const Json& trial = report.at("trials")[plan.at("trial").get<std::size_t>()];
+    if (trial.at("inclination_deg") > 0.0) {
+      EXPECT_LT(force.at("low"), force.at("high"));
+    }
     EXPECT_EQ(plan.at("scores").size(), 12u);
     EXPECT_EQ(plan.at("successes").get<std::size_t>() + plan.at("failures").size(), 12u);
   }

@@ -385,7 +385,7 @@ TEST_F(StageKeys, ADamagedArtifactIsMadeAgainWithTheSameContents) {
 }
 
 TEST_F(StageKeys, AnInterruptedRunGoesOnFromItsFinishedTrials) {
-  const Case given = read_case(folder_ / "case.json");
+  const Case given = read_case(folder_ / "case.json", {"robustness.repeats=0"});
   RunOptions options;
   options.cache = folder_ / "cache";
   options.work.threads = 1;
@@ -458,6 +458,34 @@ TEST_F(StageKeys, AnInputThatChangesWhileItIsReadIsNotTrusted) {
         << error.what();
   }
   EXPECT_TRUE(Store(options.cache).artifacts().empty());
+}
+
+TEST_F(StageKeys, AnInterruptedReportKeepsItsRepeats) {
+  const Case given = read_case(folder_ / "case.json");
+  RunOptions options;
+  options.cache = folder_ / "cache";
+  options.work.threads = 1;
+  bool stop = false;
+  options.work.progress = [&](int done, int total) { stop = total == 8 && done == 3; };
+  options.work.cancelled = [&] { return stop; };
+  EXPECT_THROW(run_stages(given, options), Interrupted);
+  int kept = 0;
+  for (const auto& entry : fs::recursive_directory_iterator(folder_ / "cache" / "report")) {
+    kept += entry.path().parent_path().filename() == "repeats" ? 1 : 0;
+  }
+  EXPECT_EQ(kept, 3);
+
+  // It goes on to the same report as in one go.
+  const auto report_of = [&](const std::string& cache) {
+    options.cache = folder_ / cache;
+    const fs::path folder = run_stages(given, options).artifacts.back().folder;
+    Json report = read_json(folder / "report.json", "wireplan.report/1");
+    report.erase("timing");
+    return report.dump();
+  };
+  options.work.progress = {};
+  options.work.cancelled = {};
+  EXPECT_EQ(report_of("cache"), report_of("other-cache"));
 }
 
 }  // namespace

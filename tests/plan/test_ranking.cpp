@@ -296,6 +296,21 @@ TEST(Rank, AssumesAnErrorWhereNoneIsKnownAndDoesNotReportIt) {
   EXPECT_EQ(ranking.plans[1].position_error, std::optional<double>(0.01));
 }
 
+TEST(Rank, RanksNoTrialThatWasScoutedOnly) {
+  Bench bench;
+  bench.add(0, 1.0, 0.1);
+  bench.add(0, 1.0, 0.2);
+  bench.add(0, 9.0, 0.2, Outcome::kMissed);
+  const Ranking ranking = rank(bench.study, bench.candidates, bench.trials, bench.metrics,
+                               bench.limits, bench.weights, {.scouted = {true, false, true}});
+  EXPECT_EQ(order_of(ranking), std::vector<int>{1});
+  ASSERT_EQ(ranking.excluded.size(), 2u);
+  EXPECT_NE(ranking.excluded[0].reason.find("scouted only: reaches with a score of 0.1"),
+            std::string::npos)
+      << ranking.excluded[0].reason;
+  EXPECT_NE(ranking.excluded[1].reason.find("scouted only: missed"), std::string::npos);
+}
+
 TEST(Rank, SummarisesEachWireOverTheTrialsThatReached) {
   Bench bench(3);
   bench.add(0, 1.0, 0.4);
