@@ -5,7 +5,7 @@
 namespace wireplan::pipeline {
 namespace {
 
-constexpr Range kBendingStiffness{.min = 0.01, .max = 1e5};  // [N mm^2]
+constexpr Range kBendingStiffness{.min = 0.01, .max = 1e7};  // [N mm^2]
 
 /// 1/radius [1/mm] of a tip that is curved at rest; 0 where the key is absent: straight.
 double read_rest_curvature(JsonReader& reader) {

@@ -21,6 +21,7 @@
 #include "pipeline/case_file.h"
 #include "pipeline/catalogue.h"
 #include "pipeline/check.h"
+#include "pipeline/compare.h"
 #include "pipeline/phantom_file.h"
 #include "pipeline/render.h"
 #include "pipeline/report.h"
@@ -465,6 +466,16 @@ int run_command(int argc, const char* const* argv) {
   CLI::App* wires = app.add_subcommand("wires", "The wire catalogue with its sources");
   wires->footer("Example: wireplan wires");
   wires->callback([&] { code = print_wires(); });
+
+  std::vector<fs::path> reports;
+  CLI::App* compare = app.add_subcommand("compare", "Wires and plans of several reports");
+  compare->add_option("REPORT", reports, "report.json of two cases or more")
+      ->required()
+      ->expected(2, 100000);
+  compare->footer(
+      "The same patient with other wires, or many patients with the same.\n"
+      "Example: wireplan compare out/one/report.json out/two/report.json");
+  compare->callback([&] { std::cout << compare_reports(reports); });
 
   std::string scene_path, scene_output;
   CLI::App* simulate = app.add_subcommand("simulate", "One wire, its supports, loads and vessel");

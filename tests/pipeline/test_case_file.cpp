@@ -212,7 +212,7 @@ TEST_F(CaseFile, NamesEachMistakeWithItsRemedy) {
       {wires_with("/diameter_mm", 0.000889),
        {"wires[0].diameter_mm is 0.000889", "from 0.1 to 3", "given in m"}},
       {wires_with("/sections/0/bending_stiffness_n_mm2", -5),
-       {"wires[0].sections[0].bending_stiffness_n_mm2 is -5", "from 0.01 to 100000"}},
+       {"wires[0].sections[0].bending_stiffness_n_mm2 is -5", "from 0.01 to 1e+07"}},
       {wires_with("/sections", Json::array()), {"wires[0].sections is []"}},
       {"wires=[]", {"wires is []", "at least one"}},
       {"wires=[\"amplatz-stif\"]",
