@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <fstream>
 
 #include "plan/metrics.h"
@@ -25,10 +24,10 @@ double choose_lumen_offset(const Workspace& work) {
   return kVoxelPart * std::cbrt(product);
 }
 
-fs::path file_of(const fs::path& folder, int trial, std::size_t repeat) {
-  char name[48];
-  std::snprintf(name, sizeof name, "%04d-%05zu.json", trial, repeat);
-  return folder / name;
+// All that one repeat is made from: what the report reads, and which it is.
+std::string repeat_key_text(const Workspace& work, int trial, std::size_t repeat) {
+  return work.key_text +
+         key_text({{"repeated trial", std::to_string(trial)}, {"repeat", std::to_string(repeat)}});
 }
 
 std::optional<plan::Repeat> find_repeat(const fs::path& file) {
@@ -43,15 +42,15 @@ std::optional<plan::Repeat> find_repeat(const fs::path& file) {
                       .reason = json.at("reason")};
 }
 
-void write_repeat(const plan::Repeat& repeat, const fs::path& file) {
-  write_json({{"schema", kSchema},
-              {"success", repeat.success},
-              {"score", repeat.score},
-              {"peak_contact_force_n", repeat.peak_contact_force},
-              {"mean_contact_force_n", repeat.mean_contact_force},
-              {"peak_tip_force_n", repeat.peak_tip_force},
-              {"reason", repeat.reason}},
-             file);
+std::string repeat_text(const plan::Repeat& repeat) {
+  return Json({{"schema", kSchema},
+               {"success", repeat.success},
+               {"score", repeat.score},
+               {"peak_contact_force_n", repeat.peak_contact_force},
+               {"mean_contact_force_n", repeat.mean_contact_force},
+               {"peak_tip_force_n", repeat.peak_tip_force},
+               {"reason", repeat.reason}})
+      .dump();
 }
 
 Json spread_json(const plan::RepeatedPlan& plan, double plan::Repeat::*member) {
@@ -132,8 +131,6 @@ void add_repeats(Workspace& work, const std::vector<plan::Candidate>& candidates
   const simulate::VesselModel& vessel = work.model();
   const Centerline& path = work.path();
   const Case& given = work.given();
-  const fs::path folder = work.unfinished / "repeats";
-  fs::create_directories(folder);
 
   const std::size_t first = repeats.plans.size(), count = repeats.disturbances.size();
   for (const int trial : trials) {
@@ -147,16 +144,18 @@ void add_repeats(Workspace& work, const std::vector<plan::Candidate>& candidates
         const std::size_t k = static_cast<std::size_t>(slot) / trials.size();
         plan::RepeatedPlan& plan =
             repeats.plans[first + static_cast<std::size_t>(slot) % trials.size()];
-        const fs::path file = file_of(folder, plan.trial, k);
+        const std::string key = repeat_key_text(work, plan.trial, k);
         const double start = plan::thread_cpu_seconds();
-        std::optional<plan::Repeat> repeat = find_repeat(file);
+        const std::optional<fs::path> kept = work.store().find_piece(key);
+        std::optional<plan::Repeat> repeat;
+        if (kept) repeat = find_repeat(*kept);
         if (!repeat) {
           const simulate::TrialResult trial =
               plan::run_disturbed(study, candidates[static_cast<std::size_t>(plan.trial)], vessel,
                                   repeats.disturbances[k]);
           repeat = plan::judge_repeat(trial, plan::compute_metrics(trial, study, path), study,
                                       given.limits, given.weights);
-          write_repeat(*repeat, file);
+          work.store().keep_piece(key, repeat_text(*repeat));
         }
         plan.repeats[k] = *repeat;
         cpu_seconds[static_cast<std::size_t>(slot)] = plan::thread_cpu_seconds() - start;
