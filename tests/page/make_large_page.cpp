@@ -135,6 +135,32 @@ Json parameters() {
       {"limits", {{"tip_force_warn_n", 0.3}}}};
 }
 
+/// The five best plans, repeated under disturbances.
+Json robustness(const plan::Ranking& ranking) {
+  const Json spread = {{"low", 0.1}, {"median", 0.2}, {"high", 0.4}};
+  Json plans = Json::array();
+  for (std::size_t k = 0; k < 5; ++k) {
+    plans.push_back({{"trial", ranking.plans.at(k).trial},
+                     {"successes", 14},
+                     {"success_rate", 0.875},
+                     {"success_rate_interval", {0.64, 0.965}},
+                     {"mean_score", 0.3},
+                     {"peak_contact_force_n", spread},
+                     {"failures", {{{"repeat", 3}, {"reason", "the target was missed"}}}}});
+  }
+  return {{"repeats", 16},
+          {"seed", 1},
+          {"unknowns",
+           {{"friction_factor", {0.5, 2.0}},
+            {"wall_factor", {0.5, 2.0}},
+            {"angle_deg", 5.0},
+            {"entry_mm", 1.0},
+            {"lumen_mm", 0.3}}},
+          {"plans", plans},
+          {"sensitivity",
+           {{"explained", 0.8}, {"shares", {{{"unknown", "friction"}, {"share", 0.6}}}}}}};
+}
+
 std::string make_page(const std::string& name) {
   const Surface surface = shapes::straight_tube(kRadius, kLength, 0.93);
   Centerline path;
@@ -172,6 +198,7 @@ std::string make_page(const std::string& name) {
   }
   report.ranking =
       plan::rank(report.study, report.candidates, report.trials, report.metrics, {}, {});
+  report.robustness = robustness(report.ranking);
   report.timing = {{"threads", 1}, {"stages", Json::array()}, {"numerics", Json::array()}};
   for (Eigen::Index k = 0; k < surface.triangles.cols(); ++k)
     page.peak_force.push_back(draw(random));
