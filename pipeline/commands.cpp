@@ -509,8 +509,10 @@ int run_command(int argc, const char* const* argv) {
 
   std::string bench_name, bench_output = "wireplan-out/bench";
   BenchOptions bench_options;
-  CLI::App* bench = app.add_subcommand("bench", "Error against run time, stability, throughput, preprocessing");
-  bench->add_option("NAME", bench_name, "accuracy, stability, throughput or preprocess")->required();
+  CLI::App* bench =
+      app.add_subcommand("bench", "Error against run time, stability, throughput, preprocessing");
+  bench->add_option("NAME", bench_name, "accuracy, stability, throughput or preprocess")
+      ->required();
   bench->add_option("-o,--output", bench_output, "Folder for results [wireplan-out/bench]");
   bench->add_flag("--quick", bench_options.quick, "A small size, under 20 s");
   bench->add_option("--case", bench_options.case_path, "Throughput: the case whose vessel to take");

@@ -13,7 +13,7 @@
 namespace wireplan::dicom_files {
 
 /// What identifies the patient of every file made here.
-inline const std::vector<std::string> kPatient = {"DOE", "JANE", "PATIENT-4711", "19540321",
+inline const std::vector<std::string> kPatient = {"LOVELACE", "AUGUSTA", "PATIENT-4711", "19540321",
                                                   "20260115"};
 
 struct DicomSlice {
@@ -117,7 +117,7 @@ inline std::string dicom(const DicomSlice& slice) {
   element(bytes, 0x08, 0x18, "UI", instance);
   element(bytes, 0x08, 0x60, "CS", "CT");
   element(bytes, 0x08, 0x20, "DA", "20260115");
-  element(bytes, 0x10, 0x10, "PN", "DOE^JANE");
+  element(bytes, 0x10, 0x10, "PN", "LOVELACE^AUGUSTA");
   element(bytes, 0x10, 0x20, "LO", "PATIENT-4711");
   element(bytes, 0x10, 0x30, "DA", "19540321");
   element(bytes, 0x20, 0x0d, "UI", "1.2.3");

@@ -120,6 +120,7 @@ Json figures(const Surface& surface) {
             {"normal_stiffness_kpa_per_mm", 25.0}}},
           {"trials",
            {{"warnings", none},
+            {"scout", nullptr},
             {"lumen_grid_mm", 1.0},
             {"lumen_max_deviation_mm", 0.1},
             {"lumen_mean_deviation_mm", 0.01}}}};
@@ -178,6 +179,7 @@ std::string make_page(const std::string& name) {
   report.figures = figures(surface);
   report.study = make_study();
   report.candidates = plan::list_candidates(report.study);
+  report.scouted.resize(report.candidates.size());
 
   PageInput page;
   page.surface = surface;

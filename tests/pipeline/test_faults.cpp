@@ -129,7 +129,7 @@ TEST_F(Faults, AnArtifactThatVanishesBetweenStagesIsNamedAndMadeAgain) {
         << error.what();
   }
   options.on_stage = {};
-  EXPECT_EQ(run_stages(given, options).stages.size(), 5u);
+  EXPECT_EQ(run_stages(given, options).stages.size(), 6u);
 }
 
 TEST_F(Faults, AnInputThatVanishesIsNamed) {
@@ -288,7 +288,8 @@ std::map<fs::path, std::pair<ino_t, std::int64_t>> kept_trials(const fs::path& c
 std::vector<std::string> write_many_trials(const fs::path& folder) {
   Json file = read_json(folder / "case.json", "wireplan.case/1");
   file["access"]["azimuth_deg"] = {0, 45, 90, 135, 180, 225, 270, 315};
-  std::vector<std::string> stages = {"surface", "centerline", "wall", "trials", "report"};
+  std::vector<std::string> stages = {"surface", "centerline", "wall",
+                                     "trials",  "manoeuvres", "report"};
 #ifdef WIREPLAN_IMAGING
   write_two_tubes(folder / "ct.nrrd");
   file = volume_case(file);
@@ -389,7 +390,7 @@ TEST_F(Faults, TwoProcessesOnOneCaseMakeEachStageOnce) {
       EXPECT_EQ(second.wait(), 0);
     }
     const std::string logs = read_text(folder_ / "a.txt") + read_text(folder_ / "b.txt");
-    for (const char* stage : {"surface", "centerline", "wall", "trials", "report"}) {
+    for (const char* stage : {"surface", "centerline", "wall", "trials", "manoeuvres", "report"}) {
       std::string line = stage;
       line.resize(10, ' ');
       EXPECT_EQ(count(logs, line + "  made"), 1) << logs;

@@ -206,7 +206,8 @@ class StageKeys : public testing::Test {
   }
 
   TemporaryFolder folder_;
-  const std::vector<std::string> all_ = {"surface", "centerline", "wall", "trials", "report"};
+  const std::vector<std::string> all_ = {"surface", "centerline", "wall",
+                                         "trials",  "manoeuvres", "report"};
 };
 
 TEST_F(StageKeys, ASecondRunRunsNoStage) {
@@ -264,8 +265,9 @@ class RerunMatrix : public testing::Test {
 // What every case has, whatever it starts from.
 std::map<std::string, std::vector<std::string>> common_table() {
   using Names = std::vector<std::string>;
-  const Names report = {"report"}, trials = {"trials", "report"}, wall = {"wall", "report"};
-  const Names ends = {"centerline", "trials", "report"};
+  const Names report = {"report"}, trials = {"trials", "manoeuvres", "report"},
+              wall = {"wall", "report"};
+  const Names ends = {"centerline", "trials", "manoeuvres", "report"};
   std::map<std::string, Names> table = {{"/name", report},
                                         {"/surface/edge_length_mm", {"surface", "report"}},
                                         {"/wall/model", trials},
@@ -276,7 +278,9 @@ std::map<std::string, std::vector<std::string>> common_table() {
                                         {"/access/inclination_deg/0", trials},
                                         {"/access/azimuth_deg/0", trials},
                                         {"/tip_roll_deg/0", trials},
-                                        {"/friction", trials}};
+                                        {"/friction", trials},
+                                        {"/manoeuvres", {"manoeuvres", "report"}},
+                                        {"/search/exhaustive", report}};
   for (const char* k : {"0", "1", "2"}) {
     table[std::string("/access/point_mm/") + k] = ends;
     table[std::string("/target/point_mm/") + k] = ends;
@@ -293,7 +297,10 @@ std::map<std::string, std::vector<std::string>> common_table() {
   for (const char* key :
        {"limits/tip_force_warn_n", "limits/tip_force_fail_n", "limits/penetration_fail_mm",
         "limits/off_path_fail_mm", "ranking/weights/reach", "ranking/weights/peak_force",
-        "ranking/weights/mean_force", "ranking/weights/margin"}) {
+        "ranking/weights/mean_force", "ranking/weights/margin", "robustness/repeats",
+        "robustness/plans", "robustness/seed", "robustness/friction_factor/0",
+        "robustness/friction_factor/1", "robustness/wall_factor/0", "robustness/wall_factor/1",
+        "robustness/angle_deg", "robustness/entry_mm", "robustness/lumen_mm"}) {
     table[std::string("/") + key] = report;
   }
   return table;
@@ -303,7 +310,12 @@ Json common_changes() {
   return {{"/wall/model", "rigid"},
           {"/wall/poisson_ratio", 0.4},
           {"/insertion/residual_tolerance_n", 1e-5},
-          {"/insertion/max_iterations", 150}};
+          {"/insertion/max_iterations", 150},
+          {"/manoeuvres", "never"},
+          {"/search/exhaustive", true},
+          {"/robustness/repeats", 17},
+          {"/robustness/plans", 4},
+          {"/robustness/seed", 8}};
 }
 
 Json case_with_every_list_of_one(const fs::path& folder) {
@@ -331,13 +343,22 @@ TEST_F(RerunMatrix, OfACaseThatStartsFromAVolume) {
   for (const char* name : {"ct.nrrd", "other.nrrd"}) write_text("values", folder_ / name);
   file["volume"] = {{"path", "ct.nrrd"}};
   file["surface"] = {{"edge_length_mm", 1.5}};
-  file["segmentation"] = {
-      {"lower_hu", 150}, {"upper_hu", 500}, {"seeds_mm", Json::array({{10, 20, 18}})}};
+  file["segmentation"] = {{"lower_hu", 150},
+                          {"upper_hu", 500},
+                          {"seeds_mm", Json::array({{10, 20, 18}})},
+                          {"smoothing_mm", 0},
+                          {"neck_opening_mm", 0}};
   auto table = common_table();
   table["/volume/path"] = {"report"};
   for (const char* key : {"lower_hu", "upper_hu", "seeds_mm/0/0", "seeds_mm/0/1", "seeds_mm/0/2",
                           "smoothing_mm", "neck_opening_mm"}) {
     table[std::string("/segmentation/") + key] = {"segment", "report"};
+  }
+  for (const char* end : {"/access/point_mm/", "/target/point_mm/"}) {  // seeds too
+    for (const char* k : {"0", "1", "2"}) {
+      auto& stages = table[std::string(end) + k];
+      stages.insert(stages.begin(), "segment");
+    }
   }
   Json changes = common_changes();
   changes["/volume/path"] = "other.nrrd";
@@ -347,7 +368,7 @@ TEST_F(RerunMatrix, OfACaseThatStartsFromAVolume) {
 TEST_F(StageKeys, AChangeRerunsAlsoWhatReadsWhatItChanges) {
   run({});
   EXPECT_EQ(not_cached(run({"wall.thickness_mm=2"})),
-            (std::vector<std::string>{"wall", "trials", "report"}));
+            (std::vector<std::string>{"wall", "trials", "manoeuvres", "report"}));
 }
 
 TEST_F(StageKeys, TrialsInARigidVesselDoNotReadItsWall) {
@@ -368,7 +389,7 @@ TEST_F(StageKeys, AStageThatComesOutTheSameStopsTheCascade) {
 TEST_F(StageKeys, ADryRunSaysWhatWouldRunAndWhyAndRunsNothing) {
   run({});
   const RunResult dry = run({"wall.thickness_mm=2"}, /*dry=*/true);
-  EXPECT_EQ(not_cached(dry), (std::vector<std::string>{"wall", "trials", "report"}));
+  EXPECT_EQ(not_cached(dry), (std::vector<std::string>{"wall", "trials", "manoeuvres", "report"}));
   EXPECT_EQ(dry.stages[2].reasons,
             std::vector<std::string>{"parameter wall.thickness_mm: 1.0 -> 2.0"});
   ASSERT_EQ(dry.stages[3].reasons.size(), 1u);
@@ -401,7 +422,8 @@ TEST_F(StageKeys, AnInterruptedRunGoesOnFromItsFinishedTrials) {
     counts.push_back(done);
     EXPECT_EQ(total, 2);
   };
-  EXPECT_EQ(not_cached(run_stages(given, options)), (std::vector<std::string>{"trials", "report"}));
+  EXPECT_EQ(not_cached(run_stages(given, options)),
+            (std::vector<std::string>{"trials", "manoeuvres", "report"}));
   EXPECT_EQ(counts, std::vector<int>{2});
 }
 
@@ -470,8 +492,9 @@ TEST_F(StageKeys, AnInterruptedReportKeepsItsRepeats) {
   options.work.cancelled = [&] { return stop; };
   EXPECT_THROW(run_stages(given, options), Interrupted);
   int kept = 0;
-  for (const auto& entry : fs::recursive_directory_iterator(folder_ / "cache" / "report")) {
-    kept += entry.path().parent_path().filename() == "repeats" ? 1 : 0;
+  for (const auto& entry : fs::recursive_directory_iterator(folder_ / "cache" / "pieces")) {
+    if (!entry.is_regular_file()) continue;
+    kept += read_text(entry.path()).find("wireplan.repeat/") != std::string::npos ? 1 : 0;
   }
   EXPECT_EQ(kept, 3);
 
