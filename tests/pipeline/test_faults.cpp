@@ -327,7 +327,7 @@ TEST_F(Faults, AKilledRunGoesOnAndComputesNoFinishedTrialTwice) {
   }
   const std::string expected = report_without_timing(folder_ / "out" / "report.json");
   const std::size_t trials = kept_trials(cache()).size();
-  EXPECT_EQ(trials, 9u);  // one along the axis, eight askew
+  EXPECT_GE(trials, 9u);  // one along the axis, eight askew; more where scouts go before them
 
   // Kills at random moments of each stage in turn, then a run to the end; over and over.
   const int wanted = long_tests() ? 100 : 7;
