@@ -62,20 +62,25 @@ case_cache=$PWD/build/case-cache
 rm -rf "$case_cache"
 run_bundled_case() { XDG_CACHE_HOME=$case_cache bash cases/demo.sh; }
 
-# A real volume, where the data lie beside the checkout.
-run_real_case() {
-  local data=${WIREPLAN_DATA:-../shared/data}
-  if [[ ! -d "$data/mra-aorta-iliac-vmtk" ]]; then
-    echo "not run: no mra-aorta-iliac-vmtk in $data (set WIREPLAN_DATA)"
-    return 0
-  fi
-  XDG_CACHE_HOME=$case_cache build/release/pipeline/wireplan run cases/aorta-iliac-mra
+# Real anatomy, where the data lie beside the checkout: a volume to its centerline, and a surface to
+# its report.
+run_real_cases() {
+  local data=${WIREPLAN_DATA:-../shared/data} folder
+  for folder in mra-aorta-iliac-vmtk surface-coronary-left; do
+    if [[ ! -d "$data/$folder" ]]; then
+      echo "not run: no $folder in $data (set WIREPLAN_DATA)"
+      return 0
+    fi
+  done
+  local -x XDG_CACHE_HOME=$case_cache
+  build/release/pipeline/wireplan run cases/aorta-iliac-mra --to centerline &&
+    build/release/pipeline/wireplan run cases/coronary-left
 }
 
 # The pages of these cases' reports in a browser.
 check_pages() {
   local pages=() name
-  for name in abdomen aorta-iliac-mra; do
+  for name in abdomen coronary-left; do
     [[ -f wireplan-out/$name/report.html ]] && pages+=("wireplan-out/$name/report.html")
   done
   if ((${#pages[@]} == 0)); then
@@ -93,7 +98,7 @@ step "formatting" check_formatting
 step "release build" bash tests/build.sh release
 step "tests" run_suite release
 step "bundled case" run_bundled_case
-step "aorta-iliac-mra" run_real_case
+step "cases on real data" run_real_cases
 step "pages in a browser" check_pages
 step "build without ITK" bash tests/build.sh surface-only
 step "tests without ITK" run_suite surface-only
