@@ -36,7 +36,8 @@ export const heatSection = (page, selection) => {
       (rough ? ", by a coarse trial" : "") + (t.reached && !ranked ? `, not ranked: ${t.excluded ?? "coarse"}` : "");
     return el("td", {},
       el("button", {
-        type: "button", tabindex: "-1", "data-trial": t.id, title: what, "aria-label": what,
+        type: "button", tabindex: "-1", "data-trial": t.id, title: what,
+        "aria-label": `${text}: ${what}`,  // what is seen must be in the name
         class: t.reached ? "cell" : "cell failed",
         style: color ? `background:${color};color:${inkOn(color)}` : null,
         onclick: () => selection.set(t.id),
