@@ -105,7 +105,8 @@ std::vector<std::size_t> find_ways(const Inside& inside, const std::vector<std::
   cost[ends.front()] = 0.0F;
   queue.push({0.0F, ends.front()});
   while (!queue.empty()) {
-    const auto [reached_at, n] = queue.top();
+    const float reached_at = queue.top().first;
+    const std::size_t n = queue.top().second;
     queue.pop();
     if (reached_at > cost[n]) {
       continue;
@@ -166,7 +167,8 @@ void flood_by_width(const Inside& inside, const std::vector<std::size_t>& starts
     reach(start, start, std::numeric_limits<float>::infinity());
   }
   while (!queue.empty()) {
-    const auto [width, n] = queue.top();
+    const float width = queue.top().first;
+    const std::size_t n = queue.top().second;
     queue.pop();
     for_each_inside(inside, n, [&](std::size_t m, double) { reach(m, n, width); });
   }
