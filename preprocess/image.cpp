@@ -293,8 +293,9 @@ void require_finite_nifti(const fs::path& path) {
   }
 }
 
-/// MetaIO frees what it read twice where a header breaks off in the middle of it, so the lines are
-/// looked through first: "Key = value" of plain text, no key twice, to ElementDataFile.
+/// MetaIO frees what it read twice where a header breaks off in the middle of it, and ITK reads
+/// past its arrays where there are no dimensions, so the lines are looked through first: "Key =
+/// value" of plain text, no key twice, to ElementDataFile; 2 to 4 dimensions.
 void require_meta_header(const fs::path& path, const std::string& no_image) {
   std::ifstream file(path, std::ios::binary);
   std::set<std::string> keys;
@@ -304,9 +305,14 @@ void require_meta_header(const fs::path& path, const std::string& no_image) {
     const bool plain = std::all_of(line.begin(), line.end(), [](char c) {
       return (c >= ' ' && c <= '~') || c == '\t' || c == '\r';
     });
-    if (!plain || end == std::string::npos ||
-        line.find('=', end) > line.find_first_not_of(' ', end) || !keys.insert(key).second) {
+    const std::size_t equals = line.find('=');
+    if (!plain || equals == std::string::npos || equals > line.find_first_not_of(' ', end) ||
+        !keys.insert(key).second) {
       throw Error(path.string() + ": " + no_image);
+    }
+    if (key == "NDims") {
+      const int dimensions = std::atoi(line.c_str() + equals + 1);
+      if (dimensions < 2 || dimensions > 4) throw Error(path.string() + ": " + no_image);
     }
   }
   for (const char* key : {"NDims", "DimSize", "ElementType", "ElementDataFile"}) {

@@ -54,7 +54,7 @@ fuzz_parsers() {
   fi
   bash tests/build.sh fuzz
   bash tests/fuzz/run.sh 20000 case scene report
-  bash tests/fuzz/run.sh 4000 surface volume
+  bash tests/fuzz/run.sh 4000 surface
 }
 
 # Cases start from nothing, not from what earlier runs left in the user's cache.

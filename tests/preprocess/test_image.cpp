@@ -246,6 +246,10 @@ TEST_F(ImageFile, AMetaImageWhoseHeaderBreaksOffIsRefusedBeforeItsLibraryReadsIt
   for (const std::string middle : {"sizes: 2 2 2\n", "\n", "Off\xff = 0 0 0\n", "NDims = 3\n"}) {
     EXPECT_TRUE(has(read_error(write("broken.mha", head + middle + tail)), "broken.mha: "));
   }
+  for (const std::string dimensions : {"= 0", "= -1", "= 9", "= many", ""}) {
+    const std::string broken = "ObjectType = Image\nNDims " + dimensions + "\n" + tail;
+    EXPECT_TRUE(has(read_error(write("broken.mha", broken)), "broken.mha: "));
+  }
 }
 
 TEST_F(ImageFile, NiftiIsScaledAndTurnedFromRasToLps) {
