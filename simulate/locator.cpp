@@ -184,7 +184,7 @@ SurfacePoint TriangleLocator::nearest(const Vec3& point) const {
 
 SurfacePoint TriangleLocator::pierced(const Vec3& point, const Vec3& direction) const {
   constexpr int kMostSteps = 10;
-  const SurfacePoint start = nearest(point);
+  SurfacePoint start = nearest(point);
   std::int32_t triangle = start.triangle;
   for (int step = 0; step < kMostSteps && triangle >= 0; ++step) {
     const std::array<Vec3, 3> corner = corners(triangle);
