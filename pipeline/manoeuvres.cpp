@@ -56,7 +56,8 @@ std::vector<plan::Candidate> find_starts(Workspace& work,
 std::vector<plan::Candidate> list_tried(Workspace& work) {
   std::vector<plan::Candidate> tried = plan::list_candidates(work.study());
   const std::size_t straight = tried.size();
-  for (const Json& script : work.figures("manoeuvres").at("scripts")) {
+  const Json figures = work.figures("manoeuvres");
+  for (const Json& script : figures.at("scripts")) {
     plan::Candidate candidate = tried.at(script.at("start"));
     expects(script.at("start") < straight);
     candidate.moves = moves_of(script.at("moves"));
