@@ -19,13 +19,11 @@
 #include "pipeline/plot.h"
 #include "preprocess/centerline.h"
 #include "preprocess/phantom.h"
+#include "preprocess/segment.h"
 #include "preprocess/surface.h"
 #include "preprocess/wall.h"
 #include "simulate/openings.h"
 #include "simulate/vessel_model.h"
-#ifdef WIREPLAN_IMAGING
-#include "preprocess/segment.h"
-#endif
 
 namespace wireplan::pipeline {
 namespace {
@@ -231,12 +229,7 @@ Picture plot_of(const std::vector<Json>& rows) {
 
 }  // namespace
 
-BenchReport bench_preprocess([[maybe_unused]] const BenchOptions& options) {
-#ifndef WIREPLAN_IMAGING
-  throw Error(
-      "bench: preprocess needs images, and this wireplan is built without them; configure " +
-      std::string("with -DWIREPLAN_IMAGING=ON"));
-#else
+BenchReport bench_preprocess(const BenchOptions& options) {
   const preprocess::PhantomSpec spec = abdomen(options.quick);
   const Truth truth(spec);
   const fs::path file =
@@ -323,7 +316,6 @@ BenchReport bench_preprocess([[maybe_unused]] const BenchOptions& options) {
                 format(" and %g MB\n", kAimMegabytes);
   report.plot = plot_of(report.rows);
   return report;
-#endif
 }
 
 }  // namespace wireplan::pipeline
