@@ -192,6 +192,7 @@ TEST(Bench, TubeOfTheFigureCaseIsThatOfTheBench) {
   EXPECT_EQ(make_paper_tube().surface.triangles.cols(), 1160);  // as in the paper's Fig. 5
 }
 
+#ifdef WIREPLAN_IMAGING
 TEST(Bench, PreprocessTellsTimeMemoryAndErrorOfEachStep) {
   const QuickRun preprocess("preprocess");
   const Json& rows = preprocess.result.at("rows");
@@ -206,6 +207,17 @@ TEST(Bench, PreprocessTellsTimeMemoryAndErrorOfEachStep) {
   EXPECT_EQ(preprocess.result.at("results").at("self_intersections"), 0);
   expect_written(preprocess, "preprocess", "surface_error_mm");
 }
+#else
+TEST(Bench, PreprocessSaysThatItNeedsImages) {
+  const TemporaryFolder folder;
+  try {
+    run_bench("preprocess", folder.path(), {.quick = true});
+    FAIL() << "no error";
+  } catch (const Error& error) {
+    EXPECT_NE(std::string(error.what()).find("-DWIREPLAN_IMAGING=ON"), std::string::npos);
+  }
+}
+#endif
 
 TEST(Bench, CaseIsForThroughputAlone) {
   const TemporaryFolder folder;
