@@ -1,7 +1,7 @@
 // What goes wrong while the program runs: the disk refuses, files are damaged or vanish, the
 // program is killed, two run at once. Nothing damaged is trusted, nothing finished is lost, and the
-// report comes out the same. WIREPLAN_LONG_TESTS=1 takes every write, 100 kills and 20 pairs of
-// processes.
+// report comes out the same. WIREPLAN_LONG_TESTS=1 takes every write, every damage, 100 kills of
+// the bundled case and 20 pairs of processes.
 #include <fcntl.h>
 #include <gtest/gtest.h>
 #include <sys/stat.h>
@@ -284,15 +284,22 @@ std::map<fs::path, std::pair<ino_t, std::int64_t>> kept_trials(const fs::path& c
   return trials;
 }
 
-// A volume of a tube, where imaging is built, so that all stages run; many short trials.
+// A volume of a tube, where imaging is built, so that all stages run; many short trials. In long
+// tests the bundled case.
 std::vector<std::string> write_many_trials(const fs::path& folder) {
   Json file = read_json(folder / "case.json", "wireplan.case/1");
   file["access"]["azimuth_deg"] = {0, 45, 90, 135, 180, 225, 270, 315};
   std::vector<std::string> stages = {"surface", "centerline", "wall",
                                      "trials",  "manoeuvres", "report"};
 #ifdef WIREPLAN_IMAGING
-  write_two_tubes(folder / "ct.nrrd");
-  file = volume_case(file);
+  if (long_tests()) {
+    const std::string abdomen = std::string(WIREPLAN_SOURCE_DIR) + "/cases/abdomen/";
+    EXPECT_EQ(run_program(folder, "phantom '" + abdomen + "phantom.json' -o phantom").code, 0);
+    file = read_json(abdomen + "case.json", "wireplan.case/1");
+  } else {
+    write_two_tubes(folder / "ct.nrrd");
+    file = volume_case(file);
+  }
   stages.insert(stages.begin(), {"volume", "segment"});
 #endif
   write_json(file, folder / "case.json");
