@@ -420,8 +420,16 @@ std::string describe_best(const Json& report) {
   const Json& ranking = report.at("ranking");
   const Json& trials = report.at("trials");
   if (ranking.empty()) {
+    const auto scouted = std::count_if(trials.begin(), trials.end(), [](const Json& trial) {
+      return trial.value("level", "full") == "scout";
+    });
     return "no plan reaches the target within the limits: " + std::to_string(trials.size()) +
-           " trials; the report says why for each";
+           " trials" +
+           (scouted > 0 ? ", " + std::to_string(scouted) +
+                              " of them with long elements and a rigid wall only (--exhaustive "
+                              "runs all in full)"
+                        : "") +
+           "; the report says why for each";
   }
   const Json& best = ranking.front();
   const std::string script = best.value("script", "");

@@ -17,7 +17,9 @@ constexpr double kLongestPush = 2.0;      //                                    
 constexpr double kScoutTolerance = 1e-4;  //                                                [N]
 constexpr std::size_t kNoScouting = 8;
 constexpr std::size_t kAlways = 5;        // the best so many are run in full
-constexpr std::size_t kAtOnce = 8;        // while no plan is found
+constexpr std::size_t kAtOnce = 8;        // while no plan is found ...
+constexpr std::size_t kGiveUpAfter = 32;  // ... until so many were run in full, ...
+constexpr std::size_t kGiveUpPart = 8;    // ... or one in so many, and none is left that reached
 constexpr std::size_t kCheckedPart = 16;  // of those that failed, one in so many is looked at
 
 /// Whether the scout itself may be why the candidate did not reach.
@@ -126,8 +128,12 @@ std::vector<int> choose_next(const Study& study, const std::vector<Candidate>& c
   if (!next.empty() || best) return next;
 
   // No plan yet.
+  const auto known = static_cast<std::size_t>(
+      std::count_if(full.begin(), full.end(), [](const auto& run) { return run.has_value(); }));
+  const bool enough = known >= std::max(kGiveUpAfter, full.size() / kGiveUpPart);
   for (const int k : order) {
-    if (!is_known(k) && next.size() < kAtOnce) next.push_back(k);
+    const bool worth = !enough || scout(k).reached;
+    if (worth && !is_known(k) && next.size() < kAtOnce) next.push_back(k);
   }
   std::sort(next.begin(), next.end());
   return next;

@@ -35,11 +35,11 @@ Sighting look_at(const simulate::TrialResult& trial, const Metrics& metrics, con
 ///   1. the five that score best;
 ///   2. of each wire its best, or the nearest where none reached;
 ///   3. of those that did not reach one in 16, rounded up, nearest first, for which the scout may
-///   be
-///      at fault: without equilibrium, or within two radii of the goal;
+///      be at fault: without equilibrium, or within two radii of the goal;
 ///   4. all that reached with a score that may beat the best full plan: by no more than the scout
 ///      was ever found to be off, and at least by kScoutMargin;
-///   5. while no full run is a plan, eight more, the best and then the nearest first, up to all.
+///   5. while no full run is a plan, eight more, the best and then the nearest first: all whose
+///      scout reached, and of the others until 32 or an eighth of all were run.
 std::vector<int> choose_next(const Study& study, const std::vector<Candidate>& candidates,
                              const std::vector<Sighting>& scouts,
                              const std::vector<std::optional<Sighting>>& full);

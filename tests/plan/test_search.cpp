@@ -105,15 +105,30 @@ TEST(ChooseNext, ChecksFailuresThatMayBeTheScouts) {
   EXPECT_EQ(next.size(), 7u);
 }
 
-TEST(ChooseNext, RunsAllBeforeItSaysThatNonePlanReaches) {
+TEST(ChooseNext, RunsTheNearestAndAllThatReachedBeforeItSaysThatNoPlanReaches) {
   Bench bench;
-  for (int k = 0; k < 40; ++k) bench.fail(k % 2, 50.0 + k);
-  EXPECT_EQ(bench.search(), 40);
+  for (int k = 0; k < 30; ++k) bench.fail(k % 2, 50.0 + k);
+  EXPECT_EQ(bench.search(), 30);
   // And finds the one that the scout saw fail furthest from the target.
   for (auto& run : bench.full) run.reset();
-  bench.truth[39] = Sighting{.reached = true, .plan = true, .score = 0.5};
+  bench.truth[29] = Sighting{.reached = true, .plan = true, .score = 0.5};
   bench.search();
-  EXPECT_TRUE(bench.full[39]->plan);
+  EXPECT_TRUE(bench.full[29]->plan);
+
+  // Of many it gives up after some: the nearest.
+  Bench large;
+  for (int k = 0; k < 200; ++k) large.fail(0, 250.0 - k);
+  EXPECT_EQ(large.search(), 33);  // the best of its wire, then eight at a time
+  for (int k = 0; k < 200; ++k) EXPECT_EQ(large.full[k].has_value(), k >= 167) << k;
+
+  // But not while there is one that the scout saw reach: the last of 50 is a plan.
+  for (int k = 0; k < 50; ++k) {
+    large.reach(0, 0.3 + 0.01 * k, 0.5);
+    large.truth.back() = Sighting{.nearest = 30.0};
+  }
+  large.truth.back() = Sighting{.reached = true, .plan = true, .score = 0.8};
+  large.search();
+  EXPECT_TRUE(large.full.back() && large.full.back()->plan);
 }
 
 TEST(ScoutErrorOf, CountsWhatTheScoutSawWrong) {

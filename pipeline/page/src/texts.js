@@ -35,9 +35,11 @@ export const answerSection = (page) => {
   if (!best) {
     const counts = new Map();
     for (const t of trials) counts.set(t.outcome, (counts.get(t.outcome) ?? 0) + 1);
+    const scouted = trials.filter((t) => t.level === "scout").length;
     return section("answer", "The answer",
       el("p", {class: "answer"}, `No plan reaches the target within the limits: of ${plural(trials.length, "trial")} `,
-        [...counts].map(([outcome, count]) => `${count} ${outcomeWord(outcome)}`).join(", "), "."));
+        [...counts].map(([outcome, count]) => `${count} ${outcomeWord(outcome)}`).join(", "),
+        scouted ? `. ${scouted} of them were run with long elements and a rigid wall only; --exhaustive runs all in full.` : "."));
   }
   const t = trials[best.trial], errors = t.errors;
   const ties = best.tied_with.length;
