@@ -113,6 +113,7 @@ const checkPage = (title, file) => {
       for (const angle of ["Inclination", "Azimuth", "Roll"]) {
         if (new Set(await column(page, angle)).size > 1) title = angle;
       }
+      assert.ok(title, "the case varies an angle");
       await page.click(`#plans th button:text-is("${title}")`);
       const rising = (await column(page, title)).map(parseFloat);
       assert.ok(new Set(rising).size > 1, "there is something to sort");
