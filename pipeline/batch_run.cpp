@@ -25,6 +25,7 @@
 #include "pipeline/commands.h"
 #include "pipeline/report.h"
 #include "pipeline/stages.h"
+#include "pipeline/text.h"
 
 namespace wireplan::pipeline {
 namespace {
@@ -295,9 +296,7 @@ class BatchRun {
     if (!row.at("summary").is_null()) line += row.at("summary").get<std::string>();
     if (row.at("summary").is_null()) line += outcome;
     if (!reason.empty()) line += ": " + first_line(reason);
-    std::array<char, 32> seconds{};
-    std::snprintf(seconds.data(), seconds.size(), " (%.1f s)", patient.wall_s);
-    options_.on_line(line + seconds.data());
+    options_.on_line(line + format(" (%.1f s)", patient.wall_s));
   }
 
   void stop_all() {

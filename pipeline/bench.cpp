@@ -9,6 +9,7 @@
 #include "pipeline/commands.h"
 #include "pipeline/disk.h"
 #include "pipeline/report.h"
+#include "pipeline/text.h"
 #include "preprocess/vessel_io.h"
 
 namespace wireplan::pipeline {
@@ -59,20 +60,7 @@ std::string table_text(const std::vector<Json>& rows) {
     lines.emplace_back();
     for (const auto& [key, value] : row.items()) lines.back().push_back(cell_text(value));
   }
-  std::vector<std::size_t> width(lines.front().size(), 0);
-  for (const auto& line : lines) {
-    for (std::size_t k = 0; k < line.size(); ++k) width[k] = std::max(width[k], line[k].size());
-  }
-  std::string text;
-  for (const auto& line : lines) {
-    std::string row;
-    for (std::size_t k = 0; k < line.size(); ++k) {
-      row += line[k] + std::string(width[k] - line[k].size() + 2, ' ');
-    }
-    row.erase(row.find_last_not_of(' ') + 1);
-    text += row + "\n";
-  }
-  return text;
+  return format_table(lines);
 }
 
 double thread_milliseconds() {

@@ -6,6 +6,7 @@
 
 #include "pipeline/bench_report.h"
 #include "pipeline/plot.h"
+#include "pipeline/text.h"
 #include "simulate/dynamics.h"
 #include "simulate/solver.h"
 

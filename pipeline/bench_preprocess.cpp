@@ -17,6 +17,7 @@
 
 #include "pipeline/bench_report.h"
 #include "pipeline/plot.h"
+#include "pipeline/text.h"
 #include "preprocess/centerline.h"
 #include "preprocess/phantom.h"
 #include "preprocess/segment.h"

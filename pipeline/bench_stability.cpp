@@ -8,6 +8,7 @@
 #include "pipeline/bench_report.h"
 #include "pipeline/bench_walls.h"
 #include "pipeline/plot.h"
+#include "pipeline/text.h"
 #include "simulate/dynamics.h"
 #include "simulate/solver.h"
 #include "simulate/trial.h"

@@ -11,6 +11,7 @@
 #include "pipeline/bench_walls.h"
 #include "pipeline/plot.h"
 #include "pipeline/stages.h"
+#include "pipeline/text.h"
 #include "plan/batch.h"
 #include "preprocess/centerline.h"
 #include "preprocess/wall.h"

@@ -11,7 +11,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstdio>
 
 #include "pipeline/disk.h"
 #include "preprocess/base.h"
@@ -117,12 +116,6 @@ void draw_line(Picture& picture, const Eigen::Vector2d& a, const Eigen::Vector2d
       }
     }
   }
-}
-
-std::string format(const char* pattern, double value) {
-  std::array<char, 64> text{};
-  std::snprintf(text.data(), text.size(), pattern, value);
-  return text.data();
 }
 
 std::string encode_png(const Picture& picture) {

@@ -41,9 +41,6 @@ enum class Align { kLeft, kCenter, kRight };
 void draw_text(Picture& picture, const std::string& text, int x, int y, int size, Align align,
                const Color& color = kInk);
 
-/// One number in the manner of printf, e.g. "%g mm".
-std::string format(const char* pattern, double value);
-
 /// The bytes of a PNG file.
 std::string encode_png(const Picture& picture);
 

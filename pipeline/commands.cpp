@@ -6,11 +6,9 @@
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
-#include <array>
 #include <atomic>
 #include <chrono>
 #include <csignal>
-#include <cstdio>
 #include <fstream>
 #include <iostream>
 #include <memory>
@@ -27,6 +25,7 @@
 #include "pipeline/report.h"
 #include "pipeline/scene_run.h"
 #include "pipeline/stages.h"
+#include "pipeline/text.h"
 
 namespace wireplan::pipeline {
 namespace {
@@ -43,13 +42,6 @@ static_assert(std::atomic<bool>::is_always_lock_free);
 void ask_to_stop(int signal) {
   stop_asked = true;
   std::signal(signal, SIG_DFL);
-}
-
-template <typename... Values>
-std::string format(const char* pattern, Values... values) {
-  std::array<char, 512> text{};
-  std::snprintf(text.data(), text.size(), pattern, values...);
-  return text.data();
 }
 
 std::shared_ptr<spdlog::logger> make_log() {

@@ -1,44 +1,19 @@
 #include "pipeline/compare.h"
 
 #include <algorithm>
-#include <array>
-#include <cstdio>
 #include <tuple>
 
 #include "pipeline/json_reader.h"
 #include "pipeline/report.h"
+#include "pipeline/text.h"
 
 namespace wireplan::pipeline {
 namespace {
 
 constexpr std::size_t kPlansListed = 10;
 
-template <typename... Values>
-std::string format(const char* pattern, Values... values) {
-  std::array<char, 256> text{};
-  std::snprintf(text.data(), text.size(), pattern, values...);
-  return text.data();
-}
-
 std::string number(const Json& value, const char* pattern) {
   return value.is_null() ? "-" : format(pattern, value.get<double>());
-}
-
-/// Cells in columns as wide as their widest, two spaces apart.
-std::string table(const std::vector<std::vector<std::string>>& rows) {
-  std::vector<std::size_t> width(rows.front().size(), 0);
-  for (const auto& row : rows) {
-    for (std::size_t k = 0; k < row.size(); ++k) width[k] = std::max(width[k], row[k].size());
-  }
-  std::string text;
-  for (const auto& row : rows) {
-    std::string line;
-    for (std::size_t k = 0; k < row.size(); ++k) {
-      line += row[k] + std::string(width[k] - row[k].size() + 2, ' ');
-    }
-    text += line.substr(0, line.find_last_not_of(' ') + 1) + "\n";
-  }
-  return text;
 }
 
 const Json& parameter(const Json& report, const char* pointer) {
@@ -101,7 +76,7 @@ std::string list_reports(const std::vector<Json>& reports) {
     }
     rows.push_back(std::move(row));
   }
-  return table(rows);
+  return format_table(rows);
 }
 
 /// Wires in the order in which reports name them first.
@@ -138,7 +113,7 @@ std::string list_wire_table(const std::vector<Json>& reports) {
     for (const Json& report : reports) row.push_back(wire_cell(report, name));
     rows.push_back(std::move(row));
   }
-  return table(rows);
+  return format_table(rows);
 }
 
 std::string list_best_plans(const std::vector<Json>& reports) {
@@ -165,7 +140,7 @@ std::string list_best_plans(const std::vector<Json>& reports) {
     row.insert(row.end(), cells.begin(), cells.end());
     rows.push_back(std::move(row));
   }
-  return table(rows);
+  return format_table(rows);
 }
 
 }  // namespace

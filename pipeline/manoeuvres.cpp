@@ -15,12 +15,6 @@ namespace fs = std::filesystem;
 // Straight pushes of each wire that a search goes on from.
 constexpr int kStartsPerWire = 2;
 
-simulate::TrialResult read_trial_file(const fs::path& file) {
-  std::optional<simulate::TrialResult> trial = find_trial(file);
-  expects(trial.has_value());
-  return std::move(*trial);
-}
-
 // Of a straight push: in full, or else the scout's.
 fs::path straight_file(const Workspace& work, int id) {
   const fs::path& folder = work.artifact("trials").folder;

@@ -6,6 +6,8 @@
 #include <cmath>
 #include <limits>
 
+#include "pipeline/text.h"
+
 namespace wireplan::pipeline {
 namespace {
 

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 
+#include "pipeline/text.h"
 #include "preprocess/base.h"
 
 namespace wireplan::pipeline {

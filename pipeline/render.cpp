@@ -8,6 +8,7 @@
 #include "pipeline/picture.h"
 #include "pipeline/plot.h"
 #include "pipeline/report.h"
+#include "pipeline/text.h"
 #include "pipeline/trial_file.h"
 #include "preprocess/vessel_io.h"
 

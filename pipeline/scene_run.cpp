@@ -1,12 +1,11 @@
 #include "pipeline/scene_run.h"
 
-#include <array>
-#include <cstdio>
 #include <map>
 #include <memory>
 
 #include "pipeline/picture.h"
 #include "pipeline/report.h"
+#include "pipeline/text.h"
 #include "pipeline/trial_file.h"
 #include "plan/batch.h"
 #include "preprocess/surface.h"
@@ -17,13 +16,6 @@ namespace wireplan::pipeline {
 namespace {
 
 namespace fs = std::filesystem;
-
-template <typename... Values>
-std::string format(const char* pattern, Values... values) {
-  std::array<char, 512> text{};
-  std::snprintf(text.data(), text.size(), pattern, values...);
-  return text.data();
-}
 
 /// A scene's vessel, read, checked and ready for a wire.
 struct LoadedVessel {

@@ -197,9 +197,7 @@ class TrialLevel {
 
   const plan::Study& study() const { return study_; }
   simulate::TrialResult read(int id) const {
-    std::optional<simulate::TrialResult> trial = find_trial(folder_ / trial_file_name(id));
-    expects(trial.has_value());
-    return std::move(*trial);
+    return read_trial_file(folder_ / trial_file_name(id));
   }
   Json timing() const {
     return {{"level", level_}, {"trials_run", trials_run_}, {"cpu_s", cpu_seconds_}};

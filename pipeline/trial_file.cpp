@@ -2,12 +2,12 @@
 
 #include <array>
 #include <cmath>
-#include <cstdio>
 #include <fstream>
 #include <sstream>
 #include <utility>
 
 #include "pipeline/json_reader.h"
+#include "pipeline/text.h"
 #include "preprocess/vessel_io.h"
 
 namespace wireplan::pipeline {
@@ -155,9 +155,7 @@ std::string to_lines(const Json& object) {
 }  // namespace
 
 std::string trial_file_name(int id) {
-  std::array<char, 32> name{};
-  std::snprintf(name.data(), name.size(), "trials/%04d.json", id);
-  return name.data();
+  return format("trials/%04d.json", id);
 }
 
 std::string trial_text(const plan::Study& study, const plan::Candidate& candidate,
@@ -217,6 +215,12 @@ std::optional<TrialResult> find_trial(const std::filesystem::path& path) {
   trial.contacts = contacts_from_json(file.at("contacts"));
   trial.peak_forces = peaks_from_json(file.at("peak_forces"));
   return trial;
+}
+
+TrialResult read_trial_file(const std::filesystem::path& path) {
+  std::optional<TrialResult> trial = find_trial(path);
+  expects(trial.has_value());
+  return std::move(*trial);
 }
 
 void write_shapes(const TrialResult& trial, const std::string& name,

@@ -22,6 +22,7 @@ std::string trial_text(const plan::Study& study, const plan::Candidate& candidat
 /// Reads such a file, bit for bit but for `shapes`, which is empty. Nothing where the
 /// file is absent or cut.
 std::optional<simulate::TrialResult> find_trial(const std::filesystem::path& path);
+simulate::TrialResult read_trial_file(const std::filesystem::path& path);  // expects it to be whole
 
 /// [{"push_mm": 40.0}, {"turn_deg": 90.0}], negative pushes pull; and back.
 Json moves_json(const std::vector<simulate::Move>& moves);

@@ -97,26 +97,10 @@ Study tube_study() {
   return study;
 }
 
-/// A wall 1 mm thick: each apex is over its triangle's middle.
-Wall extruded(const Surface& surface) {
-  const Eigen::Index count = surface.triangles.cols();
-  Wall wall{.apexes = Eigen::Matrix3Xd(3, count),
-            .height = Eigen::VectorXd::Ones(count),
-            .young_modulus = 0.056,
-            .poisson_ratio = 0.3};
-  for (Eigen::Index k = 0; k < count; ++k) {
-    const Vec3 a = surface.vertices.col(surface.triangles(0, k)),
-               b = surface.vertices.col(surface.triangles(1, k)),
-               c = surface.vertices.col(surface.triangles(2, k));
-    wall.apexes.col(k) = (a + b + c) / 3.0 + (b - a).cross(c - a).normalized();
-  }
-  return wall;
-}
-
 /// It yields, so that all that trials can share is shared.
 const simulate::VesselModel& tube() {
   static const Surface surface = shapes::straight_tube(4.0, 50.0, 2.0);
-  static const simulate::VesselModel vessel(surface, extruded(surface));
+  static const simulate::VesselModel vessel(surface, shapes::extruded_wall(surface, 1.0, 0.056));
   return vessel;
 }
 

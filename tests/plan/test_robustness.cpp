@@ -111,18 +111,7 @@ struct TubeStudy {
   }
 
   simulate::VesselModel vessel(double young_modulus) const {
-    const Eigen::Index count = surface.triangles.cols();
-    Wall wall{.apexes = Eigen::Matrix3Xd(3, count),
-              .height = Eigen::VectorXd::Ones(count),
-              .young_modulus = young_modulus,
-              .poisson_ratio = 0.3};
-    for (Eigen::Index k = 0; k < count; ++k) {
-      const Vec3 a = surface.vertices.col(surface.triangles(0, k)),
-                 b = surface.vertices.col(surface.triangles(1, k)),
-                 c = surface.vertices.col(surface.triangles(2, k));
-      wall.apexes.col(k) = (a + b + c) / 3.0 + (b - a).cross(c - a).normalized();
-    }
-    return simulate::VesselModel(surface, wall);
+    return simulate::VesselModel(surface, shapes::extruded_wall(surface, 1.0, young_modulus));
   }
 };
 
