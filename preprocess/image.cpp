@@ -97,7 +97,8 @@ Grid header_grid(const itk::ImageIOBase& io, const fs::path& path) {
     grid.spacing[axis] = exists ? io.GetSpacing(axis) : 1.0;
     grid.origin[axis] = exists ? io.GetOrigin(axis) : 0.0;
     const std::vector<double> column =
-        exists ? io.GetDirection(axis) : io.GetDefaultDirection(axis);
+        exists ? io.GetDirection(axis)
+               : std::vector<double>();  // ITK's default writes past its end
     for (unsigned row = 0; row < 3; ++row) {
       direction(row, axis) = row < column.size() ? column[row] : (row == axis ? 1.0 : 0.0);
     }
@@ -277,8 +278,10 @@ void require_finite_nifti(const fs::path& path) {
   const gzFile file = gzopen(path.c_str(), "rb");  // reads what is not compressed too
   const int count = file == nullptr ? 0 : gzread(file, header.data(), header.size());
   if (file != nullptr) gzclose(file);
-  const bool swapped = header[0] == 0 && header[3] == 0x5C;
-  if (count != static_cast<int>(header.size()) || (header[0] != 0x5C && !swapped)) return;
+  const bool is_nifti = header[344] == 'n' && (header[345] == '+' || header[345] == 'i');
+  if (count != static_cast<int>(header.size()) || !is_nifti) return;
+  // In which order the bytes are, nifticlib tells by the number of dimensions, 1 to 7.
+  const bool swapped = header[41] != 0 || header[40] < 1 || header[40] > 7;
   constexpr std::array<std::array<std::size_t, 2>, 2> kFloats = {{{76, 108}, {256, 328}}};
   for (const auto& [begin, end] : kFloats) {
     for (std::size_t at = begin; at < end; at += sizeof(float)) {
@@ -293,31 +296,77 @@ void require_finite_nifti(const fs::path& path) {
   }
 }
 
-/// MetaIO frees what it read twice where a header breaks off in the middle of it, and ITK reads
-/// past its arrays where there are no dimensions, so the lines are looked through first: "Key =
-/// value" of plain text, no key twice, to ElementDataFile; 2 to 4 dimensions.
+/// How many numbers stand behind a key of a MetaImage's header (metaImage.cxx, metaObject.cxx); -1
+/// where it is text, or a key of somebody's own.
+int count_meta_numbers(const std::string& key, int dimensions) {
+  static const std::set<std::string> kOne = {"ID",
+                                             "ParentID",
+                                             "CompressedDataSize",
+                                             "HeaderSize",
+                                             "ElementMin",
+                                             "ElementNumberOfChannels",
+                                             "ElementNBits",
+                                             "ElementMax",
+                                             "ElementToIntensityFunctionSlope",
+                                             "NDims",
+                                             "ElementToIntensityFunctionOffset"};
+  static const std::set<std::string> kVector = {"DimSize",     "Offset",           "Position",
+                                                "Origin",      "CenterOfRotation", "ElementSpacing",
+                                                "ElementSize", "SequenceID"};
+  static const std::set<std::string> kMatrix = {"TransformMatrix", "Rotation", "Orientation"};
+  if (kOne.count(key) > 0) return 1;
+  if (kVector.count(key) > 0) return dimensions;
+  return kMatrix.count(key) > 0 ? dimensions * dimensions : -1;
+}
+
+/// Whether the text holds so many numbers that a volume in mm may have, and nothing else.
+bool holds_numbers(const std::string& text, int count) {
+  constexpr double kLargest = 1e12;
+  std::istringstream words(text);
+  int found = 0;
+  for (std::string word; words >> word; ++found) {
+    char* end = nullptr;
+    const double number = std::strtod(word.c_str(), &end);
+    if (*end != '\0' || !(std::abs(number) <= kLargest)) return false;
+  }
+  return found == count;
+}
+
+/// MetaIO writes past its arrays where a header is not what it expects, and frees what it read
+/// twice where it breaks off, so the lines are looked through first: "Key = value" of plain text
+/// that fits into its buffers, no key twice, to ElementDataFile; 2 to 4 dimensions, told before
+/// what has as many numbers; as many numbers as there should be; no list of files.
 void require_meta_header(const fs::path& path, const std::string& no_image) {
+  constexpr std::size_t kLongest = 250;  // of a line: MetaIO keeps names in 255 characters
+  const auto require = [&](bool sound) {
+    if (!sound) throw Error(path.string() + ": " + no_image);
+  };
   std::ifstream file(path, std::ios::binary);
   std::set<std::string> keys;
+  int dimensions = 0;
   for (std::string line; keys.count("ElementDataFile") == 0 && std::getline(file, line);) {
-    const std::size_t end = line.find_first_of(" =");
+    const std::size_t end = line.find_first_of(" ="), equals = line.find('=');
     const std::string key = line.substr(0, end);
     const bool plain = std::all_of(line.begin(), line.end(), [](char c) {
       return (c >= ' ' && c <= '~') || c == '\t' || c == '\r';
     });
-    const std::size_t equals = line.find('=');
-    if (!plain || equals == std::string::npos || equals > line.find_first_not_of(' ', end) ||
-        !keys.insert(key).second) {
-      throw Error(path.string() + ": " + no_image);
-    }
-    if (key == "NDims") {
-      const int dimensions = std::atoi(line.c_str() + equals + 1);
-      if (dimensions < 2 || dimensions > 4) throw Error(path.string() + ": " + no_image);
+    require(plain && line.size() <= kLongest && equals != std::string::npos &&
+            equals <= line.find_first_not_of(' ', end) && keys.insert(key).second);
+    const std::string value = line.substr(equals + 1);
+    if (key == "NDims") dimensions = std::atoi(value.c_str());
+    require(dimensions >= 0 && dimensions <= 4);
+    const int numbers = count_meta_numbers(key, dimensions);
+    require(numbers != 0 && (numbers < 0 || holds_numbers(value, numbers)));
+    const std::size_t name = std::min(value.find_first_not_of(" \t"), value.size());
+    if (key == "ElementDataFile" &&
+        (value.compare(name, 4, "LIST") == 0 || value.find('%') != std::string::npos)) {
+      throw Error(path.string() + ": its voxels lie in a list of files, expected them in one; " +
+                  "save the volume as one .mha file");
     }
   }
-  for (const char* key : {"NDims", "DimSize", "ElementType", "ElementDataFile"}) {
-    if (keys.count(key) == 0) throw Error(path.string() + ": " + no_image);
-  }
+  require(dimensions >= 2);
+  for (const char* key : {"DimSize", "ElementType", "ElementDataFile"})
+    require(keys.count(key) > 0);
 }
 
 /// The same for MetaImage, where MetaIO only prints a line when a file is cut short.
@@ -339,7 +388,7 @@ void require_whole_meta(const itk::ImageIOBase& io, const fs::path& path) {
     data_file.pop_back();
   }
 
-  double stored = std::numeric_limits<double>::infinity();  // a list of files: ITK checks each
+  double stored = std::numeric_limits<double>::infinity();  // no such file: ITK says so
   if (data_file == "LOCAL") {
     stored = static_cast<double>(fs::file_size(path)) - static_cast<double>(file.tellg());
   } else if (fs::is_regular_file(path.parent_path() / data_file)) {
