@@ -2,6 +2,7 @@
 
 #include "preprocess/image.h"
 #include "preprocess/surface.h"
+#include "preprocess/surface_repair.h"
 
 namespace wireplan::pipeline {
 namespace {
@@ -35,9 +36,11 @@ void check_volume(const Case& given, Problems& problems) {
 }
 #endif
 
-void check_surface_file(const Case& given, Problems& problems) {
+std::vector<std::string> check_surface_file(const Case& given, Problems& problems) {
   const SurfaceInput& input = *given.surface_input;
-  const Surface surface = preprocess::read_surface(input.path, input.unit, input.frame);
+  const preprocess::RepairedSurface repaired =
+      preprocess::read_surface(input.path, input.unit, input.frame);
+  const Surface& surface = repaired.surface;
   preprocess::require_sound(preprocess::check_surface(surface), input.path.string());
   const auto expect_inside = [&](const std::string& key, const Vec3& point) {
     if (!preprocess::locate_point(surface, point).inside) {
@@ -47,15 +50,18 @@ void check_surface_file(const Case& given, Problems& problems) {
   };
   expect_inside("access.point_mm", given.study.access);
   expect_inside("target.point_mm", given.study.goal.point);
+  return preprocess::tell_mends(repaired.mends);
 }
 
 }  // namespace
 
-void check_input(const Case& given) {
+std::vector<std::string> check_input(const Case& given) {
   Problems problems(given.file.string());
+  std::vector<std::string> mended;
   if (given.volume) check_volume(given, problems);
-  if (given.surface_input) check_surface_file(given, problems);
+  if (given.surface_input) mended = check_surface_file(given, problems);
   problems.throw_if_any();
+  return mended;
 }
 
 }  // namespace wireplan::pipeline

@@ -266,9 +266,10 @@ int check_file(const std::string& path, const std::vector<std::string>& override
     std::cout << path << ": the description is in order\n";
   } else {
     const Case given = read_case(path, overrides);
-    check_input(given);
+    const std::vector<std::string> mended = check_input(given);
     std::cout << given.file.string() << ": the case is in order, "
               << plan::list_candidates(given.study).size() << " trials\n";
+    for (const std::string& line : mended) std::cout << "  mended: " << line << "\n";
   }
   return kDone;
 }

@@ -9,6 +9,7 @@
 #include "pipeline/trial_file.h"
 #include "plan/batch.h"
 #include "preprocess/surface.h"
+#include "preprocess/surface_repair.h"
 #include "preprocess/vessel_io.h"
 #include "preprocess/wall.h"
 
@@ -22,13 +23,16 @@ struct LoadedVessel {
   Surface surface;
   Wall wall;  // of a rigid vessel too: forces are shown on it
   std::vector<simulate::Opening> openings;
+  std::vector<std::string> mended;  // of the file, in sentences
   std::unique_ptr<const simulate::VesselModel> model;
 };
 
 LoadedVessel load_vessel(const SceneVessel& given) {
   LoadedVessel vessel;
   const SurfaceInput& file = given.surface;
-  vessel.surface = preprocess::read_surface(file.path, file.unit, file.frame);
+  preprocess::RepairedSurface repaired = preprocess::read_surface(file.path, file.unit, file.frame);
+  vessel.surface = std::move(repaired.surface);
+  vessel.mended = preprocess::tell_mends(repaired.mends);
   preprocess::require_sound(preprocess::check_surface(vessel.surface), file.path.string());
   vessel.wall = preprocess::extrude_wall(vessel.surface, given.wall.extrusion).wall;
   vessel.openings = simulate::find_openings(vessel.surface);
@@ -62,8 +66,9 @@ Json vessel_json(const SceneVessel& given, const LoadedVessel& vessel) {
   return json;
 }
 
-Json warnings_json(const SceneVessel& given) {
+Json warnings_json(const SceneVessel& given, const LoadedVessel& vessel) {
   Json warnings = Json::array();
+  for (const std::string& line : vessel.mended) warnings.push_back("surface: " + line);
   if (given.friction == 0.0) {
     warnings.push_back("frictionless (friction is 0): push forces are lower bounds");
   }
@@ -76,7 +81,7 @@ void write_result(Json result, const SceneFile& scene, const LoadedVessel* vesse
                   const fs::path& folder) {
   if (vessel) {
     result["vessel"] = vessel_json(*scene.vessel, *vessel);
-    result["warnings"] = warnings_json(*scene.vessel);
+    result["warnings"] = warnings_json(*scene.vessel, *vessel);
   }
   write_json(result, folder / "result.json");
 }

@@ -22,6 +22,7 @@
 #include "preprocess/centerline.h"
 #include "preprocess/segment.h"
 #include "preprocess/surface.h"
+#include "preprocess/surface_repair.h"
 #include "preprocess/vessel_io.h"
 #include "preprocess/wall.h"
 
@@ -101,6 +102,20 @@ void add_segmentation(const preprocess::SegmentStatistics& statistics, bool chos
   }
 }
 #endif
+
+// What was mended of a given surface: each place, and in words.
+void add_mends(const std::vector<preprocess::Mend>& mends, Json& figures) {
+  figures["mended"] = Json::array();
+  for (const preprocess::Mend& mend : mends) {
+    figures["mended"].push_back({{"what", preprocess::name_of(mend.kind)},
+                                 {"count", mend.count},
+                                 {"place_mm", to_json(mend.place)},
+                                 {"size_mm", mend.size}});
+  }
+  for (const std::string& line : preprocess::tell_mends(mends)) {
+    figures["warnings"].push_back("surface: " + line);
+  }
+}
 
 void require_inside(const Surface& surface, const std::string& key, const Vec3& point) {
   const preprocess::InsideAnswer answer = preprocess::locate_point(surface, point);
@@ -420,13 +435,16 @@ void make_segment([[maybe_unused]] Workspace& work, [[maybe_unused]] const fs::p
 }
 
 void make_surface(Workspace& work, const fs::path& folder) {
-  // From the mask, or from the case's file, which must be sound before anything mends it.
+  // From the mask, or from the case's file, mended where that is safe.
   const Case& given = work.given();
   Surface surface;
+  std::vector<preprocess::Mend> mends;
   [[maybe_unused]] preprocess::FitStatistics fit;
   if (given.surface_input) {
-    surface =
+    preprocess::RepairedSurface repaired =
         preprocess::read_surface(work.input, given.surface_input->unit, given.surface_input->frame);
+    surface = std::move(repaired.surface);
+    mends = std::move(repaired.mends);
     preprocess::require_sound(preprocess::check_surface(surface), work.input.string());
     surface = preprocess::remesh(surface, given.surface.edge_length_mm);
   } else {
@@ -458,6 +476,7 @@ void make_surface(Workspace& work, const fs::path& folder) {
                       {"mean_shift_mm", fit.mean_shift_mm},
                       {"fitted_fraction", fit.fitted_fraction}};
   }
+  if (given.surface_input) add_mends(mends, figures);
   figures["openings"] = openings_json(simulate::find_openings(surface));
   if (check.euler_number != 2) {
     figures["warnings"].push_back("surface: it has " +

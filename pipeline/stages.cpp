@@ -127,7 +127,7 @@ std::vector<Stage> stages_of(const Case& given) {
                       .make = make_surface});
   } else {
     stages.push_back({.name = "surface",
-                      .version = 3,
+                      .version = 4,
                       .reads_input = true,
                       .parameters = {"/surface/unit", "/surface/frame", "/surface/edge_length_mm"},
                       .make = make_surface});

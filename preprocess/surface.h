@@ -27,6 +27,9 @@ struct SurfaceCheck {
   int euler_number = 0;
   int self_intersections =
       0;  // pairs of triangles; not looked for where the surface is not manifold
+  // The first of each that is not sound.                                                 [mm]
+  Vec3 open_at = Vec3::Zero(), non_manifold_at = Vec3::Zero(), misoriented_at = Vec3::Zero(),
+       touching_at = Vec3::Zero(), degenerate_at = Vec3::Zero(), cut_at = Vec3::Zero();
   bool outward = false;
   double volume_mm3 = 0.0, area_mm2 = 0.0;
   double min_angle_deg = 0.0, mean_edge_mm = 0.0, max_edge_mm = 0.0;
@@ -44,12 +47,12 @@ Surface surface_from_mask(const Mask& mask, const SurfaceOptions& options);
 Surface surface_from_image(const Image& image, const Mask& mask, const SurfaceOptions& options,
                            FitStatistics* statistics = nullptr);
 
-/// Reads STL, PLY, OBJ or VTP. `unit` is "mm", "cm" or "m"; `frame` is "LPS" or "RAS" (x, y
-/// flipped). Turns normals to agree and outward, merges equal vertices, drops triangles that this
-/// collapses, keeps the largest piece. Throws `Error` where the file is missing or no surface; it
-/// may still be unsound (open, self-intersecting): pass it to `require_sound`.
-Surface read_surface(const std::filesystem::path& path, const std::string& unit,
-                     const std::string& frame);
+/// Reads the triangles of an STL, PLY, OBJ or VTP file as they stand there, but for points merged
+/// that are equal to 1e-7 of the size, and polygons cut into triangles. `unit` is "mm", "cm" or
+/// "m"; `frame` is "LPS" or "RAS" (x, y flipped). Throws `Error` where the file is missing or no
+/// surface.
+Surface read_triangles(const std::filesystem::path& path, const std::string& unit,
+                       const std::string& frame);
 
 /// Remeshes isotropically to the edge length, or to half of the local inscribed radius where that
 /// is less, so that thin branches and their caps keep their shape. Checks for self-intersections
@@ -72,8 +75,16 @@ void require_sound(const SurfaceCheck& check, const std::string& origin);
 /// Volume enclosed [mm^3], negative where the normals point inward.
 double signed_volume(const Surface& surface);
 
-/// The piece (connected through edges) of the largest volume, turned outward as a whole, without
-/// unused vertices.
+/// A piece of a surface (connected through edges), outward, without unused vertices.
+struct Piece {
+  Surface surface;
+  bool turned = false;  // it faced inward, and was turned as a whole
+};
+
+/// The one of the largest volume first. Of an open piece the volume is that up to its first vertex.
+std::vector<Piece> pieces_of(const Surface& surface);
+
+/// The first of these.
 Surface largest_piece(const Surface& surface);
 
 /// True where the point [mm] lies inside the closed surface, and its distance to it [mm].

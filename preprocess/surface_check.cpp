@@ -5,72 +5,20 @@
 #include <array>
 #include <cmath>
 #include <limits>
-#include <numeric>
 #include <tuple>
 #include <utility>
 #include <vector>
 
 #include "preprocess/cgal_mesh.h"
 #include "preprocess/surface.h"
+#include "preprocess/surface_mend.h"
+#include "preprocess/triangle_sides.h"
 
 namespace wireplan::preprocess {
 namespace {
 
 // A triangle whose double area is below this part of its longest edge squared has no usable normal.
 constexpr double kDegenerate = 1e-12;
-
-/// One side of a triangle: from corner `corner` to the next, stored with the lower vertex first.
-struct Side {
-  int low, high, triangle, corner;
-  bool forward;  // the triangle runs from low to high
-};
-
-/// All sides, those of one edge next to each other.
-std::vector<Side> sorted_sides(const Surface& surface) {
-  std::vector<Side> sides;
-  sides.reserve(3 * static_cast<std::size_t>(surface.triangles.cols()));
-  for (int t = 0; t < surface.triangles.cols(); ++t) {
-    for (int k = 0; k < 3; ++k) {
-      const int a = surface.triangles(k, t), b = surface.triangles((k + 1) % 3, t);
-      sides.push_back({std::min(a, b), std::max(a, b), t, k, a < b});
-    }
-  }
-  std::sort(sides.begin(), sides.end(), [](const Side& a, const Side& b) {
-    return std::tie(a.low, a.high, a.triangle, a.corner) <
-           std::tie(b.low, b.high, b.triangle, b.corner);
-  });
-  return sides;
-}
-
-/// Calls `visit(begin, end)` for the sides of each edge.
-template <typename Visit>
-void for_each_edge(const std::vector<Side>& sides, Visit visit) {
-  for (auto begin = sides.begin(); begin != sides.end();) {
-    auto end = begin + 1;
-    while (end != sides.end() && end->low == begin->low && end->high == begin->high) ++end;
-    visit(begin, end);
-    begin = end;
-  }
-}
-
-/// Disjoint sets of 0..n-1; a set is named by its lowest member.
-class DisjointSets {
- public:
-  explicit DisjointSets(int count) : parent_(static_cast<std::size_t>(count)) {
-    std::iota(parent_.begin(), parent_.end(), 0);
-  }
-  int find(int k) {
-    while (parent_[k] != k) k = parent_[k] = parent_[parent_[k]];
-    return k;
-  }
-  void unite(int a, int b) {
-    const std::pair<int, int> roots = std::minmax({find(a), find(b)});
-    parent_[roots.second] = roots.first;
-  }
-
- private:
-  std::vector<int> parent_;
-};
 
 /// For each triangle the lowest triangle of its piece.
 std::vector<int> piece_of_triangle(const Surface& surface, const std::vector<Side>& sides) {
@@ -85,7 +33,7 @@ std::vector<int> piece_of_triangle(const Surface& surface, const std::vector<Sid
 
 /// Vertices whose triangles do not form one fan: their corners, united across edges, make more than
 /// one set. Also counts the vertices in use.
-std::pair<int, int> count_vertices(const Surface& surface, const std::vector<Side>& sides) {
+void count_vertices(const Surface& surface, const std::vector<Side>& sides, SurfaceCheck& check) {
   const auto corner_of = [&](const Side& side, int vertex) {
     const bool first = surface.triangles(side.corner, side.triangle) == vertex;
     return 3 * side.triangle + (first ? side.corner : (side.corner + 1) % 3);
@@ -102,9 +50,12 @@ std::pair<int, int> count_vertices(const Surface& surface, const std::vector<Sid
   for (int c = 0; c < corners; ++c) {
     if (sets.find(c) == c) ++fans[surface.triangles(c % 3, c / 3)];
   }
-  const auto used = std::count_if(fans.begin(), fans.end(), [](int n) { return n > 0; });
-  const auto split = std::count_if(fans.begin(), fans.end(), [](int n) { return n > 1; });
-  return {static_cast<int>(used), static_cast<int>(split)};
+  for (std::size_t v = 0; v < fans.size(); ++v) {
+    if (fans[v] > 0) ++check.vertices;
+    if (fans[v] > 1 && check.non_manifold_vertices++ == 0) {
+      check.touching_at = surface.vertices.col(static_cast<Eigen::Index>(v));
+    }
+  }
 }
 
 /// Areas, edge lengths and angles.
@@ -122,7 +73,9 @@ void measure_triangles(const Surface& surface, SurfaceCheck& check) {
     const double double_area = edge[0].cross(edge[1]).norm();
     check.area_mm2 += 0.5 * double_area;
     check.max_edge_mm = std::max(check.max_edge_mm, longest);
-    if (!(double_area > kDegenerate * longest * longest)) ++check.degenerate_triangles;
+    if (!(double_area > kDegenerate * longest * longest) && check.degenerate_triangles++ == 0) {
+      check.degenerate_at = surface.vertices.col(corners(0));
+    }
     for (int k = 0; k < 3; ++k) {
       const Vec3 back = -edge[(k + 2) % 3];
       min_angle = std::min(min_angle, std::atan2(edge[k].cross(back).norm(), edge[k].dot(back)));
@@ -189,49 +142,60 @@ double signed_volume(const Surface& surface) {
   return sum / 6.0;
 }
 
-Surface largest_piece(const Surface& surface) {
-  if (surface.triangles.cols() == 0) return surface;
+std::vector<Piece> pieces_of(const Surface& surface) {
   const int count = static_cast<int>(surface.triangles.cols());
+  if (count == 0) return {};
   const std::vector<int> piece = piece_of_triangle(surface, sorted_sides(surface));
 
   // Volume of each piece about a point of its own, so that open ones compare as well.
   std::vector<double> volume(piece.size(), 0.0);
+  std::vector<std::vector<int>> triangles(piece.size());
   for (int t = 0; t < count; ++t) {
     const Vec3 origin = surface.vertices.col(surface.triangles(0, piece[t]));
     const auto [a, b, c] = corners_of(surface, t);
     volume[piece[t]] += (a - origin).dot((b - origin).cross(c - origin)) / 6.0;
+    triangles[piece[t]].push_back(t);
   }
-  int largest = piece[0];
+  std::vector<int> order;
   for (int t = 0; t < count; ++t) {
-    if (std::abs(volume[t]) > std::abs(volume[largest])) largest = t;
+    if (piece[t] == t) order.push_back(t);
   }
+  std::stable_sort(order.begin(), order.end(),
+                   [&](int a, int b) { return std::abs(volume[a]) > std::abs(volume[b]); });
 
-  // Copy its triangles, vertices renumbered in their old order.
-  std::vector<int> renumbered(static_cast<std::size_t>(surface.vertices.cols()), -1);
-  for (int t = 0; t < count; ++t) {
-    if (piece[t] != largest) continue;
-    for (int k = 0; k < 3; ++k) renumbered[surface.triangles(k, t)] = 0;
-  }
-  int used = 0;
-  for (int& number : renumbered) {
-    if (number == 0) number = used++;
-  }
-  Surface result;
-  result.vertices.resize(3, used);
-  for (std::size_t v = 0; v < renumbered.size(); ++v) {
-    if (renumbered[v] >= 0)
-      result.vertices.col(renumbered[v]) = surface.vertices.col(Eigen::Index(v));
-  }
-  result.triangles.resize(3, std::count(piece.begin(), piece.end(), largest));
-  for (int t = 0, column = 0; t < count; ++t) {
-    if (piece[t] != largest) continue;
-    for (int k = 0; k < 3; ++k) {
-      result.triangles(k, column) = renumbered[surface.triangles(k, t)];
+  // Copies, vertices renumbered in their old order.
+  std::vector<Piece> pieces;
+  std::vector<int> renumbered(static_cast<std::size_t>(surface.vertices.cols()));
+  for (const int first : order) {
+    std::vector<int> used;
+    for (const int t : triangles[first]) {
+      for (int k = 0; k < 3; ++k) used.push_back(surface.triangles(k, t));
     }
-    ++column;
+    std::sort(used.begin(), used.end());
+    used.erase(std::unique(used.begin(), used.end()), used.end());
+    Piece copy{.surface = {}, .turned = volume[first] < 0.0};
+    copy.surface.vertices.resize(3, static_cast<Eigen::Index>(used.size()));
+    for (std::size_t v = 0; v < used.size(); ++v) {
+      renumbered[used[v]] = static_cast<int>(v);
+      copy.surface.vertices.col(static_cast<Eigen::Index>(v)) = surface.vertices.col(used[v]);
+    }
+    Eigen::Matrix3Xi& copied = copy.surface.triangles;
+    copied.resize(3, static_cast<Eigen::Index>(triangles[first].size()));
+    for (std::size_t t = 0; t < triangles[first].size(); ++t) {
+      for (int k = 0; k < 3; ++k) {
+        copied(k, static_cast<Eigen::Index>(t)) =
+            renumbered[surface.triangles(k, triangles[first][t])];
+      }
+    }
+    if (copy.turned) copied.row(1).swap(copied.row(2));
+    pieces.push_back(std::move(copy));
   }
-  if (volume[largest] < 0.0) result.triangles.row(1).swap(result.triangles.row(2));
-  return result;
+  return pieces;
+}
+
+Surface largest_piece(const Surface& surface) {
+  if (surface.triangles.cols() == 0) return surface;
+  return std::move(pieces_of(surface).front().surface);
 }
 
 SurfaceCheck check_surface(const Surface& surface) {
@@ -246,11 +210,13 @@ SurfaceCheck check_surface(const Surface& surface) {
   int edges = 0;
   for_each_edge(sides, [&](auto begin, auto end) {
     ++edges;
-    if (end - begin == 1) ++check.open_edges;
-    if (end - begin == 2 && begin->forward == (begin + 1)->forward) ++check.misoriented_edges;
-    if (end - begin > 2) ++check.non_manifold_edges;
+    const Vec3 at = 0.5 * (surface.vertices.col(begin->low) + surface.vertices.col(begin->high));
+    const bool agree = begin->forward != (end - 1)->forward;
+    if (end - begin == 1 && check.open_edges++ == 0) check.open_at = at;
+    if (end - begin == 2 && !agree && check.misoriented_edges++ == 0) check.misoriented_at = at;
+    if (end - begin > 2 && check.non_manifold_edges++ == 0) check.non_manifold_at = at;
   });
-  std::tie(check.vertices, check.non_manifold_vertices) = count_vertices(surface, sides);
+  count_vertices(surface, sides, check);
   check.euler_number = check.vertices - edges + check.triangles;
   const std::vector<int> piece = piece_of_triangle(surface, sides);
   for (int t = 0; t < check.triangles; ++t) check.pieces += piece[t] == t ? 1 : 0;
@@ -260,7 +226,12 @@ SurfaceCheck check_surface(const Surface& surface) {
   check.volume_mm3 = signed_volume(surface);
   check.outward = check.volume_mm3 > 0.0;
   if (check.non_manifold_edges + check.misoriented_edges + check.non_manifold_vertices == 0) {
-    check.self_intersections = static_cast<int>(cutting_pairs(surface).size());
+    const FacePairs pairs = cutting_pairs(surface);
+    check.self_intersections = static_cast<int>(pairs.size());
+    if (!pairs.empty()) {
+      const auto cut = static_cast<Eigen::Index>(pairs.front().first);
+      check.cut_at = surface.vertices.col(surface.triangles(0, cut));
+    }
   }
   return check;
 }
@@ -288,21 +259,24 @@ void require_sound(const SurfaceCheck& check, const std::string& origin) {
   if (is_sound(check)) return;
   if (check.triangles == 0) throw Error(origin + ": the surface has no triangles");
   std::string faults;
-  const auto add = [&](int count, const std::string& what) {
+  const auto add = [&](int count, const std::string& what, const std::string& remedy) {
     if (count == 0) return;
-    faults += (faults.empty() ? "" : "; ") + std::to_string(count) + " " + what;
+    faults += (faults.empty() ? "" : "; ") + std::to_string(count) + " " + what + " (" + remedy;
   };
-  add(check.pieces == 1 ? 0 : check.pieces, "pieces, expected 1 (keep the vessel alone)");
-  add(check.open_edges, "open edges (close the holes and cap the vessel's ends)");
-  add(check.non_manifold_edges,
-      "edges shared by more than two triangles (remove inner walls and doubled triangles)");
-  add(check.misoriented_edges,
-      "edges whose two triangles disagree on outside (orient the normals)");
-  add(check.non_manifold_vertices,
-      "vertices where parts of the surface touch in a point (part them)");
-  add(check.degenerate_triangles, "triangles without area (collapse or remesh them)");
-  add(check.self_intersections,
-      "pairs of triangles that cut each other (smooth or remesh the surface there)");
+  const auto first = [](const Vec3& place) { return ", first at " + place_text(place) + " mm)"; };
+  add(check.pieces == 1 ? 0 : check.pieces, "pieces, expected 1", "keep the vessel alone)");
+  add(check.open_edges, "open edges",
+      "close the holes and cap the vessel's ends" + first(check.open_at));
+  add(check.non_manifold_edges, "edges shared by more than two triangles",
+      "remove inner walls and doubled triangles" + first(check.non_manifold_at));
+  add(check.misoriented_edges, "edges whose two triangles disagree on outside",
+      "orient the normals" + first(check.misoriented_at));
+  add(check.non_manifold_vertices, "vertices where parts of the surface touch in a point",
+      "part them" + first(check.touching_at));
+  add(check.degenerate_triangles, "triangles without area",
+      "collapse or remesh them" + first(check.degenerate_at));
+  add(check.self_intersections, "pairs of triangles that cut each other",
+      "smooth or remesh the surface there" + first(check.cut_at));
   if (!check.outward)
     faults += std::string(faults.empty() ? "" : "; ") + "the normals point inward";
   throw Error(origin + ": the surface is not sound: " + faults +

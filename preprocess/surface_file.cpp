@@ -1,7 +1,6 @@
 #include <vtkCellArray.h>
-#include <vtkCleanPolyData.h>
 #include <vtkOBJReader.h>
-#include <vtkPolyDataNormals.h>
+#include <vtkPointLocator.h>
 #include <vtkSTLReader.h>
 #include <vtkTriangleFilter.h>
 #include <vtkXMLPolyDataReader.h>
@@ -22,6 +21,8 @@
 
 namespace wireplan::preprocess {
 namespace {
+
+constexpr double kFarthest = 1e9;  // no vessel has such coordinates, in whatever unit
 
 template <typename Reader>
 vtkSmartPointer<vtkPolyData> read_with(const std::filesystem::path& path) {
@@ -256,26 +257,40 @@ vtkSmartPointer<vtkPolyData> read_any(const std::filesystem::path& path) {
               "\" is not known; expected .stl, .ply, .obj or .vtp");
 }
 
-/// Triangles alone, equal points merged, what collapses by that dropped, neighbours' normals made
-/// to agree where the surface can be oriented.
-vtkSmartPointer<vtkPolyData> cleaned(vtkPolyData* input) {
+/// Polygons and strips cut into triangles; lines and lone points are left out.
+vtkSmartPointer<vtkPolyData> triangles_of(vtkPolyData* input) {
   vtkNew<vtkTriangleFilter> triangles;
   triangles->SetInputData(input);
   triangles->PassVertsOff();
   triangles->PassLinesOff();
-  vtkNew<vtkCleanPolyData> merge;
-  merge->SetInputConnection(triangles->GetOutputPort());
-  merge->ToleranceIsAbsoluteOn();
-  merge->SetAbsoluteTolerance(0.0);
-  vtkNew<vtkPolyDataNormals> orient;
-  orient->SetInputConnection(merge->GetOutputPort());
-  orient->ConsistencyOn();
-  orient->SplittingOff();
-  orient->NonManifoldTraversalOff();
-  orient->ComputePointNormalsOff();
-  orient->ComputeCellNormalsOn();  // with neither kind of normals the filter does nothing
-  orient->Update();
-  return orient->GetOutput();
+  triangles->Update();
+  return triangles->GetOutput();
+}
+
+/// Points nearer to each other than the last digits of single precision made one.
+Surface merged(const Surface& surface) {
+  constexpr double kTolerance = 1e-7;  // of the size
+  const Vec3 low = surface.vertices.rowwise().minCoeff(),
+             high = surface.vertices.rowwise().maxCoeff();
+  vtkNew<vtkPoints> points;
+  points->SetDataTypeToDouble();
+  vtkNew<vtkPointLocator> locator;
+  locator->SetTolerance(kTolerance * (high - low).maxCoeff());
+  const std::array<double, 6> bounds = {low.x(), high.x(), low.y(), high.y(), low.z(), high.z()};
+  locator->InitPointInsertion(points, bounds.data(), surface.vertices.cols());
+  std::vector<int> number;
+  for (const auto& p : surface.vertices.colwise()) {
+    vtkIdType id = 0;
+    locator->InsertUniquePoint(p.data(), id);
+    number.push_back(static_cast<int>(id));
+  }
+  Surface result{.vertices = Eigen::Matrix3Xd(3, points->GetNumberOfPoints()),
+                 .triangles = surface.triangles};
+  for (vtkIdType k = 0; k < points->GetNumberOfPoints(); ++k) {
+    points->GetPoint(k, result.vertices.col(k).data());
+  }
+  for (int& v : result.triangles.reshaped()) v = number[static_cast<std::size_t>(v)];
+  return result;
 }
 
 double mm_per(const std::string& unit, const std::string& place) {
@@ -293,20 +308,24 @@ Vec3 lps_signs(const std::string& frame, const std::string& place) {
 
 }  // namespace
 
-Surface read_surface(const std::filesystem::path& path, const std::string& unit,
-                     const std::string& frame) {
+Surface read_triangles(const std::filesystem::path& path, const std::string& unit,
+                       const std::string& frame) {
   const Vec3 scale = mm_per(unit, path.string()) * lps_signs(frame, path.string());
   const vtkSmartPointer<vtkPolyData> data = read_any(path);
   require_valid_indices(data, path);
-  Surface surface = surface_from(cleaned(data));
+  Surface surface = surface_from(triangles_of(data));
   if (surface.triangles.cols() == 0) {
     throw Error(path.string() + ": holds no triangles; expected a surface (STL, PLY, OBJ or VTP)");
   }
   if (!surface.vertices.allFinite()) {
     throw Error(path.string() + ": a coordinate is not a finite number; export the surface again");
   }
+  if (surface.vertices.cwiseAbs().maxCoeff() > kFarthest) {
+    throw Error(path.string() + ": a coordinate is beyond " + std::to_string(long(kFarthest)) +
+                " " + unit + "; export the surface again");
+  }
   surface.vertices = scale.asDiagonal() * surface.vertices;
-  return largest_piece(surface);
+  return merged(surface);
 }
 
 }  // namespace wireplan::preprocess

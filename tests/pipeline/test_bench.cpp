@@ -9,6 +9,7 @@
 #include "pipeline/bench_report.h"
 #include "pipeline/bench_walls.h"
 #include "preprocess/surface.h"
+#include "preprocess/surface_repair.h"
 #include "tests/pipeline/small_case.h"
 
 namespace wireplan::pipeline {
@@ -178,7 +179,7 @@ TEST(Bench, EveryInsertionIsInBalanceAndTheSameOnTwoThreads) {
 TEST(Bench, TubeOfTheFigureCaseIsThatOfTheBench) {
   for (const std::string name : {"tube-fig5", "s-tube"}) {
     const fs::path file = fs::path(WIREPLAN_SOURCE_DIR) / "cases" / name / "tube.obj";
-    const Surface given = preprocess::read_surface(file, "mm", "LPS");
+    const Surface given = preprocess::read_surface(file, "mm", "LPS").surface;
     const Surface made = (name == "s-tube" ? make_s_tube() : make_paper_tube()).surface;
     ASSERT_EQ(given.triangles.cols(), made.triangles.cols()) << name;
     // The file has four decimals.

@@ -16,6 +16,7 @@
 
 #include "preprocess/centerline.h"
 #include "preprocess/surface.h"
+#include "preprocess/surface_repair.h"
 #include "tests/shapes.h"
 
 namespace wireplan::preprocess {
@@ -237,7 +238,8 @@ Eigen::Matrix3Xd read_curve(const fs::path& path) {
 TEST(RealCenterline, IliacToCarotidFollowsTheDrawnCurves) {
   const fs::path folder = real_data("surface-arch-to-cerebral");
   if (folder.empty()) GTEST_SKIP() << "real data is absent; set WIREPLAN_DATA";
-  const Surface arch = read_surface(folder / "vessel_architecture_collision.obj", "mm", "LPS");
+  const Surface arch =
+      read_surface(folder / "vessel_architecture_collision.obj", "mm", "LPS").surface;
   const Centerline line = find_centerline(arch, {-33.6, 66.5, 9.5}, {-601.3, -3.9, 4.7});
 
   // Through iliac, aorta and carotid: their drawn curves lie along the line, not always in the
@@ -269,7 +271,7 @@ TEST(RealCenterline, IliacToCarotidFollowsTheDrawnCurves) {
 TEST(RealCenterline, PassesTheTightCoronaryStenosis) {
   const fs::path path = real_data("surface-coronary-left/m1_fluid.stl");
   if (path.empty()) GTEST_SKIP() << "real data is absent; set WIREPLAN_DATA";
-  const Surface coronary = read_surface(path, "mm", "LPS");
+  const Surface coronary = read_surface(path, "mm", "LPS").surface;
   const Vec3 access = Vec3(27.7, -40.4, 101.1) + 2.0 * Vec3(0.67, 0.21, -0.71);
 
   // The target is the middle of an outlet cap: 1 mm inward from the cap's facet nearest to it.
@@ -298,7 +300,7 @@ TEST(RealCenterline, PassesTheTightCoronaryStenosis) {
 TEST(RealCenterline, AgreesWithTheReferenceOfVmtk) {
   const fs::path folder = real_data("mra-aorta-iliac-vmtk");
   if (folder.empty()) GTEST_SKIP() << "real data is absent; set WIREPLAN_DATA";
-  const Surface aorta = read_surface(folder / "aorta-surface.vtp", "mm", "LPS");
+  const Surface aorta = read_surface(folder / "aorta-surface.vtp", "mm", "LPS").surface;
   vtkNew<vtkXMLPolyDataReader> reader;
   reader->SetFileName((folder / "aorta-centerline.vtp").c_str());
   reader->Update();
