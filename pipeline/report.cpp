@@ -129,20 +129,27 @@ void put_figures(Row& row, const char* key, const Json& figures, const char* sta
   row.put(key, std::move(values));
 }
 
-Json vessel_json(const ReportInput& input) {
-  const Json& surface = input.figures.at("surface");
-  const Json& line = input.figures.at("centerline");
-  const Json& wall = input.figures.at("wall");
+Json branch_json(const std::string& name, const Json& line) {
   Row branch;
-  branch.put("name", "access to target");
-  branch.put("length_mm", line.at("length_mm"));
-  for (const char* key : {"mean_diameter_mm", "min_diameter_mm", "max_diameter_mm"}) {
+  branch.put("name", name);
+  for (const char* key : {"length_mm", "mean_diameter_mm", "min_diameter_mm", "max_diameter_mm"}) {
     branch.put(key, line.at(key));
   }
   const Json& tortuosity = line.at("tortuosity");
   branch.put_optional("tortuosity",
                       tortuosity.is_null() ? std::nullopt : std::optional<double>(tortuosity),
-                      "the path ends where it starts");
+                      "the line ends where it starts");
+  return branch.finish();
+}
+
+Json vessel_json(const ReportInput& input) {
+  const Json& surface = input.figures.at("surface");
+  const Json& line = input.figures.at("centerline");
+  const Json& wall = input.figures.at("wall");
+  Json branches = Json::array({branch_json("access to target", line)});
+  for (const Json& branch : line.at("branches")) {
+    branches.push_back(branch_json(branch.at("name"), branch));
+  }
 
   Row row;
   for (const char* key : {"volume_mm3", "area_mm2", "triangles", "euler_number"}) {
@@ -156,7 +163,7 @@ Json vessel_json(const ReportInput& input) {
   row.put("wall_stiffness_kpa_per_mm", wall.at("normal_stiffness_kpa_per_mm"));
   put_figures(row, "image", input.figures, "volume");
   put_figures(row, "segmentation", input.figures, "segment");
-  row.put("branches", Json::array({branch.finish()}));
+  row.put("branches", std::move(branches));
   return row.finish();
 }
 

@@ -117,6 +117,43 @@ void add_mends(const std::vector<preprocess::Mend>& mends, Json& figures) {
   }
 }
 
+// Length and width of a line, as the report has them of a branch.
+Json line_figures(const Centerline& line) {
+  const Eigen::Index last = line.points.cols() - 1;
+  const double length = line.arc_length(last);
+  const double distance = (line.points.col(last) - line.points.col(0)).norm();
+  return {{"length_mm", length},
+          {"mean_diameter_mm", 2.0 * line.radius.mean()},
+          {"min_diameter_mm", 2.0 * line.radius.minCoeff()},
+          {"max_diameter_mm", 2.0 * line.radius.maxCoeff()},
+          {"tortuosity", distance > 0.0 ? Json(length / distance) : Json(nullptr)}};
+}
+
+// The whole tree: files for viewers, and a list of its branches.
+Json write_tree(const std::vector<preprocess::Branch>& tree, const fs::path& folder) {
+  std::vector<Centerline> lines;
+  std::vector<NamedCurve> curves;
+  Json branches = Json::array();
+  for (std::size_t k = 0; k < tree.size(); ++k) {
+    const Centerline& line = tree[k].line;
+    const std::string name = "branch " + std::to_string(k + 1);
+    lines.push_back(line);
+    curves.push_back({name, line.points});
+    Json branch = {
+        {"name", name},
+        {"parent",
+         tree[k].parent < 0 ? Json(nullptr) : Json("branch " + std::to_string(tree[k].parent + 1))},
+        {"parent_arc_mm", tree[k].parent_arc},
+        {"start_mm", to_json(Vec3(line.points.col(0)))},
+        {"end_mm", to_json(Vec3(line.points.col(line.points.cols() - 1)))}};
+    branch.update(line_figures(line));
+    branches.push_back(std::move(branch));
+  }
+  preprocess::write_centerlines(lines, folder / "tree.vtp");
+  write_curve_markups(curves, folder / "tree.mrk.json");
+  return branches;
+}
+
 void require_inside(const Surface& surface, const std::string& key, const Vec3& point) {
   const preprocess::InsideAnswer answer = preprocess::locate_point(surface, point);
   if (answer.inside) return;
@@ -499,15 +536,9 @@ void make_centerline(Workspace& work, const fs::path& folder) {
   preprocess::write_centerline(line, folder / "centerline.vtp");
   write_curve_markups(line.points, "centerline", folder / "centerline.mrk.json");
 
-  const Eigen::Index last = line.points.cols() - 1;
-  const double length = line.arc_length(last);
-  const double distance = (line.points.col(last) - line.points.col(0)).norm();
   Json figures = figures_of("centerline");
-  figures["length_mm"] = length;
-  figures["mean_diameter_mm"] = 2.0 * line.radius.mean();
-  figures["min_diameter_mm"] = 2.0 * line.radius.minCoeff();
-  figures["max_diameter_mm"] = 2.0 * line.radius.maxCoeff();
-  figures["tortuosity"] = distance > 0.0 ? Json(length / distance) : Json(nullptr);
+  figures.update(line_figures(line));
+  figures["branches"] = write_tree(preprocess::find_tree(surface, study.access), folder);
   write_figures(figures, folder);
 }
 

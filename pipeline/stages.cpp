@@ -133,6 +133,7 @@ std::vector<Stage> stages_of(const Case& given) {
                       .make = make_surface});
   }
   stages.push_back({.name = "centerline",
+                    .version = 2,
                     .after = {"surface"},
                     .parameters = {"/access/point_mm", "/target/point_mm"},
                     .make = make_centerline});

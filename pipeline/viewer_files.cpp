@@ -75,6 +75,12 @@ std::string csv_field(const Json& value) {
 
 }  // namespace
 
+void write_curve_markups(const std::vector<NamedCurve>& curves, const std::filesystem::path& path) {
+  Json markups = Json::array();
+  for (const NamedCurve& curve : curves) markups.push_back(curve_markup(curve.points, curve.name));
+  write_markups(std::move(markups), path);
+}
+
 void write_curve_markups(const Eigen::Matrix3Xd& points, const std::string& name,
                          const std::filesystem::path& path) {
   write_markups(Json::array({curve_markup(points, name)}), path);

@@ -2,6 +2,7 @@
 /// Files for the tools that people use: markups for 3D Slicer, tables for spreadsheets.
 #include <filesystem>
 #include <string>
+#include <vector>
 
 #include "pipeline/json_reader.h"
 
@@ -10,6 +11,13 @@ namespace wireplan::pipeline {
 /// A line as one curve for 3D Slicer (.mrk.json, references G), mm LPS.
 void write_curve_markups(const Eigen::Matrix3Xd& points, const std::string& name,
                          const std::filesystem::path& path);
+
+/// Several curves in one such file.
+struct NamedCurve {
+  std::string name;
+  Eigen::Matrix3Xd points;  // [mm]
+};
+void write_curve_markups(const std::vector<NamedCurve>& curves, const std::filesystem::path& path);
 
 /// A plan for 3D Slicer, which makes three nodes of the one file: the wire in its final shape as a
 /// curve; the way of the introducer as a line of 40 mm that ends in the access point; access and

@@ -21,16 +21,16 @@ namespace {
 using Points = std::vector<Vec3>;
 
 // The search grid starts with about this many nodes in the lumen, within these spacings [mm], and
-// is halved where the lumen is too thin for it.
-constexpr double kNodesWanted = 60e3;
+// is halved where the lumen is too thin for it. That of the tree, which is not, starts finer.
+constexpr double kNodesWanted = 20e3, kTreeNodesWanted = 80e3;
 constexpr double kCoarsestGrid = 1.0, kFirstGrid = 0.25, kFinestGrid = 0.12;
 constexpr std::size_t kMostNodes = 3'000'000;  // bounds memory (0.25 GB) and time (about 10 s)
 constexpr double kInfinite = std::numeric_limits<double>::infinity();
-constexpr int kRounds = 3;  // of moving to the ridge and smoothing
-constexpr int kClimbSteps = 25;
+constexpr std::size_t kFewPoints = 5;  // fewer have no direction
+constexpr int kRounds = 2;             // of moving to the ridge and smoothing
 // Smoothing along the line, as part of the inscribed radius. It shortens the radius r of a bend by
-// sigma^2/(2r): in a bend as sharp as r = 3 R, by 0.7 % of R.
-constexpr double kSmoothing = 0.2;
+// sigma^2/(2r): in a bend as sharp as r = 3 R, by 0.24 % of R.
+constexpr double kSmoothing = 0.12;
 
 // ---------------------------------------------------------------------------------- the wall
 
@@ -116,6 +116,35 @@ class GridSearch {
     return false;
   }
 
+  /// Cheapest ways from the start to all that is connected to it.
+  void run_everywhere(Cost kind) {
+    nodes_[kGoal].allowed = false;
+    run(kind);
+  }
+
+  // The nodes by number, for a look at all of them; 0 is the start, 1 the goal.
+  std::size_t count() const { return nodes_.size(); }
+  const Node& at(std::size_t i) const { return nodes_[i]; }
+  double spacing() const { return spacing_; }
+
+  /// Numbers of the grid's nodes that are made within `reach` of a point.
+  std::vector<int> nodes_near(const Vec3& point, double reach) const {
+    std::vector<int> near;
+    const Vec3 place = (point - origin_) / spacing_;
+    const Eigen::Vector3i low = (place.array() - reach / spacing_).ceil().cast<int>().max(0);
+    const Eigen::Vector3i high =
+        (place.array() + reach / spacing_).floor().cast<int>().min(size_.array() - 1);
+    for (int k = low.z(); k <= high.z(); ++k) {
+      for (int j = low.y(); j <= high.y(); ++j) {
+        for (int i = low.x(); i <= high.x(); ++i) {
+          const int n = made({i, j, k});
+          if (n != kUntouched && (node(n).point - point).norm() <= reach) near.push_back(n);
+        }
+      }
+    }
+    return near;
+  }
+
   /// From now on paths stay in the vessel round `route`: within 1.5 radii of its middle.
   void stay_near(const Points& route);
 
@@ -194,14 +223,26 @@ class GridSearch {
     queue_.emplace(cost + bound, there);
   }
 
+  /// Index into nodes_ of a grid point, or kUntouched.
+  int made(const Eigen::Vector3i& ijk) const {
+    const Eigen::Vector3i brick = ijk / kBrick, in = ijk - kBrick * brick;
+    const std::unique_ptr<Brick>& entries = slots_[brick_number(brick)];
+    return entries
+               ? (*entries)[static_cast<std::size_t>(in.x() + kBrick * (in.y() + kBrick * in.z()))]
+               : kUntouched;
+  }
+
+  std::size_t brick_number(const Eigen::Vector3i& brick) const {
+    return static_cast<std::size_t>(brick.x()) +
+           static_cast<std::size_t>(bricks_.x()) *
+               (static_cast<std::size_t>(brick.y()) +
+                static_cast<std::size_t>(bricks_.y()) * static_cast<std::size_t>(brick.z()));
+  }
+
   /// Index into nodes_ of a grid point, in bricks that exist where the search has been.
   int& slot(const Eigen::Vector3i& ijk) {
     const Eigen::Vector3i brick = ijk / kBrick, in = ijk - kBrick * brick;
-    const std::size_t b =
-        static_cast<std::size_t>(brick.x()) +
-        static_cast<std::size_t>(bricks_.x()) *
-            (static_cast<std::size_t>(brick.y()) +
-             static_cast<std::size_t>(bricks_.y()) * static_cast<std::size_t>(brick.z()));
+    const std::size_t b = brick_number(brick);
     if (!slots_[b]) {
       slots_[b] = std::make_unique<Brick>();
       slots_[b]->fill(kUntouched);
@@ -353,16 +394,25 @@ Points smooth(const WallDistance& wall, const Points& line, double sample,
   return result;
 }
 
+/// Steps of a climb, the first as a part of the inscribed radius. The first climb reaches 1.25
+/// radii, later ones mend what smoothing moved.
+struct Climb {
+  double first_step = 0.25;
+  int steps = 25;
+};
+constexpr Climb kFirstClimb{}, kLaterClimb{.first_step = 0.08, .steps = 16};
+
 /// Ascends the wall distance in the plane through `point` across `tangent`, by steps along the
 /// gradient that shrink geometrically (it jumps at the ridge, so its length tells nothing). Never
 /// leaves the ball that is known to be free. `near` is a hint and is updated.
-Vec3 climb(const WallDistance& wall, Vec3 point, const Vec3& tangent, Nearest& near) {
-  constexpr double kFirstStep = 0.25, kDecay = 0.8;  // together they reach 1.25 radii
+Vec3 climb(const WallDistance& wall, Vec3 point, const Vec3& tangent, Nearest& near,
+           const Climb& how = kFirstClimb) {
+  constexpr double kDecay = 0.8;
   near = wall.find(point, near);
   Nearest here = near;
   Vec3 best = point;
-  double step = kFirstStep * here.distance;
-  for (int i = 0; i < kClimbSteps && here.distance > 0.0; ++i, step *= kDecay) {
+  double step = how.first_step * here.distance;
+  for (int i = 0; i < how.steps && here.distance > 0.0; ++i, step *= kDecay) {
     const Vec3 gradient = (point - here.foot) / here.distance;
     const Vec3 across = gradient - gradient.dot(tangent) * tangent;
     point += std::min(step, 0.9 * here.distance) * across;
@@ -381,11 +431,11 @@ Vec3 tangent_at(const Points& line, std::size_t i) {
   return (line[to] - line[from]).normalized();
 }
 
-Points move_to_ridge(const WallDistance& wall, const Points& line) {
+Points move_to_ridge(const WallDistance& wall, const Points& line, const Climb& how) {
   Points moved;
   Nearest near = wall.find(line.front());
   for (std::size_t i = 0; i < line.size(); ++i) {
-    moved.push_back(climb(wall, line[i], tangent_at(line, i), near));
+    moved.push_back(climb(wall, line[i], tangent_at(line, i), near, how));
   }
   return moved;
 }
@@ -400,6 +450,17 @@ Points without_ends(const WallDistance& wall, const Points& line) {
   if (last - first < 4) return line;
   return {line.begin() + static_cast<std::ptrdiff_t>(first),
           line.begin() + static_cast<std::ptrdiff_t>(last) + 1};
+}
+
+/// Without its last 1.5 radii: the way to the farthest place of an end, mostly a cap's corner,
+/// leaves the middle where the cap is as near as the side. A line too short for that is kept.
+Points without_tip(const WallDistance& wall, const Points& line) {
+  constexpr double kRadii = 1.5;
+  const std::vector<double> s = arc_length(line);
+  std::size_t last = line.size() - 1;
+  while (last > 0 && s.back() - s[last] < kRadii * wall.find(line[last]).distance) --last;
+  last = std::max(last, std::min(kFewPoints, line.size()) - 2);
+  return {line.begin(), line.begin() + static_cast<std::ptrdiff_t>(last) + 1};
 }
 
 /// Continues the line along the ridge beyond its last point until it has passed `end`, or the wall
@@ -418,6 +479,22 @@ void extend(const WallDistance& wall, Points& line, const Vec3& end, double samp
     near = wall.find(next, near);
     const bool cap_ahead = (next - near.foot).dot(tangent) < kCapAhead * near.distance;
     line.push_back(cap_ahead ? next : climb(wall, next, tangent, near));
+  }
+}
+
+/// The same straight on to the wall ahead: for an end that lies in a corner of a cap, to which the
+/// ridge would lead.
+void extend_straight(const WallDistance& wall, Points& line, const Vec3& end, double sample) {
+  constexpr double kSpan = 3.0, kAtWall = 0.2;  // radii whose chord is the direction; of wall ahead
+  const double radius = wall.find(line.back()).distance, at_wall = kAtWall * radius;
+  const auto span = static_cast<std::size_t>(std::max(2.0, std::round(kSpan * radius / sample)));
+  const std::size_t back = line.size() - 1 - std::min(span, line.size() - 1);
+  const Vec3 tangent = (line.back() - line[back]).normalized();
+  const double step = std::min(sample, at_wall);
+  while ((end - line.back()).dot(tangent) > 0.0) {
+    const Vec3 next = line.back() + step * tangent;
+    if (wall.find(next).distance < at_wall) break;
+    line.push_back(next);
   }
 }
 
@@ -444,7 +521,160 @@ void cut_after(Points& line, const Vec3& end, double sample) {
   line.push_back(foot);
 }
 
+/// Arc length and inscribed radius of a line.
+Centerline measured(const WallDistance& wall, const Points& line) {
+  const auto n = static_cast<Eigen::Index>(line.size());
+  const std::vector<double> s = arc_length(line);
+  Centerline result{.points = Eigen::Matrix3Xd(3, n),
+                    .radius = Eigen::VectorXd(n),
+                    .arc_length = Eigen::Map<const Eigen::VectorXd>(s.data(), n)};
+  Nearest near = wall.find(line.front());
+  for (Eigen::Index i = 0; i < n; ++i) {
+    result.points.col(i) = line[static_cast<std::size_t>(i)];
+    near = wall.find(result.points.col(i), near);
+    result.radius(i) = near.distance;
+  }
+  return result;
+}
+
+double first_spacing(const Surface& surface, double nodes_wanted,
+                     const CenterlineOptions& options) {
+  return options.grid_mm > 0.0
+             ? options.grid_mm
+             : std::clamp(std::cbrt(std::abs(signed_volume(surface)) / nodes_wanted), kFirstGrid,
+                          kCoarsestGrid);
+}
+
+// ---------------------------------------------------------------------------------- the tree
+
+/// A way through the grid from the tree to an end, as numbers of nodes.
+struct Twig {
+  std::vector<int> nodes;  // the first one is in the tree already, but for the first twig
+  int parent = -1;         // twig of that node
+};
+
+/// The ends of the lumen and the ways there, the farthest first.
+std::vector<Twig> find_twigs(GridSearch& search) {
+  constexpr double kCovered = 1.5;  // radii round a line that belong to it
+  search.run_everywhere(Cost::kRoute);
+  std::vector<std::pair<double, int>> farthest_first;
+  for (std::size_t i = 2; i < search.count(); ++i) {
+    const Node& n = search.at(i);
+    if (std::isfinite(n.cost) && n.wall.distance > 0.5 * search.spacing()) {
+      farthest_first.emplace_back(-n.cost, static_cast<int>(i));
+    }
+  }
+  std::sort(farthest_first.begin(), farthest_first.end());
+  search.run_everywhere(Cost::kMiddle);
+
+  std::vector<Twig> twigs;
+  std::vector<char> covered(search.count(), 0);
+  std::vector<int> owner(search.count(), -1);  // twig that passes a node
+  for (const auto& [cost, end] : farthest_first) {
+    if (covered[static_cast<std::size_t>(end)] != 0) continue;
+    Twig twig;
+    int at = end;
+    for (; at >= 0 && owner[static_cast<std::size_t>(at)] < 0;
+         at = search.at(static_cast<std::size_t>(at)).parent) {
+      twig.nodes.push_back(at);
+    }
+    if (at >= 0) {
+      twig.parent = owner[static_cast<std::size_t>(at)];
+      twig.nodes.push_back(at);
+    }
+    std::reverse(twig.nodes.begin(), twig.nodes.end());
+
+    // What it covers is no end again; whether it is long enough to be a vessel is another question.
+    double length = 0.0;
+    for (std::size_t k = 0; k < twig.nodes.size(); ++k) {
+      const Node& n = search.at(static_cast<std::size_t>(twig.nodes[k]));
+      if (k > 0) {
+        length += (n.point - search.at(static_cast<std::size_t>(twig.nodes[k - 1])).point).norm();
+      }
+      const double reach = kCovered * n.wall.distance + 2.0 * search.spacing();
+      for (const int near : search.nodes_near(n.point, reach)) {
+        covered[static_cast<std::size_t>(near)] = 1;
+      }
+    }
+    const double from = search.at(static_cast<std::size_t>(twig.nodes.front())).wall.distance;
+    std::vector<double> radii;
+    for (const int n : twig.nodes)
+      radii.push_back(search.at(static_cast<std::size_t>(n)).wall.distance);
+    std::nth_element(radii.begin(), radii.begin() + static_cast<std::ptrdiff_t>(radii.size() / 2),
+                     radii.end());
+    const double widest = radii[radii.size() / 2];
+    if (twig.parent >= 0 && length < from + widest + 2.0 * search.spacing()) continue;
+    const int number = static_cast<int>(twigs.size());
+    for (std::size_t k = twig.parent >= 0 ? 1 : 0; k < twig.nodes.size(); ++k) {
+      owner[static_cast<std::size_t>(twig.nodes[k])] = number;
+    }
+    twigs.push_back(std::move(twig));
+  }
+  return twigs;
+}
+
+/// Point of a line nearest to another: its index.
+Eigen::Index nearest_index(const Centerline& line, const Vec3& p) {
+  Eigen::Index best = 0;
+  (line.points.colwise() - p).colwise().squaredNorm().minCoeff(&best);
+  return best;
+}
+
 }  // namespace
+
+std::vector<Branch> find_tree(const Surface& surface, const Vec3& root,
+                              const CenterlineOptions& options) {
+  expects(options.sample_mm > 0.0 && options.grid_mm >= 0.0);
+  require_inside(surface, "access", root);
+  const WallDistance wall(surface);
+  const double spacing = first_spacing(surface, kTreeNodesWanted, options),
+               sample = options.sample_mm;
+  const Vec3 start = leave_wall(wall, root, 2.0 * spacing);
+  GridSearch search(wall, surface, spacing, start, start);
+
+  std::vector<Branch> branches;
+  std::vector<int> branch_of;  // of each twig; its parent's where it is none itself
+  for (const Twig& twig : find_twigs(search)) {
+    const int parent = twig.parent < 0 ? -1 : branch_of[static_cast<std::size_t>(twig.parent)];
+    Points line;
+    for (const int n : twig.nodes) line.push_back(search.at(static_cast<std::size_t>(n)).point);
+    const Vec3 end = line.back();
+    line = smooth(wall, resample(line, sample), sample, {.least = 2.0 * spacing});
+    line = without_tip(wall, without_ends(wall, line));
+    if (parent >= 0 && line.size() < kFewPoints) {  // a corner of its parent's end
+      branch_of.push_back(parent);
+      continue;
+    }
+
+    // To the ridge; within the parent's ball the ridge is the parent's, so the line starts at it.
+    for (int round = 0; round < kRounds; ++round) {
+      line =
+          resample(smooth(wall, move_to_ridge(wall, line, round == 0 ? kFirstClimb : kLaterClimb),
+                          sample, {.least = sample, .part = kSmoothing}),
+                   sample);
+    }
+    extend_straight(wall, line, end, sample);
+    Branch branch{.line = {}, .parent = parent};
+    if (parent >= 0) {
+      const Centerline& from = branches[static_cast<std::size_t>(parent)].line;
+      const Eigen::Index at = nearest_index(from, line.front());
+      branch.parent_arc = from.arc_length(at);
+      if ((line.front() - from.points.col(at)).norm() > 1e-9) {
+        line.insert(line.begin(), from.points.col(at));
+      }
+    } else {
+      std::reverse(line.begin(), line.end());
+      extend(wall, line, root, sample);
+      cut_after(line, root, sample);
+      std::reverse(line.begin(), line.end());
+    }
+    branch.line = measured(
+        wall, smooth(wall, resample(line, sample), sample, {.least = sample, .part = kSmoothing}));
+    branch_of.push_back(static_cast<int>(branches.size()));
+    branches.push_back(std::move(branch));
+  }
+  return branches;
+}
 
 Centerline find_centerline(const Surface& surface, const Vec3& access, const Vec3& target,
                            const CenterlineOptions& options) {
@@ -454,20 +684,17 @@ Centerline find_centerline(const Surface& surface, const Vec3& access, const Vec
   const WallDistance wall(surface);
 
   // Cheapest path on the grid, rid of its steps.
-  const double spacing =
-      options.grid_mm > 0.0 ? options.grid_mm
-                            : std::clamp(std::cbrt(std::abs(signed_volume(surface)) / kNodesWanted),
-                                         kFirstGrid, kCoarsestGrid);
-  const RawPath raw = search_path(wall, surface, access, target, spacing);
+  const RawPath raw =
+      search_path(wall, surface, access, target, first_spacing(surface, kNodesWanted, options));
   const double sample = options.sample_mm;
   Points line = smooth(wall, resample(raw.points, sample), sample, {.least = 2.0 * raw.spacing});
 
   // To the ridge, in the planes across the line.
   line = without_ends(wall, line);
   for (int round = 0; round < kRounds; ++round) {
-    line = resample(
-        smooth(wall, move_to_ridge(wall, line), sample, {.least = sample, .part = kSmoothing}),
-        sample);
+    line = resample(smooth(wall, move_to_ridge(wall, line, round == 0 ? kFirstClimb : kLaterClimb),
+                           sample, {.least = sample, .part = kSmoothing}),
+                    sample);
   }
 
   // Both ends: along the ridge to the places nearest to target and access.
@@ -483,19 +710,7 @@ Centerline find_centerline(const Surface& surface, const Vec3& access, const Vec
   }
   line = smooth(wall, resample(line, sample), sample, {.least = sample, .part = kSmoothing});
 
-  // Arc length and inscribed radius.
-  const auto n = static_cast<Eigen::Index>(line.size());
-  const std::vector<double> s = arc_length(line);
-  Centerline result{.points = Eigen::Matrix3Xd(3, n),
-                    .radius = Eigen::VectorXd(n),
-                    .arc_length = Eigen::Map<const Eigen::VectorXd>(s.data(), n)};
-  Nearest near = wall.find(line.front());
-  for (Eigen::Index i = 0; i < n; ++i) {
-    result.points.col(i) = line[static_cast<std::size_t>(i)];
-    near = wall.find(result.points.col(i), near);
-    result.radius(i) = near.distance;
-  }
-  return result;
+  return measured(wall, line);
 }
 
 Vec3 start_tangent(const Centerline& line, double span) {

@@ -179,6 +179,32 @@ void write_centerline(const Centerline& line, const std::filesystem::path& path)
                  path);
 }
 
+void write_centerlines(const std::vector<Centerline>& lines, const std::filesystem::path& path) {
+  Eigen::Index count = 0;
+  for (const Centerline& line : lines) count += line.points.cols();
+  Eigen::Matrix3Xd points(3, count);
+  Eigen::VectorXd radius(count), arc(count), branch(static_cast<Eigen::Index>(lines.size()));
+  vtkNew<vtkCellArray> cells;
+  Eigen::Index at = 0;
+  for (std::size_t k = 0; k < lines.size(); ++k) {
+    const Eigen::Index n = lines[k].points.cols();
+    points.middleCols(at, n) = lines[k].points;
+    radius.segment(at, n) = lines[k].radius;
+    arc.segment(at, n) = lines[k].arc_length;
+    branch(static_cast<Eigen::Index>(k)) = static_cast<double>(k);
+    cells->InsertNextCell(static_cast<int>(n));
+    for (Eigen::Index i = 0; i < n; ++i) cells->InsertCellPoint(at + i);
+    at += n;
+  }
+  vtkNew<vtkPolyData> data;
+  data->SetPoints(vtk_points(points));
+  data->SetLines(cells);
+  data->GetPointData()->AddArray(vtk_array("radius_mm", radius));
+  data->GetPointData()->AddArray(vtk_array("arc_length_mm", arc));
+  data->GetCellData()->AddArray(vtk_array("branch", branch));
+  write_with<vtkXMLPolyDataWriter>(data, path);
+}
+
 Centerline read_centerline(const std::filesystem::path& path) {
   const vtkSmartPointer<vtkPolyData> data = read_with<vtkXMLPolyDataReader>(path);
   Centerline line;

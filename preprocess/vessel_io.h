@@ -18,6 +18,9 @@ Surface read_surface_artifact(const std::filesystem::path& path);
 void write_centerline(const Centerline& line, const std::filesystem::path& path);
 Centerline read_centerline(const std::filesystem::path& path);
 
+/// Several lines in one .vtp, with the same arrays and the cell array `branch`, their number.
+void write_centerlines(const std::vector<Centerline>& lines, const std::filesystem::path& path);
+
 /// Values that a viewer shows on the points or cells of a file, under a name.
 struct NamedArray {
   std::string name;
