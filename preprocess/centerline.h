@@ -34,9 +34,9 @@ struct Branch {
 /// place that is farthest from the root and not yet inside 1.5 radii of a line, the cheapest way
 /// with cost 1/R^2 to the lines found before, as a branch of its own where it goes on for more than
 /// the parent's radius and its own. The longest first. Lines are moved to the ridge as
-/// `find_centerline` does, and end in the middle, 0.2 radii before the wall ahead. A loop is cut where its two ways meet. Vessels thinner than about the
-/// search grid (0.25 to 1 mm by the size of the lumen) are not followed. Throws `Error` when the
-/// root lies outside the surface.
+/// `find_centerline` does, and end in the middle, 0.2 radii before the wall ahead. A loop is cut
+/// where its two ways meet. Vessels thinner than about the search grid (0.25 to 1 mm by the size of
+/// the lumen) are not followed. Throws `Error` when the root lies outside the surface.
 std::vector<Branch> find_tree(const Surface& surface, const Vec3& root,
                               const CenterlineOptions& options = {});
 
