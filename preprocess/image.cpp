@@ -250,8 +250,8 @@ void correct_scale(itk::ImageIOBase& io, Image& image) {
 /// 1952); 0 there is the mark of a file in several blocks, which is let pass.
 void require_whole_nifti(const itk::ImageIOBase& io, const fs::path& path) {
   const double needed =
-      nifti_value(io, "vox_offset") +
-      nifti_value(io, "bitpix") / 8.0 * static_cast<double>(io.GetImageSizeInPixels());
+      nifti_value(io, "vox_offset") + std::max(1.0, nifti_value(io, "bitpix") / 8.0) *
+                                          static_cast<double>(io.GetImageSizeInPixels());
   double stored = static_cast<double>(fs::file_size(path));
   double most = std::numeric_limits<double>::infinity();
   if (lower_case(path.extension().string()) == ".gz") {
@@ -265,7 +265,7 @@ void require_whole_nifti(const itk::ImageIOBase& io, const fs::path& path) {
     }
     most = needed + 1e6;  // beyond a little padding it is no size but the middle of the data
   }
-  if (stored < needed || stored > most) {
+  if (!(stored >= needed && stored <= most)) {
     throw Error(path.string() + ": " + damaged("NIfTI"));
   }
 }

@@ -1,5 +1,4 @@
 #include <vtkCellArray.h>
-#include <vtkOBJReader.h>
 #include <vtkPointLocator.h>
 #include <vtkSTLReader.h>
 #include <vtkTriangleFilter.h>
@@ -221,6 +220,57 @@ vtkSmartPointer<vtkPolyData> read_ply(const std::filesystem::path& path) {
   return result;
 }
 
+// ---- OBJ by hand: VTK's reader ends the program where a face's numbers break off ---------------
+
+/// "3", "3/1", "3//2" or "3/1/2", counted from 1, or from the last vertex so far at -1.
+vtkIdType obj_vertex(const std::string& word, vtkIdType vertices) {
+  char* end = nullptr;
+  const long long number = std::strtoll(word.c_str(), &end, 10);
+  if (end == word.c_str() || (*end != '\0' && *end != '/')) return -1;
+  return number < 0 ? vertices + number : number - 1;
+}
+
+/// Vertices and faces; what else the file holds is for looks.
+vtkSmartPointer<vtkPolyData> read_obj(const std::filesystem::path& path) {
+  vtkNew<vtkPoints> points;
+  points->SetDataTypeToDouble();
+  vtkNew<vtkCellArray> polygons;
+  std::ifstream stream(path);
+  int number = 0;
+  const auto require = [&](bool sound) {
+    if (sound) return;
+    throw Error(path.string() + ": cannot be read as a surface (line " + std::to_string(number) +
+                "); expected an OBJ file with vertices \"v x y z\" and faces \"f 1 2 3\"");
+  };
+  for (std::string line, more; std::getline(stream, line);) {
+    ++number;
+    for (; !line.empty() && line.back() == '\\' && std::getline(stream, more); ++number) {
+      line.back() = ' ';
+      line += more;
+    }
+    std::istringstream words(line);
+    std::string kind;
+    words >> kind;
+    if (kind == "v") {
+      Vec3 p;
+      require(static_cast<bool>(words >> p.x() >> p.y() >> p.z()));
+      points->InsertNextPoint(p.data());
+    } else if (kind == "f") {
+      std::vector<vtkIdType> face;
+      for (std::string word; words >> word;) {
+        face.push_back(obj_vertex(word, points->GetNumberOfPoints()));
+        require(face.back() >= 0);
+      }
+      require(face.size() >= 3);
+      polygons->InsertNextCell(static_cast<vtkIdType>(face.size()), face.data());
+    }
+  }
+  vtkNew<vtkPolyData> result;
+  result->SetPoints(points);
+  result->SetPolys(polygons);
+  return result;
+}
+
 // ---- Any format ------------------------------------------------------------------------------
 
 /// Readers hand on vertex numbers as they stand in the file; VTK's filters rely on them.
@@ -251,7 +301,7 @@ vtkSmartPointer<vtkPolyData> read_any(const std::filesystem::path& path) {
     return read_with<vtkSTLReader>(path);
   }
   if (ending == ".ply") return read_ply(path);
-  if (ending == ".obj") return read_with<vtkOBJReader>(path);
+  if (ending == ".obj") return read_obj(path);
   if (ending == ".vtp") return read_with<vtkXMLPolyDataReader>(path);
   throw Error(path.string() + ": the ending \"" + ending +
               "\" is not known; expected .stl, .ply, .obj or .vtp");

@@ -397,6 +397,12 @@ TEST_F(SurfaceFile, WhatIsNoSurfaceIsRefusedWithItsName) {
   }
   EXPECT_NE(refused(write("far.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 9\n")).find("vertex 8"),
             std::string::npos);
+  for (const char* face : {"f 1/ 2 ]3", "f 1 2", "f 0 1 2", "f -4 1 2", "f 1 2 3x"}) {
+    EXPECT_NE(refused(write("face.obj", std::string("v 0 0 0\nv 1 0 0\nv 0 1 0\n") + face + "\n"))
+                  .find("(line 4)"),
+              std::string::npos)
+        << face;
+  }
   EXPECT_NE(refused(write("points.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\n")).find("no triangles"),
             std::string::npos);
 }
