@@ -6,6 +6,8 @@
 #include <cmath>
 #include <cstdint>
 #include <optional>
+#include <string>
+#include <string_view>
 #include <vector>
 
 #include "preprocess/vessel.h"
@@ -54,7 +56,14 @@ class Lumen {
   double mean_deviation() const { return mean_deviation_; }
   std::size_t memory_bytes() const;
 
+  /// The field as bytes, and back bit for bit, for processes that need not compute it each
+  /// (lumen_bytes.cpp). The bytes are of this machine's number formats; other ones, or cut ones,
+  /// give nothing.
+  std::string to_bytes() const;
+  static std::optional<Lumen> from_bytes(std::string_view bytes);
+
  private:
+  Lumen() = default;
   static constexpr int kCells = 8;           // cells of a brick along each axis
   static constexpr int kNodes = kCells + 3;  // spline coefficients that they need
 

@@ -2,6 +2,7 @@
 /// The vessel as wires feel it: built once per patient, shared read-only by all trials.
 #include <algorithm>
 #include <memory>
+#include <utility>
 
 #include "preprocess/vessel.h"
 #include "simulate/compliance.h"
@@ -17,6 +18,8 @@ struct VesselModel {
   /// Of a rigid vessel; with a wall, of one that yields: its band is at least kYieldingBand.
   explicit VesselModel(const Surface& surface, const LumenOptions& options = {})
       : lumen(surface, options), locator(surface) {}
+  /// With the field as from_bytes() gives it.
+  VesselModel(const Surface& surface, Lumen known) : lumen(std::move(known)), locator(surface) {}
   VesselModel(const Surface& surface, const Wall& wall, LumenOptions options = {})
       : lumen(surface, (options.band = std::max(options.band, kYieldingBand), options)),
         locator(surface),
