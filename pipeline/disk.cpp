@@ -8,6 +8,7 @@
 #include <cstdio>
 #include <cstring>
 #include <fstream>
+#include <random>
 #include <sstream>
 
 namespace wireplan::pipeline {
@@ -66,10 +67,13 @@ void sync(const fs::path& path) {
 }
 
 fs::path name_beside(const fs::path& place) {
+  // Process numbers repeat among machines that share a folder, and children have their parent's
+  // random number.
+  static const unsigned random = std::random_device()();
   static std::atomic<int> counter{0};
   return place.parent_path() /
-         (kTemporaryPrefix + std::to_string(::getpid()) + "-" + std::to_string(counter++) + "-" +
-          place.filename().string().substr(0, 16));
+         (kTemporaryPrefix + std::to_string(random) + "-" + std::to_string(::getpid()) + "-" +
+          std::to_string(counter++) + "-" + place.filename().string().substr(0, 16));
 }
 
 FileLock::FileLock(FileLock&& other) noexcept

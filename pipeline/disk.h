@@ -25,8 +25,8 @@ void write_whole(std::string_view text, const std::filesystem::path& file,
 /// Brings a file or folder to the disk.
 void sync(const std::filesystem::path& path);
 
-/// A name in the same folder that no other process and no other call uses: so that a rename between
-/// the two is one step of the file system. It starts with kTemporaryPrefix.
+/// A name in the same folder that no other process, of whatever machine, and no other call uses: so
+/// that a rename between the two is one step of the file system. It starts with kTemporaryPrefix.
 std::filesystem::path name_beside(const std::filesystem::path& place);
 inline constexpr const char* kTemporaryPrefix = ".part-";
 

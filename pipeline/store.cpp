@@ -74,18 +74,25 @@ std::optional<Artifact> read_manifest(const fs::path& folder) {
   }
 }
 
-// Opens a lock file, making it where it is not; negative where the file system refuses.
+// Opens a lock file, making it where it is not; negative where the file system refuses. For
+// writing where that may be: NFS gives no exclusive lock on a file that is open for reading alone.
 int open_lock(const fs::path& path) {
+  const int file = ::open(path.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0666);
+  if (file >= 0) return file;
   return ::open(path.c_str(), O_RDONLY | O_CREAT | O_CLOEXEC, 0666);
 }
 
 // Whether the open file is still what stands under the name: a lock on a file that another process
-// has removed locks nothing.
+// has removed locks nothing. The name is opened, which asks an NFS server; its attributes may be
+// seconds old.
 bool stands_at(int file, const fs::path& path) {
+  const int again = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
+  if (again < 0) return false;
+  const FileLock closed_at_end(again);
   struct stat open {
   }, named{};
-  return ::fstat(file, &open) == 0 && ::stat(path.c_str(), &named) == 0 &&
-         open.st_ino == named.st_ino && open.st_dev == named.st_dev;
+  return ::fstat(file, &open) == 0 && ::fstat(again, &named) == 0 && open.st_ino == named.st_ino &&
+         open.st_dev == named.st_dev;
 }
 
 // Removes what a killed process left under temporary names for that place. Only for the one that
