@@ -24,6 +24,7 @@
 #include "pipeline/render.h"
 #include "pipeline/report.h"
 #include "pipeline/scene_run.h"
+#include "pipeline/shards.h"
 #include "pipeline/stages.h"
 #include "pipeline/text.h"
 
@@ -93,6 +94,7 @@ struct RunArguments {
   std::vector<std::string> force, overrides;
   int threads = 0;
   bool dry_run = false, explain = false;
+  bool after_shards = false;  // told where shards left out trials that are then run here
 };
 
 const char* state_name(StageState state) {
@@ -149,6 +151,35 @@ int print_status(const RunArguments& arguments) {
   return kDone;
 }
 
+// One shard of a case's trials.
+int run_shard(const RunArguments& arguments, const std::string& shard, int round) {
+  const Share share = parse_share(shard, round);
+  const Case given = read_case(arguments.case_path, arguments.overrides);
+  const std::shared_ptr<spdlog::logger> log = make_log();
+  ProgressBar bar;
+  RunOptions options = run_options(arguments);
+  options.work.progress = [&](int done, int total) { bar.show(done, total); };
+  options.on_stage = [&](const StageOutcome& outcome) { log->info(stage_line(outcome, false)); };
+  std::signal(SIGINT, ask_to_stop);
+  std::cout << describe_share(share, run_share_of_case(given, options, share)) << "\n";
+  return kDone;
+}
+
+// What shards left out, if the trials were made just now.
+std::string missing_shards(const RunResult& result) {
+  for (const StageOutcome& stage : result.stages) {
+    if (stage.stage == "trials" && stage.state != StageState::kMade) return "";
+  }
+  for (const Artifact& artifact : result.artifacts) {
+    if (artifact.stage != "trials") continue;
+    const FirstRound first = read_first_round(artifact);
+    if (first.run == 0) return "";
+    return std::to_string(first.run) + " of the " + std::to_string(first.trials) +
+           " trials of round 1 were in the store from no shard and were run here";
+  }
+  return "";
+}
+
 int run_case(const RunArguments& arguments) {
   if (arguments.dry_run) return print_status(arguments);
   const Case given = read_case(arguments.case_path, arguments.overrides);
@@ -166,6 +197,10 @@ int run_case(const RunArguments& arguments) {
   std::signal(SIGINT, ask_to_stop);
   const RunResult result = run_stages(given, options);
   publish(result.artifacts, output);
+  if (arguments.after_shards) {
+    const std::string missing = missing_shards(result);
+    if (!missing.empty()) log->warn(missing);
+  }
 
   // The answer.
   if (result.stages.back().stage != "report") {
@@ -185,10 +220,19 @@ struct BatchArguments {
   std::string output, cache;
   int threads = 0;
   double memory_gb = 0.0;
-  bool fail_fast = false;
+  bool fail_fast = false, list = false;
 };
 
 int run_batch_command(const BatchArguments& arguments) {
+  if (arguments.list) {
+    for (const BatchCase& entry : list_batch_cases(arguments.cases)) {
+      std::cout << entry.name << "\t" << entry.path.string() << "\n";
+    }
+    return kDone;
+  }
+  if (arguments.output.empty()) {
+    throw Error("batch: no folder for batch.json and the results, expected --output DIR");
+  }
   BatchRunOptions options{.output = arguments.output,
                           .cache = cache_folder(arguments.cache),
                           .threads = arguments.threads,
@@ -327,12 +371,25 @@ void add_case_options(CLI::App& command, RunArguments& arguments) {
   command.add_option("CASE", arguments.case_path, "Case file, or a folder with a case.json")
       ->required();
   add_cache_option(command, arguments.cache);
-  command.add_option("--to", arguments.to, "Last stage to run");
-  command.add_option("--force", arguments.force, "Stage to run again although it is cached")
-      ->allow_extra_args(false);
   command
       .add_option("--set", arguments.overrides, "Change a value of the case: wall.thickness_mm=2")
       ->allow_extra_args(false);
+}
+
+void add_stage_options(CLI::App& command, RunArguments& arguments) {
+  command.add_option("--to", arguments.to, "Last stage to run");
+  command.add_option("--force", arguments.force, "Stage to run again although it is cached")
+      ->allow_extra_args(false);
+}
+
+// How trials are run; for commands that run them.
+void add_trial_options(CLI::App& command, RunArguments& arguments) {
+  command.add_option("-j,--threads", arguments.threads, "Threads of the trials [all cores]")
+      ->check(CLI::Range(1, 4096));
+  command.add_flag(
+      "--exhaustive",
+      [&](std::int64_t) { arguments.overrides.push_back("search.exhaustive=true"); },
+      "Run all candidates in full, not only those that a coarse trial lets hope");
 }
 
 }  // namespace
@@ -381,30 +438,53 @@ int run_command(int argc, const char* const* argv) {
   RunArguments run_arguments;
   CLI::App* run = app.add_subcommand("run", "Plan a case: from its volume or surface to a ranking");
   add_case_options(*run, run_arguments);
+  add_stage_options(*run, run_arguments);
   run->add_option("-o,--output", run_arguments.output, "Results [wireplan-out/CASE NAME]");
-  run->add_option("-j,--threads", run_arguments.threads, "Threads of the trials [all cores]")
-      ->check(CLI::Range(1, 4096));
-  run->add_flag(
-      "--exhaustive",
-      [&](std::int64_t) { run_arguments.overrides.push_back("search.exhaustive=true"); },
-      "Run all candidates in full, not only those that a coarse trial lets hope");
+  add_trial_options(*run, run_arguments);
   run->add_flag("--dry-run", run_arguments.dry_run, "Only say which stages would run, and why");
   run->add_flag("--explain", run_arguments.explain, "Say why each stage runs");
   run->footer("Example: wireplan run cases/abdomen -o out -j 2");
   run->callback([&] { code = run_case(run_arguments); });
 
+  RunArguments shard_arguments;
+  std::string shard;
+  int round = 1;
+  CLI::App* trials = app.add_subcommand("trials", "One part of a case's trials, for a cluster");
+  add_case_options(*trials, shard_arguments);
+  trials->add_option("--shard", shard, "K/N: part K of N, from 1")->required();
+  trials->add_option("--round", round, "1: scouts, or all in full; 2 on: those in full that follow")
+      ->check(CLI::Range(1, 1000));
+  add_trial_options(*trials, shard_arguments);
+  trials->footer(
+      "Puts its trials into the cache and writes nothing else. Shards run in any order, on any\n"
+      "machine that shares the cache; `wireplan report` takes them from there and runs what is\n"
+      "missing. Example: wireplan trials cases/abdomen --shard 3/8");
+  trials->callback([&] { code = run_shard(shard_arguments, shard, round); });
+
+  RunArguments report_arguments;
+  report_arguments.after_shards = true;
+  CLI::App* report =
+      app.add_subcommand("report", "The report of a case whose trials were run in shards");
+  add_case_options(*report, report_arguments);
+  report->add_option("-o,--output", report_arguments.output, "Results [wireplan-out/CASE NAME]");
+  add_trial_options(*report, report_arguments);
+  report->footer(
+      "The same files as `wireplan run`. What no shard has run is run here, and told.\n"
+      "Example: wireplan report cases/abdomen -o out");
+  report->callback([&] { code = run_case(report_arguments); });
+
   BatchArguments batch_arguments;
   CLI::App* batch = app.add_subcommand("batch", "Plan many cases; one that fails stops no other");
   batch->add_option("CASE", batch_arguments.cases, "Case files, case folders, or a folder of them")
       ->required();
-  batch->add_option("-o,--output", batch_arguments.output, "Folder for batch.json and the results")
-      ->required();
+  batch->add_option("-o,--output", batch_arguments.output, "Folder for batch.json and the results");
   batch->add_option("-j,--threads", batch_arguments.threads, "Cases at a time [all cores]")
       ->check(CLI::Range(1, 4096));
   batch
       ->add_option("--memory-gb", batch_arguments.memory_gb,
                    "Memory of all cases together [3/4 of the machine's]")
       ->check(CLI::Range(0.1, 1e6));
+  batch->add_flag("--list", batch_arguments.list, "Only print name and file of each case");
   batch->add_flag("--fail-fast", batch_arguments.fail_fast, "Stop after the first that fails");
   add_cache_option(*batch, batch_arguments.cache);
   batch->footer(
@@ -444,6 +524,7 @@ int run_command(int argc, const char* const* argv) {
   RunArguments status_arguments;
   CLI::App* status = app.add_subcommand("status", "Which stages are cached, which would run, why");
   add_case_options(*status, status_arguments);
+  add_stage_options(*status, status_arguments);
   status->footer("Example: wireplan status cases/abdomen --set wall.thickness_mm=2");
   status->callback([&] { code = print_status(status_arguments); });
 

@@ -1,6 +1,6 @@
 #pragma once
-/// The command line: run, batch, check, status, cache, wires, simulate, phantom, bench (design
-/// section 3). Answers go to standard output, the log to standard error.
+/// The command line: run, trials, report, batch, check, status, cache, wires, simulate, phantom,
+/// bench (design section 3). Answers go to standard output, the log to standard error.
 #include <filesystem>
 #include <string>
 

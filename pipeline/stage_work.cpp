@@ -188,39 +188,38 @@ std::string trial_key_text(const Workspace& work, const plan::Study& study,
                             {"length", Json(study.insertion.length).dump()}});
 }
 
-// Puts a kept trial into the stage's folder: the same bytes, not a second time on the disk.
-void take_piece(const fs::path& piece, const fs::path& to) {
-  std::error_code cannot_link;
-  fs::create_hard_link(piece, to, cannot_link);
-  if (cannot_link) fs::copy_file(piece, to);
-}
-
 // Trials of one level. Each is kept as soon as it is finished: a run goes on where it was stopped,
 // and a case that has a trial in common with another takes it from there.
 class TrialLevel {
  public:
-  TrialLevel(Workspace& work, const char* level, plan::Study study, fs::path folder)
-      : work_(work), level_(level), study_(std::move(study)), folder_(std::move(folder)) {
+  TrialLevel(Workspace& work, const char* level, plan::Study study)
+      : work_(work), level_(level), study_(std::move(study)) {
     study_.insertion.record_every = study_.insertion.length;  // shapes on the way are not kept
-    fs::create_directories(folder_ / "trials");
   }
 
-  // Puts the trials of these candidates into the folder, from the store or by running them. Throws
-  // Interrupted.
-  void run(const std::vector<plan::Candidate>& candidates, const std::vector<int>& wanted,
-           const simulate::VesselModel& vessel) {
+  // Those of these candidates whose trials the store has not; of the others read() is good then.
+  std::vector<int> find_missing(const std::vector<plan::Candidate>& candidates,
+                                const std::vector<int>& wanted) {
     std::vector<int> ids;
-    std::vector<std::string> keys;
     for (const int id : wanted) {
-      const std::string key = key_of(candidates[static_cast<std::size_t>(id)]);
-      const std::optional<fs::path> kept = work_.store().find_piece(key);
+      std::optional<fs::path> kept =
+          work_.store().find_piece(key_of(candidates[static_cast<std::size_t>(id)]));
       if (kept) {
-        take_piece(*kept, folder_ / trial_file_name(id));
+        pieces_[id] = std::move(*kept);
       } else {
         ids.push_back(id);
-        keys.push_back(key);
       }
     }
+    return ids;
+  }
+
+  // Takes the trials of these candidates from the store or runs them. The vessel is asked for only
+  // where there is one to run. Throws Interrupted.
+  void run(const std::vector<plan::Candidate>& candidates, const std::vector<int>& wanted,
+           const std::function<const simulate::VesselModel&()>& find_vessel) {
+    const std::vector<int> ids = find_missing(candidates, wanted);
+    if (ids.empty()) return;
+    const simulate::VesselModel& vessel = find_vessel();
     const int kept = static_cast<int>(wanted.size() - ids.size());
     const WorkOptions& options = work_.options();
     plan::BatchOptions batch{
@@ -229,6 +228,7 @@ class TrialLevel {
       batch.progress = [&](int done, int count) { options.progress(kept + done, kept + count); };
     }
     std::vector<double> cpu_seconds(ids.size());
+    std::vector<fs::path> made(ids.size());
     const std::vector<bool> finished = plan::for_each_slot(
         static_cast<int>(ids.size()),
         [&](int slot) {
@@ -236,20 +236,34 @@ class TrialLevel {
           const int id = ids[static_cast<std::size_t>(slot)];
           const plan::Candidate& candidate = candidates[static_cast<std::size_t>(id)];
           const simulate::TrialResult trial = plan::run_candidate(study_, candidate, vessel);
-          const fs::path piece = work_.store().keep_piece(keys[static_cast<std::size_t>(slot)],
-                                                          trial_text(study_, candidate, trial));
-          take_piece(piece, folder_ / trial_file_name(id));
+          made[static_cast<std::size_t>(slot)] =
+              work_.store().keep_piece(key_of(candidate), trial_text(study_, candidate, trial));
           cpu_seconds[static_cast<std::size_t>(slot)] = plan::thread_cpu_seconds() - start;
         },
         batch);
     if (std::find(finished.begin(), finished.end(), false) != finished.end()) throw Interrupted();
-    for (const double seconds : cpu_seconds) cpu_seconds_ += seconds;
+    for (std::size_t slot = 0; slot < ids.size(); ++slot) {
+      cpu_seconds_ += cpu_seconds[slot];
+      pieces_[ids[slot]] = std::move(made[slot]);
+    }
     trials_run_ += static_cast<int>(ids.size());
   }
 
+  // Puts all that was found or run into the folder: the same bytes, not a second time on the disk.
+  void place(const fs::path& folder) const {
+    fs::create_directories(folder / "trials");
+    for (const auto& [id, piece] : pieces_) {
+      std::error_code cannot_link;
+      fs::create_hard_link(piece, folder / trial_file_name(id), cannot_link);
+      if (cannot_link) fs::copy_file(piece, folder / trial_file_name(id));
+    }
+  }
+
+  const char* name() const { return level_; }
+  int trials_run() const { return trials_run_; }
   const plan::Study& study() const { return study_; }
   simulate::TrialResult read(int id) const {
-    return read_trial_file(folder_ / trial_file_name(id));
+    return read_trial_file(pieces_.at(id));
   }
   Json timing() const {
     return {{"level", level_}, {"trials_run", trials_run_}, {"cpu_s", cpu_seconds_}};
@@ -265,9 +279,92 @@ class TrialLevel {
   Workspace& work_;
   const char* level_;
   plan::Study study_;
-  fs::path folder_;
-  int trials_run_ = 0;        // this time
-  double cpu_seconds_ = 0.0;  // of these                                                  [s]
+  std::map<int, fs::path> pieces_;  // in the store, by candidate
+  int trials_run_ = 0;              // this time
+  double cpu_seconds_ = 0.0;        // of these                                            [s]
+};
+
+// A case's trials, round by round: first the scouts of all candidates on a rigid wall, then in full
+// those that may be among the best, by what is known of the rounds before; or all in full at once.
+class TrialRounds {
+ public:
+  explicit TrialRounds(Workspace& work)
+      : work_(work),
+        candidates_(plan::list_candidates(work.study())),
+        full_(work, "full", work.study()),
+        known_(candidates_.size()) {
+    if (plan::needs_search(work.study(), work.given().exhaustive)) {
+      scout_.emplace(work, "scout", plan::scout_study(work.study()));
+    }
+  }
+
+  // The candidates of the next round, ascending; empty where all is known. Expects every trial of
+  // the round before to be found or run.
+  std::vector<int> next() {
+    ++round_;
+    const bool at_scouts = round_ == 1;
+    std::vector<int> ids(at_scouts ? candidates_.size() : 0);
+    std::iota(ids.begin(), ids.end(), 0);
+    if (scout_ && !at_scouts) {
+      for (const int id : last_) {
+        if (round_ == 2) scouts_.push_back(look(*scout_, id));
+        if (round_ > 2) known_[static_cast<std::size_t>(id)] = look(full_, id);
+      }
+      ids = plan::choose_next(work_.study(), candidates_, scouts_, known_);
+    }
+    last_ = ids;
+    return ids;
+  }
+
+  TrialLevel& level() { return round_ == 1 && scout_ ? *scout_ : full_; }
+  std::vector<int> find_missing(const std::vector<int>& ids) {
+    return level().find_missing(candidates_, ids);
+  }
+  void run(const std::vector<int>& ids) {
+    const bool rigid = round_ == 1 && scout_;
+    level().run(candidates_, ids, [&]() -> const simulate::VesselModel& {
+      return rigid ? work_.rigid_model() : work_.model();
+    });
+  }
+
+  std::size_t candidate_count() const { return candidates_.size(); }
+  const TrialLevel& full() const { return full_; }
+  const std::optional<TrialLevel>& scout() const { return scout_; }
+
+  // What the report tells of the scouts; null where there are none.
+  Json describe_scouts() const {
+    if (!scout_) return nullptr;
+    const plan::ScoutError error = plan::find_scout_error(scouts_, known_);
+    const auto number = [](const std::optional<double>& value) {
+      return value ? Json(*value) : Json(nullptr);
+    };
+    return {{"element_length_mm", scout_->study().insertion.element_length},
+            {"step_mm", scout_->study().insertion.step},
+            {"wall", "rigid"},
+            {"trials", candidates_.size()},
+            {"compared", error.compared},
+            {"both_reached", error.both_reached},
+            {"median_score_error", number(error.median_score)},
+            {"largest_score_error", number(error.largest_score)},
+            {"missed", error.missed},
+            {"false_reached", error.false_reached}};
+  }
+
+ private:
+  plan::Sighting look(const TrialLevel& level, int id) const {
+    const simulate::TrialResult trial = level.read(id);
+    return plan::look_at(trial, plan::compute_metrics(trial, level.study(), work_.path()),
+                         level.study(), work_.given().limits, work_.given().weights);
+  }
+
+  Workspace& work_;
+  std::vector<plan::Candidate> candidates_;
+  TrialLevel full_;
+  std::optional<TrialLevel> scout_;
+  std::vector<plan::Sighting> scouts_;
+  std::vector<std::optional<plan::Sighting>> known_;
+  std::vector<int> last_;  // candidates of the round before
+  int round_ = 0;
 };
 
 // Largest force on each triangle, over trials.
@@ -392,8 +489,32 @@ const Wall& Workspace::wall() {
   return *wall_;
 }
 
+std::string Workspace::field_key_text() const {
+  // The program stands for how it is made.
+  return pipeline::key_text({{"piece", "field"},
+                             {"input surface", artifact("surface").contents()},
+                             {"yields", given_.wall.elastic ? "true" : "false"},
+                             {"program", build_info().dump()}});
+}
+
+bool Workspace::find_field() {
+  const std::optional<fs::path> kept = store_.find_piece(field_key_text());
+  if (!kept) return false;
+  std::optional<simulate::Lumen> field = simulate::Lumen::from_bytes(read_if_there(*kept));
+  if (!field) return false;
+  model_ = std::make_unique<simulate::VesselModel>(surface(), std::move(*field));
+  return true;
+}
+
+void Workspace::share_field() {
+  if (model_) return;
+  const std::optional<FileLock> lock = store_.lock("field", field_key_text(), options_.cancelled);
+  if (!lock) throw Interrupted();
+  if (!find_field()) store_.keep_piece(field_key_text(), rigid_model().lumen.to_bytes());
+}
+
 const simulate::VesselModel& Workspace::rigid_model() {
-  if (!model_) {
+  if (!model_ && !find_field()) {
     // The field as a yielding wall needs it, since the wall may come later.
     simulate::LumenOptions options{.openings = simulate::find_openings(surface())};
     if (given_.wall.elastic) options.band = simulate::VesselModel::kYieldingBand;
@@ -563,73 +684,21 @@ void make_wall(Workspace& work, const fs::path& folder) {
   write_figures(figures, folder);
 }
 
-namespace {
-
-// Scouts all candidates on a rigid wall and runs in full those that may be among the best. Returns
-// what the report tells of the levels.
-Json search_candidates(Workspace& work, const std::vector<plan::Candidate>& candidates,
-                       TrialLevel& full, const fs::path& folder) {
-  const Case& given = work.given();
-  TrialLevel scout(work, "scout", plan::scout_study(work.study()), folder / kScoutFolder);
-  const auto look = [&](const TrialLevel& level, int id) {
-    const simulate::TrialResult trial = level.read(id);
-    return plan::look_at(trial, plan::compute_metrics(trial, level.study(), work.path()),
-                         level.study(), given.limits, given.weights);
-  };
-
-  std::vector<int> all(candidates.size());
-  std::iota(all.begin(), all.end(), 0);
-  scout.run(candidates, all, work.rigid_model());
-  std::vector<plan::Sighting> scouts;
-  for (const int id : all) scouts.push_back(look(scout, id));
-
-  std::vector<std::optional<plan::Sighting>> known(candidates.size());
-  for (;;) {
-    const std::vector<int> next = plan::choose_next(work.study(), candidates, scouts, known);
-    if (next.empty()) break;
-    full.run(candidates, next, work.model());
-    for (const int id : next) known[static_cast<std::size_t>(id)] = look(full, id);
-  }
-
-  const plan::ScoutError error = plan::find_scout_error(scouts, known);
-  const auto number = [](const std::optional<double>& value) {
-    return value ? Json(*value) : Json(nullptr);
-  };
-  return {{"element_length_mm", scout.study().insertion.element_length},
-          {"step_mm", scout.study().insertion.step},
-          {"wall", "rigid"},
-          {"trials", candidates.size()},
-          {"compared", error.compared},
-          {"both_reached", error.both_reached},
-          {"median_score_error", number(error.median_score)},
-          {"largest_score_error", number(error.largest_score)},
-          {"missed", error.missed},
-          {"false_reached", error.false_reached},
-          {"timing", scout.timing()}};
-}
-
-}  // namespace
-
 void make_trials(Workspace& work, const fs::path& folder) {
   const plan::Study& study = work.study();
-  const std::vector<plan::Candidate> candidates = plan::list_candidates(study);
-  TrialLevel full(work, "full", study, folder);
-  Json scout = nullptr, timing = Json::array();
-  if (plan::needs_search(study, work.given().exhaustive)) {
-    scout = search_candidates(work, candidates, full, folder);
-    timing.push_back(scout.at("timing"));
-    scout.erase("timing");
-  } else {
-    std::vector<int> all(candidates.size());
-    std::iota(all.begin(), all.end(), 0);
-    full.run(candidates, all, work.model());
+  TrialRounds rounds(work);
+  for (std::vector<int> ids = rounds.next(); !ids.empty(); ids = rounds.next()) rounds.run(ids);
+  rounds.full().place(folder);
+  Json timing = Json::array({rounds.full().timing()});
+  if (rounds.scout()) {
+    rounds.scout()->place(folder / kScoutFolder);
+    timing.insert(timing.begin(), rounds.scout()->timing());
   }
-  timing.push_back(full.timing());
   const simulate::VesselModel& vessel = work.model();
 
   Json figures = figures_of("trials");
-  figures["trials"] = candidates.size();
-  figures["scout"] = std::move(scout);
+  figures["trials"] = rounds.candidate_count();
+  figures["scout"] = rounds.describe_scouts();
   figures["tangent"] = to_json(study.tangent);
   figures["insertion_length_mm"] = study.insertion.length;
   figures["lumen_grid_mm"] = vessel.lumen.grid_spacing();
@@ -654,6 +723,36 @@ void make_trials(Workspace& work, const fs::path& folder) {
               {"cpu_s", cpu_sum},
               {"levels", std::move(timing)}},
              folder / kTimingFile);
+}
+
+ShareOutcome run_share(Workspace& work, const Share& share) {
+  expects(share.shard >= 1 && share.shard <= share.shards && share.round >= 1);
+  TrialRounds rounds(work);
+  std::vector<int> ids = rounds.next();
+  for (int round = 1; round < share.round && !ids.empty(); ++round) {
+    const std::size_t missing = rounds.find_missing(ids).size();
+    if (missing > 0) {
+      throw Error("round " + std::to_string(share.round) + " follows from all " +
+                  std::to_string(ids.size()) + " trials of round " + std::to_string(round) +
+                  ", of which " + std::to_string(missing) +
+                  " are not in the store; run its other shards first, or \"wireplan report\", "
+                  "which runs what is missing");
+    }
+    ids = rounds.next();
+  }
+
+  // Every N-th, so that the costly ones, which are neighbours, are shared out.
+  std::vector<int> own;
+  const auto shards = static_cast<std::size_t>(share.shards);
+  for (auto k = static_cast<std::size_t>(share.shard - 1); k < ids.size(); k += shards) {
+    own.push_back(ids[k]);
+  }
+  if (share.shards > 1 && !rounds.find_missing(own).empty()) work.share_field();
+  rounds.run(own);
+  return {.level = rounds.level().name(),
+          .round_trials = static_cast<int>(ids.size()),
+          .own_trials = static_cast<int>(own.size()),
+          .run = rounds.level().trials_run()};
 }
 
 namespace {

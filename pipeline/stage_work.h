@@ -54,6 +54,9 @@ class Workspace {
   const simulate::VesselModel& model();
   /// The same with a wall that does not yield. It becomes model(), so its use ends before that.
   const simulate::VesselModel& rigid_model();
+  /// Makes the field of the vessel a piece in the store, unless another process did: for shards, so
+  /// that one of them computes it. rigid_model() takes it from there.
+  void share_field();
   /// The case's study with what the centerline tells: the tangent at the access, and the insertion
   /// length where the case leaves it open.
   const plan::Study& study();
@@ -75,6 +78,9 @@ class Workspace {
   std::optional<Wall> wall_;
   std::optional<plan::Study> study_;
   std::unique_ptr<simulate::VesselModel> model_;
+
+  std::string field_key_text() const;
+  bool find_field();  // whether the store has it; model_ then
 };
 
 /// The start of a stage's figures.json, and its end.
@@ -91,5 +97,22 @@ void make_wall(Workspace& work, const std::filesystem::path& folder);
 void make_trials(Workspace& work, const std::filesystem::path& folder);
 void make_manoeuvres(Workspace& work, const std::filesystem::path& folder);
 void make_report(Workspace& work, const std::filesystem::path& folder);
+
+/// One of several processes' part of a case's trials. They are run in rounds: the scouts of all
+/// candidates (all in full where none are scouted), then in full those that the rounds before name.
+struct Share {
+  int shard = 1, shards = 1;  // part `shard` of `shards`, from 1
+  int round = 1;
+};
+struct ShareOutcome {
+  std::string level;            // "scout" or "full"
+  int round_trials = 0;         // 0: there is no such round
+  int own_trials = 0, run = 0;  // of these in the part; run this time
+};
+
+/// Puts the trials of that part into the store, each a piece, for make_trials() to find; runs those
+/// that are missing. Expects `work` to be ready for make_trials(). Throws `Error` where a round
+/// before is not complete, and Interrupted.
+ShareOutcome run_share(Workspace& work, const Share& share);
 
 }  // namespace wireplan::pipeline

@@ -89,22 +89,28 @@ std::string in_context(const Workspace& work, const std::string& stage, const st
   return text;
 }
 
+// Calls what acts for the stage, whose key text it finds in the workspace.
+template <typename Act>
+auto act_for(const Stage& stage, const std::string& key_text, Workspace& work, const Act& act) {
+  work.key_text = key_text;
+  try {
+    return act();
+  } catch (const DiskError& error) {
+    throw DiskError(in_context(work, stage.name, error.what()));
+  } catch (const Error& error) {
+    throw Error(in_context(work, stage.name, error.what()));
+  }
+}
+
 Artifact make_artifact(const Stage& stage, const Store& store, const std::string& key_text,
                        Workspace& work) {
-  work.key_text = key_text;
   const auto make = [&](const fs::path& folder) {
     stage.make(work, folder);
     if (stage.reads_input && input_stamp(work.input) != work.input_stamp) {
       throw Error(work.input.string() + ": changed while it was read; run again");
     }
   };
-  try {
-    return store.commit(stage.name, key_text, make);
-  } catch (const DiskError& error) {
-    throw DiskError(in_context(work, stage.name, error.what()));
-  } catch (const Error& error) {
-    throw Error(in_context(work, stage.name, error.what()));
-  }
+  return act_for(stage, key_text, work, [&] { return store.commit(stage.name, key_text, make); });
 }
 
 }  // namespace
@@ -205,6 +211,10 @@ RunResult run_stages(const Case& given, const RunOptions& options,
     std::optional<Artifact> artifact;
     if (!forced) artifact = store.find(stage.name, text);
     StageOutcome outcome{.stage = stage.name};
+    if (!artifact && options.instead && stage.name == options.to) {
+      act_for(stage, text, work, [&] { options.instead(work); });
+      break;
+    }
 
     // Run it, unless another process just did; or in a dry run say so.
     if (!artifact && !options.dry_run) {

@@ -48,6 +48,8 @@ struct RunOptions {
   bool dry_run = false;            // look only
   WorkOptions work;
   std::function<void(const StageOutcome&)> on_stage;  // after each; may be empty
+  /// Called instead of running `to`, where that is not in the store; may be empty.
+  std::function<void(Workspace&)> instead = {};
 };
 
 struct RunResult {

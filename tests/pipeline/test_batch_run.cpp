@@ -73,6 +73,18 @@ TEST_F(Batch, TellsWhoFailedAndWhyAndPlansTheOthers) {
             report_without_timing(folder_ / "out/anna/report.json"));
 }
 
+TEST_F(Batch, ListsItsCasesAndRunsNone) {
+  const Answer answer = run_program(folder_.path(), "batch --list study nowhere.json");
+  EXPECT_EQ(answer.code, 2) << "there is no such file";
+  const Answer list = run_program(folder_.path(), "batch --list study");
+  EXPECT_EQ(list.code, 0) << list.log;
+  EXPECT_EQ(list.out, "anna\tstudy/anna\nbert\tstudy/bert\ncarl\tstudy/carl\ndora\tstudy/dora\n");
+  EXPECT_FALSE(fs::exists(folder_ / "cache"));
+  const Answer nowhere = run_program(folder_.path(), "batch study");
+  EXPECT_EQ(nowhere.code, 2);
+  EXPECT_NE(nowhere.log.find("expected --output DIR"), std::string::npos) << nowhere.log;
+}
+
 TEST_F(Batch, FailFastStartsNoOtherAfterTheFirstThatFails) {
   const Answer answer =
       run_program(folder_.path(), "batch study/carl study/anna study/bert -o out -j 1 --fail-fast");
