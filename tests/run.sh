@@ -96,6 +96,13 @@ check_pages() {
   ((status == 0 || status == 77))  # 77: no browser, which it says
 }
 
+# The workflow for clusters, by Snakemake alone and on a Slurm of this machine.
+run_cluster() {
+  local status=0
+  python3 tests/cluster/test_cluster.py build/release/pipeline/wireplan || status=$?
+  ((status == 0 || status == 77))  # 77: no Snakemake, which it says
+}
+
 step "install packages" bash tests/install.sh
 step "formatting" check_formatting
 step "release build" bash tests/build.sh release
@@ -103,6 +110,7 @@ step "tests" run_suite release
 step "bundled case" run_bundled_case
 step "cases on real data" run_real_cases
 step "pages in a browser" check_pages
+step "cluster" run_cluster
 step "build without ITK and Node" bash tests/build.sh surface-only
 step "tests without ITK and Node" run_suite surface-only
 step "simulate and plan with Clang and clang-tidy" build_tidy
