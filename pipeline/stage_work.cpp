@@ -262,9 +262,7 @@ class TrialLevel {
   const char* name() const { return level_; }
   int trials_run() const { return trials_run_; }
   const plan::Study& study() const { return study_; }
-  simulate::TrialResult read(int id) const {
-    return read_trial_file(pieces_.at(id));
-  }
+  simulate::TrialResult read(int id) const { return read_trial_file(pieces_.at(id)); }
   Json timing() const {
     return {{"level", level_}, {"trials_run", trials_run_}, {"cpu_s", cpu_seconds_}};
   }
