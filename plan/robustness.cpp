@@ -85,7 +85,7 @@ std::vector<Predictor> list_predictors(const std::vector<Disturbance>& disturban
     std::vector<double> column;
     for (const Disturbance& d : disturbances) column.push_back(value(d));
     const auto [low, high] = std::minmax_element(column.begin(), column.end());
-    if (*low < *high) predictors[k].columns.push_back(find_ranks(column));
+    if (low != column.end() && *low < *high) predictors[k].columns.push_back(find_ranks(column));
   };
   add(0, [](const Disturbance& d) { return d.friction_factor; });
   add(1, [](const Disturbance& d) { return d.wall_factor; });
