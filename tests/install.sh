@@ -1,25 +1,27 @@
 #!/usr/bin/env bash
-# Installs the packages of packages.txt that are missing. Silent and quick where none is.
+# install.sh [LIST]: installs the packages of LIST, tests/packages.txt if none is named, that are
+# missing. Silent and quick where none is.
 # WIREPLAN_SKIP_INSTALL=1 leaves the system as it is, for other distributions.
 set -euo pipefail
-cd "$(dirname "${BASH_SOURCE[0]}")"
+cd "$(dirname "${BASH_SOURCE[0]}")/.."
+list=${1:-tests/packages.txt}
 
 [[ -n "${WIREPLAN_SKIP_INSTALL:-}" ]] && exit 0
 if ! { command -v apt-get && command -v dpkg-query; } >/dev/null; then
   echo "install: needs Debian 12, Ubuntu 22.04 or later (no apt-get here). Elsewhere, install what" \
-    "tests/packages.txt names and set WIREPLAN_SKIP_INSTALL=1." >&2
+    "$list names and set WIREPLAN_SKIP_INSTALL=1." >&2
   exit 1
 fi
 
 # What the list names and no installed package is or provides (that of Node's makers has npm in it).
-mapfile -t wanted < <(sed 's/#.*//' packages.txt | xargs -n 1 | sort -u)
+mapfile -t wanted < <(sed 's/#.*//' "$list" | xargs -n 1 | sort -u)
 present=$(dpkg-query -W -f '${db:Status-Status} ${Package}, ${Provides}\n' 2>/dev/null |
   sed -n 's/^installed //p' | sed 's/([^)]*)//g' | tr -s ', ' '\n' | sort -u) || true
 mapfile -t missing < <(comm -23 <(printf '%s\n' "${wanted[@]}") <(echo "$present"))
 ((${#missing[@]} == 0)) && exit 0
 
 # What may be left out: optional ones, where no source that apt has read knows them.
-is_optional() { grep -q "^$1 .*# optional" packages.txt; }
+is_optional() { grep -q "^$1 .*# optional" "$list"; }
 is_known() { apt-cache show "$1" 2>/dev/null | grep -q '^Filename:'; }
 drop_unknown() {
   local kept=() package
