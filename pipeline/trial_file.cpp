@@ -154,9 +154,7 @@ std::string to_lines(const Json& object) {
 
 }  // namespace
 
-std::string trial_file_name(int id) {
-  return format("trials/%04d.json", id);
-}
+std::string trial_file_name(int id) { return format("trials/%04d.json", id); }
 
 std::string trial_text(const plan::Study& study, const plan::Candidate& candidate,
                        const TrialResult& trial) {
