@@ -226,6 +226,9 @@ struct BatchArguments {
 int run_batch_command(const BatchArguments& arguments) {
   if (arguments.list) {
     for (const BatchCase& entry : list_batch_cases(arguments.cases)) {
+      if (!std::filesystem::exists(entry.path)) {
+        throw Error("batch: " + entry.path.string() + ": no such file or folder");
+      }
       std::cout << entry.name << "\t" << entry.path.string() << "\n";
     }
     return kDone;
@@ -431,8 +434,8 @@ int run_command(int argc, const char* const* argv) {
                                         build_info().at("revision").get<std::string>() + ")");
   app.require_subcommand(1);
   app.footer(
-      "Exit codes: 0 done, 1 ran but no plan reaches the target, 2 bad input, 3 our fault,\n"
-      "130 interrupted. `wireplan COMMAND --help` tells more.");
+      "Exit codes: 0 done, 1 no plan reaches the target, 2 bad input, 3 our fault, 130 "
+      "interrupted.");
   int code = kDone;
 
   RunArguments run_arguments;

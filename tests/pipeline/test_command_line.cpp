@@ -255,14 +255,28 @@ TEST_F(CommandLine, RefusesWhatTheCaseSaysWrong) {
   }
 }
 
-TEST_F(CommandLine, RefusesASurfaceThatIsNoneOrOpen) {
+TEST_F(CommandLine, RefusesASurfaceThatIsNoneOrHalfOfOneAndMendsASmallHole) {
   write_text("not a surface", folder_ / "tube.stl");
   expect_refused(case_, "tube.stl");
 
-  Surface open = shapes::straight_tube(4.0, 36.0, 1.5);
-  open.triangles.conservativeResize(3, open.triangles.cols() - 1);
-  write_stl(open, folder_ / "tube.stl");
+  const Surface whole = shapes::straight_tube(4.0, 36.0, 1.5);
+  Surface part = whole;
+  const auto keep = [&](const auto& wanted) {
+    Eigen::Index kept = 0;
+    for (Eigen::Index k = 0; k < whole.triangles.cols(); ++k) {
+      if (wanted(k)) part.triangles.col(kept++) = whole.triangles.col(k);
+    }
+    part.triangles.conservativeResize(3, kept);
+    write_stl(part, folder_ / "tube.stl");
+  };
+  keep([&](Eigen::Index k) { return whole.vertices(0, whole.triangles(0, k)) > 0.0; });
   expect_refused(case_, "tube.stl");
+
+  part = whole;
+  keep([](Eigen::Index k) { return k != 100; });
+  const Answer mended = call("run case.json -o mended");
+  EXPECT_EQ(mended.code, 0) << mended.log;
+  EXPECT_NE(read_text(folder_ / "mended" / "report.json").find("mended"), std::string::npos);
 }
 
 #ifdef WIREPLAN_IMAGING
