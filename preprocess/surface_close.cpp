@@ -26,8 +26,9 @@ namespace pmp = CGAL::Polygon_mesh_processing;
 constexpr double kSmallHole = 1.0;
 constexpr std::size_t kFewEdges = 4;
 // At an open end the wall runs across the loop's plane: the part of its normals along that plane's
-// normal is under sin 45 degrees; and the loop is flat, its points within this part of its radius.
-constexpr double kAlongWall = 0.7, kFlat = 0.5;
+// normal is under sin 45 degrees; the loop is flat, its points within this part of its radius; and
+// it is round, no wider than this times the disc of its area: a vessel slit along its side is not.
+constexpr double kAlongWall = 0.7, kFlat = 0.5, kRound = 1.5;
 constexpr double kMostVolumeChange = 0.01;  // by making triangles anew that cut each other
 
 Vec3 point_of(const CgalMesh& mesh, CgalMesh::Vertex_index v) {
@@ -93,7 +94,8 @@ std::vector<Loop> find_loops(const CgalMesh& mesh) {
 }
 
 bool is_open_end(const Loop& loop) {
-  return loop.facing < kAlongWall && loop.off_plane < kFlat * loop.radius;
+  return loop.facing < kAlongWall && loop.off_plane < kFlat * loop.radius &&
+         loop.width < kRound * 2.0 * loop.radius;
 }
 
 [[noreturn]] void refuse_hole(const Loop& loop, double vessel_radius, const std::string& origin) {
