@@ -28,7 +28,7 @@ constexpr std::size_t kFewEdges = 4;
 // At an open end the wall runs across the loop's plane: the part of its normals along that plane's
 // normal is under sin 45 degrees; the loop is flat, its points within this part of its radius; and
 // it is round, no wider than this times the disc of its area: a vessel slit along its side is not.
-constexpr double kAlongWall = 0.7, kFlat = 0.5, kRound = 1.5;
+constexpr double kAlongWall = 0.7, kFlat = 0.5, kRound = 1.75;
 constexpr double kMostVolumeChange = 0.01;  // by making triangles anew that cut each other
 
 Vec3 point_of(const CgalMesh& mesh, CgalMesh::Vertex_index v) {
