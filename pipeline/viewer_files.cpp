@@ -83,7 +83,7 @@ void write_curve_markups(const std::vector<NamedCurve>& curves, const std::files
 
 void write_curve_markups(const Eigen::Matrix3Xd& points, const std::string& name,
                          const std::filesystem::path& path) {
-  write_markups(Json::array({curve_markup(points, name)}), path);
+  write_curve_markups({{name, points}}, path);
 }
 
 void write_plan_markups(const PlanMarkups& plan, const std::filesystem::path& path) {

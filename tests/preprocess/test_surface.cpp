@@ -5,7 +5,6 @@
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
-#include <functional>
 #include <numeric>
 #include <random>
 #include <sstream>
@@ -13,6 +12,7 @@
 #include "preprocess/surface.h"
 #include "preprocess/surface_repair.h"
 #include "preprocess/vessel_io.h"
+#include "tests/messages.h"
 #include "tests/shapes.h"
 
 namespace wireplan::preprocess {
@@ -38,15 +38,6 @@ class SurfaceFile : public ::testing::Test {
 
   fs::path folder_;
 };
-
-std::string message_of(const std::function<void()>& action) {
-  try {
-    action();
-  } catch (const Error& error) {
-    return error.what();
-  }
-  return "no error";
-}
 
 // ---- The formats, written by hand ------------------------------------------------------------
 

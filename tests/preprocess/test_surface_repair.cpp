@@ -9,21 +9,13 @@
 
 #include "preprocess/surface.h"
 #include "preprocess/surface_repair.h"
+#include "tests/messages.h"
 #include "tests/shapes.h"
 
 namespace wireplan::preprocess {
 namespace {
 
 namespace fs = std::filesystem;
-
-std::string message_of(const std::function<void()>& action) {
-  try {
-    action();
-  } catch (const Error& error) {
-    return error.what();
-  }
-  return "no error";
-}
 
 int count_of(const RepairedSurface& repaired, MendKind kind) {
   return static_cast<int>(std::count_if(repaired.mends.begin(), repaired.mends.end(),

@@ -2,11 +2,11 @@
 
 #include <filesystem>
 #include <fstream>
-#include <functional>
 #include <random>
 #include <sstream>
 
 #include "preprocess/vessel_io.h"
+#include "tests/messages.h"
 #include "tests/shapes.h"
 
 namespace wireplan::preprocess {
@@ -31,15 +31,6 @@ std::string bytes_of(const fs::path& path) {
   std::ostringstream text;
   text << std::ifstream(path, std::ios::binary).rdbuf();
   return text.str();
-}
-
-std::string message_of(const std::function<void()>& action) {
-  try {
-    action();
-  } catch (const Error& error) {
-    return error.what();
-  }
-  return "no error";
 }
 
 /// Numbers that use all 53 bits.
