@@ -5,6 +5,18 @@
 
 namespace wireplan::simulate {
 
+void Yielding::Envelope::clear() {
+  first_.clear();
+  offset_.clear();
+  values_.clear();
+}
+
+void Yielding::Envelope::add_row(int first) {
+  offset_.push_back(static_cast<std::ptrdiff_t>(values_.size()) - first);
+  values_.resize(values_.size() + static_cast<std::size_t>(size() - first + 1));
+  first_.push_back(first);
+}
+
 int Yielding::slot_of(const WallCompliance& wall, int vertex) {
   const auto known = std::lower_bound(
       slots_.begin(), slots_.end(), vertex,
@@ -29,10 +41,6 @@ int Yielding::slot_of(const WallCompliance& wall, int vertex) {
 
 void Yielding::set_feet(const WallCompliance& wall, const std::vector<SurfacePoint>& feet) {
   const std::size_t m = feet.size();
-  start_.resize(m);
-  offset_.resize(m);
-  compliance_.values.clear();
-
   // The feet's vertices in the table; when it is full, it starts anew with these.
   if (slots_.size() + 3 * m > table_side_) {
     slots_.clear();
@@ -59,28 +67,22 @@ void Yielding::set_feet(const WallCompliance& wall, const std::vector<SurfacePoi
     }
     return sum;
   };
+  compliance_.clear();
   for (std::size_t i = 0; i < m; ++i) {
     std::size_t first = 0;
     while (first < i && compliance_between(i, first) == 0.0) ++first;
-    start_[i] = static_cast<int>(first);
-    offset_[i] = static_cast<std::ptrdiff_t>(compliance_.values.size());
-    for (std::size_t j = first; j <= i; ++j) {
-      compliance_.values.push_back(compliance_between(i, j));
-    }
+    compliance_.add_row(static_cast<int>(first));
+    double* row = compliance_.row(static_cast<int>(i));
+    for (std::size_t j = first; j <= i; ++j) row[j] = compliance_between(i, j);
   }
-  last_coupled_.resize(m);
-  for (int i = 0; i < size(); ++i) {
-    for (int j = first_coupled(i); j <= i; ++j) last_coupled_[static_cast<std::size_t>(j)] = i;
-  }
-  factor_.values.resize(compliance_.values.size());
-  inverse_.values.resize(compliance_.values.size());
 }
 
 void Yielding::find_slopes(const std::vector<SurfacePoint>& feet, const std::vector<Mat3>& slopes) {
-  slope_.resize(compliance_.values.size());
+  slope_.resize(compliance_.entries());
   for (std::size_t i = 0; i < feet.size(); ++i) {
-    const std::size_t first = static_cast<std::size_t>(start_[i]);
-    for (std::size_t j = first; j <= i; ++j) {
+    auto* slope = slope_.data() + compliance_.offset(static_cast<int>(i));
+    for (std::size_t j = static_cast<std::size_t>(first_coupled(static_cast<int>(i))); j <= i;
+         ++j) {
       Mat3 response;  // between the vertices of either foot
       for (std::size_t a = 0; a < 3; ++a) {
         const double* row =
@@ -89,9 +91,8 @@ void Yielding::find_slopes(const std::vector<SurfacePoint>& feet, const std::vec
           response(static_cast<int>(a), static_cast<int>(b)) = row[foot_slots_[j][b]];
         }
       }
-      auto& slope = slope_[static_cast<std::size_t>(offset_[i]) + j - first];
-      slope.col(0) = slopes[i].transpose() * (response * feet[j].weight);
-      slope.col(1) = slopes[j].transpose() * (response.transpose() * feet[i].weight);
+      slope[j].col(0) = slopes[i].transpose() * (response * feet[j].weight);
+      slope[j].col(1) = slopes[j].transpose() * (response.transpose() * feet[i].weight);
     }
   }
 }
@@ -99,7 +100,7 @@ void Yielding::find_slopes(const std::vector<SurfacePoint>& feet, const std::vec
 void Yielding::add_change_of_compliance(const Eigen::Matrix3Xd& motion, const Eigen::VectorXd& f,
                                         Eigen::VectorXd& w) const {
   for (int i = 0; i < size(); ++i) {
-    const auto* row = slope_.data() + offset_[static_cast<std::size_t>(i)] - first_coupled(i);
+    const auto* row = slope_.data() + compliance_.offset(i);
     for (int j = first_coupled(i); j <= i; ++j) {
       const double change = row[j].col(0).dot(motion.col(i)) + row[j].col(1).dot(motion.col(j));
       w[i] += change * f[j];
@@ -111,7 +112,7 @@ void Yielding::add_change_of_compliance(const Eigen::Matrix3Xd& motion, const Ei
 void Yielding::multiply_by_compliance(const Eigen::VectorXd& f, Eigen::VectorXd& w) const {
   w.setZero(size());
   for (int i = 0; i < size(); ++i) {
-    const double* row = compliance_.row(*this, i);
+    const double* row = compliance_.row(i);
     for (int j = first_coupled(i); j < i; ++j) {
       w[i] += row[j] * f[j];
       w[j] += row[j] * f[i];
@@ -121,30 +122,44 @@ void Yielding::multiply_by_compliance(const Eigen::VectorXd& f, Eigen::VectorXd&
 }
 
 void Yielding::factor() {
+  stiff_.clear();
+  place_.clear();
+  factor_.clear();
   for (int i = 0; i < size(); ++i) {
-    const double* c = compliance_.row(*this, i);
-    double* row = factor_.row(*this, i);
-    for (int j = first_coupled(i); j <= i; ++j) {
+    place_.push_back(root_[i] > 0.0 ? factor_.size() : -1);
+    if (root_[i] == 0.0) continue;
+    const int p = factor_.size();
+    int first = p;
+    while (first > 0 && stiff_[static_cast<std::size_t>(first - 1)] >= first_coupled(i)) --first;
+    stiff_.push_back(i);
+    factor_.add_row(first);
+    const double* c = compliance_.row(i);
+    double* row = factor_.row(p);
+    for (int q = first; q <= p; ++q) {
+      const int j = stiff_[static_cast<std::size_t>(q)];
+      const double* above = factor_.row(q);
       double sum = root_[i] * c[j] * root_[j];
-      const double* above = factor_.row(*this, j);
-      const int first = std::max(first_coupled(i), first_coupled(j));
-      sum -= Eigen::Map<const Eigen::VectorXd>(row + first, j - first)
-                 .dot(Eigen::Map<const Eigen::VectorXd>(above + first, j - first));
-      row[j] = j < i ? sum / above[j] : std::sqrt(1.0 + sum);
+      for (int k = std::max(first, factor_.first(q)); k < q; ++k) sum -= row[k] * above[k];
+      row[q] = q < p ? sum / above[q] : std::sqrt(1.0 + sum);
     }
   }
 }
 
-void Yielding::solve_factored(Eigen::VectorXd& v) const {
-  for (int i = 0; i < size(); ++i) {
-    const double* row = factor_.row(*this, i);
-    for (int k = first_coupled(i); k < i; ++k) v[i] -= row[k] * v[k];
-    v[i] /= row[i];
+void Yielding::solve_factored(Eigen::VectorXd& v) {
+  const int count = factor_.size();
+  stiff_values_.resize(count);
+  double* x = stiff_values_.data();
+  for (int p = 0; p < count; ++p) {
+    const double* row = factor_.row(p);
+    x[p] = v[stiff_[static_cast<std::size_t>(p)]];
+    for (int q = factor_.first(p); q < p; ++q) x[p] -= row[q] * x[q];
+    x[p] /= row[p];
   }
-  for (int i = size() - 1; i >= 0; --i) {
-    const double* row = factor_.row(*this, i);
-    v[i] /= row[i];
-    for (int k = first_coupled(i); k < i; ++k) v[k] -= row[k] * v[i];
+  for (int p = count - 1; p >= 0; --p) {
+    const double* row = factor_.row(p);
+    x[p] /= row[p];
+    for (int q = factor_.first(p); q < p; ++q) x[q] -= row[q] * x[p];
+    v[stiff_[static_cast<std::size_t>(p)]] = x[p];
   }
 }
 
@@ -201,28 +216,34 @@ void Yielding::find_stiffness(const Eigen::VectorXd& law_stiffness) {
   factor();
   // Inverse of the factored matrix within the envelope (Takahashi), from the last row upward. Rows
   // k > j couple with j where their envelope reaches it; two of them then couple with each other.
-  for (int j = size() - 1; j >= 0; --j) {
-    const double diagonal = factor_.row(*this, j)[j];
+  inverse_ = factor_;
+  last_coupled_.resize(stiff_.size());
+  for (int i = 0; i < factor_.size(); ++i) {
+    for (int j = factor_.first(i); j <= i; ++j) last_coupled_[static_cast<std::size_t>(j)] = i;
+  }
+  for (int j = factor_.size() - 1; j >= 0; --j) {
+    const double diagonal = factor_.row(j)[j];
     const int last = last_coupled_[static_cast<std::size_t>(j)];
-    const auto couples = [&](int k) { return first_coupled(k) <= j; };
+    const auto couples = [&](int k) { return factor_.first(k) <= j; };
     for (int i = last; i >= j; --i) {
       if (!couples(i)) continue;
       double sum = i == j ? 1.0 / diagonal : 0.0;
       for (int k = j + 1; k <= last; ++k) {
         if (!couples(k)) continue;
-        sum -= factor_.row(*this, k)[j] * inverse_.row(*this, std::max(i, k))[std::min(i, k)];
+        sum -= factor_.row(k)[j] * inverse_.row(std::max(i, k))[std::min(i, k)];
       }
-      inverse_.row(*this, i)[j] = sum / diagonal;
+      inverse_.row(i)[j] = sum / diagonal;
     }
   }
 }
 
 double Yielding::stiffness(int i, int j) const {
-  if (j < first_coupled(i)) return 0.0;
-  return root_[i] * inverse_.row(*this, i)[j] * root_[j];
+  const int p = place_[static_cast<std::size_t>(i)], q = place_[static_cast<std::size_t>(j)];
+  if (p < 0 || q < 0 || q < factor_.first(p)) return 0.0;
+  return root_[i] * inverse_.row(p)[q] * root_[j];
 }
 
-void Yielding::multiply_by_stiffness(Eigen::VectorXd& v) const {
+void Yielding::multiply_by_stiffness(Eigen::VectorXd& v) {
   v.array() *= root_.array();
   solve_factored(v);
   v.array() *= root_.array();

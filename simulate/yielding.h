@@ -19,7 +19,7 @@ class Yielding {
  public:
   /// Where the points' forces act, in the order of the wire; finds C.
   void set_feet(const WallCompliance& wall, const std::vector<SurfacePoint>& feet);
-  int size() const { return static_cast<int>(start_.size()); }
+  int size() const { return compliance_.size(); }
 
   /// Finds the forces, starting from what they are, and w; `share` is each point's length of wire
   /// [mm]. All of size(). Returns the energy of the contact law [N mm].
@@ -30,8 +30,8 @@ class Yielding {
   /// within the envelope, which find_stiffness() fills, and all of it as a product in place.
   void find_stiffness(const Eigen::VectorXd& law_stiffness);
   double stiffness(int i, int j) const;  // j <= i; 0 beyond the envelope
-  int first_coupled(int i) const { return start_[static_cast<std::size_t>(i)]; }
-  void multiply_by_stiffness(Eigen::VectorXd& v) const;
+  int first_coupled(int i) const { return compliance_.first(i); }
+  void multiply_by_stiffness(Eigen::VectorXd& v);
 
   /// How C changes as the points move along the wall: `slopes` of each foot's weights over the
   /// motion of its point (TriangleLocator::weight_slopes), of those that set_feet() had.
@@ -41,19 +41,33 @@ class Yielding {
                                 Eigen::VectorXd& w) const;
 
  private:
-  /// Lower triangle of a symmetric matrix, row i from column start_[i] on.
-  struct Envelope {
-    std::vector<double> values;
-    double* row(const Yielding& y, int i) { return values.data() + y.offset_[i] - y.start_[i]; }
-    const double* row(const Yielding& y, int i) const {
-      return values.data() + y.offset_[i] - y.start_[i];
-    }
+  /// Lower triangle of a symmetric matrix, row i from column first(i) on.
+  class Envelope {
+   public:
+    void clear();
+    /// One more row of zeros.
+    void add_row(int first);
+    int size() const { return static_cast<int>(first_.size()); }
+    std::size_t entries() const { return values_.size(); }
+    int first(int i) const { return first_[static_cast<std::size_t>(i)]; }
+    /// Row i, indexed by column.
+    double* row(int i) { return values_.data() + offset(i); }
+    const double* row(int i) const { return values_.data() + offset(i); }
+    /// Place of column 0 of row i among the entries, were it there.
+    std::ptrdiff_t offset(int i) const { return offset_[static_cast<std::size_t>(i)]; }
+
+   private:
+    std::vector<int> first_;
+    std::vector<std::ptrdiff_t> offset_;
+    std::vector<double> values_;
   };
   /// Place of a vertex in the table of responses, which it enters if it is new.
   int slot_of(const WallCompliance& wall, int vertex);
   void multiply_by_compliance(const Eigen::VectorXd& f, Eigen::VectorXd& w) const;
-  void factor();  // of I + D^1/2 C D^1/2, D the law's stiffness
-  void solve_factored(Eigen::VectorXd& v) const;
+  /// Of I + D^1/2 C D^1/2, D the law's stiffness. Points with none have rows and columns of the
+  /// identity, which are left out.
+  void factor();
+  void solve_factored(Eigen::VectorXd& v);
 
   /// Responses between the vertices that feet stood on lately; vertices in ascending order.
   static constexpr std::size_t kSmallestTable = 300;
@@ -62,15 +76,12 @@ class Yielding {
   std::vector<double> table_;               // table_side_ squared                        [mm/N]
   std::vector<std::array<int, 3>> foot_slots_;
 
-  std::vector<int> start_;         // first column of each row
-  std::vector<int> last_coupled_;  // last row with an entry in each column
-  std::vector<std::ptrdiff_t> offset_;
-  Envelope compliance_, factor_, inverse_;
+  Envelope compliance_, factor_, inverse_;  // of all points; of those with a stiff law
+  std::vector<int> stiff_, place_;          // those, in order; the place of each point there, or -1
+  std::vector<int> last_coupled_;           // of the factor: last row with an entry in each column
   std::vector<Eigen::Matrix<double, 3, 2>> slope_;  // of each entry of C, over either motion
   Eigen::VectorXd root_;                            // D^1/2
-  Eigen::VectorXd
-      near_wall_;  // per vertex of the surface: its displacement under a force at a foot
-  Eigen::VectorXd lawful_, residual_, step_;
+  Eigen::VectorXd lawful_, residual_, step_, stiff_values_;
 };
 
 }  // namespace wireplan::simulate
