@@ -1,7 +1,11 @@
 #pragma once
 /// Symmetric block-pentadiagonal matrices: a wire is a chain, its Hessian couples a node with two
 /// neighbours on each side. Cholesky in place, linear in the number of nodes, nothing allocated.
+/// Leading block rows may lack their last unknown: those of the part of a wire whose twist is no
+/// unknown (twist_chain.h).
 #include <Eigen/Core>
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <vector>
 
@@ -11,17 +15,19 @@ template <int D>
 class BlockBand {
  public:
   using Block = Eigen::Matrix<double, D, D>;
-  using Vector = Eigen::Matrix<double, D, 1>;
 
-  /// n block rows of zeros. Memory only ever grows.
-  void reset(int n) {
+  /// n block rows of zeros, of which the first `narrow` lack their last unknown: it has the
+  /// identity's row and column, and must stay 0 in vectors. Memory only ever grows.
+  void reset(int n, int narrow = 0) {
     size_ = n;
+    narrow_ = narrow;
     if (static_cast<int>(rows_.size()) < n) rows_.resize(static_cast<std::size_t>(n));
     for (int i = 0; i < n; ++i) {
       Row& row = rows_[static_cast<std::size_t>(i)];
       row.own.setZero();
       row.one.setZero();
       row.two.setZero();
+      if (i < narrow) row.own(D - 1, D - 1) = 1.0;
     }
   }
   int size() const { return size_; }
@@ -33,57 +39,29 @@ class BlockBand {
   /// A = L L'. Only the lower triangle of own(i) is read. Returns false at the first pivot that is
   /// not positive: A is then not positive definite, and its contents are lost.
   bool factor() {
-    for (int i = 0; i < size_; ++i) {
-      Row& row = rows_[static_cast<std::size_t>(i)];
-      if (i >= 2) solve_right(row.two, rows_[static_cast<std::size_t>(i - 2)].own);
-      if (i >= 1) {
-        const Row& above = rows_[static_cast<std::size_t>(i - 1)];
-        if (i >= 2) row.one.noalias() -= row.two * above.one.transpose();
-        solve_right(row.one, above.own);
-        row.own.noalias() -= row.one * row.one.transpose();
-        if (i >= 2) row.own.noalias() -= row.two * row.two.transpose();
-      }
-      if (!cholesky(row.own)) return false;
+    for (int i = 0; i < narrow_; ++i) {
+      if (!factor_row<D - 1>(i)) return false;
+    }
+    for (int i = narrow_; i < size_; ++i) {
+      if (!factor_row<D>(i)) return false;
     }
     return true;
   }
 
   /// Solves A x = b after factor(); b, of size() * D values, becomes x.
-  void solve(Eigen::Ref<Eigen::VectorXd> b) const {
+  void solve(Eigen::Ref<Eigen::VectorXd> b) const { solve<1>({b.data()}); }
+  /// The same of K at once, in less time than one after the other: a solve waits for itself.
+  template <int K>
+  void solve(std::array<double*, K> b) const {
     // The two unknowns before (or after) the one at hand stay in registers.
-    Vector near = Vector::Zero(), far = Vector::Zero();
-    double* x = b.data();
-    for (int i = 0; i < size_; ++i, x += D) {
-      const Row& row = rows_[static_cast<std::size_t>(i)];
-      Vector v;
-      for (int r = 0; r < D; ++r) {
-        double sum = x[r];
-        for (int c = 0; c < D; ++c) sum -= row.one(r, c) * near[c] + row.two(r, c) * far[c];
-        for (int c = 0; c < r; ++c) sum -= row.own(r, c) * v[c];
-        x[r] = v[r] = sum * row.own(r, r);  // holds 1 / L_rr
-      }
-      far = near;
-      near = v;
-    }
-    near.setZero();
-    far.setZero();
-    const Row none{Block::Zero(), Block::Zero(), Block::Zero()};
-    const Row *next = &none, *after = &none;
-    for (int i = size_ - 1; i >= 0; --i) {
-      x -= D;
-      const Row& row = rows_[static_cast<std::size_t>(i)];
-      Vector v;
-      for (int r = D - 1; r >= 0; --r) {
-        double sum = x[r];
-        for (int c = 0; c < D; ++c) sum -= next->one(c, r) * near[c] + after->two(c, r) * far[c];
-        for (int c = r + 1; c < D; ++c) sum -= row.own(c, r) * v[c];
-        x[r] = v[r] = sum * row.own(r, r);
-      }
-      far = near;
-      near = v;
-      after = next;
-      next = &row;
-    }
+    Pair<K> known;
+    for (int i = 0; i < narrow_; ++i) solve_forward<D - 1, K>(i, b, known);
+    for (int i = narrow_; i < size_; ++i) solve_forward<D, K>(i, b, known);
+    known = {};
+    // The last two narrow rows couple with all unknowns of those after them.
+    const int narrow = std::max(0, narrow_ - 2);
+    for (int i = size_ - 1; i >= narrow; --i) solve_back<D, K>(i, b, known);
+    for (int i = narrow - 1; i >= 0; --i) solve_back<D - 1, K>(i, b, known);
   }
 
  private:
@@ -91,15 +69,82 @@ class BlockBand {
     Block own, one, two;
   };
 
+  // Of a row, and of the rows that it couples with, the first R unknowns.
+
+  template <int R>
+  bool factor_row(int i) {
+    Row& row = rows_[static_cast<std::size_t>(i)];
+    auto own = row.own.template topLeftCorner<R, R>();
+    auto one = row.one.template topLeftCorner<R, R>();
+    auto two = row.two.template topLeftCorner<R, R>();
+    if (i >= 2) solve_right<R>(row.two, rows_[static_cast<std::size_t>(i - 2)].own);
+    if (i >= 1) {
+      const Row& above = rows_[static_cast<std::size_t>(i - 1)];
+      if (i >= 2) one.noalias() -= two * above.one.template topLeftCorner<R, R>().transpose();
+      solve_right<R>(row.one, above.own);
+      own.noalias() -= one * one.transpose();
+      if (i >= 2) own.noalias() -= two * two.transpose();
+    }
+    return cholesky<R>(row.own);
+  }
+
+  /// Unknowns of K right sides in the rows next to the one at hand, and those after.
+  template <int K>
+  struct Pair {
+    double near[D][K] = {}, far[D][K] = {};
+    void take(const double (&v)[D][K]) {
+      std::copy(&near[0][0], &near[0][0] + D * K, &far[0][0]);
+      std::copy(&v[0][0], &v[0][0] + D * K, &near[0][0]);
+    }
+  };
+
+  template <int R, int K>
+  void solve_forward(int i, const std::array<double*, K>& x, Pair<K>& known) const {
+    const Row& row = rows_[static_cast<std::size_t>(i)];
+    double v[D][K] = {};
+    for (int r = 0; r < R; ++r) {
+      for (int k = 0; k < K; ++k) {
+        double sum = x[k][D * i + r];
+        for (int c = 0; c < R; ++c) {
+          sum -= row.one(r, c) * known.near[c][k] + row.two(r, c) * known.far[c][k];
+        }
+        for (int c = 0; c < r; ++c) sum -= row.own(r, c) * v[c][k];
+        x[k][D * i + r] = v[r][k] = sum * row.own(r, r);  // holds 1 / L_rr
+      }
+    }
+    known.take(v);
+  }
+
+  template <int R, int K>
+  void solve_back(int i, const std::array<double*, K>& x, Pair<K>& known) const {
+    // What lies beyond the last row is multiplied by 0.
+    const Row& row = rows_[static_cast<std::size_t>(i)];
+    const Row& next = rows_[static_cast<std::size_t>(std::min(i + 1, size_ - 1))];
+    const Row& after = rows_[static_cast<std::size_t>(std::min(i + 2, size_ - 1))];
+    double v[D][K] = {};
+    for (int r = R - 1; r >= 0; --r) {
+      for (int k = 0; k < K; ++k) {
+        double sum = x[k][D * i + r];
+        for (int c = 0; c < R; ++c) {
+          sum -= next.one(c, r) * known.near[c][k] + after.two(c, r) * known.far[c][k];
+        }
+        for (int c = r + 1; c < R; ++c) sum -= row.own(c, r) * v[c][k];
+        x[k][D * i + r] = v[r][k] = sum * row.own(r, r);
+      }
+    }
+    known.take(v);
+  }
+
   /// Lower Cholesky factor in place, its diagonal inverted.
+  template <int R>
   static bool cholesky(Block& a) {
-    for (int c = 0; c < D; ++c) {
+    for (int c = 0; c < R; ++c) {
       double pivot = a(c, c);
       for (int k = 0; k < c; ++k) pivot -= a(c, k) * a(c, k);
       if (!(pivot > 0.0)) return false;
       const double inverse = 1.0 / std::sqrt(pivot);
       a(c, c) = inverse;
-      for (int r = c + 1; r < D; ++r) {
+      for (int r = c + 1; r < R; ++r) {
         double v = a(r, c);
         for (int k = 0; k < c; ++k) v -= a(r, k) * a(c, k);
         a(r, c) = v * inverse;
@@ -109,14 +154,16 @@ class BlockBand {
   }
 
   /// b <- b L^-T, for the factor L made by cholesky().
+  template <int R>
   static void solve_right(Block& b, const Block& factor) {
-    for (int c = 0; c < D; ++c) {
-      for (int k = 0; k < c; ++k) b.col(c) -= factor(c, k) * b.col(k);
-      b.col(c) *= factor(c, c);
+    for (int c = 0; c < R; ++c) {
+      auto column = b.col(c).template head<R>();
+      for (int k = 0; k < c; ++k) column -= factor(c, k) * b.col(k).template head<R>();
+      column *= factor(c, c);
     }
   }
 
-  int size_ = 0;
+  int size_ = 0, narrow_ = 0;
   std::vector<Row> rows_;
 };
 

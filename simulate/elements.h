@@ -15,8 +15,22 @@ inline Mat3 cross_matrix(const Vec3& v) {
   return m;
 }
 
+// Entry by entry: as Eigen's outer products they are function calls.
+
+inline Mat3 outer_product(const Vec3& a, const Vec3& b) {
+  Mat3 m;
+  for (int c = 0; c < 3; ++c) {
+    for (int r = 0; r < 3; ++r) m(r, c) = a[r] * b[c];
+  }
+  return m;
+}
+
 inline Mat3 symmetric_product(const Vec3& a, const Vec3& b) {
-  return a * b.transpose() + b * a.transpose();
+  Mat3 m;
+  for (int c = 0; c < 3; ++c) {
+    for (int r = 0; r < 3; ++r) m(r, c) = a[r] * b[c] + b[r] * a[c];
+  }
+  return m;
 }
 
 // ---------------------------------------------------------------- elements
@@ -36,7 +50,7 @@ double add_stretch(const Problem& problem, const RodState& state, int i, Sink& s
   sink.gradient(i, -f);
   sink.gradient(i + 1, f);
   if constexpr (Sink::kHessian) {
-    Mat3 H = (2.0 * k) * e * e.transpose();
+    Mat3 H = outer_product((2.0 * k) * e, e);
     H.diagonal().array() += k * excess;
     sink.hessian(i, i, H);
     sink.hessian(i + 1, i + 1, H);
@@ -106,7 +120,8 @@ inline Edge edge_at(const RodState& state, int i) {
 
 /// Adds a Hessian given for the edges a = (i-1, i) and b = (i, i+1) to the nodes.
 template <class Sink>
-void add_edge_hessian(int i, const Mat3& H_aa, const Mat3& H_ab, const Mat3& H_bb, Sink& sink) {
+inline void add_edge_hessian(int i, const Mat3& H_aa, const Mat3& H_ab, const Mat3& H_bb,
+                             Sink& sink) {
   sink.hessian(i - 1, i - 1, H_aa);
   sink.hessian(i, i, H_aa - H_ab - H_ab.transpose() + H_bb);
   sink.hessian(i + 1, i + 1, H_bb);
@@ -124,7 +139,7 @@ void add_theta_hessian(int i, int edge, const Vec3& h_a, const Vec3& h_b, Sink& 
 }
 
 template <class Sink>
-void add_edge_gradient(int i, const Vec3& g_a, const Vec3& g_b, Sink& sink) {
+inline void add_edge_gradient(int i, const Vec3& g_a, const Vec3& g_b, Sink& sink) {
   sink.gradient(i - 1, -g_a);
   sink.gradient(i, g_a - g_b);
   sink.gradient(i + 1, g_b);
@@ -203,14 +218,15 @@ void add_lean(const Lean& lean, double first, double second, Sink& sink) {
                            carried_hessian(a, d_a.d, lean.u));
     const Mat3 H_bb = c * (-symmetric_product(b.t, d_b.d) / (lean.l_b * b.length) +
                            carried_hessian(b, d_b.d, lean.u));
-    const Mat3 H_ab = (-c / (lean.l_b * a.length)) * d_a.d * a.t.transpose() +
-                      (c / (lean.l_a * b.length)) * b.t * d_b.d.transpose();
+    const Mat3 H_ab = outer_product((-c / (lean.l_b * a.length)) * d_a.d, a.t) +
+                      outer_product((c / (lean.l_a * b.length)) * b.t, d_b.d);
     add_edge_hessian(i, H_aa, H_ab, H_bb, sink);
     if (second == 0.0) return;
 
     // W'' times the products of the first ones.
     const Vec3 w_a = second * s_a, w_b = second * s_b;
-    add_edge_hessian(i, w_a * s_a.transpose(), w_a * s_b.transpose(), w_b * s_b.transpose(), sink);
+    add_edge_hessian(i, outer_product(w_a, s_a), outer_product(w_a, s_b), outer_product(w_b, s_b),
+                     sink);
     add_theta_hessian(i, i - 1, s_theta_a * w_a, s_theta_a * w_b, sink);
     add_theta_hessian(i, i, s_theta_b * w_a, s_theta_b * w_b, sink);
     sink.hessian_theta_theta(i - 1, i - 1, second * s_theta_a * s_theta_a);
@@ -263,7 +279,7 @@ double add_clamp_shape(const Problem& problem, const RodState& state, int edge, 
     sink.gradient(edge + 1, first * s_e);
     sink.gradient_theta(edge, first * s_theta);
     if constexpr (Sink::kHessian) {
-      const Mat3 H = first * carried_hessian(e, across.d, w) + second * s_e * s_e.transpose();
+      const Mat3 H = first * carried_hessian(e, across.d, w) + outer_product(second * s_e, s_e);
       sink.hessian(edge, edge, H);
       sink.hessian(edge + 1, edge + 1, H);
       sink.hessian(edge + 1, edge, -H);
@@ -289,31 +305,49 @@ double add_clamp_shape(const Problem& problem, const RodState& state, int edge, 
   return energy;
 }
 
-/// Twist at node i, W = T/2 (theta_b - theta_a + reference twist)^2; derivatives of the reference
-/// twist: "Discrete Viscous Threads", Eq. (16) and appendix.
+/// How the reference directors' twist at node i follows its edges: first and second derivatives,
+/// "Discrete Viscous Threads", Eq. (16) and appendix.
+struct ReferenceTwist {
+  double a, b;  // lengths of the edges
+  Vec3 t_a, t_b;
+  double chi;
+  Vec3 kb, by_a, by_b;  // curvature binormal; derivatives with the edges
+
+  ReferenceTwist(const RodState& state, int i) {
+    const Vec3 e_a = state.x.col(i) - state.x.col(i - 1), e_b = state.x.col(i + 1) - state.x.col(i);
+    a = e_a.norm();
+    b = e_b.norm();
+    t_a = e_a / a;
+    t_b = e_b / b;
+    chi = 1.0 + t_a.dot(t_b);
+    kb = (2.0 / chi) * t_a.cross(t_b);
+    by_a = kb / (2.0 * a);
+    by_b = kb / (2.0 * b);
+  }
+
+  /// Adds `moment` times the second derivatives.
+  void add_curvature(double moment, Mat3& H_aa, Mat3& H_ab, Mat3& H_bb) const {
+    const Vec3 mean = (t_a + t_b) / chi;
+    H_aa -= (0.25 * moment / (a * a)) * symmetric_product(kb, t_a + mean);
+    H_bb -= (0.25 * moment / (b * b)) * symmetric_product(kb, t_b + mean);
+    H_ab += (0.5 * moment / (a * b)) * ((2.0 / chi) * cross_matrix(t_a) - outer_product(kb, mean));
+  }
+};
+
+/// Twist at node i, W = T/2 (theta_b - theta_a + reference twist)^2.
 template <class Sink>
 double add_twist(const Problem& problem, const RodState& state, int i, Sink& sink) {
   const double T = problem.rod->twist[i];
-  const Vec3 e_a = state.x.col(i) - state.x.col(i - 1), e_b = state.x.col(i + 1) - state.x.col(i);
-  const double a = e_a.norm(), b = e_b.norm();
-  const Vec3 t_a = e_a / a, t_b = e_b / b;
-  const double chi = 1.0 + t_a.dot(t_b);
-  const Vec3 kb = (2.0 / chi) * t_a.cross(t_b);
+  const ReferenceTwist twist(state, i);
   const double angle = state.theta[i] - state.theta[i - 1] + state.reference_twist[i];
-  const Vec3 m_a = kb / (2.0 * a), m_b = kb / (2.0 * b);  // d angle / d e
+  const Vec3 &m_a = twist.by_a, &m_b = twist.by_b;
   add_edge_gradient(i, T * angle * m_a, T * angle * m_b, sink);
   sink.gradient_theta(i - 1, -T * angle);
   sink.gradient_theta(i, T * angle);
   if constexpr (Sink::kHessian) {
-    Mat3 H_aa = T * m_a * m_a.transpose(), H_bb = T * m_b * m_b.transpose(),
-         H_ab = T * m_a * m_b.transpose();
-    {
-      const Vec3 mean = (t_a + t_b) / chi;
-      H_aa -= (0.25 * T * angle / (a * a)) * symmetric_product(kb, t_a + mean);
-      H_bb -= (0.25 * T * angle / (b * b)) * symmetric_product(kb, t_b + mean);
-      H_ab +=
-          (0.5 * T * angle / (a * b)) * ((2.0 / chi) * cross_matrix(t_a) - kb * mean.transpose());
-    }
+    Mat3 H_aa = outer_product(T * m_a, m_a), H_bb = outer_product(T * m_b, m_b),
+         H_ab = outer_product(T * m_a, m_b);
+    twist.add_curvature(T * angle, H_aa, H_ab, H_bb);
     add_edge_hessian(i, H_aa, H_ab, H_bb, sink);
     add_theta_hessian(i, i - 1, -T * m_a, -T * m_b, sink);
     add_theta_hessian(i, i, T * m_a, T * m_b, sink);
@@ -322,6 +356,28 @@ double add_twist(const Problem& problem, const RodState& state, int i, Sink& sin
     sink.hessian_theta_theta(i, i - 1, -T);
   }
   return 0.5 * T * angle * angle;
+}
+
+/// Twist of a chain: derivatives of its energy but for k times the product of psi's first ones,
+/// which couples all of its nodes: that is CoupledChain's. Of it, the sink has k on the diagonal of
+/// the last theta; psi's derivatives with the nodes are added to `psi`, in the sink's layout.
+template <class Sink>
+double add_chain(const TwistChain& chain, const RodState& state, Sink& sink, Eigen::VectorXd& psi) {
+  if (!chain.exists()) return 0.0;
+  const double torque = chain.stiffness * chain.angle(state);
+  sink.gradient_theta(chain.last, torque);
+  sink.hessian_theta_theta(chain.last, chain.last, chain.stiffness);
+  for (int i = chain.first; i <= chain.last; ++i) {
+    const ReferenceTwist twist(state, i);
+    add_edge_gradient(i, torque * twist.by_a, torque * twist.by_b, sink);
+    sink.add_to(psi, i - 1, -twist.by_a);
+    sink.add_to(psi, i, twist.by_a - twist.by_b);
+    sink.add_to(psi, i + 1, twist.by_b);
+    Mat3 H_aa = Mat3::Zero(), H_ab = Mat3::Zero(), H_bb = Mat3::Zero();
+    twist.add_curvature(torque, H_aa, H_ab, H_bb);
+    add_edge_hessian(i, H_aa, H_ab, H_bb, sink);
+  }
+  return chain.energy(state);
 }
 
 /// Angle of the last edge about the moment's axis, counted on from that of the last accepted state.
@@ -363,7 +419,7 @@ double add_plane(const Problem& problem, const RodState& state, int i, Sink& sin
   const double k = problem.rod->stretch[0] / problem.rod->rest_length[0];
   const double height = normal.dot(state.x.col(i) - state.x.col(0));
   sink.gradient(i, k * height * normal);
-  if constexpr (Sink::kHessian) sink.hessian(i, i, k * normal * normal.transpose());
+  if constexpr (Sink::kHessian) sink.hessian(i, i, outer_product(k * normal, normal));
   return 0.5 * k * height * height;
 }
 

@@ -172,30 +172,39 @@ RodState rest_state(const Rod& rod, const Vec3& point, const Vec3& direction, do
   return state;
 }
 
-void transport_frames(const RodState& base, RodState& moved, int first_edge, int last_edge) {
+void transport_frames(const RodState& base, RodState& moved, int first_edge, int last_edge,
+                      int first_plain, int plain_edges) {
   const int edges = static_cast<int>(base.theta.size());
   const auto tangent = [](const RodState& state, int i) -> Vec3 {
     return (state.x.col(i + 1) - state.x.col(i)).normalized();
   };
-  Vec3 t_a = first_edge > 0 ? tangent(moved, first_edge - 1) : Vec3::Zero();
+  Vec3 t_a = Vec3::Zero(), behind = Vec3::Zero();  // tangent and director of the edge behind
+  if (first_edge > 0) {
+    t_a = tangent(moved, first_edge - 1);
+    behind = moved.director.col(first_edge - 1);
+  }
   for (int i = first_edge; i <= std::min(last_edge + 1, edges - 1); ++i) {
     const Vec3 t_b = tangent(moved, i);
+    const Vec3 carried = parallel_transport(behind, t_a, t_b);
+    t_a = t_b;
+    if (i >= first_plain && i < first_plain + plain_edges) {
+      behind = carried;
+      continue;
+    }
     if (i <= last_edge) {
       Vec3 d = parallel_transport(base.director.col(i), tangent(base, i), t_b);
       d -= d.dot(t_b) * t_b;  // rounding must not build up over thousands of steps
       moved.director.col(i) = d.normalized();
     }
+    behind = moved.director.col(i);
     if (i > 0) {
       // Twist of the reference directors: the angle next to that of before, so that it never jumps
       // by a turn.
-      const Vec3 carried = parallel_transport(moved.director.col(i - 1), t_a, t_b);
-      const Vec3 actual = moved.director.col(i);
-      const double angle = std::atan2(carried.cross(actual).dot(t_b), carried.dot(actual));
+      const double angle = std::atan2(carried.cross(behind).dot(t_b), carried.dot(behind));
       const double before = base.reference_twist[i];
       const bool far = std::abs(angle - before) > kPi;
       moved.reference_twist[i] = far ? before + std::remainder(angle - before, 2.0 * kPi) : angle;
     }
-    t_a = t_b;
   }
 }
 

@@ -98,7 +98,10 @@ Vec3 reference_normal(const Vec3& axis);
 Vec3 parallel_transport(const Vec3& vector, const Vec3& from, const Vec3& to);
 
 /// Moves directors and reference twist along with nodes that moved from those of `base`; copies
-/// theta. Called only for twisted rods. `first` and `last` bound the edges that moved.
-void transport_frames(const RodState& base, RodState& moved, int first_edge, int last_edge);
+/// theta. Called only for twisted rods. `first` and `last` bound the edges that moved. Of
+/// `plain_edges` edges from `first_plain` on the directors follow those behind without twist and
+/// are not written; reference twist of all their nodes is that of the node after them.
+void transport_frames(const RodState& base, RodState& moved, int first_edge, int last_edge,
+                      int first_plain = 0, int plain_edges = 0);
 
 }  // namespace wireplan::simulate

@@ -14,9 +14,10 @@ namespace wireplan::simulate {
 
 namespace {
 
-/// All elements that touch a free node, apart from contact with a vessel.
+/// All elements that touch a free node, apart from contact with a vessel and the twist of a chain.
 template <class Sink>
-Energy assemble(const Problem& problem, const RodState& state, Sink& sink) {
+Energy assemble(const Problem& problem, const RodState& state, Sink& sink,
+                const TwistChain& chain = {}) {
   const Rod& rod = *problem.rod;
   const int n = rod.nodes();
   Energy energy;
@@ -36,6 +37,7 @@ Energy assemble(const Problem& problem, const RodState& state, Sink& sink) {
   }
   if (rod.twisted) {
     for (int i = std::max(1, problem.first - 1); i <= std::min(n - 2, problem.last); ++i) {
+      if (chain.has(i)) continue;  // it has no shape either
       energy.twist += add_twist(problem, state, i, sink);
       if (rod.rest_angle[i] != 0.0) energy.bend += add_rest_bend(problem, state, i, sink);
       if (rod.strip[i] != 0.0) energy.bend += add_strip(problem, state, i, sink);
@@ -141,9 +143,10 @@ struct BandSink {
   BlockBand<D>& H;
 
   bool is_free(int i) const { return i >= first && i < last; }
-  void gradient(int i, const Vec3& v) {
-    if (is_free(i)) g.template segment<3>(D * (i - first)) += v;
+  void add_to(Eigen::VectorXd& vector, int i, const Vec3& v) {
+    if (is_free(i)) vector.template segment<3>(D * (i - first)) += v;
   }
+  void gradient(int i, const Vec3& v) { add_to(g, i, v); }
   void gradient_theta(int e, double v) {
     if (D == 4 && is_free(e)) g[D * (e - first) + 3] += v;
   }
@@ -343,16 +346,22 @@ NewtonResult Statics::solve_with(BlockBand<D>& hessian, BlockBand<D>& untouched,
   const bool twisted = D == 4;
   const bool polynomial = contact == nullptr && !twisted && !problem.tip_moment && !problem.plane;
   const auto motion = [&] { return WallContact::Motion{problem.first, problem.last, D, step_}; };
+  const bool out_of_introducer = problem.first > 0 && problem.last == n;
+  const TwistChain chain =
+      twisted && out_of_introducer ? find_chain(*problem.rod, problem.first) : TwistChain{};
+  gather_chain(chain, state);
 
   // Gradient and Hessian of the wire, and of contact as it was sampled last; energy of the wire.
   const auto differentiate = [&](const RodState& where) {
     gradient_.setZero();
-    hessian.reset(count);
+    hessian.reset(count, chain.edges());
+    coupled_.psi.setZero(D * count);
     BandSink<D> sink{problem.first, problem.last, gradient_, hessian};
-    const Energy energy = assemble(problem, where, sink);
+    double sum = assemble(problem, where, sink, chain).total();
+    if (chain.exists()) sum += add_chain(chain, where, sink, coupled_.psi);
     if (contact != nullptr) contact->add(sink);
     apply_supports<D>(problem, gradient_, hessian);
-    return energy.total();
+    return sum;
   };
   const auto largest_force = [&] {
     double residual = 0.0;
@@ -383,6 +392,7 @@ NewtonResult Statics::solve_with(BlockBand<D>& hessian, BlockBand<D>& untouched,
   if (contact != nullptr) contact->begin(state.x);
   wire_energy = differentiate(state);
   const auto finish = [&](bool converged) {
+    spread_chain(chain, rod, state);
     result.converged = converged;
     result.energy = wire_energy;
     if (contact != nullptr) result.energy += contact->energy().contact + contact->energy().wall;
@@ -414,13 +424,16 @@ NewtonResult Statics::solve_with(BlockBand<D>& hessian, BlockBand<D>& untouched,
     double slope, cap;  // of the energy along the step; largest part of the step that is safe
     shift = 0.0;
     for (int shifts = 0;; ++shifts) {
-      while (!hessian.factor()) {
+      const Eigen::Index theta = D * (chain.last - problem.first) + 3;
+      const auto solve = [&] {
+        step_ = -gradient_;
+        return hessian.factor() && coupled_.solve(chain, hessian, theta, step_);
+      };
+      while (!solve()) {
         shift = shift == 0.0 ? std::max(kSmallestShift, 0.1 * last_shift) : 8.0 * shift;
         if (!(shift < kLargestShift)) return finish(false);  // a number in it is not finite
         apply_shift();
       }
-      step_ = -gradient_;
-      hessian.solve(step_);
       slope = gradient_.dot(step_);
       if (contact != nullptr && shift == 0.0 && contact->has_remainder()) {
         slope = refine_step<D>(problem, hessian, slope);
@@ -446,19 +459,19 @@ NewtonResult Statics::solve_with(BlockBand<D>& hessian, BlockBand<D>& untouched,
     double trial_wire_energy = 0.0;
     const auto try_trial = [&](double length) {
       if constexpr (D == 4) {
-        for (int k = 0; k < count && problem.first + k < n - 1; ++k) {
+        for (int k = chain.edges(); k < count && problem.first + k < n - 1; ++k) {
           trial_.theta[problem.first + k] =
               state.theta[problem.first + k] + length * step_[D * k + 3];
         }
         transport_frames(state, trial_, std::max(0, problem.first - 1),
-                         std::min(n - 2, problem.last - 1));
+                         std::min(n - 2, problem.last - 1), chain.first, chain.edges());
       }
       double trial_energy;
       if (contact == nullptr) {
         trial_energy = trial_wire_energy = differentiate(trial_);
       } else {
         EnergySink sink;
-        trial_wire_energy = assemble(problem, trial_, sink).total();
+        trial_wire_energy = assemble(problem, trial_, sink, chain).total() + chain.energy(trial_);
         trial_energy = trial_wire_energy + contact->sample(trial_.x).total();
       }
       accepted = trial_energy <= energy + 1e-4 * length * slope + rounding;
@@ -538,6 +551,7 @@ double Statics::refine_step(const Problem& problem, const BlockBand<D>& factored
   find_rest(step_);
   if (refined_.norm() <= kSmall * gradient_.norm()) return slope;
   factored.solve(refined_);
+  coupled_.correct(refined_);
   const double start = refined_.norm();
   if (start <= kEnough * step_.norm()) {
     step_ -= refined_;
@@ -555,6 +569,7 @@ double Statics::refine_step(const Problem& problem, const BlockBand<D>& factored
       direction_ = krylov_.col(k);
       find_rest(direction_);
       factored.solve(refined_);
+      coupled_.correct(refined_);
       refined_ += direction_;
       for (int i = 0; i <= k; ++i) {
         upper(i, k) = krylov_.col(i).dot(refined_);

@@ -7,6 +7,7 @@
 
 #include "simulate/block_band.h"
 #include "simulate/rod.h"
+#include "simulate/twist_chain.h"
 #include "simulate/wall_contact.h"
 
 namespace wireplan::simulate {
@@ -107,6 +108,7 @@ class Statics {
   RodState trial_;
   Eigen::VectorXd gradient_, step_, first_step_, refined_, direction_;
   Eigen::MatrixXd krylov_;
+  CoupledChain coupled_;
 };
 
 }  // namespace wireplan::simulate
