@@ -14,6 +14,8 @@
 #include <array>
 #include <charconv>
 #include <fstream>
+#include <sstream>
+#include <string_view>
 
 #include "preprocess/vtk_mesh.h"
 
@@ -64,21 +66,29 @@ void mark_as_lps(vtkDataObject* data) {
   data->GetFieldData()->AddArray(space);
 }
 
-template <typename Writer>
-void write_with(vtkDataObject* data, const std::filesystem::path& path) {
-  mark_as_lps(data);
-  const VtkErrors errors;
-  vtkNew<Writer> writer;
-  writer->SetFileName(path.c_str());
-  writer->SetInputData(data);
-  writer->SetDataModeToAppended();
-  writer->EncodeAppendedDataOff();
-  writer->SetByteOrderToLittleEndian();
-  if (writer->Write() != 1 || errors.any()) {
+void write_bytes(std::string_view bytes, const std::filesystem::path& path) {
+  std::ofstream out(path, std::ios::binary);
+  out.write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
+  out.close();
+  if (!out) {
     throw DiskError(path.string() +
                     ": cannot be written; check that the folder exists, may be written to and that "
                     "the disk is not full");
   }
+}
+
+/// By way of memory: to a file VTK writes in hundreds of small parts.
+template <typename Writer>
+void write_with(vtkDataObject* data, const std::filesystem::path& path) {
+  mark_as_lps(data);
+  vtkNew<Writer> writer;
+  writer->WriteToOutputStringOn();
+  writer->SetInputData(data);
+  writer->SetDataModeToAppended();
+  writer->EncodeAppendedDataOff();
+  writer->SetByteOrderToLittleEndian();
+  expects(writer->Write() == 1);
+  write_bytes(writer->GetOutputString(), path);
 }
 
 // ---- Values out of VTK -----------------------------------------------------------------------
@@ -261,7 +271,7 @@ std::vector<double> read_wall_array(const std::filesystem::path& path, const std
 void write_time_series(const std::vector<std::filesystem::path>& files,
                        const std::vector<double>& times, const std::filesystem::path& path) {
   expects(files.size() == times.size());
-  std::ofstream out(path, std::ios::binary);
+  std::ostringstream out;
   out << "<?xml version=\"1.0\"?>\n<VTKFile type=\"Collection\" version=\"0.1\">\n<Collection>\n";
   for (std::size_t k = 0; k < files.size(); ++k) {
     const std::filesystem::path file =
@@ -270,13 +280,7 @@ void write_time_series(const std::vector<std::filesystem::path>& files,
         << xml_escaped(file.generic_string()) << "\"/>\n";
   }
   out << "</Collection>\n</VTKFile>\n";
-  out.close();
-  if (!out) {
-    throw DiskError(
-        path.string() +
-        ": cannot be written; check that the folder exists, may be written to and that the "
-        "disk is not full");
-  }
+  write_bytes(out.str(), path);
 }
 
 }  // namespace wireplan::preprocess
