@@ -19,6 +19,8 @@ namespace {
 constexpr double kInnerSkin = 0.2;
 // Pieces of less than this part of the largest's area are crumbs.
 constexpr double kCrumb = 0.05;
+// A vessel's area is more than this part of its length squared: 600 times that at 1 m and 0.1 mm.
+constexpr double kLeastArea = 1e-6;
 constexpr int kShortest = 1, kLongest = 5000;  // of what may be a vessel               [mm]
 
 Vec3 middle_of(const Surface& s) {
@@ -75,6 +77,12 @@ void require_length(const Surface& s, const std::string& origin) {
               std::to_string(kLongest) + " mm; correct the unit (mm, cm or m)");
 }
 
+void require_area(const Surface& s, const std::string& origin) {
+  if (area_of(s) > kLeastArea * std::pow(length_of(s), 2.0)) return;
+  throw Error(origin + ": the triangles near " + place_text(middle_of(s)) +
+              " mm enclose nothing, expected the wall of a vessel; export the surface again");
+}
+
 /// The vessel among closed or open pieces: the largest, closed; or a piece within it that is the
 /// inner skin of its wall.
 Surface choose_piece(const std::vector<Piece>& pieces, const std::string& origin,
@@ -82,6 +90,7 @@ Surface choose_piece(const std::vector<Piece>& pieces, const std::string& origin
   const Surface& first = pieces.front().surface;
   const double largest = area_of(first);
   if (pieces.front().turned) mends.push_back(turned_piece(first));
+  require_area(first, origin);
   Surface vessel = close_openings(first, origin, mends);
   for (std::size_t k = 1; k < pieces.size(); ++k) {
     const Surface& piece = pieces[k].surface;

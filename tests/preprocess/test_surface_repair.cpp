@@ -329,6 +329,17 @@ TEST(SurfaceRepair, WhatIsNothingButFinsIsRefused) {
             std::string::npos);
 }
 
+TEST(SurfaceRepair, WhatIsFlatInEveryTriangleIsRefused) {
+  Surface needle;
+  needle.vertices.resize(3, 4);
+  needle.vertices.transpose() << 0, 0, 0, 10, 0, 0, 20, 0, 0, 30, 0, 1e-30;
+  needle.triangles.resize(3, 4);
+  needle.triangles.transpose() << 0, 2, 1, 0, 1, 3, 1, 2, 3, 2, 0, 3;
+  EXPECT_EQ(message_of([&] { repair_surface(needle, "x"); }),
+            "x: the triangles near (15.0, 0.0, 0.0) mm enclose nothing, expected the wall of a "
+            "vessel; export the surface again");
+}
+
 TEST(SurfaceRepair, TellsWhatWasMendedInSentences) {
   const std::vector<Mend> mends = {
       {.kind = MendKind::kOpenEnd, .count = 12, .place = {1, 2, 3}, .size = 6.0},
