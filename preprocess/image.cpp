@@ -24,6 +24,7 @@
 #include "itkMetaImageIO.h"
 #include "itkNiftiImageIO.h"
 #include "itkNrrdImageIO.h"
+#include "preprocess/apart.h"
 #include "preprocess/dicom_check.h"
 
 namespace wireplan::preprocess {
@@ -249,9 +250,9 @@ void correct_scale(itk::ImageIOBase& io, Image& image) {
 /// the header promises. A compressed file ends with its size before compression, modulo 2^32 (RFC
 /// 1952); 0 there is the mark of a file in several blocks, which is let pass.
 void require_whole_nifti(const itk::ImageIOBase& io, const fs::path& path) {
-  const double needed =
-      nifti_value(io, "vox_offset") + std::max(1.0, nifti_value(io, "bitpix") / 8.0) *
-                                          static_cast<double>(io.GetImageSizeInPixels());
+  const double needed = std::max(0.0, nifti_value(io, "vox_offset")) +
+                        std::max(1.0, nifti_value(io, "bitpix") / 8.0) *
+                            static_cast<double>(io.GetImageSizeInPixels());
   double stored = static_cast<double>(fs::file_size(path));
   double most = std::numeric_limits<double>::infinity();
   if (lower_case(path.extension().string()) == ".gz") {
@@ -270,27 +271,35 @@ void require_whole_nifti(const itk::ImageIOBase& io, const fs::path& path) {
   }
 }
 
-/// ITK's matrices end the program on what is not finite, so the spacing and the two transforms of
-/// a NIfTI-1 header are looked at first (offsets: nifti1.h). Other headers are for the reader to
-/// judge.
-void require_finite_nifti(const fs::path& path) {
+/// ITK takes what lacks the mark of a NIfTI-1 file for Analyze, whose header promises nothing, and
+/// its matrices end the program, or never, on what is not finite or far too small; so the mark, the
+/// spacing and the two transforms are looked at first (offsets: nifti1.h).
+void require_nifti_header(const fs::path& path, const std::string& no_image) {
   std::array<unsigned char, 348> header{};
   const gzFile file = gzopen(path.c_str(), "rb");  // reads what is not compressed too
   const int count = file == nullptr ? 0 : gzread(file, header.data(), header.size());
   if (file != nullptr) gzclose(file);
-  const bool is_nifti = header[344] == 'n' && (header[345] == '+' || header[345] == 'i');
-  if (count != static_cast<int>(header.size()) || !is_nifti) return;
+  const bool is_nifti = header[344] == 'n' && header[345] == '+' && header[346] == '1';
+  if (count != static_cast<int>(header.size()) || !is_nifti) {
+    throw Error(path.string() + ": " + no_image);
+  }
   // In which order the bytes are, nifticlib tells by the number of dimensions, 1 to 7.
   const bool swapped = header[41] != 0 || header[40] < 1 || header[40] > 7;
-  constexpr std::array<std::array<std::size_t, 2>, 2> kFloats = {{{76, 108}, {256, 328}}};
-  for (const auto& [begin, end] : kFloats) {
+  // Distances and places are below a kilometre, steps of time and the like below any unit's.
+  struct Floats {
+    std::size_t begin, end;
+    float largest;
+  };
+  constexpr float kSmallest = 1e-30F;  // but 0: no rounding leaves less
+  constexpr std::array<Floats, 3> kFloats = {{{76, 92, 1e6F}, {92, 108, 1e12F}, {256, 328, 1e6F}}};
+  for (const auto& [begin, end, largest] : kFloats) {
     for (std::size_t at = begin; at < end; at += sizeof(float)) {
       std::array<unsigned char, sizeof(float)> bytes{};
       for (std::size_t k = 0; k < bytes.size(); ++k) {
         bytes[k] = header[at + (swapped ? bytes.size() - 1 - k : k)];
       }
-      constexpr float kLargest = 1e12F;  // of a place in mm, with room to spare
-      if (std::abs(std::bit_cast<float>(bytes)) <= kLargest) continue;
+      const float size = std::abs(std::bit_cast<float>(bytes));
+      if (size == 0.0F || (size >= kSmallest && size <= largest)) continue;
       throw Error(path.string() + ": " + damaged("NIfTI"));
     }
   }
@@ -422,7 +431,7 @@ FileFormat open_file(const fs::path& path) {
   const std::string no_image = "not a " + format.name + " image, or damaged; " + kFormats;
   call_itk(path, no_image, [&] {
     if (format.name == "MetaImage") require_meta_header(path, no_image);
-    if (format.name == "NIfTI") require_finite_nifti(path);
+    if (format.name == "NIfTI") require_nifti_header(path, no_image);
     format.io->SetFileName(path.string());
     if (!format.io->CanReadFile(path.c_str())) {
       throw Error(path.string() + ": " + no_image);
@@ -464,8 +473,12 @@ bool same_series(const Slice& a, const Slice& b) {
          (a.grid.direction - b.grid.direction).cwiseAbs().maxCoeff() < 1e-3;
 }
 
+constexpr const char* kDamagedDicom =
+    "a DICOM file that is damaged or cut short; copy or export the series again, or take the file "
+    "out if it is no slice";
+
 /// Headers of all DICOM images in the folder, by series, in the order of their file names.
-std::vector<Series> find_series(const fs::path& folder) {
+std::vector<Series> find_series(const fs::path& folder, const At& at) {
   std::vector<fs::path> files;
   for (const fs::directory_entry& entry : fs::directory_iterator(folder)) {
     if (entry.is_regular_file()) {
@@ -479,11 +492,9 @@ std::vector<Series> find_series(const fs::path& folder) {
     const DicomForm form = check_dicom(file);
     if (form == DicomForm::kNone) continue;  // folders also hold notes and pictures
     if (form == DicomForm::kDamaged) {
-      throw Error(
-          file.string() +
-          ": a DICOM file that is damaged or cut short; copy or export the series again, or "
-          "take the file out if it is no slice");
+      throw Error(file.string() + ": " + kDamagedDicom);
     }
+    at(file.string());
     Slice slice{.io = itk::GDCMImageIO::New(), .series_uid = {}, .series_number = {}, .grid = {}};
     if (!slice.io->CanReadFile(file.c_str())) {
       continue;  // such as DICOMDIR and reports
@@ -629,8 +640,26 @@ void require_whole_dicom(itk::GDCMImageIO& io) {
   }
 }
 
-Image read_dicom_folder(const fs::path& folder) {
-  std::vector<Series> all = find_series(folder);
+void send_grid(const Send& send, const Grid& grid) {
+  send(grid.size.data(), sizeof grid.size);
+  send(grid.spacing.data(), sizeof(double) * 3);
+  send(grid.origin.data(), sizeof(double) * 3);
+  send(grid.direction.data(), sizeof(double) * 9);
+}
+
+Grid receive_grid(const Receive& receive) {
+  Grid grid;
+  receive(grid.size.data(), sizeof grid.size);
+  receive(grid.spacing.data(), sizeof(double) * 3);
+  receive(grid.origin.data(), sizeof(double) * 3);
+  receive(grid.direction.data(), sizeof(double) * 9);
+  return grid;
+}
+
+/// Sends the grid of the folder's series, then its values slice by slice.
+void send_dicom_folder(const fs::path& folder, const Send& send, const At& at) {
+  at(folder.string());
+  std::vector<Series> all = find_series(folder, at);
   if (all.empty()) {
     throw Error(folder.string() +
                 ": a folder without DICOM images (folders inside it are not searched); " +
@@ -640,21 +669,49 @@ Image read_dicom_folder(const fs::path& folder) {
     throw several_series(folder, std::move(all));
   }
   Series& slices = all.front();
-  if (slices.size() == 1 && slices.front().grid.size[2] > 1) {
+  at(slices.front().io->GetFileName());
+  if (slices.size() == 1 && slices.front().grid.size[2] > 1) {  // all frames in one file
     require_whole_dicom(*slices.front().io);
-    return read_volume(*slices.front().io, folder);  // all frames in one file
+    const Image image = read_volume(*slices.front().io, folder);
+    send_grid(send, image.grid);
+    return send(image.values.data(), image.values.size() * sizeof(float));
   }
-  Image image;
-  image.grid = stack(slices, folder);
-  require_scalar_volume(*slices.front().io, image.grid, folder);
-  image.values.reserve(image.grid.voxels());
+  const Grid grid = stack(slices, folder);
+  require_scalar_volume(*slices.front().io, grid, folder);
+  send_grid(send, grid);
+  std::vector<float> values;
   for (const Slice& slice : slices) {
+    at(slice.io->GetFileName());
     require_whole_dicom(*slice.io);
-    append_voxels(*slice.io, folder, image.values);
+    values.clear();
+    append_voxels(*slice.io, folder, values);
+    if (values.size() * slices.size() != grid.voxels()) {
+      throw Error(folder.string() + ": files of several frames each, expected one slice per file");
+    }
+    send(values.data(), values.size() * sizeof(float));
   }
-  if (image.values.size() != image.grid.voxels()) {
-    throw Error(folder.string() + ": files of several frames each, expected one slice per file");
-  }
+}
+
+/// In a process of its own, since distributions build GDCM with assertions, and those end the
+/// process on some values that a damaged header holds.
+Image read_dicom_folder(const fs::path& folder) {
+  Image image;
+  run_apart(
+      [&](const Send& send, const At& at) {
+        call_itk(folder, damaged("DICOM"), [&] { send_dicom_folder(folder, send, at); });
+      },
+      [&](const Receive& receive) {
+        image.grid = receive_grid(receive);
+        image.values.reserve(image.grid.voxels());
+        const std::size_t slice =
+            image.grid.voxels() / static_cast<std::size_t>(image.grid.size[2]);
+        while (image.values.size() < image.grid.voxels()) {
+          const std::size_t before = image.values.size();
+          image.values.resize(before + slice);
+          receive(image.values.data() + before, slice * sizeof(float));
+        }
+      },
+      kDamagedDicom);
   return image;
 }
 

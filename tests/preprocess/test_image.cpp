@@ -12,6 +12,7 @@
 #include "gdcmImageChangeTransferSyntax.h"
 #include "gdcmImageReader.h"
 #include "gdcmImageWriter.h"
+#include "preprocess/dicom_check.h"
 #include "preprocess/image.h"
 #include "tests/dicom.h"
 
@@ -269,6 +270,17 @@ TEST_F(ImageFile, NiftiWhoseTransformIsNoNumberIsRefusedBeforeItsLibraryReadsIt)
   EXPECT_TRUE(has(read_error(write("nan.nii", bytes)), "nan.nii: its header reads as NIfTI"));
 }
 
+TEST_F(ImageFile, NiftiWithoutItsMarkOrWithPlacesBeyondAnyRoomIsRefusedAtOnce) {
+  std::string bytes = nifti({});
+  bytes[344] = '\0';  // Analyze, which promises no voxels
+  EXPECT_TRUE(has(read_error(write("mark.nii", bytes)), "mark.nii: not a NIfTI image"));
+  for (const float place : {2e8F, 1e-40F}) {
+    std::array<float, 12> rows = NiftiHeader{}.rows;
+    rows[1] = place;
+    EXPECT_TRUE(has(read_error(write("far.nii", nifti({.rows = rows}))), "far.nii: its header"));
+  }
+}
+
 TEST_F(ImageFile, NiftiSlopeOfZeroMeansUnscaled) {
   const Image image = read_image(write("plain.nii", nifti({.slope = 0.0F, .intercept = 7.0F})));
   EXPECT_EQ(image.values[5], 5.0F);
@@ -419,6 +431,19 @@ TEST_F(DicomFolder, CompressedSlicesHoldTheSameValues) {
       ASSERT_EQ(image.values[n], values[n % values.size()]) << n;
     }
   }
+}
+
+TEST_F(DicomFolder, ASliceThatEndsTheProcessOfItsLibraryIsNamed) {
+  write_series({0, 2, 4});
+  std::string bytes = dicom({.position = Vec3(0, 0, 6), .first_value = 30});
+  const std::size_t rows = bytes.find(std::string("\x28\0\x10\0US", 6));
+  ASSERT_NE(rows, std::string::npos);
+  bytes.replace(rows + 4, 2, "UL");  // well formed, but no number of rows
+  const fs::path file = write("slice", bytes);
+  ASSERT_EQ(check_dicom(file), DicomForm::kSound);
+  EXPECT_EQ(read_error(folder_), file.string() +
+                                     ": a DICOM file that is damaged or cut short; copy or export "
+                                     "the series again, or take the file out if it is no slice");
 }
 
 TEST_F(DicomFolder, SingleFileOrSliceAsksForTheSeries) {
