@@ -53,8 +53,9 @@ fuzz_parsers() {
     return 0
   fi
   bash tests/build.sh fuzz
-  bash tests/fuzz/run.sh 20000 case scene report
-  bash tests/fuzz/run.sh 4000 surface
+  bash tests/fuzz/run.sh 20000
+  bash tests/fuzz/run.sh 2000 repair
+  bash tests/fuzz/run.sh 200 dicom
 }
 
 # Cases start from nothing, not from what earlier runs left in the user's cache.
