@@ -50,6 +50,13 @@ class Faults : public testing::Test {
 
 TEST_F(Faults, AWriteThatFailsIsToldAndSpoilsNothing) {
   if (!can_preload()) GTEST_SKIP() << "a preloaded library comes before the sanitizer's";
+#ifdef WIREPLAN_IMAGING
+  if (long_tests()) {  // all stages
+    write_two_tubes(folder_ / "ct.nrrd");
+    const Json tube = read_json(folder_ / "case.json", "wireplan.case/1");
+    write_json(volume_case(tube), folder_ / "case.json");
+  }
+#endif
   const Answer whole = run_with("WIREPLAN_FAULT_COUNT='" + (folder_ / "count.txt").string() + "'");
   ASSERT_EQ(whole.code, 0) << whole.log;
   const long writes = std::stol(read_text(folder_ / "count.txt"));
@@ -66,7 +73,8 @@ TEST_F(Faults, AWriteThatFailsIsToldAndSpoilsNothing) {
   long tried = 0, told = 0;
   for (long at = 1; at <= writes; at += step) {
     for (std::size_t kind = 0; kind < faults.size(); ++kind) {
-      if (!long_tests() && kind != static_cast<std::size_t>(tried) % faults.size()) continue;
+      const bool always = long_tests() && kind < 2;
+      if (!always && kind != static_cast<std::size_t>(tried) % faults.size()) continue;
       const Fault fault = faults[kind];
       SCOPED_TRACE("write " + std::to_string(at) + ": " + std::strerror(fault.error));
       fs::remove_all(folder_ / "cache");
@@ -91,6 +99,8 @@ TEST_F(Faults, AWriteThatFailsIsToldAndSpoilsNothing) {
     ++tried;
   }
   EXPECT_GT(told, tried / 2);
+  RecordProperty("writes", static_cast<int>(writes));
+  RecordProperty("told", static_cast<int>(told));
 }
 
 TEST_F(Faults, ARunThatFindsEverythingWritesNothing) {
@@ -336,8 +346,9 @@ TEST_F(Faults, AKilledRunGoesOnAndComputesNoFinishedTrialTwice) {
   const std::size_t trials = kept_trials(cache()).size();
   EXPECT_GE(trials, 9u);  // one along the axis, eight askew; more where scouts go before them
 
-  // Kills at random moments of each stage in turn, then a run to the end; over and over.
-  const int wanted = long_tests() ? 100 : 7;
+  // Kills at random moments of each stage in turn, each followed by a run that goes on, until one
+  // runs to the end; over and over.
+  const int wanted = long_tests() ? 100 : 7, kills_per_stage = long_tests() ? 4 : 1;
   std::mt19937_64 random(7);
   std::map<std::string, int> hits;
   int kills = 0, attempts = 0;
@@ -345,7 +356,9 @@ TEST_F(Faults, AKilledRunGoesOnAndComputesNoFinishedTrialTwice) {
     fs::remove_all(folder_ / "cache");
     fs::remove_all(folder_ / "out");
     std::map<fs::path, std::pair<ino_t, std::int64_t>> kept;
-    for (std::size_t stage = 0; stage < stages.size() && kills < wanted; ++stage) {
+    const std::size_t tries = stages.size() * static_cast<std::size_t>(kills_per_stage);
+    for (std::size_t k = 0; k < tries && kills < wanted; ++k) {
+      const std::size_t stage = k / static_cast<std::size_t>(kills_per_stage);
       ++attempts;
       {
         Process program(folder_.path(), arguments, log);
@@ -377,6 +390,7 @@ TEST_F(Faults, AKilledRunGoesOnAndComputesNoFinishedTrialTwice) {
     EXPECT_EQ(last.size(), trials);
     prune_cache(Store(cache()), {});
     EXPECT_TRUE(verify_cache(Store(cache())).empty());
+    if (long_tests()) std::cout << kills << " kills, " << trials << " trials" << std::endl;
   }
   EXPECT_EQ(kills, wanted);
   if (long_tests()) {
