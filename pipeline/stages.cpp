@@ -126,7 +126,7 @@ std::vector<Stage> stages_of(const Case& given) {
                       .parameters = {"/segmentation", "/access/point_mm", "/target/point_mm"},
                       .make = make_segment});
     stages.push_back({.name = "surface",
-                      .version = 3,
+                      .version = 4,
                       .reads_input = true,
                       .after = {"segment"},
                       .parameters = {"/surface/edge_length_mm"},

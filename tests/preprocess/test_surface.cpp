@@ -594,25 +594,38 @@ TEST(SurfaceFromMask, RefusesAnEmptyMask) {
 
 // ---- From the image -----------------------------------------------------------------------------
 
+/// Share of a disc that a point spread of width `blur` sees at distance r from its middle: its
+/// chords, each with the blur along it, weighted with the blur across them.
+double blurred_disc(double r, double radius, double blur) {
+  constexpr int kChords = 64;
+  const double reach = std::min(radius, 5.0 * blur), step = 2.0 * reach / kChords;
+  const auto below = [&](double x) { return 0.5 * std::erfc(-x / (blur * std::sqrt(2.0))); };
+  double sum = 0.0;
+  for (int k = 0; k < kChords; ++k) {
+    const double y = -reach + (k + 0.5) * step, half = std::sqrt(radius * radius - y * y);
+    const double weight = std::exp(-0.5 * y * y / (blur * blur)) / (blur * std::sqrt(2.0 * M_PI));
+    sum += step * weight * (below(half - r) - below(-half - r));
+  }
+  return sum;
+}
+
 /// Grey values of a straight tube along z of 350 HU, its wall of 45 HU 1.2 mm thick, fat (-100 HU)
-/// on the side of negative x and 2.4 mm off bone (700 HU) on the other, blurred by an edge of erf
-/// shape.
+/// on the side of negative x and 2.4 mm off bone (700 HU) on the other, blurred.
 Image grey_tube(const Grid& grid, const Vec3& axis, double radius) {
   constexpr double kWall = 1.2, kBlur = 0.55;  // mm
   Image image{.grid = grid, .values = {}};
-  const auto beyond = [](double depth) {
-    return 0.5 * std::erfc(-depth / (kBlur * std::sqrt(2.0)));
-  };
-  for (int k = 0; k < grid.size[2]; ++k) {
-    for (int j = 0; j < grid.size[1]; ++j) {
-      for (int i = 0; i < grid.size[0]; ++i) {
-        const Vec3 p = grid.lps_from_ijk(Vec3(i, j, k)) - axis;
-        const double depth = p.head<2>().norm() - radius;
-        const double outer =
-            p.x() < 0.0 ? -145.0 * beyond(depth - kWall) : 655.0 * beyond(depth - 2.0 * kWall);
-        image.values.push_back(static_cast<float>(350.0 - 305.0 * beyond(depth) + outer));
-      }
+  for (int j = 0; j < grid.size[1]; ++j) {
+    for (int i = 0; i < grid.size[0]; ++i) {
+      const Vec3 p = grid.lps_from_ijk(Vec3(i, j, 0)) - axis;
+      const auto within = [&](double r) { return blurred_disc(p.head<2>().norm(), r, kBlur); };
+      const double outer = p.x() < 0.0 ? -145.0 * (1.0 - within(radius + kWall))
+                                       : 655.0 * (1.0 - within(radius + 2.0 * kWall));
+      image.values.push_back(static_cast<float>(45.0 + 305.0 * within(radius) + outer));
     }
+  }
+  const std::vector<float> slice = image.values;
+  for (int k = 1; k < grid.size[2]; ++k) {
+    image.values.insert(image.values.end(), slice.begin(), slice.end());
   }
   return image;
 }
@@ -640,10 +653,10 @@ TEST(SurfaceFromImage, LiesOnTheEdgeOfTheLumenWhateverTheMasksThresholdWas) {
       }
       ASSERT_GT(errors.size(), 200U);
       std::sort(errors.begin(), errors.end());
-      // A level from the wall 1.2 voxels off is wrong by up to 30 HU where fat follows; the
-      // edge falls by 220 HU/mm.
-      EXPECT_LT(std::accumulate(errors.begin(), errors.end(), 0.0) / double(errors.size()), 0.1);
-      EXPECT_LT(errors[errors.size() * 95 / 100], 0.2);
+      // Without taking the blur and the fat behind the wall into account 0.07 to 0.17 and 0.16 to
+      // 0.25: blur draws the edge of a vessel of 2 mm in by 0.08.
+      EXPECT_LT(std::accumulate(errors.begin(), errors.end(), 0.0) / double(errors.size()), 0.06);
+      EXPECT_LT(errors[errors.size() * 95 / 100], 0.13);
       EXPECT_GT(fit.fitted_fraction, 0.7);
       EXPECT_NEAR(fit.lumen_value, 350.0, 15.0);
     }
