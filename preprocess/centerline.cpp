@@ -12,8 +12,8 @@
 #include <utility>
 #include <vector>
 
+#include "preprocess/nearest_wall.h"
 #include "preprocess/surface.h"
-#include "preprocess/wall_distance.h"
 
 namespace wireplan::preprocess {
 namespace {
@@ -36,7 +36,7 @@ constexpr double kSmoothing = 0.12;
 
 /// From a point near the wall straight away from it, as far as the distance grows and at most to
 /// `depth`: there the ball is large enough to meet the grid.
-Vec3 leave_wall(const WallDistance& wall, Vec3 point, double depth) {
+Vec3 leave_wall(const NearestWall& wall, Vec3 point, double depth) {
   Nearest here = wall.find(point);
   while (here.distance < depth) {
     const Vec3 next = point + 0.5 * (point - here.foot);
@@ -75,7 +75,7 @@ double cost_per_mm(Cost cost, double r) {
 /// and so all that is reached lies in the same lumen as the start, without any inside test.
 class GridSearch {
  public:
-  GridSearch(const WallDistance& wall, const Surface& surface, double spacing, const Vec3& start,
+  GridSearch(const NearestWall& wall, const Surface& surface, double spacing, const Vec3& start,
              const Vec3& goal)
       : wall_(wall), spacing_(spacing) {
     origin_ = surface.vertices.rowwise().minCoeff();
@@ -253,7 +253,7 @@ class GridSearch {
   // Cheapest first; of equal costs the point that was touched first, so that ties are settled.
   using Entry = std::pair<double, int>;
 
-  const WallDistance& wall_;
+  const NearestWall& wall_;
   double spacing_;
   Cost kind_ = Cost::kRoute;
   Vec3 origin_;
@@ -308,7 +308,7 @@ struct RawPath {
 
 /// Searches from the target, which mostly lies in the thinner vessel: then most of the wide one is
 /// never visited.
-RawPath search_path(const WallDistance& wall, const Surface& surface, const Vec3& access,
+RawPath search_path(const NearestWall& wall, const Surface& surface, const Vec3& access,
                     const Vec3& target, double first_spacing) {
   const auto search_on = [&](double spacing, const Vec3& from, const Vec3& to) {
     const double depth = 2.0 * spacing;  // there every ball meets the grid
@@ -371,7 +371,7 @@ struct Smoothing {
 /// Gaussian smoothing of points that are `sample` apart. The window is symmetric and shrinks toward
 /// the ends, which stay. A point that would leave its inscribed ball, and so perhaps the lumen,
 /// stays as well.
-Points smooth(const WallDistance& wall, const Points& line, double sample,
+Points smooth(const NearestWall& wall, const Points& line, double sample,
               const Smoothing& smoothing) {
   const int n = static_cast<int>(line.size());
   const auto at = [&](int i) -> const Vec3& { return line[static_cast<std::size_t>(i)]; };
@@ -405,7 +405,7 @@ constexpr Climb kFirstClimb{}, kLaterClimb{.first_step = 0.08, .steps = 16};
 /// Ascends the wall distance in the plane through `point` across `tangent`, by steps along the
 /// gradient that shrink geometrically (it jumps at the ridge, so its length tells nothing). Never
 /// leaves the ball that is known to be free. `near` is a hint and is updated.
-Vec3 climb(const WallDistance& wall, Vec3 point, const Vec3& tangent, Nearest& near,
+Vec3 climb(const NearestWall& wall, Vec3 point, const Vec3& tangent, Nearest& near,
            const Climb& how = kFirstClimb) {
   constexpr double kDecay = 0.8;
   near = wall.find(point, near);
@@ -431,7 +431,7 @@ Vec3 tangent_at(const Points& line, std::size_t i) {
   return (line[to] - line[from]).normalized();
 }
 
-Points move_to_ridge(const WallDistance& wall, const Points& line, const Climb& how) {
+Points move_to_ridge(const NearestWall& wall, const Points& line, const Climb& how) {
   Points moved;
   Nearest near = wall.find(line.front());
   for (std::size_t i = 0; i < line.size(); ++i) {
@@ -442,7 +442,7 @@ Points move_to_ridge(const WallDistance& wall, const Points& line, const Climb& 
 
 /// Without its two ends, where the path still climbs from access and target to the ridge: what is
 /// within one inscribed radius of an end. A path too short for that is kept.
-Points without_ends(const WallDistance& wall, const Points& line) {
+Points without_ends(const NearestWall& wall, const Points& line) {
   const std::vector<double> s = arc_length(line);
   std::size_t first = 0, last = line.size() - 1;
   while (first < last && s[first] < wall.find(line[first]).distance) ++first;
@@ -454,7 +454,7 @@ Points without_ends(const WallDistance& wall, const Points& line) {
 
 /// Without its last 1.5 radii: the way to the farthest place of an end, mostly a cap's corner,
 /// leaves the middle where the cap is as near as the side. A line too short for that is kept.
-Points without_tip(const WallDistance& wall, const Points& line) {
+Points without_tip(const NearestWall& wall, const Points& line) {
   constexpr double kRadii = 1.5;
   const std::vector<double> s = arc_length(line);
   std::size_t last = line.size() - 1;
@@ -466,7 +466,7 @@ Points without_tip(const WallDistance& wall, const Points& line) {
 /// Continues the line along the ridge beyond its last point until it has passed `end`, or the wall
 /// is ahead. Where the nearest wall is a cap ahead, the distance says nothing about the middle, and
 /// the line goes straight on.
-void extend(const WallDistance& wall, Points& line, const Vec3& end, double sample) {
+void extend(const NearestWall& wall, Points& line, const Vec3& end, double sample) {
   constexpr std::size_t kSpan = 8;    // points whose chord is the direction
   constexpr double kCapAhead = -0.5;  // slope of the distance along the line, -1 before a flat cap
   Nearest near = wall.find(line.back());
@@ -484,7 +484,7 @@ void extend(const WallDistance& wall, Points& line, const Vec3& end, double samp
 
 /// The same straight on to the wall ahead: for an end that lies in a corner of a cap, to which the
 /// ridge would lead.
-void extend_straight(const WallDistance& wall, Points& line, const Vec3& end, double sample) {
+void extend_straight(const NearestWall& wall, Points& line, const Vec3& end, double sample) {
   constexpr double kSpan = 3.0, kAtWall = 0.2;  // radii whose chord is the direction; of wall ahead
   const double radius = wall.find(line.back()).distance, at_wall = kAtWall * radius;
   const auto span = static_cast<std::size_t>(std::max(2.0, std::round(kSpan * radius / sample)));
@@ -522,7 +522,7 @@ void cut_after(Points& line, const Vec3& end, double sample) {
 }
 
 /// Arc length and inscribed radius of a line.
-Centerline measured(const WallDistance& wall, const Points& line) {
+Centerline measured(const NearestWall& wall, const Points& line) {
   const auto n = static_cast<Eigen::Index>(line.size());
   const std::vector<double> s = arc_length(line);
   Centerline result{.points = Eigen::Matrix3Xd(3, n),
@@ -626,7 +626,7 @@ std::vector<Branch> find_tree(const Surface& surface, const Vec3& root,
                               const CenterlineOptions& options) {
   expects(options.sample_mm > 0.0 && options.grid_mm >= 0.0);
   require_inside(surface, "access", root);
-  const WallDistance wall(surface);
+  const NearestWall wall(surface);
   const double spacing = first_spacing(surface, kTreeNodesWanted, options),
                sample = options.sample_mm;
   const Vec3 start = leave_wall(wall, root, 2.0 * spacing);
@@ -681,7 +681,7 @@ Centerline find_centerline(const Surface& surface, const Vec3& access, const Vec
   expects(options.sample_mm > 0.0 && options.grid_mm >= 0.0);
   require_inside(surface, "access", access);
   require_inside(surface, "target", target);
-  const WallDistance wall(surface);
+  const NearestWall wall(surface);
 
   // Cheapest path on the grid, rid of its steps.
   const RawPath raw =

@@ -14,7 +14,7 @@
 #include "preprocess/cgal_mesh.h"
 #include "preprocess/surface.h"
 #include "preprocess/surface_mend.h"
-#include "preprocess/wall_distance.h"
+#include "preprocess/wall_rays.h"
 
 namespace wireplan::preprocess {
 namespace {
@@ -159,7 +159,7 @@ Surface close_openings(const Surface& open, const std::string& origin, std::vect
   const std::vector<Loop> loops = find_loops(mesh);
   if (loops.empty()) return surface_of_copy(mesh);
 
-  const WallDistance wall(open);
+  const WallRays wall(open);
   const double reach =
       (open.vertices.rowwise().maxCoeff() - open.vertices.rowwise().minCoeff()).norm();
   for (const Loop& loop : loops) {

@@ -13,7 +13,7 @@
 #include "preprocess/cgal_mesh.h"
 #include "preprocess/surface.h"
 #include "preprocess/vertex_graph.h"
-#include "preprocess/wall_distance.h"
+#include "preprocess/wall_rays.h"
 
 namespace wireplan::preprocess {
 namespace {
@@ -61,7 +61,7 @@ void grade(const Surface& surface, const Neighbours& neighbours, Eigen::VectorXd
 Eigen::VectorXd wanted_edges(const Surface& surface, double longest) {
   const Eigen::Index n = surface.vertices.cols(), m = surface.triangles.cols();
   const Neighbours neighbours = find_neighbours(surface);
-  const WallDistance wall(surface);
+  const WallRays wall(surface);
   const Eigen::Index stride = std::max<Eigen::Index>(1, m / kSamples), samples = (m - 1) / stride;
   Eigen::VectorXd measured(samples + 1);
 #pragma omp parallel for schedule(dynamic, 64)

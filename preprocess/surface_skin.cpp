@@ -11,7 +11,7 @@
 #include "preprocess/cgal_mesh.h"
 #include "preprocess/surface.h"
 #include "preprocess/surface_mend.h"
-#include "preprocess/wall_distance.h"
+#include "preprocess/wall_rays.h"
 
 namespace wireplan::preprocess {
 namespace {
@@ -46,7 +46,7 @@ double size_of(const Surface& s) {
 }
 
 /// Thickness of the wall if the surface is one with two skins, else 0.                    [mm]
-double wall_thickness(const Surface& s, const WallDistance& wall) {
+double wall_thickness(const Surface& s, const WallRays& wall) {
   const double reach = size_of(s);
   const Eigen::Index stride = std::max<Eigen::Index>(1, s.triangles.cols() / kSamples);
   double inside = 0.0, all = 0.0;
@@ -68,7 +68,7 @@ double wall_thickness(const Surface& s, const WallDistance& wall) {
 }
 
 /// Part of the rays from a triangle outward that meet the surface again.
-double enclosed_part(const WallDistance& wall, const Facet& facet, double reach) {
+double enclosed_part(const WallRays& wall, const Facet& facet, double reach) {
   const Vec3 u = facet.normal.unitOrthogonal(), v = facet.normal.cross(u);
   int met = 0;
   for (int k = 0; k < kRays; ++k) {
@@ -82,7 +82,7 @@ double enclosed_part(const WallDistance& wall, const Facet& facet, double reach)
 }
 
 /// Inner or outer for each triangle: as each is enclosed, with the shortest cut along rims.
-std::vector<std::size_t> label_skins(const Surface& s, const WallDistance& wall, double thickness) {
+std::vector<std::size_t> label_skins(const Surface& s, const WallRays& wall, double thickness) {
   CgalMesh mesh = cgal_mesh_from(s);
   const double reach = size_of(s);
   std::vector<double> enclosed(static_cast<std::size_t>(s.triangles.cols()));
@@ -122,7 +122,7 @@ std::vector<std::size_t> label_skins(const Surface& s, const WallDistance& wall,
 }  // namespace
 
 Surface inner_skin(const Surface& closed, std::vector<Mend>& mends) {
-  const WallDistance wall(closed);
+  const WallRays wall(closed);
   const double thickness = wall_thickness(closed, wall);
   if (thickness == 0.0) return closed;
 

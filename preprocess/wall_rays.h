@@ -1,5 +1,5 @@
 #pragma once
-/// Exact distance to a surface; for the .cpp files here that call CGAL, not for other folders.
+/// Free ways to a surface; for the .cpp files here that call CGAL, not for other folders.
 #include <CGAL/AABB_traits.h>
 #include <CGAL/AABB_tree.h>
 #include <CGAL/AABB_triangle_primitive.h>
@@ -16,17 +16,10 @@ namespace wireplan::preprocess {
 using WallKernel = CGAL::Exact_predicates_inexact_constructions_kernel;
 using WallTriangles = std::vector<WallKernel::Triangle_3>;
 
-/// The place of the wall nearest to some point.
-struct Nearest {
-  Vec3 foot = Vec3::Zero();
-  double distance = 0.0;
-  WallTriangles::const_iterator triangle;
-};
-
-/// Exact distance to the triangles.
-class WallDistance {
+/// The triangles, for rays that meet them.
+class WallRays {
  public:
-  explicit WallDistance(const Surface& surface) {
+  explicit WallRays(const Surface& surface) {
     triangles_.reserve(static_cast<std::size_t>(surface.triangles.cols()));
     for (Eigen::Index k = 0; k < surface.triangles.cols(); ++k) {
       const auto corner = [&](int i) {
@@ -40,14 +33,8 @@ class WallDistance {
     tree_.rebuild(triangles_.cbegin(), triangles_.cend());
     tree_.build();
   }
-  WallDistance(const WallDistance&) = delete;  // the tree points into triangles_
-  WallDistance& operator=(const WallDistance&) = delete;
-
-  Nearest find(const Vec3& p) const {
-    const WallKernel::Point_3& corner = triangles_.front().vertex(0);
-    return find(
-        p, {.foot = Vec3(corner.x(), corner.y(), corner.z()), .triangle = triangles_.cbegin()});
-  }
+  WallRays(const WallRays&) = delete;  // the tree points into triangles_
+  WallRays& operator=(const WallRays&) = delete;
 
   /// Way from a point on the wall along a unit direction to the next wall, at most `reach`.
   double free_way(const Vec3& from, const Vec3& direction, double reach) const {
@@ -68,15 +55,6 @@ class WallDistance {
       least = std::min(least, reach * (kStart + (1.0 - kStart) * part));
     }
     return least;
-  }
-
-  /// The same answer, sooner: from the answer for a point close by.
-  Nearest find(const Vec3& p, const Nearest& near) const {
-    const auto point = [](const Vec3& q) { return WallKernel::Point_3(q.x(), q.y(), q.z()); };
-    const auto [foot, triangle] =
-        tree_.closest_point_and_primitive(point(p), {point(near.foot), near.triangle});
-    const Vec3 q(foot.x(), foot.y(), foot.z());
-    return {.foot = q, .distance = (p - q).norm(), .triangle = triangle};
   }
 
  private:
