@@ -157,6 +157,9 @@ Json vessel_json(const ReportInput& input) {
   }
   row.put("openings", surface.at("openings"));
   row.put("tetrahedra", wall.at("tetrahedra"));
+  row.put("inverted_tetrahedra", wall.at("inverted_tetrahedra"));
+  row.put("limited_tetrahedra", wall.at("limited_tetrahedra"));
+  row.put("min_tetrahedron_height_mm", wall.at("min_height_mm"));
   row.put("wall_model", input.parameters.at("wall").at("model"));
   row.put("wall_thickness_mm", wall.at("thickness_mm"));
   row.put("wall_young_modulus_kpa", wall.at("young_modulus_kpa"));

@@ -677,6 +677,7 @@ void make_wall(Workspace& work, const fs::path& folder) {
       clean(wall_normal_stiffness(extruded.wall.young_modulus, extruded.wall.poisson_ratio,
                                   options.thickness_mm) /
             kMpaPerKpa);
+  figures["inverted_tetrahedra"] = extruded.statistics.inverted;
   figures["limited_tetrahedra"] = extruded.statistics.limited;
   figures["min_height_mm"] = extruded.statistics.min_height_mm;
   write_figures(figures, folder);

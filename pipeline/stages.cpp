@@ -139,12 +139,13 @@ std::vector<Stage> stages_of(const Case& given) {
                       .make = make_surface});
   }
   stages.push_back({.name = "centerline",
-                    .version = 2,
+                    .version = 3,
                     .after = {"surface"},
                     .parameters = {"/access/point_mm", "/target/point_mm"},
                     .make = make_centerline});
   stages.push_back(
       {.name = "wall",
+       .version = 2,
        .after = {"surface"},
        .parameters = {"/wall/thickness_mm", "/wall/young_modulus_kpa", "/wall/poisson_ratio"},
        .make = make_wall});

@@ -56,8 +56,10 @@ class Surroundings {
   Surroundings(const Surroundings&) = delete;  // the tree points into triangles_
   Surroundings& operator=(const Surroundings&) = delete;
 
-  /// Way from triangle k outward along its normal to the next wall, at most `reach`.
-  double free_distance(Eigen::Index k, const Facet& facet, double reach) const {
+  /// Way from triangle k outward along its normal to the next wall, at most `reach`; to a triangle
+  /// that shares a vertex, across a crease, not below `least_in_crease`.
+  double free_distance(Eigen::Index k, const Facet& facet, double reach,
+                       double least_in_crease) const {
     const Vec3 end = facet.centroid + reach * facet.normal;
     std::vector<Triangles::const_iterator> hits;
     tree_.all_intersected_primitives(Kernel::Segment_3(to_cgal(facet.centroid), to_cgal(end)),
@@ -65,7 +67,10 @@ class Surroundings {
     double least = reach;
     for (const Triangles::const_iterator hit : hits) {
       const auto other = static_cast<Eigen::Index>(hit - triangles_.cbegin());
-      if (other != k) least = std::min(least, crossing(facet, other, share_vertex(k, other)));
+      if (other == k) continue;
+      const bool neighbour = share_vertex(k, other);
+      const double way = crossing(facet, other, neighbour);
+      least = std::min(least, neighbour ? std::max(way, least_in_crease) : way);
     }
     return least;
   }
@@ -106,7 +111,8 @@ class Surroundings {
 /// half of the height as its distance from all other wall.
 double find_height(const Surroundings& surroundings, const Facet& facet, Eigen::Index k,
                    double thickness) {
-  const double ahead = surroundings.free_distance(k, facet, 2.0 * thickness);
+  const double ahead =
+      surroundings.free_distance(k, facet, 2.0 * thickness, 2.0 * kLeastPart * thickness);
   double height = std::min(thickness, 0.5 * ahead);
   while (height > kLeastPart * thickness &&
          surroundings.distance(facet.centroid + height * facet.normal, k) < 0.5 * height) {
@@ -144,6 +150,11 @@ ExtrudedWall extrude_wall(const Surface& surface, const WallOptions& options) {
     wall.apexes.col(k) = facet.centroid + wall.height(k) * facet.normal;
   }
 
+  for (Eigen::Index k = 0; k < m; ++k) {
+    const Facet facet = facet_of(surface, k);
+    const bool outward = (wall.apexes.col(k) - facet.centroid).dot(facet.normal) > 0.0;
+    result.statistics.inverted += outward ? 0 : 1;
+  }
   result.statistics.min_height_mm = wall.height.minCoeff();
   result.statistics.limited = static_cast<int>((wall.height.array() < thickness).count());
   return result;

@@ -34,6 +34,7 @@ TEST(Wall, OfAConvexVesselHasTheAskedThicknessEverywhere) {
   EXPECT_EQ(wall.height.minCoeff(), 1.2);
   EXPECT_EQ(wall.height.maxCoeff(), 1.2);
   EXPECT_EQ(extruded.statistics.limited, 0);
+  EXPECT_EQ(extruded.statistics.inverted, 0);
   EXPECT_EQ(extruded.statistics.min_height_mm, 1.2);
   for (Eigen::Index k = 0; k < tube.triangles.cols(); ++k) {
     const double volume = area(tube, k) * 1.2 / 3.0;
@@ -110,6 +111,31 @@ TEST(Wall, InsideASharpBendKeepsItsApexesOffTheOtherWall) {
     ASSERT_FALSE(apex.inside);
     ASSERT_GE(apex.distance, 0.5 * wall.height(k) - 1e-9);
   }
+}
+
+TEST(Wall, AcrossACreaseIsNotMuchThinnerThanItsStiffnessAllows) {
+  // Two roofs whose facing sides meet in a groove of 1 degree.
+  const double slope = 0.5 * kPi / 180.0;
+  Surface block;
+  block.vertices.resize(3, 10);
+  block.triangles.resize(3, 16);
+  for (int end = 0; end < 2; ++end) {  // a W cut out of a block, at y = 0 and y = 4
+    const double y = 4.0 * end, open = 4.0 * std::tan(slope);
+    block.vertices.middleCols<5>(5 * end) << -3.0, 3.0, 3.0, 0.0, -3.0,  //
+        y, y, y, y, y,                                                   //
+        0.0, 0.0, 6.0, 2.0, 6.0;
+    block.vertices(0, 5 * end + 2) = open;
+    block.vertices(0, 5 * end + 4) = -open;
+  }
+  block.triangles << 0, 0, 1, 5, 5, 6, 0, 0, 1, 1, 2, 2, 3, 4, 4, 4,  //
+      1, 3, 2, 8, 9, 8, 5, 6, 6, 7, 7, 8, 8, 8, 9, 5,                 //
+      3, 4, 3, 6, 8, 7, 6, 1, 7, 2, 8, 3, 4, 9, 5, 0;
+  ASSERT_TRUE(is_sound(check_surface(block)));
+  const double thickness = 1.0;
+  const ExtrudedWall extruded = extrude_wall(block, {.thickness_mm = thickness});
+  EXPECT_EQ(extruded.statistics.limited, 4);  // the sides of the groove
+  EXPECT_EQ(extruded.statistics.inverted, 0);
+  EXPECT_NEAR(extruded.statistics.min_height_mm, 0.05 * thickness, 0.01);
 }
 
 TEST(Wall, InAVerySharpCreaseStillHasPositiveVolume) {
