@@ -29,6 +29,9 @@ constexpr double kHold = 0.15;
 constexpr int kRounds = 2;
 constexpr double kFirstBlur = 0.75;  // sigma before it is measured: a scanner's and the voxels'
 constexpr double kDeep = 0.8413;     // part of a blurred step one sigma inside of it
+// Blur moves the half level of a disc by sigma^2/(2 r), but not by more than this part of sigma: in
+// one thinner than 3 sigma it lowers the lumen's value, and so the level, as well.
+constexpr double kMostMoved = 0.15;
 // The wall round a lumen of this contrast [HU] is soft tissue, at least so bright. An image in
 // other units has no such contrast, or lies above it.
 constexpr double kWallHu = 20.0, kLeastHu = 100.0;
@@ -205,7 +208,7 @@ Surface fit_to_image(const Surface& surface, const Image& image, FitStatistics* 
                  [](double w) { return w > 0.0; });
     if (!widths.empty()) sigma = median(widths);
     const Eigen::VectorXd inward = moved_by_blur(fitted, neighbours, normals, sigma, edge);
-    shift += (certainty.array() == 1.0).select(inward, 0.0).matrix();
+    shift += (certainty.array() == 1.0).select(inward.cwiseMin(kMostMoved * sigma), 0.0).matrix();
     if (statistics) {
       statistics->fitted_fraction =
           static_cast<double>((certainty.array() == 1.0).count()) / static_cast<double>(n);
