@@ -164,30 +164,115 @@ void for_each_node(SampleGrid& grid, const NodeBox& box, const Visit& visit) {
   });
 }
 
+/// Distances of triangles to the nodes of a brick. A block of nodes is halved down to two along
+/// each axis, each time without the triangles that cannot be the nearest of any of its nodes.
+class BlockDistances {
+ public:
+  BlockDistances(SampleGrid& grid, const Surface& surface)
+      : grid_(grid), surface_(surface), normals_(compute_pseudo_normals(surface)) {
+    const Eigen::Index m = surface.triangles.cols();
+    middle_.resize(3, m);
+    radius_.resize(m);
+    for (Eigen::Index f = 0; f < m; ++f) {
+      const Eigen::Vector3i t = surface.triangles.col(f);
+      Mat3 corners;
+      for (int c = 0; c < 3; ++c) corners.col(c) = surface.vertices.col(t[c]);
+      middle_.col(f) = corners.rowwise().mean();
+      radius_[f] =
+          std::sqrt((corners.colwise() - middle_.col(f)).colwise().squaredNorm().maxCoeff());
+    }
+  }
+
+  /// Takes over what is shorter than what a node has, and than the grid's limit. Of equal ones the
+  /// first triangle counts: `near` ascends.
+  void take(std::int32_t slot, const std::array<int, 3>& brick, const std::vector<int>& near) {
+    take(slot, brick, {0, 0, 0}, SampleGrid::kSide, near);
+  }
+
+ private:
+  void take(std::int32_t slot, const std::array<int, 3>& brick, const std::array<int, 3>& first,
+            int side, const std::vector<int>& near) {
+    // The ball round the block; what is farther than the nearest one by its width is no one's.
+    const Vec3 low(SampleGrid::kSide * brick[0] + first[0], SampleGrid::kSide * brick[1] + first[1],
+                   SampleGrid::kSide * brick[2] + first[2]);
+    const Vec3 center = grid_.origin + grid_.spacing * (low.array() + 0.5 * (side - 1)).matrix();
+    const double reach = 0.5 * (side - 1) * std::sqrt(3.0) * grid_.spacing;
+    std::vector<double> distance;
+    distance.reserve(near.size());
+    double least = grid_.limit;
+    for (const int f : near) {
+      distance.push_back((middle_.col(f) - center).norm());
+      least = std::min(least, distance.back() + reach);
+    }
+    std::vector<int> left;
+    left.reserve(near.size());
+    for (std::size_t k = 0; k < near.size(); ++k) {
+      if (distance[k] - radius_[near[k]] - reach <= least + kRounding) left.push_back(near[k]);
+    }
+    if (left.empty()) return;
+
+    if (side > 2) {
+      const int half = side / 2;
+      for (int octant = 0; octant < 8; ++octant) {
+        const std::array<int, 3> at = {first[0] + (octant & 1 ? half : 0),
+                                       first[1] + (octant & 2 ? half : 0),
+                                       first[2] + (octant & 4 ? half : 0)};
+        take(slot, brick, at, half, left);
+      }
+      return;
+    }
+    double* values = grid_.values.data() + static_cast<std::size_t>(slot) * SampleGrid::kVolume;
+    for (int node = 0; node < 8; ++node) {
+      const int i = node & 1, j = (node >> 1) & 1, k = node >> 2;
+      double& value = values[SampleGrid::node_index(first[0] + i, first[1] + j, first[2] + k)];
+      const Vec3 p = grid_.origin + grid_.spacing * (low + Vec3(i, j, k));
+      for (const int f : left) take(value, p, f);
+    }
+  }
+
+  static constexpr double kRounding = 1e-9;  // [mm]
+
+  void take(double& value, const Vec3& p, Eigen::Index f) const {
+    const Eigen::Vector3i t = surface_.triangles.col(f);
+    const Vec3 a = surface_.vertices.col(t[0]);
+    const double bound = std::min(std::abs(value), grid_.limit);
+    const Vec3 plane = normals_.face.col(f);
+    if (std::abs(plane.dot(p - a)) >= bound) return;
+    const NearestOnTriangle nearest =
+        nearest_on_triangle(p, a, surface_.vertices.col(t[1]), surface_.vertices.col(t[2]));
+    const double squared_distance = nearest.offset.squaredNorm();
+    if (squared_distance >= bound * bound) return;
+    const bool outside = nearest.offset.dot(normal_of(nearest, normals_, f, t)) > 0.0;
+    value = outside ? -std::sqrt(squared_distance) : std::sqrt(squared_distance);
+  }
+
+  SampleGrid& grid_;
+  const Surface& surface_;
+  const PseudoNormals normals_;
+  Eigen::Matrix3Xd middle_;  // of each triangle                                         [mm]
+  Eigen::VectorXd radius_;   // of the ball round its middle that holds it               [mm]
+};
+
 /// Takes over the distances to the triangles near the boxes at all nodes where they are shorter
-/// than what is there, and than `limit`.
+/// than what is there, and than the grid's limit.
 void scatter_distances(SampleGrid& grid, const Surface& surface,
                        const std::vector<NodeBox>& boxes) {
-  const PseudoNormals normals = compute_pseudo_normals(surface);
+  std::vector<std::vector<int>> near(static_cast<std::size_t>(grid.slots));
+  std::vector<std::array<int, 3>> brick(near.size());
   for (Eigen::Index f = 0; f < surface.triangles.cols(); ++f) {
     const NodeBox box = node_box(grid, surface, f);
     if (std::none_of(boxes.begin(), boxes.end(),
                      [&](const NodeBox& other) { return overlap(box, other); })) {
       continue;
     }
-    const Eigen::Vector3i t = surface.triangles.col(f);
-    const Vec3 a = surface.vertices.col(t[0]), b = surface.vertices.col(t[1]),
-               c = surface.vertices.col(t[2]);
-    const Vec3 plane = normals.face.col(f);
-    for_each_node(grid, box, [&](double& value, const Vec3& p) {
-      const double bound = std::min(std::abs(value), grid.limit);
-      if (std::abs(plane.dot(p - a)) >= bound) return;
-      const NearestOnTriangle nearest = nearest_on_triangle(p, a, b, c);
-      const double squared_distance = nearest.offset.squaredNorm();
-      if (squared_distance >= bound * bound) return;
-      const bool outside = nearest.offset.dot(normal_of(nearest, normals, f, t)) > 0.0;
-      value = outside ? -std::sqrt(squared_distance) : std::sqrt(squared_distance);
+    for_each_brick(grid, box, [&](std::int32_t& s, int i, int j, int k) {
+      near[static_cast<std::size_t>(s)].push_back(static_cast<int>(f));
+      brick[static_cast<std::size_t>(s)] = {i, j, k};
     });
+  }
+  BlockDistances distances(grid, surface);
+  for (std::size_t s = 0; s < near.size(); ++s) {
+    if (!near[s].empty()) distances.take(static_cast<std::int32_t>(s), brick[s], near[s]);
   }
 }
 
