@@ -103,19 +103,27 @@ void be_quiet() {
   ::dup2(nowhere, STDERR_FILENO);
   const rlimit none{0, 0};
   ::setrlimit(RLIMIT_CORE, &none);
-  for (const int signal : {SIGABRT, SIGSEGV, SIGBUS, SIGFPE, SIGILL}) ::signal(signal, SIG_DFL);
+  for (const int signal : {SIGABRT, SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGALRM}) {
+    ::signal(signal, SIG_DFL);
+  }
 }
 
 /// The child: ends without the clean-up of the process it was.
 [[noreturn]] void work_as_child(const std::function<void(const Send&, const At&)>& work,
-                                const PipeEnd& data, const PipeEnd& words, SharedText& place) {
+                                const PipeEnd& data, const PipeEnd& words, SharedText& place,
+                                unsigned patience) {
   be_quiet();
+  ::alarm(patience);  // ends the process, unless it is set anew
   try {
     work(
         [&](const void* bytes, std::size_t count) {
           if (!data.send(bytes, count)) ::_exit(kGaveUp);
+          ::alarm(patience);
         },
-        [&](const std::string& now) { place.set(now); });
+        [&](const std::string& now) {
+          place.set(now);
+          ::alarm(patience);
+        });
   } catch (const Error& error) {
     const std::string text = error.what();
     ::_exit(words.send(text.data(), text.size()) ? kRefused : kGaveUp);
@@ -128,7 +136,8 @@ void be_quiet() {
 }  // namespace
 
 void run_apart(const std::function<void(const Send&, const At&)>& work,
-               const std::function<void(const Receive&)>& take, const std::string& ended) {
+               const std::function<void(const Receive&)>& take, const std::string& ended,
+               unsigned patience) {
   SharedText place;
   Pipe data = open_pipe(), words = open_pipe();
   const pid_t child = ::fork();
@@ -136,7 +145,7 @@ void run_apart(const std::function<void(const Send&, const At&)>& work,
   if (child == 0) {
     data.out.close();
     words.out.close();
-    work_as_child(work, data.in, words.in, place);
+    work_as_child(work, data.in, words.in, place, patience);
   }
   data.in.close();
   words.in.close();

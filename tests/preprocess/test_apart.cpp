@@ -72,6 +72,22 @@ TEST(RunApart, HoweverTheWorkEndsItsPlaceIsTold) {
   EXPECT_EQ(message_where([] { throw std::runtime_error("a patient's name"); }), expected);
 }
 
+TEST(RunApart, WorkThatStandsStillIsGivenUp) {
+  EXPECT_EQ(message_of([] {
+              run_apart(
+                  [](const Send&, const At& at) {
+                    at("a file");
+                    while (true) ::pause();
+                  },
+                  [](const Receive& receive) {
+                    int received = 0;
+                    receive(&received, sizeof received);
+                  },
+                  kEnded, 1);
+            }),
+            "a file: it ended");
+}
+
 TEST(RunApart, WhatTheWorkPrintsIsDropped) {
   testing::internal::CaptureStderr();
   testing::internal::CaptureStdout();
