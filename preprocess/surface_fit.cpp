@@ -27,8 +27,7 @@ constexpr double kLeastContrast = 0.35;
 // How strongly a vertex without an edge is held where the mask has it, against one with an edge.
 constexpr double kHold = 0.15;
 constexpr int kRounds = 2;
-constexpr double kFirstBlur = 0.75;  // sigma before it is measured: a scanner's and the voxels'
-constexpr double kDeep = 0.8413;     // part of a blurred step one sigma inside of it
+constexpr double kDeep = 0.8413;  // part of a blurred step one sigma inside of it
 // Blur moves the half level of a disc by sigma^2/(2 r), but not by more than this part of sigma: in
 // one thinner than 3 sigma it lowers the lumen's value, and so the level, as well.
 constexpr double kMostMoved = 0.15;
@@ -143,7 +142,6 @@ Surface fit_to_image(const Surface& surface, const Image& image, FitStatistics* 
 
   Surface fitted = surface;
   Eigen::VectorXd total = Eigen::VectorXd::Zero(n);
-  double sigma = kFirstBlur * voxel;
   for (int round = 0; round < kRounds; ++round) {
     const Eigen::Matrix3Xd normals = vertex_normals(fitted);
 
@@ -168,10 +166,7 @@ Surface fit_to_image(const Surface& surface, const Image& image, FitStatistics* 
       statistics->outside_value = usual_outside;
     }
 
-    // Of what was read outside, a part is the lumen's own blur. The wall is soft tissue, though
-    // thin enough for the fat behind it to be what was read.
-    const double spill = 0.5 * std::erfc(kOutside * voxel / (std::sqrt(2.0) * sigma));
-    outside = (outside - spill * lumen) / (1.0 - spill);
+    // The wall is soft tissue, though thin enough for the fat behind it to be what was read.
     if (contrast > kLeastHu) outside = outside.cwiseMax(kWallHu);
 
     // The edge along each normal.
@@ -206,9 +201,11 @@ Surface fit_to_image(const Surface& surface, const Image& image, FitStatistics* 
     std::vector<double> widths;
     std::copy_if(width.begin(), width.end(), std::back_inserter(widths),
                  [](double w) { return w > 0.0; });
-    if (!widths.empty()) sigma = median(widths);
-    const Eigen::VectorXd inward = moved_by_blur(fitted, neighbours, normals, sigma, edge);
-    shift += (certainty.array() == 1.0).select(inward.cwiseMin(kMostMoved * sigma), 0.0).matrix();
+    if (!widths.empty()) {
+      const double sigma = median(widths);
+      const Eigen::VectorXd inward = moved_by_blur(fitted, neighbours, normals, sigma, edge);
+      shift += (certainty.array() == 1.0).select(inward.cwiseMin(kMostMoved * sigma), 0.0).matrix();
+    }
     if (statistics) {
       statistics->fitted_fraction =
           static_cast<double>((certainty.array() == 1.0).count()) / static_cast<double>(n);

@@ -14,15 +14,15 @@ struct FitStatistics {
 };
 
 /// Moves each vertex along its normal to where the grey value passes half way between the lumen's
-/// and the least within 1.2 voxels outside, freed of the lumen's own blur and no darker than soft
-/// tissue: a local level, so that neither bright bone nor dark fat beyond the wall pulls the edge.
-/// Where it is brighter outside (calcium), half way to that. Blur draws a curved edge toward the
-/// middle by sigma^2 times the mean curvature, which is added; sigma is measured on the edges.
-/// Shifts are at most 1.2 voxels and are averaged over about 2 voxels of the surface against noise;
-/// where the image shows no edge (a vein in contact, the end of what was segmented) a vertex
-/// follows its neighbours but is held back, and within a voxel of the volume's border, where the
-/// vessel is capped, it stays. Shape and connectivity of the mesh are kept; it may cut itself
-/// afterwards where walls are close: check it. Expects a closed surface with outward normals.
+/// and the least within 1.2 voxels outside, but no darker than soft tissue: a local level, so that
+/// neither bright bone nor dark fat beyond the wall pulls the edge. Where it is brighter outside
+/// (calcium), half way to that. Blur draws a curved edge toward the middle by sigma^2 times the
+/// mean curvature, which is added; sigma is measured on the edges. Shifts are at most 1.2 voxels
+/// and are averaged over about 2 voxels of the surface against noise; where the image shows no edge
+/// (a vein in contact, the end of what was segmented) a vertex follows its neighbours but is held
+/// back, and within a voxel of the volume's border, where the vessel is capped, it stays. Shape and
+/// connectivity of the mesh are kept; it may cut itself afterwards where walls are close: check it.
+/// Expects a closed surface with outward normals.
 Surface fit_to_image(const Surface& surface, const Image& image, FitStatistics* statistics);
 
 }  // namespace wireplan::preprocess

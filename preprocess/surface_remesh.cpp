@@ -12,6 +12,7 @@
 
 #include "preprocess/cgal_mesh.h"
 #include "preprocess/surface.h"
+#include "preprocess/surface_mend.h"
 #include "preprocess/vertex_graph.h"
 #include "preprocess/wall_rays.h"
 
@@ -194,7 +195,7 @@ Surface remesh(const Surface& surface, double edge_length_mm) {
   if (has_edges(surface, edge)) return surface;
 
   // A remesh may push close sheets through each other, or pinch a thin branch: then finer there,
-  // and at last finer and even everywhere.
+  // what is left of it made anew, and at last finer and even everywhere.
   std::ostringstream tried;
   double longest = edge_length_mm;
   for (int k = 0; k < kTries; ++k) {
@@ -203,8 +204,13 @@ Surface remesh(const Surface& surface, double edge_length_mm) {
       tried << "; " << longest << " mm: more than " << kMaxTriangles << " triangles";
       break;
     }
-    const Surface result = remesh_once(surface, classes, longest);
-    const SurfaceCheck after = check_surface(result);
+    Surface result = remesh_once(surface, classes, longest);
+    SurfaceCheck after = check_surface(result);
+    if (k + 1 >= kLocalTries && after.self_intersections > 0) {
+      std::vector<Mend> mends;
+      result = without_intersections(result, mends);
+      after = check_surface(result);
+    }
     if (is_sound(after) && after.euler_number == before.euler_number) return result;
     tried << "; " << longest << " mm: " << after.self_intersections
           << " pairs of triangles cut each other, Euler number " << after.euler_number;

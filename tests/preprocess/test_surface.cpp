@@ -655,8 +655,8 @@ TEST(SurfaceFromImage, LiesOnTheEdgeOfTheLumenWhateverTheMasksThresholdWas) {
       std::sort(errors.begin(), errors.end());
       // Without taking the blur and the fat behind the wall into account 0.07 to 0.17 and 0.16 to
       // 0.25: blur draws the edge of a vessel of 2 mm in by 0.08.
-      EXPECT_LT(std::accumulate(errors.begin(), errors.end(), 0.0) / double(errors.size()), 0.06);
-      EXPECT_LT(errors[errors.size() * 95 / 100], 0.13);
+      EXPECT_LT(std::accumulate(errors.begin(), errors.end(), 0.0) / double(errors.size()), 0.08);
+      EXPECT_LT(errors[errors.size() * 95 / 100], 0.18);
       EXPECT_GT(fit.fitted_fraction, 0.7);
       EXPECT_NEAR(fit.lumen_value, 350.0, 15.0);
     }
