@@ -5,6 +5,8 @@
 #include <cmath>
 #include <utility>
 
+#include "preprocess/triangle.h"
+
 namespace wireplan::preprocess {
 namespace {
 
@@ -64,33 +66,13 @@ void NearestWall::split(int box, int first, int last) {
   boxes_[static_cast<std::size_t>(box)] = made;
 }
 
-/// Ericson, "Real-Time Collision Detection", 5.1.5.
-Vec3 NearestWall::nearest_on(const Triangle& t, const Vec3& p) {
-  const Vec3 ab = t.b - t.a, ac = t.c - t.a, ap = p - t.a;
-  const double d1 = ab.dot(ap), d2 = ac.dot(ap);
-  if (d1 <= 0.0 && d2 <= 0.0) return t.a;
-  const Vec3 bp = p - t.b;
-  const double d3 = ab.dot(bp), d4 = ac.dot(bp);
-  if (d3 >= 0.0 && d4 <= d3) return t.b;
-  const double vc = d1 * d4 - d3 * d2;
-  if (vc <= 0.0 && d1 >= 0.0 && d3 <= 0.0) return t.a + d1 / (d1 - d3) * ab;
-  const Vec3 cp = p - t.c;
-  const double d5 = ab.dot(cp), d6 = ac.dot(cp);
-  if (d6 >= 0.0 && d5 <= d6) return t.c;
-  const double vb = d5 * d2 - d1 * d6;
-  if (vb <= 0.0 && d2 >= 0.0 && d6 <= 0.0) return t.a + d2 / (d2 - d6) * ac;
-  const double va = d3 * d6 - d5 * d4;
-  if (va <= 0.0 && d4 - d3 >= 0.0 && d5 - d6 >= 0.0) {
-    return t.b + (d4 - d3) / ((d4 - d3) + (d5 - d6)) * (t.c - t.b);
-  }
-  const double inverse = 1.0 / (va + vb + vc);
-  return t.a + vb * inverse * ab + vc * inverse * ac;
-}
-
 Nearest NearestWall::find(const Vec3& p, const Nearest& near) const {
-  Nearest best{.foot = nearest_on(triangles_[static_cast<std::size_t>(near.triangle)], p),
-               .triangle = near.triangle};
-  double least = (p - best.foot).squaredNorm();
+  const auto offset_from = [&](const Triangle& t) {
+    return nearest_on_triangle(p, t.a, t.b, t.c).offset;
+  };
+  Vec3 offset = offset_from(triangles_[static_cast<std::size_t>(near.triangle)]);
+  Nearest best{.triangle = near.triangle};
+  double least = offset.squaredNorm();
 
   std::array<std::pair<int, double>, kDeepest> open;  // boxes with their squared distance
   std::size_t count = 0;
@@ -105,11 +87,10 @@ Nearest NearestWall::find(const Vec3& p, const Nearest& near) const {
       const Triangle& t = triangles_[static_cast<std::size_t>(k)];
       const double above = t.normal.dot(p - t.a);
       if (above * above >= least) continue;
-      const Vec3 foot = nearest_on(t, p);
-      const double squared = (p - foot).squaredNorm();
-      if (squared >= least) continue;
-      least = squared;
-      best.foot = foot;
+      const Vec3 other = offset_from(t);
+      if (other.squaredNorm() >= least) continue;
+      offset = other;
+      least = other.squaredNorm();
       best.triangle = k;
     }
     if (box.count > 0) continue;
@@ -126,6 +107,7 @@ Nearest NearestWall::find(const Vec3& p, const Nearest& near) const {
       if (child.second < least) open[count++] = child;
     }
   }
+  best.foot = p - offset;
   best.distance = std::sqrt(least);
   return best;
 }

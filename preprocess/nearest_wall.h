@@ -36,7 +36,6 @@ class NearestWall {
   };
 
   void split(int box, int first, int last);
-  static Vec3 nearest_on(const Triangle& t, const Vec3& p);
 
   std::vector<Triangle> triangles_;  // those of a box lie together
   std::vector<Box> boxes_;

@@ -8,7 +8,7 @@
 #include <map>
 #include <set>
 
-#include "simulate/triangle.h"
+#include "preprocess/triangle.h"
 
 namespace wireplan::simulate {
 

@@ -6,7 +6,7 @@
 #include <map>
 #include <utility>
 
-#include "simulate/triangle.h"
+#include "preprocess/triangle.h"
 
 namespace wireplan::simulate {
 

@@ -1,10 +1,10 @@
 #pragma once
-/// Nearest point of a triangle: what the distance field and the search for contacts share.
+/// Nearest point of a triangle: what centerline, distance field and search for contacts share.
 #include <Eigen/Geometry>
 
 #include "preprocess/base.h"
 
-namespace wireplan::simulate {
+namespace wireplan {
 
 /// The point of a triangle that is nearest to another point.
 struct NearestOnTriangle {
@@ -44,4 +44,4 @@ inline NearestOnTriangle nearest_on_triangle(const Vec3& p, const Vec3& a, const
   return {ap - v * ab - w * ac, {1.0 - v - w, v, w}, 6};
 }
 
-}  // namespace wireplan::simulate
+}  // namespace wireplan
