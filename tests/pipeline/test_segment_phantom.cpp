@@ -1,36 +1,16 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <filesystem>
 
-#include "pipeline/phantom_file.h"
 #include "preprocess/segment.h"
+#include "tests/pipeline/upper_abdomen.h"
 
 #ifdef WIREPLAN_IMAGING
 namespace wireplan::pipeline {
 namespace {
 
 using preprocess::Phantom;
-using preprocess::PhantomSpec;
 using preprocess::Segmentation;
-
-const std::filesystem::path kAbdomen =
-    std::filesystem::path(WIREPLAN_SOURCE_DIR) / "cases" / "abdomen";
-
-/// The part of the bundled abdomen above the aneurysm, up to the coeliac trunk: aorta, renal
-/// arteries, SMA, coeliac trunk with its branches; vertebrae that touch, veins and kidneys beside
-/// them.
-PhantomSpec upper_abdomen(double spacing, double noise) {
-  PhantomSpec spec = read_phantom_spec(kAbdomen / "phantom.json");
-  const Vec3 low(-50, -46, 58), high(64, 60, 134);
-  spec.grid.spacing = Vec3::Constant(spacing);
-  spec.grid.origin = low;
-  for (int axis = 0; axis < 3; ++axis) {
-    spec.grid.size[axis] = static_cast<int>((high - low)[axis] / spacing);
-  }
-  spec.noise_hu = noise;
-  return spec;
-}
 
 double dice(const preprocess::Mask& a, const preprocess::Mask& b) {
   double both = 0.0, sum = 0.0;

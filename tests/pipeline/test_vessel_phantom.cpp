@@ -2,13 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
-#include <filesystem>
 #include <numeric>
 
-#include "pipeline/phantom_file.h"
 #include "preprocess/centerline.h"
 #include "preprocess/segment.h"
 #include "preprocess/surface.h"
+#include "tests/pipeline/upper_abdomen.h"
 
 #ifdef WIREPLAN_IMAGING
 namespace wireplan::pipeline {
@@ -16,21 +15,6 @@ namespace {
 
 using preprocess::Phantom;
 using preprocess::PhantomSpec;
-
-/// Upper part of the bundled abdomen as in test_segment_phantom.cpp, without plaque, which is no
-/// part of the tubes' radii.
-PhantomSpec upper_abdomen() {
-  PhantomSpec spec = read_phantom_spec(std::filesystem::path(WIREPLAN_SOURCE_DIR) / "cases" /
-                                       "abdomen" / "phantom.json");
-  const Vec3 low(-50, -46, 58), high(64, 60, 134);
-  spec.grid.spacing = Vec3::Constant(0.7);
-  spec.grid.origin = low;
-  for (int axis = 0; axis < 3; ++axis) {
-    spec.grid.size[axis] = static_cast<int>((high - low)[axis] / 0.7);
-  }
-  spec.calcium.clear();
-  return spec;
-}
 
 /// A point of an axis, and how far another one is from it.
 struct Place {
@@ -104,7 +88,8 @@ double quantile(std::vector<double> values, double part) {
 }
 
 TEST(VesselPhantom, SurfaceAxisAndRadiusOfAnAbdomenAreTheTrueOnes) {
-  const PhantomSpec spec = upper_abdomen();
+  PhantomSpec spec = upper_abdomen(0.7, 22.0);
+  spec.calcium.clear();  // plaque is no part of the tubes' radii
   const Phantom phantom = make_phantom(spec);
   const Vec3 access(12, 3, 64);
   const preprocess::Segmentation lumen =
