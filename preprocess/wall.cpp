@@ -143,18 +143,17 @@ ExtrudedWall extrude_wall(const Surface& surface, const WallOptions& options) {
   wall.apexes.resize(3, m);
   wall.height.resize(m);
   const Surroundings surroundings(surface);
-#pragma omp parallel for schedule(dynamic, 256)
+  int inverted = 0;
+#pragma omp parallel for schedule(dynamic, 256) reduction(+ : inverted)
   for (Eigen::Index k = 0; k < m; ++k) {
     const Facet facet = facet_of(surface, k);
     wall.height(k) = find_height(surroundings, facet, k, thickness);
     wall.apexes.col(k) = facet.centroid + wall.height(k) * facet.normal;
+    const bool outward = (wall.apexes.col(k) - facet.centroid).dot(facet.normal) > 0.0;
+    inverted += outward ? 0 : 1;
   }
 
-  for (Eigen::Index k = 0; k < m; ++k) {
-    const Facet facet = facet_of(surface, k);
-    const bool outward = (wall.apexes.col(k) - facet.centroid).dot(facet.normal) > 0.0;
-    result.statistics.inverted += outward ? 0 : 1;
-  }
+  result.statistics.inverted = inverted;
   result.statistics.min_height_mm = wall.height.minCoeff();
   result.statistics.limited = static_cast<int>((wall.height.array() < thickness).count());
   return result;

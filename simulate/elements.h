@@ -363,7 +363,6 @@ double add_twist(const Problem& problem, const RodState& state, int i, Sink& sin
 /// the last theta; psi's derivatives with the nodes are added to `psi`, in the sink's layout.
 template <class Sink>
 double add_chain(const TwistChain& chain, const RodState& state, Sink& sink, Eigen::VectorXd& psi) {
-  if (!chain.exists()) return 0.0;
   const double torque = chain.stiffness * chain.angle(state);
   sink.gradient_theta(chain.last, torque);
   sink.hessian_theta_theta(chain.last, chain.last, chain.stiffness);

@@ -355,10 +355,12 @@ NewtonResult Statics::solve_with(BlockBand<D>& hessian, BlockBand<D>& untouched,
   const auto differentiate = [&](const RodState& where) {
     gradient_.setZero();
     hessian.reset(count, chain.edges());
-    coupled_.psi.setZero(D * count);
     BandSink<D> sink{problem.first, problem.last, gradient_, hessian};
     double sum = assemble(problem, where, sink, chain).total();
-    if (chain.exists()) sum += add_chain(chain, where, sink, coupled_.psi);
+    if (chain.exists()) {
+      coupled_.psi.setZero(D * count);
+      sum += add_chain(chain, where, sink, coupled_.psi);
+    }
     if (contact != nullptr) contact->add(sink);
     apply_supports<D>(problem, gradient_, hessian);
     return sum;
