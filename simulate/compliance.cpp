@@ -1,14 +1,16 @@
 #include "simulate/compliance.h"
 
+#include <metis.h>
+
 #include <Eigen/Geometry>
 #include <Eigen/LU>
-#include <Eigen/OrderingMethods>
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdio>
 #include <limits>
 #include <memory>
+#include <mutex>
 #include <string>
 
 namespace wireplan::simulate {
@@ -153,8 +155,8 @@ SparseMatrix expand(const BlockStiffness& blocks, const std::vector<int>& place)
   return matrix;
 }
 
-/// Places of the vertices in an order of elimination with little fill, by approximate minimum
-/// degree; -1 for those without a triangle.
+/// Places of the vertices in an order of elimination by nested dissection, in which a vertex has
+/// few ancestors; -1 for those without a triangle.
 std::vector<int> elimination_places(const BlockStiffness& blocks) {
   const int vertices = static_cast<int>(blocks.start.size()) - 1;
   std::vector<int> place(static_cast<std::size_t>(vertices), -1), used;
@@ -163,19 +165,24 @@ std::vector<int> elimination_places(const BlockStiffness& blocks) {
     place[a] = static_cast<int>(used.size());
     used.push_back(a);
   }
-  std::vector<Eigen::Triplet<double>> joined;
-  joined.reserve(blocks.neighbour.size());
+  std::vector<idx_t> start = {0}, neighbour;  // the graph, without the vertices themselves
   for (const int a : used) {
     for (int e = blocks.start[a]; e < blocks.start[a + 1]; ++e) {
-      joined.emplace_back(place[blocks.neighbour[e]], place[a], 1.0);
+      if (blocks.neighbour[e] != a) neighbour.push_back(place[blocks.neighbour[e]]);
     }
+    start.push_back(static_cast<idx_t>(neighbour.size()));
   }
-  const auto count = static_cast<Eigen::Index>(used.size());
-  SparseMatrix graph(count, count);
-  graph.setFromTriplets(joined.begin(), joined.end());
-  Eigen::AMDOrdering<int>::PermutationType order;
-  Eigen::AMDOrdering<int>()(graph, order);
-  for (int k = 0; k < count; ++k) place[used[order.indices()[k]]] = k;
+  auto count = static_cast<idx_t>(used.size());
+  std::vector<idx_t> at(used.size()), place_in_order(used.size());
+  static std::mutex one_at_a_time;  // METIS seeds and draws from rand()
+  const std::lock_guard lock(one_at_a_time);
+  if (METIS_NodeND(&count, start.data(), neighbour.data(), nullptr, nullptr, at.data(),
+                   place_in_order.data()) != METIS_OK) {
+    throw Error("wall: METIS found no order of elimination for " + std::to_string(count) +
+                " vertices; make a coarser surface");
+  }
+  for (std::size_t k = 0; k < used.size(); ++k)
+    place[used[k]] = static_cast<int>(place_in_order[k]);
   return place;
 }
 
@@ -199,61 +206,67 @@ Eigen::Matrix3Xd vertex_normals(const Surface& surface) {
 
 // ---------------------------------------------------------------- solves along the tree
 
-/// Solves L L' x = f for a force on one vertex and the displacements of a few, reading only the
-/// columns of L between them and the root of the elimination tree: the parent of a vertex is the
-/// first one below it in its columns, and all that stand in its columns are ancestors (Davis,
-/// "Direct Methods for Sparse Linear Systems", chapters 3 and 4).
+/// Solves L L' x = f for several right sides at once, each with forces on a few vertices, and the
+/// displacements of a few, reading only the columns of L between them and the root of the
+/// elimination tree: the parent of a vertex is the first one below it in its columns, and all that
+/// stand in its columns are ancestors (Davis, "Direct Methods for Sparse Linear Systems", chapters
+/// 3 and 4).
 class TreeSolver {
  public:
+  using Lanes = Eigen::Matrix<double, 3, WallCompliance::kGroup, Eigen::RowMajor>;
   struct Force {
-    int place;
+    int place, lane;
     Vec3 force;
   };
   TreeSolver(const SparseMatrix& L, const std::vector<Force>& forces)
-      : L_(L),
-        x_(static_cast<std::size_t>(L.cols()), 0.0),
-        solved_(static_cast<std::size_t>(L.cols()) / 3, 0) {
+      : L_(L), slot_(static_cast<std::size_t>(L.cols()) / 3, -1) {
     // L y = f: y is 0 off the paths from the vertices to the root, on which children come first.
     for (const Force& f : forces) {
-      at(f.place) = f.force;
-      for (int p = f.place; p >= 0 && solved_[p] == 0; p = columns(p).parent()) {
-        solved_[p] = 1;
+      for (int p = f.place; p >= 0 && slot_[p] < 0; p = columns(p).parent()) {
+        slot_[p] = 0;
         path_.push_back(p);
       }
     }
     std::sort(path_.begin(), path_.end());
+    for (const int p : path_) add_slot(p);
+    for (const Force& f : forces) x_[slot_[f.place]].col(f.lane) += f.force;
     for (const int p : path_) {
-      solved_[p] = 0;
       const Columns c = columns(p);
-      const Vec3 y = c.diagonal.triangularView<Eigen::Lower>().solve(at(p));
-      at(p) = y;
+      Lanes& y = x_[slot_[p]];
+      c.diagonal.triangularView<Eigen::Lower>().solveInPlace(y);
       for (int e = 0; e < c.size; e += 3) {
-        double* x = &x_[c.row[e]];
-        for (int k = 0; k < 3; ++k) {
-          x[k] -= c.value[0][e + k] * y[0] + c.value[1][e + k] * y[1] + c.value[2][e + k] * y[2];
+        Lanes& x = x_[slot_[c.row[e] / 3]];
+        for (int d = 0; d < 3; ++d) {
+          for (int k = 0; k < 3; ++k) x.row(k) -= c.value[d][e + k] * y.row(d);
         }
       }
     }
   }
 
-  Vec3 displacement(int place) {
+  const Lanes& displacement(int place) {
     // L' x = y, downward from the first ancestor that is solved.
     path_.clear();
-    for (int p = place; p >= 0 && solved_[p] == 0; p = columns(p).parent()) path_.push_back(p);
+    for (int p = place; p >= 0 && !is_solved(p); p = columns(p).parent()) path_.push_back(p);
     for (auto it = path_.rbegin(); it != path_.rend(); ++it) {
+      if (slot_[*it] < 0) add_slot(*it);
       const Columns c = columns(*it);
-      Mat3 sums = Mat3::Zero();  // of each column over first, second, third rows of blocks
-      for (int e = 0; e < c.size; e += 3) {
-        const double* x = &x_[c.row[e]];
-        for (int d = 0; d < 3; ++d) {
-          for (int k = 0; k < 3; ++k) sums(k, d) += c.value[d][e + k] * x[k];
+      // Half of the lanes at a time: their sums then stay in registers.
+      constexpr int kHalf = WallCompliance::kGroup / 2;
+      for (int half = 0; half < WallCompliance::kGroup; half += kHalf) {
+        Eigen::Matrix<double, 3, kHalf, Eigen::RowMajor> sum =
+            x_[slot_[*it]].middleCols<kHalf>(half);
+        for (int e = 0; e < c.size; e += 3) {
+          const auto x = x_[slot_[c.row[e] / 3]].middleCols<kHalf>(half);
+          for (int d = 0; d < 3; ++d) {
+            for (int k = 0; k < 3; ++k) sum.row(d) -= c.value[d][e + k] * x.row(k);
+          }
         }
+        x_[slot_[*it]].middleCols<kHalf>(half) = sum;
       }
-      const Vec3 rest = at(*it) - sums.colwise().sum().transpose();
-      at(*it) = c.diagonal.triangularView<Eigen::Lower>().transpose().solve(rest);
-      solved_[*it] = 1;
+      c.diagonal.triangularView<Eigen::Lower>().transpose().solveInPlace(x_[slot_[*it]]);
+      solved_[slot_[*it]] = 1;
     }
-    return at(place);
+    return x_[slot_[place]];
   }
 
  private:
@@ -276,11 +289,17 @@ class TreeSolver {
     c.diagonal << u[0], 0.0, 0.0, u[1], v[0], 0.0, u[2], v[1], w[0];
     return c;
   }
-  Eigen::Map<Vec3> at(int place) { return Eigen::Map<Vec3>(x_.data() + 3 * place); }
+  bool is_solved(int place) const { return slot_[place] >= 0 && solved_[slot_[place]] != 0; }
+  void add_slot(int place) {
+    slot_[place] = static_cast<int>(x_.size());
+    x_.push_back(Lanes::Zero());
+    solved_.push_back(0);
+  }
 
   const SparseMatrix& L_;
-  std::vector<double> x_;
-  std::vector<char> solved_;
+  std::vector<int> slot_;  // of each place in x_; -1: not read so far
+  std::vector<Lanes> x_;
+  std::vector<char> solved_;  // of each slot
   std::vector<int> path_;
 };
 
@@ -300,6 +319,7 @@ WallCompliance::WallCompliance(const Surface& surface, const Wall& wall)
   const SparseMatrix stiffness = expand(blocks, place_);
   neighbour_start_ = std::move(blocks.start);
   neighbour_ = std::move(blocks.neighbour);
+  find_groups();
 
   // Factor, and see that the forces that move all vertices by 1 mm do so again.
   cholesky_.compute(stiffness);
@@ -320,67 +340,118 @@ WallCompliance::~WallCompliance() {
   for (const std::atomic<const Response*>& response : responses_) delete response.load();
 }
 
+void WallCompliance::find_groups() {
+  group_of_.assign(place_.size(), -1);
+  group_start_ = {0};
+  for (int a = 0; a < static_cast<int>(place_.size()); ++a) {
+    if (place_[a] < 0 || group_of_[a] >= 0) continue;
+    // Breadth first over vertices that have no group yet.
+    const int number = static_cast<int>(group_start_.size()) - 1;
+    const std::size_t start = group_.size();
+    group_.push_back(a);
+    group_of_[a] = number;
+    for (std::size_t at = start; at < group_.size(); ++at) {
+      for (int e = neighbour_start_[group_[at]]; e < neighbour_start_[group_[at] + 1]; ++e) {
+        const int b = neighbour_[e];
+        if (group_of_[b] >= 0 || group_.size() == start + kGroup) continue;
+        group_.push_back(b);
+        group_of_[b] = number;
+      }
+    }
+    group_start_.push_back(static_cast<int>(group_.size()));
+  }
+}
+
 const WallCompliance::Response& WallCompliance::response(int vertex) const {
   expects(vertex >= 0 && vertex < normals_.cols() && place_[vertex] >= 0);
-  std::atomic<const Response*>& slot = responses_[vertex];
-  const Response* kept = slot.load(std::memory_order_acquire);
-  if (kept != nullptr) return *kept;
+  const Response* kept = responses_[vertex].load(std::memory_order_acquire);
+  return kept != nullptr ? *kept : find_group(vertex);
+}
 
-  // Two threads may find the same response; both find the same, and one is kept.
-  auto found = std::make_unique<const Response>(find_response(vertex));
-  if (!slot.compare_exchange_strong(kept, found.get(), std::memory_order_acq_rel)) return *kept;
-  ++response_count_;
-  response_bytes_ += sizeof(Response) + found->vertices.size() * (sizeof(int) + sizeof(double));
-  return *found.release();
+const WallCompliance::Response& WallCompliance::find_group(int vertex) const {
+  // Two threads may find the same group; both find the same responses, and one of each is kept.
+  const int* first = group_.data() + group_start_[group_of_[vertex]];
+  const int* last = group_.data() + group_start_[group_of_[vertex] + 1];
+  std::vector<Response> found = find_responses({first, last});
+  for (const int* member = first; member != last; ++member) {
+    auto response = std::make_unique<const Response>(std::move(found[member - first]));
+    const Response* none = nullptr;
+    if (!responses_[*member].compare_exchange_strong(none, response.get(),
+                                                     std::memory_order_acq_rel)) {
+      continue;
+    }
+    ++response_count_;
+    response_bytes_ +=
+        sizeof(Response) + response->vertices.size() * (sizeof(int) + sizeof(double));
+    (void)response.release();
+  }
+  return *responses_[vertex].load(std::memory_order_acquire);
+}
+
+template <class Visit>
+void WallCompliance::for_each_part(int vertex, Visit&& visit) const {
+  const int start = neighbour_start_[vertex], end = neighbour_start_[vertex + 1];
+  for (int e = start; e < end; ++e) {
+    const int b = neighbour_[e];
+    visit(b, b == vertex ? 0.5 : 0.5 / (end - start - 1));
+  }
 }
 
 std::vector<WallCompliance::Part> WallCompliance::spread(int vertex) const {
-  const int start = neighbour_start_[vertex], end = neighbour_start_[vertex + 1];
   std::vector<Part> parts;
-  for (int e = start; e < end; ++e) {
-    const int b = neighbour_[e];
-    parts.push_back({b, b == vertex ? 0.5 : 0.5 / (end - start - 1)});
-  }
+  for_each_part(vertex, [&](int b, double part) { parts.push_back({b, part}); });
   return parts;
 }
 
-WallCompliance::Response WallCompliance::find_response(int vertex) const {
+std::vector<WallCompliance::Response> WallCompliance::find_responses(
+    const std::vector<int>& group) const {
+  using Lane = Eigen::Array<double, 1, kGroup>;
+  const int count = static_cast<int>(group.size());
   std::vector<TreeSolver::Force> forces;
-  for (const auto& [b, part] : spread(vertex)) {
-    forces.push_back({place_[b], part * normals_.col(b)});
+  for (int lane = 0; lane < count; ++lane) {
+    for_each_part(group[lane], [&](int b, double part) {
+      forces.push_back({place_[b], lane, part * normals_.col(b)});
+    });
   }
   TreeSolver solver(cholesky_.matrixL().nestedExpression(), forces);
 
-  constexpr double kUnknown = std::numeric_limits<double>::infinity();
-  std::vector<double> normal(static_cast<std::size_t>(normals_.cols()), kUnknown);
-  const auto find = [&](int b) {
-    const Vec3 displacement = solver.displacement(place_[b]);
-    normal[b] = normals_.col(b).dot(displacement);
-    return displacement.norm();
+  // Normal motion of the vertices looked at so far, at their numbers.
+  std::vector<int> number(static_cast<std::size_t>(normals_.cols()), -1);
+  std::vector<Lane> normal;
+  const auto look_at = [&](int b) -> Lane {
+    const auto& displacement = solver.displacement(place_[b]);
+    if (number[b] < 0) {
+      number[b] = static_cast<int>(normal.size());
+      normal.push_back(normals_.col(b).transpose() * displacement);
+    }
+    return displacement.colwise().norm();
   };
   const auto motion_of_point = [&](int b) {
-    double displacement = 0.0;
-    for (const auto& [c, part] : spread(b)) displacement += part * normal[c];
+    Lane displacement = Lane::Zero();
+    for_each_part(b, [&](int c, double part) { displacement += part * normal[number[c]]; });
     return displacement;
   };
 
   // Rings of neighbours, breadth first, until a whole ring hardly moves, in whatever direction:
   // past a sharp edge of the surface a sideways motion is a normal one.
-  for (const auto& [b, part] : spread(vertex)) find(b);
-  const double least = kKeptFraction * motion_of_point(vertex);
+  Lane least = Lane::Constant(std::numeric_limits<double>::infinity());
+  for (int lane = 0; lane < count; ++lane) {
+    for_each_part(group[lane], [&](int b, double) { look_at(b); });
+    least[lane] = kKeptFraction * motion_of_point(group[lane])[lane];
+  }
   std::vector<char> seen(static_cast<std::size_t>(normals_.cols()), 0);
-  seen[vertex] = 1;
-  std::vector<int> ring = {vertex}, next, inner;
-  for (double largest = least; largest >= least && !ring.empty(); std::swap(ring, next)) {
+  for (const int a : group) seen[a] = 1;
+  std::vector<int> ring = group, next, inner;
+  for (bool moves = true; moves && !ring.empty(); std::swap(ring, next)) {
     next.clear();
-    largest = 0.0;
+    moves = false;
     inner.insert(inner.end(), ring.begin(), ring.end());
     for (const int a : ring) {
       for (int e = neighbour_start_[a]; e < neighbour_start_[a + 1]; ++e) {
         const int b = neighbour_[e];
         if (seen[b] != 0) continue;
         seen[b] = 1;
-        largest = std::max(largest, find(b));
+        moves = (look_at(b) >= least).any() || moves;
         next.push_back(b);
       }
     }
@@ -388,16 +459,20 @@ WallCompliance::Response WallCompliance::find_response(int vertex) const {
 
   // What a point at each of them moves by, in ascending order.
   std::sort(inner.begin(), inner.end());
-  Response response;
-  response.vertices.reserve(inner.size());
-  response.displacement.reserve(inner.size());
+  std::vector<Response> responses(group.size());
   for (const int b : inner) {
-    const double displacement = motion_of_point(b);
-    if (std::abs(displacement) < least) continue;
-    response.vertices.push_back(b);
-    response.displacement.push_back(displacement);
+    const Lane displacement = motion_of_point(b);
+    for (int lane = 0; lane < count; ++lane) {
+      if (std::abs(displacement[lane]) < least[lane]) continue;
+      responses[lane].vertices.push_back(b);
+      responses[lane].displacement.push_back(displacement[lane]);
+    }
   }
-  return response;
+  for (Response& response : responses) {
+    response.vertices.shrink_to_fit();
+    response.displacement.shrink_to_fit();
+  }
+  return responses;
 }
 
 Eigen::Matrix3Xd WallCompliance::displacements(const Eigen::Matrix3Xd& forces) const {

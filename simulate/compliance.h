@@ -25,6 +25,9 @@ class WallCompliance {
  public:
   /// What a response leaves out, as part of the displacement under the force.
   static constexpr double kKeptFraction = 1e-8;
+  /// Responses found together, of vertices that lie together: each entry of the factor is read once
+  /// for all of them, and a wire that presses one soon presses the others.
+  static constexpr int kGroup = 8;
 
   /// Throws Error as `wall_stiffness` does, and where the factorisation does not solve it.
   WallCompliance(const Surface& surface, const Wall& wall);
@@ -67,10 +70,16 @@ class WallCompliance {
  private:
   using Cholesky =
       Eigen::SimplicialLLT<Eigen::SparseMatrix<double>, Eigen::Lower, Eigen::NaturalOrdering<int>>;
-  Response find_response(int vertex) const;
+  template <class Visit>
+  void for_each_part(int vertex, Visit&& visit) const;  // of its spread
+  void find_groups();
+  const Response& find_group(int vertex) const;
+  std::vector<Response> find_responses(const std::vector<int>& group) const;
   Eigen::Matrix3Xd normals_;
   std::vector<int> neighbour_start_, neighbour_;  // vertices joined to each by an edge, and itself
   std::vector<int> place_;                        // of each vertex in the factor; -1: no triangle
+  std::vector<int> group_of_;                     // each vertex's group
+  std::vector<int> group_start_, group_;          // the vertices of each
   Cholesky cholesky_;
   mutable std::vector<std::atomic<const Response*>> responses_;  // owned; null: not found yet
   mutable std::atomic<std::size_t> response_count_ = 0, response_bytes_ = 0;

@@ -276,7 +276,8 @@ TEST(WallCompliance, KeepsWhatItFound) {
   EXPECT_GT(after, before);
   EXPECT_EQ(&compliance.response(7), first);
   EXPECT_EQ(compliance.memory_bytes(), after);
-  EXPECT_EQ(compliance.response_count(), 1U);
+  EXPECT_GE(compliance.response_count(), 1U);  // with those of its group
+  EXPECT_LE(compliance.response_count(), static_cast<std::size_t>(WallCompliance::kGroup));
 }
 
 TEST(WallCompliance, HoldsWhereWallsNearlyTouch) {
