@@ -835,7 +835,7 @@ void make_report(Workspace& work, const fs::path& folder) {
     end.terms = trial.terms;
   }
 
-  // Rank, find the errors of the best by refining them, and rank again with these.
+  // Rank; find errors by refining, and rank with these, until no other error matters.
   const Case& given = work.given();
   plan::Findings findings;
   findings.scouted = report.scouted;
@@ -846,10 +846,20 @@ void make_report(Workspace& work, const fs::path& folder) {
   rank();
   const plan::BatchOptions batch{
       .threads = work.options().threads, .progress = {}, .cancelled = work.options().cancelled};
-  report.refinements = plan::refine_plans(study, candidates, report.metrics, report.ranking,
-                                          work.model(), {.batch = batch});
-  findings.errors = plan::errors_by_trial(report.refinements, static_cast<int>(candidates.size()));
-  rank();
+  const auto refine = [&] {
+    for (;;) {
+      const std::vector<int> chosen =
+          plan::choose_plans_to_refine(report.ranking, report.refinements, {});
+      if (chosen.empty()) return;
+      const auto found =
+          plan::refine_plans(study, candidates, report.metrics, chosen, work.model(), batch);
+      report.refinements.insert(report.refinements.end(), found.begin(), found.end());
+      findings.errors =
+          plan::errors_by_trial(report.refinements, static_cast<int>(candidates.size()));
+      rank();
+    }
+  };
+  refine();
 
   // Repeat the best under disturbances until the best are repeated ones.
   Repeats repeats = prepare_repeats(work);
@@ -861,6 +871,7 @@ void make_report(Workspace& work, const fs::path& folder) {
     findings.repeated = repeats.plans;
     rank();
   }
+  refine();  // the repeats may have put others first
   report.robustness = robustness_json(repeats);
 
   // The largest forces on the wall.

@@ -152,7 +152,7 @@ std::string compare_with_next_wire(const std::vector<RankedPlan>& plans, const S
                           metrics[plan.trial].peak_contact_force) +
            " the next wire (" + study.wires[next].name + ")";
   }
-  return study.wires.size() > 1 ? "; no other wire has a plan" : "";
+  return study.wires.size() > 1 ? "; no plan was found with another wire" : "";
 }
 
 /// A later plan against the best one: its force, and the component that costs it most.

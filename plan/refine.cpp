@@ -76,17 +76,38 @@ std::optional<double> find_order(const std::optional<Change>& coarse,
 
 }  // namespace
 
+std::vector<int> choose_plans_to_refine(const Ranking& ranking,
+                                        const std::vector<Refinement>& known,
+                                        const RefineOptions& options) {
+  expects(options.plans >= 0);
+  std::vector<int> next;
+  if (ranking.plans.empty()) return next;
+  const auto add = [&](int trial) {
+    const bool is_known = std::any_of(known.begin(), known.end(),
+                                      [&](const Refinement& r) { return r.trial == trial; });
+    const bool is_next = std::find(next.begin(), next.end(), trial) != next.end();
+    if (!is_known && !is_next) next.push_back(trial);
+  };
+  for (std::size_t k = 0; k < ranking.plans.size(); ++k) {
+    if (static_cast<int>(k) < options.plans) add(ranking.plans[k].trial);
+  }
+  for (const int trial : ranking.plans.front().tied_with) {
+    if (static_cast<int>(known.size() + next.size()) < options.most) add(trial);
+  }
+  return next;
+}
+
 std::vector<Refinement> refine_plans(const Study& study, const std::vector<Candidate>& candidates,
-                                     const std::vector<Metrics>& metrics, const Ranking& ranking,
+                                     const std::vector<Metrics>& metrics,
+                                     const std::vector<int>& trials,
                                      const simulate::VesselModel& vessel,
-                                     const RefineOptions& options) {
-  expects(options.plans >= 0 && metrics.size() == candidates.size());
-  const int plans = std::min(options.plans, static_cast<int>(ranking.plans.size()));
+                                     const BatchOptions& batch) {
+  expects(metrics.size() == candidates.size());
 
   // Plan by plan: 2h, h, h/2.
   constexpr std::array kFactors = {2.0, 1.0, 0.5};
   std::vector<RefinedRun> runs;
-  for (int k = 0; k < plans; ++k) {
+  for (std::size_t k = 0; k < trials.size(); ++k) {
     for (const double factor : kFactors) {
       RefinedRun& run = runs.emplace_back();
       run.element_length = factor * study.insertion.element_length;
@@ -95,18 +116,17 @@ std::vector<Refinement> refine_plans(const Study& study, const std::vector<Candi
   }
   const auto run_slot = [&](int slot) {
     RefinedRun& run = runs[slot];
-    const int trial = ranking.plans[slot / 3].trial;
+    const int trial = trials[slot / 3];
     const double start = thread_cpu_seconds();
     run.trial = run_candidate(coarsened(study, kFactors[slot % 3], metrics[trial].insertion),
                               candidates[trial], vessel);
     run.cpu_seconds = thread_cpu_seconds() - start;
   };
-  for_each_slot(static_cast<int>(runs.size()), run_slot, options.batch);
+  for_each_slot(static_cast<int>(runs.size()), run_slot, batch);
 
   std::vector<Refinement> refinements;
-  for (int k = 0; k < plans; ++k) {
-    const int trial = ranking.plans[k].trial;
-    refinements.push_back(estimate_error(trial, metrics[trial].insertion,
+  for (std::size_t k = 0; k < trials.size(); ++k) {
+    refinements.push_back(estimate_error(trials[k], metrics[trials[k]].insertion,
                                          {runs[3 * k], runs[3 * k + 1], runs[3 * k + 2]}));
   }
   return refinements;

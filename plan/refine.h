@@ -12,8 +12,8 @@
 namespace wireplan::plan {
 
 struct RefineOptions {
-  int plans = 3;            // the best so many are refined
-  BatchOptions batch = {};  // counts runs, three per plan
+  int plans = 3;  // the best so many are refined, ...
+  int most = 8;   // ... and then what cannot be told from the first, up to so many in all
 };
 
 /// One run of a plan: one row of the report's error-against-time table.
@@ -40,13 +40,22 @@ struct RefinedRun {
   double cpu_seconds = 0.0;  //                                                             [s]
 };
 
-/// Runs the best plans with elements of 2h, h and h/2, h the study's. All three push to the
-/// insertion that the plan ended at, past the goal if need be, so that shapes of equal insertion
-/// are compared. Returns one Refinement per plan, in order of rank.
+/// The plans to refine next: of the first `options.plans` those that are not in `known` yet, and,
+/// where `options.most` allows, those tied with the first plan, whose error may change which is
+/// first. Trials, best first. With their errors known the plans are ranked and this is asked again,
+/// until it is empty: then no error that is still assumed touches the first plan.
+std::vector<int> choose_plans_to_refine(const Ranking& ranking,
+                                        const std::vector<Refinement>& known,
+                                        const RefineOptions& options);
+
+/// Runs plans with elements of 2h, h and h/2, h the study's. All three push to the insertion that
+/// the plan ended at, past the goal if need be, so that shapes of equal insertion are compared.
+/// Returns one Refinement for each of `trials`, in their order; the batch counts runs, three each.
 std::vector<Refinement> refine_plans(const Study& study, const std::vector<Candidate>& candidates,
-                                     const std::vector<Metrics>& metrics, const Ranking& ranking,
+                                     const std::vector<Metrics>& metrics,
+                                     const std::vector<int>& trials,
                                      const simulate::VesselModel& vessel,
-                                     const RefineOptions& options);
+                                     const BatchOptions& batch);
 
 /// Richardson's estimate from three runs to the same `insertion`, with elements of 2h, h and h/2.
 /// With d the change from one run to the next finer one, the longer elements' error is

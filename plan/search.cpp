@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <numeric>
 #include <set>
 #include <tuple>
@@ -17,6 +18,7 @@ constexpr double kLongestPush = 2.0;      //                                    
 constexpr double kScoutTolerance = 1e-4;  //                                                [N]
 constexpr std::size_t kNoScouting = 8;
 constexpr std::size_t kAlways = 5;        // the best so many are run in full
+constexpr int kTriesPerWire = 4;          // to find it a plan
 constexpr std::size_t kAtOnce = 8;        // while no plan is found ...
 constexpr std::size_t kGiveUpAfter = 32;  // ... until so many were run in full, ...
 constexpr std::size_t kGiveUpPart = 8;    // ... or one in so many, and none is left that reached
@@ -95,6 +97,7 @@ std::vector<int> choose_next(const Study& study, const std::vector<Candidate>& c
   expects(scouts.size() == candidates.size() && full.size() == candidates.size());
   const std::vector<int> order = order_by_promise(scouts);
   const auto scout = [&](int k) -> const Sighting& { return scouts[static_cast<std::size_t>(k)]; };
+  const auto wire_of = [&](int k) { return candidates[static_cast<std::size_t>(k)].wire; };
   std::set<int> wanted;
 
   // The best of all and of each wire, and failures that may be the scout's.
@@ -104,7 +107,7 @@ std::vector<int> choose_next(const Study& study, const std::vector<Candidate>& c
   for (std::size_t place = 0; place < order.size(); ++place) {
     const int k = order[place];
     if (place < kAlways && scout(k).reached) wanted.insert(k);
-    if (wires.insert(candidates[static_cast<std::size_t>(k)].wire).second) wanted.insert(k);
+    if (wires.insert(wire_of(k)).second) wanted.insert(k);
     if (is_doubtful(scout(k), study.goal.radius) && checked * kCheckedPart < failed) {
       wanted.insert(k);
       ++checked;
@@ -122,6 +125,19 @@ std::vector<int> choose_next(const Study& study, const std::vector<Candidate>& c
     if (best && scout(k).reached && scout(k).score - margin < *best) wanted.insert(k);
   }
   const auto is_known = [&](int k) { return full[static_cast<std::size_t>(k)].has_value(); };
+
+  // Of a wire without a plan the next that reached.
+  std::map<int, int> tries;
+  std::set<int> settled;
+  for (std::size_t k = 0; k < full.size(); ++k) {
+    if (!full[k]) continue;
+    const int wire = wire_of(static_cast<int>(k));
+    if (full[k]->plan || ++tries[wire] >= kTriesPerWire) settled.insert(wire);
+  }
+  for (const int k : order) {
+    if (!scout(k).reached || full[static_cast<std::size_t>(k)]) continue;
+    if (settled.insert(wire_of(k)).second) wanted.insert(k);
+  }
   std::vector<int> next;
   std::copy_if(wanted.begin(), wanted.end(), std::back_inserter(next),
                [&](int k) { return !is_known(k); });

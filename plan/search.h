@@ -33,7 +33,8 @@ Sighting look_at(const simulate::TrialResult& trial, const Metrics& metrics, con
 /// The candidates to run in full next, ascending; empty when no more are needed. `scouts` holds one
 /// sighting per candidate, `full` those known so far. Asked again until it is empty, it names:
 ///   1. the five that score best;
-///   2. of each wire its best, or the nearest where none reached;
+///   2. of each wire its best, or the nearest where none reached; and while its full runs are no
+///      plans the next that reached, four in all;
 ///   3. of those that did not reach one in 16, rounded up, nearest first, for which the scout may
 ///      be at fault: without equilibrium, or within two radii of the goal;
 ///   4. all that reached with a score that may beat the best full plan: by no more than the scout

@@ -201,10 +201,44 @@ struct TubeStudy {
   }
 
   std::vector<Refinement> refined(int threads) const {
-    return refine_plans(study, candidates, metrics, ranking, vessel,
-                        {.plans = 3, .batch = {.threads = threads}});
+    return refine_plans(study, candidates, metrics, choose_plans_to_refine(ranking, {}, {}), vessel,
+                        {.threads = threads});
   }
 };
+
+/// Plans 10, 11, ... in order, the first tied with those given.
+Ranking ranking_of(int plans, const std::vector<int>& tied_with_first) {
+  Ranking ranking;
+  for (int k = 0; k < plans; ++k) ranking.plans.emplace_back().trial = 10 + k;
+  ranking.plans[0].tied_with = tied_with_first;
+  return ranking;
+}
+
+std::vector<Refinement> refinements_of(const std::vector<int>& trials) {
+  std::vector<Refinement> known;
+  for (const int trial : trials) known.emplace_back().trial = trial;
+  return known;
+}
+
+TEST(ChoosePlansToRefine, StopsWhereNoAssumedErrorTouchesTheFirst) {
+  const Ranking clear = ranking_of(12, {});
+  EXPECT_EQ(choose_plans_to_refine(clear, {}, {}), (std::vector<int>{10, 11, 12}));
+  EXPECT_TRUE(choose_plans_to_refine(clear, refinements_of({10, 11, 12}), {}).empty());
+
+  const Ranking tied = ranking_of(12, {12, 14, 17});
+  EXPECT_EQ(choose_plans_to_refine(tied, {}, {}), (std::vector<int>{10, 11, 12, 14, 17}));
+  EXPECT_EQ(choose_plans_to_refine(tied, refinements_of({10, 11, 12, 14}), {}),
+            (std::vector<int>{17}));
+  EXPECT_TRUE(choose_plans_to_refine(tied, refinements_of({10, 11, 12, 14, 17}), {}).empty());
+}
+
+TEST(ChoosePlansToRefine, TakesNoMoreThanAskedButTheFirstAlways) {
+  const Ranking all_tied = ranking_of(12, {11, 12, 13, 14, 15, 16, 17, 18, 19, 20, 21});
+  EXPECT_EQ(choose_plans_to_refine(all_tied, {}, {}).size(), 8U);
+  EXPECT_EQ(choose_plans_to_refine(all_tied, refinements_of({10, 12, 14, 15, 16, 17, 18, 19}), {}),
+            (std::vector<int>{11}));
+  EXPECT_TRUE(choose_plans_to_refine(Ranking{}, {}, {}).empty());
+}
 
 TEST(RefinePlans, EstimatesASmallErrorOfAWireAgainstTheWall) {
   const TubeStudy tube;

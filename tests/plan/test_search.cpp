@@ -93,6 +93,21 @@ TEST(ChooseNext, LooksAtTheBestOfEachWire) {
   EXPECT_FALSE(std::count(next.begin(), next.end(), 11));
 }
 
+TEST(ChooseNext, TriesToFindEachWireAPlan) {
+  Bench bench;
+  for (int k = 0; k < 10; ++k) bench.reach(0, 0.2, 0.2);
+  for (int k = 0; k < 6; ++k) {  // 10 to 15: the third is a plan
+    bench.reach(1, 0.7 + 0.01 * k, 0.7);
+    if (k < 2) bench.truth.back() = Sighting{.nearest = 30.0};
+  }
+  for (int k = 0; k < 6; ++k) {  // 16 to 21: none is
+    bench.reach(2, 0.8 + 0.01 * k, 0.8);
+    bench.truth.back() = Sighting{.nearest = 30.0};
+  }
+  bench.search();
+  for (int k = 10; k < 22; ++k) EXPECT_EQ(bench.full[k].has_value(), k < 13 || (k > 15 && k < 20));
+}
+
 TEST(ChooseNext, ChecksFailuresThatMayBeTheScouts) {
   Bench bench;
   for (int k = 0; k < 6; ++k) bench.reach(0, 0.2, 0.2);
