@@ -492,7 +492,9 @@ Eigen::Matrix3Xd WallCompliance::displacements(const Eigen::Matrix3Xd& forces) c
 std::size_t WallCompliance::memory_bytes() const {
   const SparseMatrix& L = cholesky_.matrixL().nestedExpression();
   return static_cast<std::size_t>(L.nonZeros()) * (sizeof(double) + sizeof(int)) +
-         (neighbour_start_.size() + neighbour_.size() + place_.size()) * sizeof(int) +
+         (neighbour_start_.size() + neighbour_.size() + place_.size() + group_of_.size() +
+          group_start_.size() + group_.size()) *
+             sizeof(int) +
          static_cast<std::size_t>(normals_.size()) * sizeof(double) +
          responses_.size() * sizeof(responses_[0]) + response_bytes_;
 }
