@@ -219,7 +219,8 @@ Json trial_json(const ReportInput& input, std::size_t k) {
   row.put_number("residual_n", m.residual, ended);
   const plan::Refinement* refined = find_refinement(input, static_cast<int>(k));
   if (refined == nullptr) {
-    row.put_optional("position_error_mm", {}, "only the first plans and those tied with the best are refined");
+    row.put_optional("position_error_mm", {},
+                     "only the first plans and those tied with the best are refined");
   } else {
     row.put_optional("position_error_mm",
                      refined->error ? std::optional(refined->error->position) : std::nullopt,
