@@ -100,14 +100,12 @@ std::vector<int> choose_next(const Study& study, const std::vector<Candidate>& c
   const auto wire_of = [&](int k) { return candidates[static_cast<std::size_t>(k)].wire; };
   std::set<int> wanted;
 
-  // The best of all and of each wire, and failures that may be the scout's.
-  std::set<int> wires;
+  // The best of all, and failures that may be the scout's.
   std::size_t failed = 0, checked = 0;
   for (const int k : order) failed += scout(k).reached ? 0 : 1;
   for (std::size_t place = 0; place < order.size(); ++place) {
     const int k = order[place];
     if (place < kAlways && scout(k).reached) wanted.insert(k);
-    if (wires.insert(wire_of(k)).second) wanted.insert(k);
     if (is_doubtful(scout(k), study.goal.radius) && checked * kCheckedPart < failed) {
       wanted.insert(k);
       ++checked;
@@ -126,7 +124,7 @@ std::vector<int> choose_next(const Study& study, const std::vector<Candidate>& c
   }
   const auto is_known = [&](int k) { return full[static_cast<std::size_t>(k)].has_value(); };
 
-  // Of a wire without a plan the next that reached.
+  // Of a wire without a plan its best, whatever it is, then the next that reached.
   std::map<int, int> tries;
   std::set<int> settled;
   for (std::size_t k = 0; k < full.size(); ++k) {
@@ -135,7 +133,7 @@ std::vector<int> choose_next(const Study& study, const std::vector<Candidate>& c
     if (full[k]->plan || ++tries[wire] >= kTriesPerWire) settled.insert(wire);
   }
   for (const int k : order) {
-    if (!scout(k).reached || full[static_cast<std::size_t>(k)]) continue;
+    if (is_known(k) || (!scout(k).reached && tries.contains(wire_of(k)))) continue;
     if (settled.insert(wire_of(k)).second) wanted.insert(k);
   }
   std::vector<int> next;
