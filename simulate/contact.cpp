@@ -1,5 +1,7 @@
 #include "simulate/contact.h"
 
+#include <tbb/parallel_for.h>
+
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <array>
@@ -72,9 +74,9 @@ struct SampleGrid {
   Vec3 origin;
   double spacing, limit;  // distances are cut to +-limit
   std::array<int, 3> bricks;
-  std::vector<std::int32_t> slot;  // of each brick; negative: no samples there
-  std::int32_t slots = 0;          // given so far
-  std::vector<double> values;      // kVolume per slot
+  std::vector<std::int32_t> slot;           // of each brick; negative: no samples there
+  std::vector<std::array<int, 3>> sampled;  // the brick of each slot
+  std::vector<double> values;               // kVolume per slot
 
   std::size_t brick_index(int i, int j, int k) const {
     return static_cast<std::size_t>(i) +
@@ -129,6 +131,13 @@ bool overlap(const NodeBox& a, const NodeBox& b) {
   return true;
 }
 
+/// Calls work(slot) for every brick that has samples, on all cores. It may write to its own slot
+/// alone.
+template <class Work>
+void for_each_slot(const SampleGrid& grid, const Work& work) {
+  tbb::parallel_for(std::size_t{0}, grid.sampled.size(), work);
+}
+
 /// Calls visit(slot, i, j, k) for every brick of the box.
 template <class Visit>
 void for_each_brick(SampleGrid& grid, const NodeBox& box, const Visit& visit) {
@@ -143,8 +152,10 @@ void for_each_brick(SampleGrid& grid, const NodeBox& box, const Visit& visit) {
 
 /// Gives samples to the bricks of a box; their values come later.
 void add_samples(SampleGrid& grid, const NodeBox& box) {
-  for_each_brick(grid, box, [&](std::int32_t& s, int, int, int) {
-    if (s < 0) s = grid.slots++;
+  for_each_brick(grid, box, [&](std::int32_t& s, int i, int j, int k) {
+    if (s >= 0) return;
+    s = static_cast<std::int32_t>(grid.sampled.size());
+    grid.sampled.push_back({i, j, k});
   });
 }
 
@@ -183,27 +194,26 @@ class BlockDistances {
     }
   }
 
-  /// Takes over what is shorter than what a node has, and than the grid's limit. Of equal ones the
-  /// first triangle counts: `near` ascends.
-  void take(std::int32_t slot, const std::array<int, 3>& brick, const std::vector<int>& near) {
-    take(slot, brick, {0, 0, 0}, SampleGrid::kSide, near);
+  /// Takes over what is shorter than what a node has, and than the grid's limit. Expects triangles
+  /// near.
+  void take(std::size_t slot, const std::vector<int>& near) const {
+    take(slot, {0, 0, 0}, SampleGrid::kSide, near);
   }
 
  private:
-  void take(std::int32_t slot, const std::array<int, 3>& brick, const std::array<int, 3>& first,
-            int side, const std::vector<int>& near) {
+  void take(std::size_t slot, const std::array<int, 3>& first, int side,
+            const std::vector<int>& near) const {
     // The ball round the block; what is farther than the nearest one by its width is no one's.
+    const std::array<int, 3>& brick = grid_.sampled[slot];
     const Vec3 low(SampleGrid::kSide * brick[0] + first[0], SampleGrid::kSide * brick[1] + first[1],
                    SampleGrid::kSide * brick[2] + first[2]);
     const Vec3 center = grid_.origin + grid_.spacing * (low.array() + 0.5 * (side - 1)).matrix();
     const double reach = 0.5 * (side - 1) * std::sqrt(3.0) * grid_.spacing;
     std::vector<double> distance;
     distance.reserve(near.size());
-    double least = grid_.limit;
-    for (const int f : near) {
-      distance.push_back((middle_.col(f) - center).norm());
-      least = std::min(least, distance.back() + reach);
-    }
+    for (const int f : near) distance.push_back((middle_.col(f) - center).norm());
+    const auto nearest = std::min_element(distance.begin(), distance.end());
+    const double least = std::min(grid_.limit, *nearest + reach);
     std::vector<int> left;
     left.reserve(near.size());
     for (std::size_t k = 0; k < near.size(); ++k) {
@@ -217,15 +227,16 @@ class BlockDistances {
         const std::array<int, 3> at = {first[0] + (octant & 1 ? half : 0),
                                        first[1] + (octant & 2 ? half : 0),
                                        first[2] + (octant & 4 ? half : 0)};
-        take(slot, brick, at, half, left);
+        take(slot, at, half, left);
       }
       return;
     }
-    double* values = grid_.values.data() + static_cast<std::size_t>(slot) * SampleGrid::kVolume;
+    double* values = grid_.values.data() + slot * SampleGrid::kVolume;
     for (int node = 0; node < 8; ++node) {
       const int i = node & 1, j = (node >> 1) & 1, k = node >> 2;
       double& value = values[SampleGrid::node_index(first[0] + i, first[1] + j, first[2] + k)];
       const Vec3 p = grid_.origin + grid_.spacing * (low + Vec3(i, j, k));
+      take(value, p, near[static_cast<std::size_t>(nearest - distance.begin())]);
       for (const int f : left) take(value, p, f);
     }
   }
@@ -236,6 +247,8 @@ class BlockDistances {
     const Eigen::Vector3i t = surface_.triangles.col(f);
     const Vec3 a = surface_.vertices.col(t[0]);
     const double bound = std::min(std::abs(value), grid_.limit);
+    const double far = bound + radius_[f] + kRounding;
+    if ((p - middle_.col(f)).squaredNorm() >= far * far) return;
     const Vec3 plane = normals_.face.col(f);
     if (std::abs(plane.dot(p - a)) >= bound) return;
     const NearestOnTriangle nearest =
@@ -257,23 +270,21 @@ class BlockDistances {
 /// than what is there, and than the grid's limit.
 void scatter_distances(SampleGrid& grid, const Surface& surface,
                        const std::vector<NodeBox>& boxes) {
-  std::vector<std::vector<int>> near(static_cast<std::size_t>(grid.slots));
-  std::vector<std::array<int, 3>> brick(near.size());
+  std::vector<std::vector<int>> near(grid.sampled.size());
   for (Eigen::Index f = 0; f < surface.triangles.cols(); ++f) {
     const NodeBox box = node_box(grid, surface, f);
     if (std::none_of(boxes.begin(), boxes.end(),
                      [&](const NodeBox& other) { return overlap(box, other); })) {
       continue;
     }
-    for_each_brick(grid, box, [&](std::int32_t& s, int i, int j, int k) {
+    for_each_brick(grid, box, [&](std::int32_t& s, int, int, int) {
       near[static_cast<std::size_t>(s)].push_back(static_cast<int>(f));
-      brick[static_cast<std::size_t>(s)] = {i, j, k};
     });
   }
-  BlockDistances distances(grid, surface);
-  for (std::size_t s = 0; s < near.size(); ++s) {
-    if (!near[s].empty()) distances.take(static_cast<std::int32_t>(s), brick[s], near[s]);
-  }
+  const BlockDistances distances(grid, surface);
+  for_each_slot(grid, [&](std::size_t s) {
+    if (!near[s].empty()) distances.take(s, near[s]);
+  });
 }
 
 /// Gives unreached nodes, then bricks without samples, the sign of a neighbour: between two
@@ -300,15 +311,10 @@ void spread_signs(SampleGrid& grid) {
       }
     }
   };
-  for (int k = 0; k < grid.bricks[2]; ++k) {
-    for (int j = 0; j < grid.bricks[1]; ++j) {
-      for (int i = 0; i < grid.bricks[0]; ++i) {
-        if (grid.slot[grid.brick_index(i, j, k)] < 0) continue;
-        for (int v = 0; v < SampleGrid::kVolume; ++v) {
-          const std::array<int, 3> n = {8 * i + (v & 7), 8 * j + ((v >> 3) & 7), 8 * k + (v >> 6)};
-          if (std::isfinite(*value_at(n))) front.push_back(n);
-        }
-      }
+  for (const auto& [i, j, k] : grid.sampled) {
+    for (int v = 0; v < SampleGrid::kVolume; ++v) {
+      const std::array<int, 3> n = {8 * i + (v & 7), 8 * j + ((v >> 3) & 7), 8 * k + (v >> 6)};
+      if (std::isfinite(*value_at(n))) front.push_back(n);
     }
   }
   for (; !front.empty(); std::swap(front, next)) {
@@ -491,52 +497,47 @@ void open_caps(SampleGrid& grid, const Surface& surface, const std::vector<Mouth
 std::vector<double> spline_coefficients(const SampleGrid& grid) {
   constexpr int kRounds = 3, kHalo = 10;
   std::vector<double> coefficients = grid.values, updated(grid.values.size());
-  std::array<double, kHalo * kHalo * kHalo> halo{}, pass{};
-  const auto at = [](std::array<double, kHalo * kHalo * kHalo>& a, int i, int j, int k) -> double& {
+  using Halo = std::array<double, kHalo * kHalo * kHalo>;
+  const auto at = [](Halo& a, int i, int j, int k) -> double& {
     return a[static_cast<std::size_t>(i + kHalo * (j + kHalo * k))];
   };
-  for (int round = 0; round < kRounds; ++round) {
-    for (int bk = 0; bk < grid.bricks[2]; ++bk) {
-      for (int bj = 0; bj < grid.bricks[1]; ++bj) {
-        for (int bi = 0; bi < grid.bricks[0]; ++bi) {
-          const std::int32_t s = grid.slot[grid.brick_index(bi, bj, bk)];
-          if (s < 0) continue;
-          for (int k = 0; k < kHalo; ++k) {
-            for (int j = 0; j < kHalo; ++j) {
-              for (int i = 0; i < kHalo; ++i) {
-                at(halo, i, j, k) =
-                    grid.at(coefficients, 8 * bi + i - 1, 8 * bj + j - 1, 8 * bk + k - 1);
-              }
-            }
-          }
-          // (1 4 1)/6 along x, y, z in turn, in place from `halo` to `pass` and back.
-          for (int k = 0; k < kHalo; ++k) {
-            for (int j = 0; j < kHalo; ++j) {
-              for (int i = 1; i <= 8; ++i) {
-                at(pass, i, j, k) =
-                    (at(halo, i - 1, j, k) + 4.0 * at(halo, i, j, k) + at(halo, i + 1, j, k)) / 6.0;
-              }
-            }
-          }
-          for (int k = 0; k < kHalo; ++k) {
-            for (int j = 1; j <= 8; ++j) {
-              for (int i = 1; i <= 8; ++i) {
-                at(halo, i, j, k) =
-                    (at(pass, i, j - 1, k) + 4.0 * at(pass, i, j, k) + at(pass, i, j + 1, k)) / 6.0;
-              }
-            }
-          }
-          for (int v = 0; v < SampleGrid::kVolume; ++v) {
-            const int i = 1 + (v & 7), j = 1 + ((v >> 3) & 7), k = 1 + (v >> 6);
-            const double smoothed =
-                (at(halo, i, j, k - 1) + 4.0 * at(halo, i, j, k) + at(halo, i, j, k + 1)) / 6.0;
-            const std::size_t n =
-                static_cast<std::size_t>(s) * SampleGrid::kVolume + static_cast<std::size_t>(v);
-            updated[n] = coefficients[n] + grid.values[n] - smoothed;
-          }
+  const auto update = [&](std::size_t s) {
+    const auto& [bi, bj, bk] = grid.sampled[s];
+    Halo halo, pass;
+    for (int k = 0; k < kHalo; ++k) {
+      for (int j = 0; j < kHalo; ++j) {
+        for (int i = 0; i < kHalo; ++i) {
+          at(halo, i, j, k) = grid.at(coefficients, 8 * bi + i - 1, 8 * bj + j - 1, 8 * bk + k - 1);
         }
       }
     }
+    // (1 4 1)/6 along x, y, z in turn, in place from `halo` to `pass` and back.
+    for (int k = 0; k < kHalo; ++k) {
+      for (int j = 0; j < kHalo; ++j) {
+        for (int i = 1; i <= 8; ++i) {
+          at(pass, i, j, k) =
+              (at(halo, i - 1, j, k) + 4.0 * at(halo, i, j, k) + at(halo, i + 1, j, k)) / 6.0;
+        }
+      }
+    }
+    for (int k = 0; k < kHalo; ++k) {
+      for (int j = 1; j <= 8; ++j) {
+        for (int i = 1; i <= 8; ++i) {
+          at(halo, i, j, k) =
+              (at(pass, i, j - 1, k) + 4.0 * at(pass, i, j, k) + at(pass, i, j + 1, k)) / 6.0;
+        }
+      }
+    }
+    for (int v = 0; v < SampleGrid::kVolume; ++v) {
+      const int i = 1 + (v & 7), j = 1 + ((v >> 3) & 7), k = 1 + (v >> 6);
+      const double smoothed =
+          (at(halo, i, j, k - 1) + 4.0 * at(halo, i, j, k) + at(halo, i, j, k + 1)) / 6.0;
+      const std::size_t n = s * SampleGrid::kVolume + static_cast<std::size_t>(v);
+      updated[n] = coefficients[n] + grid.values[n] - smoothed;
+    }
+  };
+  for (int round = 0; round < kRounds; ++round) {
+    for_each_slot(grid, update);
     std::swap(coefficients, updated);
   }
   return coefficients;
@@ -588,7 +589,7 @@ Lumen::Lumen(const Surface& surface, const LumenOptions& options)
     add_samples(grid, node_box(grid, surface, f));
   }
   for (const Mouth& mouth : mouths) add_samples(grid, node_box(grid, mouth.low, mouth.high));
-  grid.values.assign(static_cast<std::size_t>(grid.slots) * SampleGrid::kVolume,
+  grid.values.assign(grid.sampled.size() * SampleGrid::kVolume,
                      std::numeric_limits<double>::infinity());
   scatter_distances(grid, surface, {node_box(grid, low, high)});
   spread_signs(grid);
@@ -599,26 +600,20 @@ Lumen::Lumen(const Surface& surface, const LumenOptions& options)
   origin_ = grid.origin;
   bricks_ = grid.bricks;
   brick_ = grid.slot;
-  const std::size_t slots = grid.values.size() / SampleGrid::kVolume;
-  coefficients_.resize(slots * kNodes * kNodes * kNodes);
-  for (int bk = 0; bk < bricks_[2]; ++bk) {
-    for (int bj = 0; bj < bricks_[1]; ++bj) {
-      for (int bi = 0; bi < bricks_[0]; ++bi) {
-        const std::int32_t s = brick_[grid.brick_index(bi, bj, bk)];
-        if (s < 0) continue;
-        float* target =
-            coefficients_.data() + static_cast<std::size_t>(s) * kNodes * kNodes * kNodes;
-        for (int k = 0; k < kNodes; ++k) {
-          for (int j = 0; j < kNodes; ++j) {
-            for (int i = 0; i < kNodes; ++i) {
-              *target++ = static_cast<float>(grid.at(coefficients, kCells * bi + i - 1,
-                                                     kCells * bj + j - 1, kCells * bk + k - 1));
-            }
-          }
+  constexpr std::size_t kPerBrick = static_cast<std::size_t>(kNodes) * kNodes * kNodes;
+  coefficients_.resize(grid.sampled.size() * kPerBrick);
+  for_each_slot(grid, [&](std::size_t slot) {
+    const auto& [bi, bj, bk] = grid.sampled[slot];
+    float* target = coefficients_.data() + slot * kPerBrick;
+    for (int k = 0; k < kNodes; ++k) {
+      for (int j = 0; j < kNodes; ++j) {
+        for (int i = 0; i < kNodes; ++i) {
+          *target++ = static_cast<float>(
+              grid.at(coefficients, kCells * bi + i - 1, kCells * bj + j - 1, kCells * bk + k - 1));
         }
       }
     }
-  }
+  });
 
   // 4. How well the smooth wall follows the triangles, caps left out.
   std::vector<bool> is_wall(static_cast<std::size_t>(surface.triangles.cols()), true);

@@ -68,6 +68,7 @@ class CapFinder {
   explicit CapFinder(const Surface& surface)
       : surface_(surface),
         facets_(describe_facets(surface)),
+        all_(facets_.area.sum()),
         seen_(facets_.neighbour.size(), 0),
         tried_(facets_.neighbour.size(), false),
         taken_(facets_.neighbour.size(), false) {}
@@ -146,12 +147,10 @@ class CapFinder {
 
   /// From a seed its flat surroundings, then on to the rim.
   bool grow_cap(int seed, Opening& cap) {
-    const double all = facets_.area.sum();
-
     // The core, flat to a few degrees; none of it need be a seed again.
     const Vec3 seed_normal = facets_.normal.col(seed);
     cap.triangles = {seed};
-    flood(cap.triangles, all, [&](int f) {
+    flood(cap.triangles, all_, [&](int f) {
       return !taken_[static_cast<std::size_t>(f)] && facets_.normal.col(f).dot(seed_normal) > kFlat;
     });
     for (const int f : cap.triangles) tried_[static_cast<std::size_t>(f)] = true;
@@ -160,7 +159,7 @@ class CapFinder {
 
     // On to the rim, near the core's plane, and the notches that this leaves.
     const Opening core = cap;
-    flood(cap.triangles, all, [&](int f) {
+    flood(cap.triangles, all_, [&](int f) {
       const double depth = core.normal.dot(facets_.centroid.col(f) - core.center);
       return !taken_[static_cast<std::size_t>(f)] &&
              facets_.normal.col(f).dot(core.normal) > kLip &&
@@ -168,7 +167,7 @@ class CapFinder {
     });
     for (std::size_t before = 0; before != cap.triangles.size();) {
       before = cap.triangles.size();
-      flood(cap.triangles, all, [&](int f) {
+      flood(cap.triangles, all_, [&](int f) {
         int inside = 0;
         for (const int g : facets_.neighbour[static_cast<std::size_t>(f)]) {
           if (seen_[static_cast<std::size_t>(g)] == stamp_) ++inside;
@@ -184,8 +183,6 @@ class CapFinder {
 
   /// One piece without holes, flat, and about as wide as long.
   bool is_disc(const Opening& cap) const {
-    std::set<int> vertices;
-    std::set<std::pair<int, int>> edges;
     Mat3 moments = Mat3::Zero();  // of area about the center
     double area = 0.0;
     for (const int f : cap.triangles) {
@@ -193,20 +190,29 @@ class CapFinder {
       const Vec3 offset = facets_.centroid.col(f) - cap.center;
       Mat3 second = offset * offset.transpose();
       for (int c = 0; c < 3; ++c) {
-        vertices.insert(t[c]);
-        edges.emplace(std::min(t[c], t[(c + 1) % 3]), std::max(t[c], t[(c + 1) % 3]));
         const Vec3 arm = surface_.vertices.col(t[c]) - facets_.centroid.col(f);
         second += arm * arm.transpose() / 12.0;
       }
       moments += facets_.area[f] * second;
       area += facets_.area[f];
     }
-    if (vertices.size() + cap.triangles.size() != edges.size() + 1) return false;
     const Eigen::SelfAdjointEigenSolver<Mat3> solver(moments / area);
     const Vec3 spread = solver.eigenvalues().cwiseMax(0.0);
     const double ellipse = 4.0 * kPi * std::sqrt(spread[1] * spread[2]);
-    return std::sqrt(spread[0]) < kLargestDeviation * cap.radius &&
-           spread[2] < kLargestAspect * kLargestAspect * spread[1] && area > kLeastFill * ellipse;
+    if (std::sqrt(spread[0]) >= kLargestDeviation * cap.radius ||
+        spread[2] >= kLargestAspect * kLargestAspect * spread[1] || area <= kLeastFill * ellipse) {
+      return false;
+    }
+    std::set<int> vertices;
+    std::set<std::pair<int, int>> edges;
+    for (const int f : cap.triangles) {
+      const Eigen::Vector3i t = surface_.triangles.col(f);
+      for (int c = 0; c < 3; ++c) {
+        vertices.insert(t[c]);
+        edges.emplace(std::min(t[c], t[(c + 1) % 3]), std::max(t[c], t[(c + 1) % 3]));
+      }
+    }
+    return vertices.size() + cap.triangles.size() == edges.size() + 1;
   }
 
   /// The section at a depth, by the divergence theorem: what lies between it and the cap has no
@@ -246,6 +252,7 @@ class CapFinder {
 
   const Surface& surface_;
   const Facets facets_;
+  const double all_;       // area of all triangles                                      [mm^2]
   std::vector<int> seen_;  // equals stamp_ where the last flood went
   int stamp_ = 0;
   std::vector<bool> tried_, taken_;

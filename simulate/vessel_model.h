@@ -1,6 +1,5 @@
 #pragma once
 /// The vessel as wires feel it: built once per patient, shared read-only by all trials.
-#include <algorithm>
 #include <memory>
 #include <utility>
 
@@ -20,10 +19,7 @@ struct VesselModel {
       : lumen(surface, options), locator(surface) {}
   /// With the field as from_bytes() gives it.
   VesselModel(const Surface& surface, Lumen known) : lumen(std::move(known)), locator(surface) {}
-  VesselModel(const Surface& surface, const Wall& wall, LumenOptions options = {})
-      : lumen(surface, (options.band = std::max(options.band, kYieldingBand), options)),
-        locator(surface),
-        compliance(std::make_unique<WallCompliance>(surface, wall)) {}
+  VesselModel(const Surface& surface, const Wall& wall, const LumenOptions& options = {});
 
   Lumen lumen;
   TriangleLocator locator;
