@@ -15,18 +15,23 @@
 namespace wireplan::preprocess {
 namespace {
 
-// Distances along the normal, in voxels (geometric mean of the spacing).
+// Distances along the normal, in units: voxels (geometric mean of the spacing) at first, then what
+// the edge is found to be blurred over, where that is more.
 constexpr double kReach = 1.2;           // the edge is sought this far on either side
 constexpr double kStep = 0.2;            // of the search
 constexpr double kInside = 1.5;          // the lumen's value is taken here, and a step deeper
+constexpr double kNearInside = 0.8;      // and here, the middle of a vessel thinner than that
 constexpr double kOutside = 1.2;         // the surroundings' value is the least up to here
-constexpr double kSmoothing = 2.0;       // shifts are averaged over this far along the surface
+constexpr double kSmoothing = 2.0;       // shifts and the values outside are averaged over this far
+                                         // along the surface
 constexpr double kLevelSmoothing = 2.5;  // and the lumen's value over this
+constexpr double kUnitPerSigma = 1.7,
+                 kMostUnit = 2.0;  // the unit, per sigma of the blur; in voxels
 // A step less than this part of the usual one is no edge that a level could be put on.
 constexpr double kLeastContrast = 0.35;
 // How strongly a vertex without an edge is held where the mask has it, against one with an edge.
 constexpr double kHold = 0.15;
-constexpr int kRounds = 2;
+constexpr int kRounds = 3;        // the first finds the unit
 constexpr double kDeep = 0.8413;  // part of a blurred step one sigma inside of it
 // Blur moves the half level of a disc by sigma^2/(2 r), but not by more than this part of sigma: in
 // one thinner than 3 sigma it lowers the lumen's value, and so the level, as well.
@@ -135,6 +140,7 @@ Surface fit_to_image(const Surface& surface, const Image& image, FitStatistics* 
   const Interpolated grey(image);
   const Neighbours neighbours = find_neighbours(surface);
   const double voxel = std::cbrt(image.grid.spacing.prod()), edge = mean_edge(surface);
+  double unit = voxel;  // of distances along the normal                                  [mm]
   const int half = static_cast<int>(std::lround(kReach / kStep));
 
   std::vector<char> fixed(static_cast<std::size_t>(n));
@@ -149,8 +155,9 @@ Surface fit_to_image(const Surface& surface, const Image& image, FitStatistics* 
     Eigen::VectorXd lumen(n), outside(n), beyond(n), weight = Eigen::VectorXd::Ones(n);
 #pragma omp parallel for schedule(static)
     for (Eigen::Index v = 0; v < n; ++v) {
-      const Vec3 p = fitted.vertices.col(v), out = voxel * normals.col(v);
-      lumen(v) = std::max(grey.at(p - kInside * out), grey.at(p - (kInside + 0.5) * out));
+      const Vec3 p = fitted.vertices.col(v), out = unit * normals.col(v);
+      const double deep = 0.5 * (grey.at(p - kInside * out) + grey.at(p - (kInside + 0.5) * out));
+      lumen(v) = std::max(deep, grey.at(p - kNearInside * out));
       beyond(v) = grey.at(p + kOutside * out);
       outside(v) = beyond(v);
       for (double way = kStep; way < kOutside; way += kStep) {
@@ -160,7 +167,9 @@ Surface fit_to_image(const Surface& surface, const Image& image, FitStatistics* 
     const double usual_lumen = median({lumen.begin(), lumen.end()});
     const double usual_outside = median({outside.begin(), outside.end()});
     const double contrast = usual_lumen - usual_outside;
-    average(neighbours, passes_for(kLevelSmoothing * voxel, edge), lumen, weight);
+    average(neighbours, passes_for(kLevelSmoothing * unit, edge), lumen, weight);
+    weight.setOnes();
+    average(neighbours, passes_for(kSmoothing * unit, edge), outside, weight);
     if (statistics) {
       statistics->lumen_value = usual_lumen;
       statistics->outside_value = usual_outside;
@@ -183,17 +192,17 @@ Surface fit_to_image(const Surface& surface, const Image& image, FitStatistics* 
         const double least = kLeastContrast * std::abs(contrast);
         const bool falls = lumen(v) - outside(v) >= least;
         if (!falls && beyond(v) - lumen(v) < least) continue;
-        const Vec3 p = fitted.vertices.col(v), out = kStep * voxel * normals.col(v);
+        const Vec3 p = fitted.vertices.col(v), out = kStep * unit * normals.col(v);
         for (int k = -half; k <= half; ++k) {
           profile[static_cast<std::size_t>(k + half)] = grey.at(p + k * out);
         }
         const double level = 0.5 * (lumen(v) + (falls ? outside(v) : beyond(v)));
         const std::optional<double> at = crossing(profile, level, falls);
         if (!at) continue;
-        shift(v) = *at * kStep * voxel;
+        shift(v) = *at * kStep * unit;
         certainty(v) = 1.0;
         const double deep = level + (2.0 * kDeep - 1.0) * (lumen(v) - level);
-        width(v) = way_inward(profile, *at, deep, falls).value_or(0.0) * kStep * voxel;
+        width(v) = way_inward(profile, *at, deep, falls).value_or(0.0) * kStep * unit;
       }
     }
 
@@ -205,6 +214,7 @@ Surface fit_to_image(const Surface& surface, const Image& image, FitStatistics* 
       const double sigma = median(widths);
       const Eigen::VectorXd inward = moved_by_blur(fitted, neighbours, normals, sigma, edge);
       shift += (certainty.array() == 1.0).select(inward.cwiseMin(kMostMoved * sigma), 0.0).matrix();
+      unit = std::clamp(kUnitPerSigma * sigma, voxel, kMostUnit * voxel);
     }
     if (statistics) {
       statistics->fitted_fraction =
@@ -212,10 +222,10 @@ Surface fit_to_image(const Surface& surface, const Image& image, FitStatistics* 
     }
 
     // Against noise and gaps: the average of the neighbourhood.
-    average(neighbours, passes_for(kSmoothing * voxel, edge), shift, certainty);
+    average(neighbours, passes_for(kSmoothing * unit, edge), shift, certainty);
     for (Eigen::Index v = 0; v < n; ++v) {
       if (fixed[v] != 0) continue;
-      const double most = kReach * voxel;
+      const double most = kReach * unit;
       const double move = std::clamp(total(v) + shift(v), -most, most) - total(v);
       total(v) += move;
       fitted.vertices.col(v) += move * normals.col(v);
