@@ -25,6 +25,9 @@ constexpr double kOutside = 1.2;         // the surroundings' value is the least
 constexpr double kSmoothing = 2.0;       // shifts and the values outside are averaged over this far
                                          // along the surface
 constexpr double kLevelSmoothing = 2.5;  // and the lumen's value over this
+// Over more of it in a noisy image: where the lumen's values stray from their average by more than
+// this part of the contrast (median), in proportion.
+constexpr double kQuiet = 0.03, kMostOfSmoothing = 1.5;
 constexpr double kUnitPerSigma = 1.7,
                  kMostUnit = 2.0;  // the unit, per sigma of the blur; in voxels
 // A step less than this part of the usual one is no edge that a level could be put on.
@@ -167,9 +170,13 @@ Surface fit_to_image(const Surface& surface, const Image& image, FitStatistics* 
     const double usual_lumen = median({lumen.begin(), lumen.end()});
     const double usual_outside = median({outside.begin(), outside.end()});
     const double contrast = usual_lumen - usual_outside;
+    const Eigen::VectorXd as_read = lumen;
     average(neighbours, passes_for(kLevelSmoothing * unit, edge), lumen, weight);
+    const Eigen::VectorXd off = (as_read - lumen).cwiseAbs();
+    const double noise = median({off.begin(), off.end()}) / std::abs(contrast);
+    const double reach = kSmoothing * std::clamp(noise / kQuiet, 1.0, kMostOfSmoothing);
     weight.setOnes();
-    average(neighbours, passes_for(kSmoothing * unit, edge), outside, weight);
+    average(neighbours, passes_for(reach * unit, edge), outside, weight);
     if (statistics) {
       statistics->lumen_value = usual_lumen;
       statistics->outside_value = usual_outside;
@@ -222,7 +229,7 @@ Surface fit_to_image(const Surface& surface, const Image& image, FitStatistics* 
     }
 
     // Against noise and gaps: the average of the neighbourhood.
-    average(neighbours, passes_for(kSmoothing * unit, edge), shift, certainty);
+    average(neighbours, passes_for(reach * unit, edge), shift, certainty);
     for (Eigen::Index v = 0; v < n; ++v) {
       if (fixed[v] != 0) continue;
       const double most = kReach * unit;
