@@ -373,9 +373,7 @@ void spread_signs(SampleGrid& grid) {
 
 // ---------------------------------------------------------------- openings
 
-constexpr double kFreeLength = 8.0;  // how far the lumen goes on beyond a cap               [mm]
-
-/// The free space before an opening: a disc's worth round the cap's axis, to kFreeLength.
+/// The free space before an opening: a disc's worth round the cap's axis, to Lumen::kFreeLength.
 struct Mouth {
   const Opening* opening;
   double rim_radius;    // of the farthest vertex of the cap                            [mm]
@@ -406,7 +404,7 @@ Mouth describe_mouth(const Surface& surface, const Opening& opening, double limi
     mouth.flange_width = std::min(mouth.flange_width, room);
   }
   const double reach = mouth.rim_radius + 2.0 * limit;
-  const Vec3 end = opening.center + kFreeLength * opening.normal;
+  const Vec3 end = opening.center + Lumen::kFreeLength * opening.normal;
   mouth.low = opening.center.cwiseMin(end).array() - reach;
   mouth.high = opening.center.cwiseMax(end).array() + reach;
   return mouth;
@@ -479,7 +477,7 @@ void open_caps(SampleGrid& grid, const Surface& surface, const std::vector<Mouth
     const Mouth& mouth = mouths[k];
     for_each_node(grid, boxes[k], [&](double& value, const Vec3& p) {
       const double depth = mouth.depth(p);
-      if (!std::isfinite(value) && depth > 0.0 && depth < kFreeLength &&
+      if (!std::isfinite(value) && depth > 0.0 && depth < Lumen::kFreeLength &&
           mouth.lateral(p) < mouth.rim_radius + mouth.flange_width) {
         value = grid.limit;
       }
@@ -740,13 +738,13 @@ WallSample Lumen::sample(const Vec3& point) const {
   return result;
 }
 
-std::optional<int> Lumen::passed_opening(const Vec3& tip) const {
+std::optional<int> Lumen::passed_opening(const Vec3& tip, double reach) const {
   constexpr double kPassed = 1.0;  // beyond the cap's plane                               [mm]
   for (std::size_t k = 0; k < openings_.size(); ++k) {
     const Opening& opening = openings_[k];
     const Vec3 offset = tip - opening.center;
     const double depth = opening.normal.dot(offset);
-    if (depth < kPassed || depth > kFreeLength) continue;
+    if (depth < kPassed || depth > reach) continue;
     const double lateral = (offset - depth * opening.normal).norm();
     if (lateral < 1.5 * opening.radius + depth) return static_cast<int>(k);
   }

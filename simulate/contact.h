@@ -37,6 +37,8 @@ struct WallSample {
 /// distance is that to the rim, or round it to the cap's plane, as if the vessel ended in a flange.
 class Lumen {
  public:
+  static constexpr double kFreeLength = 8.0;  // how far the lumen goes on beyond a cap      [mm]
+
   /// Expects a closed surface with outward triangles.
   explicit Lumen(const Surface& surface, const LumenOptions& options = {});
 
@@ -44,9 +46,10 @@ class Lumen {
   WallSample sample(const Vec3& point) const;
 
   const std::vector<Opening>& openings() const { return openings_; }
-  /// The opening that a wire with its tip here has left through: the tip is 1 to 8 mm beyond the
-  /// cap's plane, within a cone of 45 degrees from 1.5 radii at the cap, which covers oval ones.
-  std::optional<int> passed_opening(const Vec3& tip) const;
+  /// The opening that a wire with its tip here has left through: the tip is 1 mm to `reach` beyond
+  /// the cap's plane, within a cone of 45 degrees from 1.5 radii at the cap, which covers oval
+  /// ones.
+  std::optional<int> passed_opening(const Vec3& tip, double reach = kFreeLength) const;
 
   double grid_spacing() const { return spacing_; }
   double band() const { return band_; }

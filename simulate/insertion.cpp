@@ -34,6 +34,8 @@ constexpr double kSmallestPart = 0.05;  // of a node's share of wire that bends 
 constexpr double kLongestPart = 2.0;  // of a push: friction turns with the path               [mm]
 constexpr double kLongestTurn = 15.0 * kRadPerDeg;  // of the hub in one go
 constexpr double kSmallestCut = 1.0 / 16.0;         // of a push, when one does not converge
+constexpr double kSlippedOut =
+    3.0 * Lumen::kFreeLength;  // a tip beyond an opening, without balance
 
 /// Edges of the part of the wire that goes in, proximal to distal, and two more, so that the
 /// innermost free node bends against a straight introducer.
@@ -112,6 +114,7 @@ Insertion::Insertion(const Wire& wire, const Introducer& introducer, const Vesse
 template <class Part>
 std::optional<Push> Insertion::move(double amount, double longest_part, const Part& part) {
   Push record;
+  slipped_out_.reset();
   double done = 0.0, cut = std::min(std::abs(amount), longest_part);
   while (std::abs(amount - done) > 1e-9) {
     save(before_cut_);
@@ -125,6 +128,7 @@ std::optional<Push> Insertion::move(double amount, double longest_part, const Pa
       done += now;
       continue;
     }
+    if (!slipped_out_) slipped_out_ = vessel_.lumen.passed_opening(tip(), kSlippedOut);
     restore(before_cut_);
     cut *= 0.5;
     if (cut < kSmallestCut * std::abs(amount)) return std::nullopt;

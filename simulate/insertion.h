@@ -98,6 +98,10 @@ class Insertion {
   /// way. A straight round wire does not feel it.
   std::optional<Push> turn(double angle);
 
+  /// The opening that the tip was beyond when a part of the last move found no equilibrium: it
+  /// springs out further than the free space before an opening goes.
+  std::optional<int> slipped_out() const { return slipped_out_; }
+
   double longest() const { return longest_; }      // that can be brought into the body      [mm]
   double depth() const { return depth_; }          // wire in the body                       [mm]
   double hub_angle() const { return hub_angle_; }  // since the start               [rad]
@@ -163,9 +167,10 @@ class Insertion {
   double depth_ = 0.0, longest_ = 0.0;
   double hub_angle_ = 0.0;      // since the start                                           [rad]
   double last_distance_ = 0.0;  // of the last push; negative: pulled                         [mm]
-  Push totals_;                 // forces of the hand, works and energy so far
-  Eigen::Matrix3Xd path_;       // where the wire ahead of each node was before the last push   [mm]
-  Eigen::Matrix3Xd drift_;      // off that path, per length of push
+  std::optional<int> slipped_out_;
+  Push totals_;             // forces of the hand, works and energy so far
+  Eigen::Matrix3Xd path_;   // where the wire ahead of each node was before the last push   [mm]
+  Eigen::Matrix3Xd drift_;  // off that path, per length of push
   Eigen::Matrix3Xd forces_, guess_ahead_;
   std::vector<Touch> touches_;
   std::vector<std::pair<int, double>> triangle_forces_;  // of this push

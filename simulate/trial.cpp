@@ -90,6 +90,12 @@ bool Trial::step(const Move& move) {
       move.turn == 0.0 ? insertion_.push(distance) : insertion_.turn(move.turn);
   if (!push) {
     insertion_.restore(before_);
+    if (const std::optional<int> opening = insertion_.slipped_out()) {
+      return end(Outcome::kLeftOpening,
+                 "the wire springs out of the vessel through the opening at " + place_of(*opening) +
+                     " after " + millimetres(depth) + " of insertion, from " +
+                     place(insertion_.tip()));
+    }
     return end(Outcome::kNotConverged, "no equilibrium after " + millimetres(depth) +
                                            " of insertion, tip at " + place(insertion_.tip()));
   }
@@ -108,14 +114,17 @@ bool Trial::step(const Move& move) {
   return true;
 }
 
+std::string Trial::place_of(int opening) const {
+  return place(vessel_.lumen.openings()[static_cast<std::size_t>(opening)].center);
+}
+
 /// False where the last step ended the trial.
 bool Trial::check_progress() {
   const Push& push = result_.pushes.back();
   if (const std::optional<int> opening = vessel_.lumen.passed_opening(push.tip)) {
-    return end(Outcome::kLeftOpening,
-               "the tip left the vessel through the opening at " +
-                   place(vessel_.lumen.openings()[static_cast<std::size_t>(*opening)].center) +
-                   " after " + millimetres(push.insertion) + " of insertion");
+    return end(Outcome::kLeftOpening, "the tip left the vessel through the opening at " +
+                                          place_of(*opening) + " after " +
+                                          millimetres(push.insertion) + " of insertion");
   }
   if (push.max_penetration > kOutside) {
     return end(Outcome::kLeftLumen, millimetres(push.max_penetration) + " through the wall after " +

@@ -84,6 +84,7 @@ class Trial {
   bool end(Outcome outcome, const std::string& reason);
   bool check_progress();
   std::string reached_reason() const;
+  std::string place_of(int opening) const;
   void record_shape();
 
   Goal goal_;

@@ -264,6 +264,7 @@ TEST(OpenLumen, NamesTheOpeningThatATipHasPassed) {
   EXPECT_EQ(open.passed_opening(Vec3(0.0, 0.0, 15.0)), std::nullopt);  // inside
   EXPECT_EQ(open.passed_opening(Vec3(9.0, 0.0, 21.5)), std::nullopt);  // beside
   EXPECT_EQ(open.passed_opening(Vec3(0.0, 0.0, 40.0)), std::nullopt);  // elsewhere
+  EXPECT_EQ(open.passed_opening(Vec3(0.0, 0.0, 40.0), 24.0), 1);
   const Lumen closed(shapes::straight_tube(2.0, 20.0, 0.5));
   EXPECT_EQ(closed.passed_opening(Vec3(0.0, 0.0, 21.5)), std::nullopt);
 }
