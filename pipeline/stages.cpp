@@ -126,7 +126,7 @@ std::vector<Stage> stages_of(const Case& given) {
                       .parameters = {"/segmentation", "/access/point_mm", "/target/point_mm"},
                       .make = make_segment});
     stages.push_back({.name = "surface",
-                      .version = 4,
+                      .version = 5,
                       .reads_input = true,
                       .after = {"segment"},
                       .parameters = {"/surface/edge_length_mm"},
@@ -150,7 +150,7 @@ std::vector<Stage> stages_of(const Case& given) {
        .parameters = {"/wall/thickness_mm", "/wall/young_modulus_kpa", "/wall/poisson_ratio"},
        .make = make_wall});
   Stage trials{.name = "trials",
-               .version = 6,
+               .version = 7,
                .after = {"surface", "centerline"},
                .parameters = {"/access", "/target", "/wires", "/tip_roll_deg", "/friction",
                               "/wall/model", "/insertion"},
@@ -162,7 +162,7 @@ std::vector<Stage> stages_of(const Case& given) {
   stages.push_back(trials);
   Stage manoeuvres = trials;
   manoeuvres.name = "manoeuvres";
-  manoeuvres.version = 1;
+  manoeuvres.version = 2;
   manoeuvres.after.push_back("trials");
   manoeuvres.parameters.push_back("/manoeuvres");
   manoeuvres.make = make_manoeuvres;

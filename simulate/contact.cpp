@@ -1,7 +1,5 @@
 #include "simulate/contact.h"
 
-#include <tbb/parallel_for.h>
-
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <array>
@@ -11,6 +9,7 @@
 #include <set>
 
 #include "preprocess/triangle.h"
+#include "simulate/parallel.h"
 
 namespace wireplan::simulate {
 
@@ -129,13 +128,6 @@ bool overlap(const NodeBox& a, const NodeBox& b) {
     if (a.low[d] > b.high[d] || b.low[d] > a.high[d]) return false;
   }
   return true;
-}
-
-/// Calls work(slot) for every brick that has samples, on all cores. It may write to its own slot
-/// alone.
-template <class Work>
-void for_each_slot(const SampleGrid& grid, const Work& work) {
-  tbb::parallel_for(std::size_t{0}, grid.sampled.size(), work);
 }
 
 /// Calls visit(slot, i, j, k) for every brick of the box.
@@ -282,7 +274,7 @@ void scatter_distances(SampleGrid& grid, const Surface& surface,
     });
   }
   const BlockDistances distances(grid, surface);
-  for_each_slot(grid, [&](std::size_t s) {
+  for_each_index(grid.sampled.size(), [&](std::size_t s) {
     if (!near[s].empty()) distances.take(s, near[s]);
   });
 }
@@ -535,7 +527,7 @@ std::vector<double> spline_coefficients(const SampleGrid& grid) {
     }
   };
   for (int round = 0; round < kRounds; ++round) {
-    for_each_slot(grid, update);
+    for_each_index(grid.sampled.size(), update);
     std::swap(coefficients, updated);
   }
   return coefficients;
@@ -600,7 +592,7 @@ Lumen::Lumen(const Surface& surface, const LumenOptions& options)
   brick_ = grid.slot;
   constexpr std::size_t kPerBrick = static_cast<std::size_t>(kNodes) * kNodes * kNodes;
   coefficients_.resize(grid.sampled.size() * kPerBrick);
-  for_each_slot(grid, [&](std::size_t slot) {
+  for_each_index(grid.sampled.size(), [&](std::size_t slot) {
     const auto& [bi, bj, bk] = grid.sampled[slot];
     float* target = coefficients_.data() + slot * kPerBrick;
     for (int k = 0; k < kNodes; ++k) {

@@ -1,9 +1,7 @@
 #include "simulate/vessel_model.h"
 
-#include <tbb/parallel_invoke.h>
-
 #include <algorithm>
-#include <optional>
+#include <future>
 
 namespace wireplan::simulate {
 
@@ -11,12 +9,10 @@ namespace {
 
 VesselModel make_yielding(const Surface& surface, const Wall& wall, LumenOptions options) {
   options.band = std::max(options.band, VesselModel::kYieldingBand);
-  std::optional<Lumen> field;
-  std::unique_ptr<const WallCompliance> compliance;
-  tbb::parallel_invoke([&] { field.emplace(surface, options); },
-                       [&] { compliance = std::make_unique<WallCompliance>(surface, wall); });
-  VesselModel model(surface, std::move(*field));
-  model.compliance = std::move(compliance);
+  std::future<std::unique_ptr<WallCompliance>> compliance = std::async(
+      std::launch::async, [&] { return std::make_unique<WallCompliance>(surface, wall); });
+  VesselModel model(surface, options);
+  model.compliance = compliance.get();
   return model;
 }
 
