@@ -28,8 +28,8 @@ constexpr double kLevelSmoothing = 2.5;  // and the lumen's value over this
 // Over more of it in a noisy image: where the lumen's values stray from their average by more than
 // this part of the contrast (median), in proportion.
 constexpr double kQuiet = 0.03, kMostOfSmoothing = 1.5;
-constexpr double kUnitPerSigma = 1.7,
-                 kMostUnit = 2.0;  // the unit, per sigma of the blur; in voxels
+constexpr double kUnitPerSigma = 1.7;  // of the blur ...
+constexpr double kMostUnit = 2.0;      // ... but at most so many voxels
 // A step less than this part of the usual one is no edge that a level could be put on.
 constexpr double kLeastContrast = 0.35;
 // How strongly a vertex without an edge is held where the mask has it, against one with an edge.
@@ -173,7 +173,8 @@ Surface fit_to_image(const Surface& surface, const Image& image, FitStatistics* 
     const Eigen::VectorXd as_read = lumen;
     average(neighbours, passes_for(kLevelSmoothing * unit, edge), lumen, weight);
     const Eigen::VectorXd off = (as_read - lumen).cwiseAbs();
-    const double noise = median({off.begin(), off.end()}) / std::abs(contrast);
+    const double noise = median({off.begin(), off.end()}) /
+                         std::max(std::abs(contrast), std::numeric_limits<double>::min());
     const double reach = kSmoothing * std::clamp(noise / kQuiet, 1.0, kMostOfSmoothing);
     weight.setOnes();
     average(neighbours, passes_for(reach * unit, edge), outside, weight);

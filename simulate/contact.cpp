@@ -186,8 +186,8 @@ class BlockDistances {
     }
   }
 
-  /// Takes over what is shorter than what a node has, and than the grid's limit. Expects triangles
-  /// near.
+  /// Takes over what is shorter than what a node has, and than the grid's limit. Expects a
+  /// triangle near.
   void take(std::size_t slot, const std::vector<int>& near) const {
     take(slot, {0, 0, 0}, SampleGrid::kSide, near);
   }
