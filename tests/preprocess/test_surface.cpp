@@ -671,13 +671,16 @@ TEST(SurfaceFromImage, MovesAndMirrorsWithItsGrid) {
   const Vec3 axis = grid.lps_from_ijk({11.3, 11.6, 0.0});
   Image image = grey_tube(grid, axis, 3.0);
   Mask mask = tube_mask(grid, axis - 10.0 * Vec3::UnitZ(), axis + 50.0 * Vec3::UnitZ(), 3.0);
-  const Surface here = surface_from_image(image, mask, {.edge_length_mm = 1.0});
+  // Fine: how the remesh cuts corners depends on the order of their triangles, which a mirror
+  // turns.
+  const SurfaceOptions options{.edge_length_mm = 0.5};
+  const Surface here = surface_from_image(image, mask, options);
   const Grid turned = oblique_grid();
   image.grid.origin = mask.grid.origin = turned.origin;
   image.grid.direction = mask.grid.direction = turned.direction;
-  const Surface there = surface_from_image(image, mask, {.edge_length_mm = 1.0});
+  const Surface there = surface_from_image(image, mask, options);
   EXPECT_TRUE(is_sound(check_surface(there)));
-  EXPECT_NEAR(signed_volume(there), signed_volume(here), 2e-3 * signed_volume(here));
+  EXPECT_NEAR(signed_volume(there), signed_volume(here), 1e-3 * signed_volume(here));
 }
 
 TEST(SurfaceFromImage, HoldsATubesRadiusAtVoxelsFinerThanTheBlur) {
