@@ -23,13 +23,12 @@ namespace {
 
 constexpr double kTipRegion = 2.0;  // wire that counts as tip for its force            [mm]
 constexpr double kFoldTurn = 150.0 * kRadPerDeg;  // turning beyond the rest shape's that is one
-constexpr double kFoldLead = 10.0;    // ... with the bow so far ahead of the tip            [mm]
-constexpr double kFoldLength = 60.0;  // ... within so much wire                [mm]
-constexpr double kGuessInto = 0.5;    // a guess may lie this much deeper in the wall than the wire
-                                      // did: contact bends it back more smoothly than a guess
-                                      // could [mm]
-constexpr double kSnap = 2.0;         // way off the path per push that is a jump, not to go on
-constexpr double kKeptDrift = 0.8;    // of the last push's way off the path, in the next
+constexpr double kFoldLead = 10.0;      // ... with the bow so far ahead of the tip            [mm]
+constexpr double kFoldLength = 60.0;    // ... within so much wire                [mm]
+constexpr double kDriftInto = 0.5;      // a wire's drift may lead this much deeper into the wall
+                                        // than the wire did [mm]
+constexpr double kSnap = 2.0;           // way off the path per push that is a jump, not to go on
+constexpr double kKeptDrift = 0.8;      // of the last push's way off the path, in the next
 constexpr double kSmallestPart = 0.05;  // of a node's share of wire that bends at the exit
 constexpr double kLongestPart = 2.0;  // of a push: friction turns with the path               [mm]
 constexpr double kLongestTurn = 15.0 * kRadPerDeg;  // of the hub in one go
@@ -108,7 +107,7 @@ Insertion::Insertion(const Wire& wire, const Introducer& introducer, const Vesse
   forces_ = Eigen::Matrix3Xd::Zero(3, n);
   guess_ahead_.resize(3, n);
   path_.resize(3, n);
-  drift_ = Eigen::Matrix3Xd::Zero(3, n);
+  drift_ = moved_ = Eigen::Matrix3Xd::Zero(3, n);
 }
 
 template <class Part>
@@ -166,7 +165,7 @@ void Insertion::restore(const Snapshot& snapshot) {
   contact_.restore(snapshot.memory);
   contact_.free_from(depth_);
   totals_ = snapshot.totals;
-  drift_.setZero();
+  forget_drift();
   bend_at_the_exit();
 }
 
@@ -174,7 +173,7 @@ void Insertion::restore(const Snapshot& snapshot) {
 NewtonResult Insertion::advance(double distance) {
   guess_ = state_;
   depth_ += distance;
-  if (distance * last_distance_ < 0.0) drift_.setZero();
+  if (distance * last_distance_ < 0.0) forget_drift();
   last_distance_ = distance;
   // Nodes in the introducer lie on its axis; the others go where the wire ahead of them was, and
   // most of what they came off that path in the last push, per length of it, unless that leads
@@ -193,26 +192,28 @@ NewtonResult Insertion::advance(double distance) {
       path_.col(i) = ahead_of(i, distance);
       const Vec3 way = (kKeptDrift * distance) * drift_.col(i);
       guess_ahead_.col(i) = path_.col(i) + way;
-      through = through || (way.norm() > kGuessInto &&
-                            vessel_.lumen.distance(guess_ahead_.col(i)) < -kGuessInto - deepest_);
+      through = through || (way.norm() > kDriftInto &&
+                            vessel_.lumen.distance(guess_ahead_.col(i)) < -kDriftInto - deepest_);
     }
   }
   if (through) guess_ahead_ = path_;
-  // Keep the edges' lengths of before, and a curved tip's shape, which turns with the edge that
-  // carries it: a guess that strains or unbends a stiff wire costs more than one that lies a
-  // little in the wall.
-  Eigen::Quaterniond turn = Eigen::Quaterniond::Identity();
+  // Keep the edges' lengths of before: a guess that strains a stiff wire costs more than one that
+  // lies a little in the wall. A curved tip keeps its shape, and most of how it turned and changed
+  // in the last push.
   for (int i = problem_.first; i < n; ++i) {
     const Vec3 before = state_.x.col(i) - state_.x.col(i - 1);
     Vec3 edge = guess_ahead_.col(i) - guess_ahead_.col(i - 1);
-    if (i > first_curved_) edge = turn * before;
-    if (i == first_curved_) turn.setFromTwoVectors(before, edge);
+    if (i > first_curved_) {
+      edge = before + (kKeptDrift * distance) * (moved_.col(i) - moved_.col(i - 1));
+      edge = out_of_wall(guess_.x.col(i - 1) + edge) - guess_.x.col(i - 1);
+    }
     guess_.x.col(i) = guess_.x.col(i - 1) + (before.norm() / edge.norm()) * edge;
   }
-  const NewtonResult result = settle_guess(distance);
+  const NewtonResult result = settle_guess(distance);  // swaps the state of before into guess_
   if (result.converged) {
     drift_ = (state_.x - path_) / distance;
-    if (drift_.colwise().norm().maxCoeff() > kSnap) drift_.setZero();
+    moved_ = (state_.x - guess_.x) / distance;
+    if (drift_.colwise().norm().maxCoeff() > kSnap) forget_drift();
   }
   return result;
 }
@@ -230,7 +231,7 @@ NewtonResult Insertion::spin(double angle) {
       guess_.x.col(i) = state_.x.col(root) + turn * (state_.x.col(i) - state_.x.col(root));
     }
   }
-  drift_.setZero();
+  forget_drift();
   return settle_guess(0.0);
 }
 
@@ -289,10 +290,15 @@ Vec3 Insertion::ahead_of(int i, double distance) {
   }
   const Vec3 end = state_.x.col(n - 1);
   const Vec3 tangent = (end - state_.x.col(n - 2)).normalized();
-  Vec3 p = end - wanted * tangent;
+  return out_of_wall(end - wanted * tangent);
+}
+
+/// The point, or if a wire there would lie deeper in the wall than the wire did, the nearest one
+/// where it does not.
+Vec3 Insertion::out_of_wall(Vec3 p) const {
   for (int round = 0; round < 2; ++round) {
     const WallSample wall = vessel_.lumen.sample(p);
-    const double deep = rod_.radius - wall.distance - kGuessInto - deepest_;
+    const double deep = rod_.radius - wall.distance - deepest_;
     if (deep > 0.0) p += deep * wall.gradient;
   }
   return p;

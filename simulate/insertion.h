@@ -142,6 +142,11 @@ class Insertion {
   void bend_at_the_exit();
   double part_outside(int i) const;
   Vec3 ahead_of(int i, double distance);
+  Vec3 out_of_wall(Vec3 p) const;
+  void forget_drift() {
+    drift_.setZero();
+    moved_.setZero();
+  }
   double push_force(const HeldEnd& held) const;
   Vec3 edge(int i) const { return state_.x.col(i + 1) - state_.x.col(i); }
   Vec3 turn_at(int i) const;
@@ -171,6 +176,7 @@ class Insertion {
   Push totals_;             // forces of the hand, works and energy so far
   Eigen::Matrix3Xd path_;   // where the wire ahead of each node was before the last push   [mm]
   Eigen::Matrix3Xd drift_;  // off that path, per length of push
+  Eigen::Matrix3Xd moved_;  // each node in the last push, per length of it
   Eigen::Matrix3Xd forces_, guess_ahead_;
   std::vector<Touch> touches_;
   std::vector<std::pair<int, double>> triangle_forces_;  // of this push
