@@ -49,19 +49,26 @@ class BlockBand {
   }
 
   /// Solves A x = b after factor(); b, of size() * D values, becomes x.
-  void solve(Eigen::Ref<Eigen::VectorXd> b) const { solve<1>({b.data()}); }
-  /// The same of K at once, in less time than one after the other: a solve waits for itself.
+  void solve(Eigen::Ref<Eigen::VectorXd> b) const {
+    solve_lower<1>({b.data()});
+    solve_upper(b);
+  }
+  /// The first half of that, b <- L^-1 b, of K at once, in less time than one after the other: a
+  /// solve waits for itself. From block row `first` on; b is 0 before.
   template <int K>
-  void solve(std::array<double*, K> b) const {
+  void solve_lower(std::array<double*, K> b, int first = 0) const {
     // The two unknowns before (or after) the one at hand stay in registers.
     Pair<K> known;
-    for (int i = 0; i < narrow_; ++i) solve_forward<D - 1, K>(i, b, known);
-    for (int i = narrow_; i < size_; ++i) solve_forward<D, K>(i, b, known);
-    known = {};
+    for (int i = first; i < narrow_; ++i) solve_forward<D - 1, K>(i, b, known);
+    for (int i = std::max(first, narrow_); i < size_; ++i) solve_forward<D, K>(i, b, known);
+  }
+  /// The second half, b <- L^-T b.
+  void solve_upper(Eigen::Ref<Eigen::VectorXd> b) const {
+    Pair<1> known;
     // The last two narrow rows couple with all unknowns of those after them.
     const int narrow = std::max(0, narrow_ - 2);
-    for (int i = size_ - 1; i >= narrow; --i) solve_back<D, K>(i, b, known);
-    for (int i = narrow - 1; i >= 0; --i) solve_back<D - 1, K>(i, b, known);
+    for (int i = size_ - 1; i >= narrow; --i) solve_back<D, 1>(i, {b.data()}, known);
+    for (int i = narrow - 1; i >= 0; --i) solve_back<D - 1, 1>(i, {b.data()}, known);
   }
 
  private:

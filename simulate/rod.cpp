@@ -136,11 +136,6 @@ Vec3 reference_normal(const Vec3& axis) {
   return (toward - toward.dot(t) * t).normalized();
 }
 
-Vec3 parallel_transport(const Vec3& vector, const Vec3& from, const Vec3& to) {
-  const double chi = 1.0 + from.dot(to);
-  return vector - (vector.dot(to) / chi) * (from + to);  // vector is normal to `from`
-}
-
 RodState straight_state(const Rod& rod, const Vec3& point, const Vec3& direction, double roll) {
   const int n = rod.nodes();
   RodState state;
@@ -176,7 +171,8 @@ void transport_frames(const RodState& base, RodState& moved, int first_edge, int
                       int first_plain, int plain_edges) {
   const int edges = static_cast<int>(base.theta.size());
   const auto tangent = [](const RodState& state, int i) -> Vec3 {
-    return (state.x.col(i + 1) - state.x.col(i)).normalized();
+    const Vec3 e = state.x.col(i + 1) - state.x.col(i);
+    return (1.0 / e.norm()) * e;
   };
   Vec3 t_a = Vec3::Zero(), behind = Vec3::Zero();  // tangent and director of the edge behind
   if (first_edge > 0) {

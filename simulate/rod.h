@@ -95,7 +95,10 @@ RodState rest_state(const Rod& rod, const Vec3& point, const Vec3& direction, do
 Vec3 reference_normal(const Vec3& axis);
 
 /// Turns a vector normal to unit `from` into one normal to unit `to`, without twist about it.
-Vec3 parallel_transport(const Vec3& vector, const Vec3& from, const Vec3& to);
+inline Vec3 parallel_transport(const Vec3& vector, const Vec3& from, const Vec3& to) {
+  const double chi = 1.0 + from.dot(to);
+  return vector - (vector.dot(to) / chi) * (from + to);  // vector is normal to `from`
+}
 
 /// Moves directors and reference twist along with nodes that moved from those of `base`; copies
 /// theta. Called only for twisted rods. `first` and `last` bound the edges that moved. Of

@@ -122,6 +122,11 @@ struct DenseSink {
     H.block<3, 3>(3 * i, 3 * j) += block;
     if (i != j) H.block<3, 3>(3 * j, 3 * i) += block.transpose();
   }
+  void hessian_of_edge(int i, const Mat3& block) {
+    hessian(i, i, block);
+    hessian(i + 1, i + 1, block);
+    hessian(i + 1, i, -block);
+  }
   void hessian_scaled_identity(int i, int j, double v) { hessian(i, j, v * Mat3::Identity()); }
   void hessian_theta(int e, int i, const Vec3& v) {
     H.block<3, 1>(3 * i, 3 * n + e) += v;
@@ -155,6 +160,23 @@ struct BandSink {
   }
   void hessian(int i, int j, const Mat3& v) {
     if (is_free(i) && is_free(j)) block(i, j).template topLeftCorner<3, 3>() += v;
+  }
+  void hessian_of_edge(int i, const Mat3& v) {
+    if (!is_free(i) || !is_free(i + 1)) {
+      hessian(i, i, v);
+      hessian(i + 1, i + 1, v);
+      return;
+    }
+    auto& own = H.own(i - first);
+    auto& next = H.own(i + 1 - first);
+    auto& one = H.one(i + 1 - first);
+    for (int c = 0; c < 3; ++c) {
+      for (int r = 0; r < 3; ++r) {
+        own(r, c) += v(r, c);
+        next(r, c) += v(r, c);
+        one(r, c) -= v(r, c);
+      }
+    }
   }
   void hessian_scaled_identity(int i, int j, double v) {
     if (is_free(i) && is_free(j))
@@ -359,7 +381,7 @@ NewtonResult Statics::solve_with(BlockBand<D>& hessian, BlockBand<D>& untouched,
     double sum = assemble(problem, where, sink, chain).total();
     if (chain.exists()) {
       coupled_.psi.setZero(D * count);
-      sum += add_chain(chain, where, sink, coupled_.psi);
+      sum += add_chain(chain, *problem.rod, where, sink, coupled_.psi, gradient_);
     }
     if (contact != nullptr) contact->add(sink);
     apply_supports<D>(problem, gradient_, hessian);
@@ -426,10 +448,10 @@ NewtonResult Statics::solve_with(BlockBand<D>& hessian, BlockBand<D>& untouched,
     double slope, cap;  // of the energy along the step; largest part of the step that is safe
     shift = 0.0;
     for (int shifts = 0;; ++shifts) {
-      const Eigen::Index theta = D * (chain.last - problem.first) + 3;
       const auto solve = [&] {
         step_ = -gradient_;
-        return hessian.factor() && coupled_.solve(chain, hessian, theta, step_);
+        return hessian.factor() &&
+               coupled_.solve_first(chain, hessian, chain.last - problem.first, step_);
       };
       while (!solve()) {
         shift = shift == 0.0 ? std::max(kSmallestShift, 0.1 * last_shift) : 8.0 * shift;
@@ -552,8 +574,7 @@ double Statics::refine_step(const Problem& problem, const BlockBand<D>& factored
   first_step_ = step_;
   find_rest(step_);
   if (refined_.norm() <= kSmall * gradient_.norm()) return slope;
-  factored.solve(refined_);
-  coupled_.correct(refined_);
+  coupled_.solve(factored, refined_);
   const double start = refined_.norm();
   if (start <= kEnough * step_.norm()) {
     step_ -= refined_;
@@ -570,8 +591,7 @@ double Statics::refine_step(const Problem& problem, const BlockBand<D>& factored
       const int k = count++;
       direction_ = krylov_.col(k);
       find_rest(direction_);
-      factored.solve(refined_);
-      coupled_.correct(refined_);
+      coupled_.solve(factored, refined_);
       refined_ += direction_;
       for (int i = 0; i <= k; ++i) {
         upper(i, k) = krylov_.col(i).dot(refined_);

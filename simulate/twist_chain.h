@@ -5,6 +5,7 @@
 #include <Eigen/Core>
 #include <Eigen/LU>
 
+#include "simulate/block_band.h"
 #include "simulate/rod.h"
 
 namespace wireplan::simulate {
@@ -71,50 +72,58 @@ inline void spread_chain(const TwistChain& chain, const Rod& rod, RodState& stat
   }
 }
 
-/// Solves with a banded matrix A that has been factored and what add_chain() left out of it:
+/// Solves with a banded matrix A = L L' that has been factored and what add_chain() left out of it:
 /// H = A + k ((p + e)(p + e)' - e e'), e the last theta's unit vector, p psi's derivatives with the
-/// nodes (Sherman, Morrison and Woodbury).
+/// nodes (Sherman, Morrison and Woodbury). Between the halves of a solve with A, so that p + e and
+/// e need the first half alone.
 class CoupledChain {
  public:
   Eigen::VectorXd psi;  // p
 
-  /// v <- H^-1 v, A having been factored anew. `theta`: place of the last theta. Returns false
+  /// v <- H^-1 v, A having been factored anew. `theta`: block row of the last theta. Returns false
   /// where H is not positive definite.
-  template <class Band>
-  bool solve(const TwistChain& chain, const Band& factored, Eigen::Index theta,
-             Eigen::VectorXd& v) {
+  template <int D>
+  bool solve_first(const TwistChain& chain, const BlockBand<D>& factored, int theta,
+                   Eigen::VectorXd& v) {
     exists_ = chain.exists();
     if (!exists_) {
       factored.solve(v);
       return true;
     }
-    theta_ = theta;
+    const Eigen::Index place = D * theta + D - 1;
     together_ = psi;
-    together_[theta] += 1.0;
-    by_together_ = together_;
-    by_theta_.setZero(psi.size());
-    by_theta_[theta] = 1.0;
-    factored.template solve<3>({v.data(), by_together_.data(), by_theta_.data()});
+    together_[place] += 1.0;
+    theta_.setZero(psi.size());
+    theta_[place] = 1.0;
+    factored.template solve_lower<2>({v.data(), together_.data()});
+    factored.template solve_lower<1>({theta_.data()}, theta);
+    const double mixed = together_.dot(theta_);
     Eigen::Matrix2d inner;
-    inner << 1.0 / chain.stiffness + together_.dot(by_together_), together_.dot(by_theta_),
-        by_together_[theta], by_theta_[theta] - 1.0 / chain.stiffness;
+    inner << 1.0 / chain.stiffness + together_.squaredNorm(), mixed, mixed,
+        theta_.squaredNorm() - 1.0 / chain.stiffness;
     inverse_ = inner.inverse();
     correct(v);
+    factored.solve_upper(v);
     // A is positive definite; H is if the inner matrix has an eigenvalue of either sign
     // (Haynsworth).
     return inner.determinant() < 0.0;
   }
-  /// v <- H^-1 A v.
-  void correct(Eigen::VectorXd& v) const {
-    if (!exists_) return;
-    const Eigen::Vector2d share = inverse_ * Eigen::Vector2d(together_.dot(v), v[theta_]);
-    v -= share[0] * by_together_ + share[1] * by_theta_;
+  /// v <- H^-1 v with the same matrix again.
+  template <int D>
+  void solve(const BlockBand<D>& factored, Eigen::VectorXd& v) const {
+    factored.template solve_lower<1>({v.data()});
+    if (exists_) correct(v);
+    factored.solve_upper(v);
   }
 
  private:
+  void correct(Eigen::VectorXd& v) const {
+    const Eigen::Vector2d share = inverse_ * Eigen::Vector2d(together_.dot(v), theta_.dot(v));
+    v -= share[0] * together_ + share[1] * theta_;
+  }
+
   bool exists_ = false;
-  Eigen::Index theta_ = 0;
-  Eigen::VectorXd together_, by_together_, by_theta_;
+  Eigen::VectorXd together_, theta_;  // L^-1 (p + e), L^-1 e
   Eigen::Matrix2d inverse_;
 };
 
