@@ -455,7 +455,9 @@ int run_command(int argc, const char* const* argv) {
   CLI::App* trials = app.add_subcommand("trials", "One part of a case's trials, for a cluster");
   add_case_options(*trials, shard_arguments);
   trials->add_option("--shard", shard, "K/N: part K of N, from 1")->required();
-  trials->add_option("--round", round, "1: scouts, or all in full; 2 on: those in full that follow")
+  trials
+      ->add_option("--round", round,
+                   "1: scouts, or all in full; 2 on: the probes and full runs that follow")
       ->check(CLI::Range(1, 1000));
   add_trial_options(*trials, shard_arguments);
   trials->footer(

@@ -15,11 +15,19 @@ namespace fs = std::filesystem;
 // Straight pushes of each wire that a search goes on from.
 constexpr int kStartsPerWire = 2;
 
-// Of a straight push: in full, or else the scout's.
-fs::path straight_file(const Workspace& work, int id) {
+// Of a straight push: that of the highest level that ran it.
+struct StraightFile {
+  std::string level;
+  fs::path path;
+};
+
+StraightFile straight_file(const Workspace& work, int id) {
   const fs::path& folder = work.artifact("trials").folder;
-  const fs::path full = folder / trial_file_name(id);
-  return fs::exists(full) ? full : folder / kScoutFolder / trial_file_name(id);
+  for (const char* level : {kProbeLevel, kScoutLevel}) {
+    const fs::path coarse = folder / level / trial_file_name(id);
+    if (!fs::exists(folder / trial_file_name(id)) && fs::exists(coarse)) return {level, coarse};
+  }
+  return {kFullLevel, folder / trial_file_name(id)};
 }
 
 // The straight pushes that a search goes on from; none where the case wants no search.
@@ -30,7 +38,7 @@ std::vector<plan::Candidate> find_starts(Workspace& work,
   std::vector<double> progress;
   std::vector<simulate::Outcome> outcomes;
   for (int id = 0; id < std::ssize(straight); ++id) {
-    const simulate::TrialResult trial = read_trial_file(straight_file(work, id));
+    const simulate::TrialResult trial = read_trial_file(straight_file(work, id).path);
     progress.push_back(plan::find_progress(trial, work.path()));
     outcomes.push_back(trial.outcome);
   }
@@ -61,15 +69,14 @@ std::vector<plan::Candidate> list_tried(Workspace& work) {
 }
 
 simulate::TrialResult read_trial(const Workspace& work, std::size_t id) {
-  const fs::path straight = straight_file(work, static_cast<int>(id));
+  const fs::path straight = straight_file(work, static_cast<int>(id)).path;
   return read_trial_file(fs::exists(straight) ? straight
                                               : work.artifact("manoeuvres").folder /
                                                     trial_file_name(static_cast<int>(id)));
 }
 
-bool is_scouted(const Workspace& work, std::size_t id) {
-  const fs::path file = straight_file(work, static_cast<int>(id));
-  return file.parent_path().parent_path().filename() == kScoutFolder && fs::exists(file);
+std::string level_of(const Workspace& work, std::size_t id) {
+  return straight_file(work, static_cast<int>(id)).level;
 }
 
 void make_manoeuvres(Workspace& work, const fs::path& folder) {

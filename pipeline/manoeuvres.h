@@ -13,10 +13,13 @@ std::vector<plan::Candidate> list_tried(Workspace& work);
 /// The trial of a candidate in that list.
 simulate::TrialResult read_trial(const Workspace& work, std::size_t id);
 
-/// Whether a candidate was scouted only, so that read_trial() gives the scout's trial.
-bool is_scouted(const Workspace& work, std::size_t id);
+/// The level of a candidate's trial as read_trial() gives it.
+std::string level_of(const Workspace& work, std::size_t id);
 
-/// Where scouts' trials are, in the folder of the trials.
-inline constexpr const char* kScoutFolder = "scout";
+/// Levels of trials (plan/search.h). Those but the full ones have folders of these names in the
+/// folder of the trials.
+inline constexpr const char* kScoutLevel = "scout";
+inline constexpr const char* kProbeLevel = "probe";
+inline constexpr const char* kFullLevel = "full";
 
 }  // namespace wireplan::pipeline

@@ -17,7 +17,7 @@ constexpr const char* kStatement =
     "Research use only. Not a medical device. Not for diagnosis or treatment decisions.";
 
 constexpr const char* kRigidWall = "the wall is rigid";
-constexpr const char* kRigidScout = "a scout's wall is rigid";
+constexpr const char* kRigidScout = "the wall of a scout or a probe is rigid";
 constexpr const char* kNoRepeats = "only the best plans are repeated, and the best of each wire";
 
 bool is_rigid(const ReportInput& input) {
@@ -197,7 +197,7 @@ Json trial_json(const ReportInput& input, std::size_t k) {
   Row row;
   row.put("id", k);
   put_candidate(row, input, k);
-  row.put("level", input.scouted[k] ? "scout" : "full");
+  row.put("level", input.levels[k]);
   row.put("outcome", outcome_name(trial.outcome));
   row.put("reason", trial.reason);
   row.put("reached", m.reached);
@@ -211,7 +211,7 @@ Json trial_json(const ReportInput& input, std::size_t k) {
   row.put_number("push_work_n_mm", m.push_work, ended);
   row.put_number("friction_work_n_mm", m.friction_work, ended);
   row.put_number("energy_released_n_mm", m.energy_released, ended);
-  put_wall_motion(row, input, m, input.scouted[k], ended);
+  put_wall_motion(row, input, m, input.is_scouted(k), ended);
   row.put_number("peak_curvature_per_mm", m.peak_curvature, ended);
   row.put_number("centerline_deviation_mm", m.centerline_deviation, ended);
   row.put_number("off_path_mm", m.off_path, ended);
@@ -432,13 +432,12 @@ std::string describe_best(const Json& report) {
   const Json& trials = report.at("trials");
   if (ranking.empty()) {
     const auto scouted = std::count_if(trials.begin(), trials.end(), [](const Json& trial) {
-      return trial.value("level", "full") == "scout";
+      return trial.value("level", "full") != "full";
     });
     return "no plan reaches the target within the limits: " + std::to_string(trials.size()) +
            " trials" +
            (scouted > 0 ? ", " + std::to_string(scouted) +
-                              " of them with long elements and a rigid wall only (--exhaustive "
-                              "runs all in full)"
+                              " of them on a rigid wall only (--exhaustive runs all in full)"
                         : "") +
            "; the report says why for each";
   }

@@ -27,7 +27,8 @@ struct ReportInput {
   std::vector<plan::Candidate> candidates;
   std::vector<simulate::TrialResult> trials;  // outcome, reason and terms; the rest may be empty
   std::vector<plan::Metrics> metrics;
-  std::vector<bool> scouted;  // per trial: it is a scout's, on a rigid wall with long elements
+  std::vector<std::string> levels;  // per trial: "scout" or "probe", on a rigid wall, or "full"
+  bool is_scouted(std::size_t trial) const { return levels[trial] != "full"; }
   plan::Ranking ranking;
   std::vector<plan::Refinement> refinements;
   Json robustness;  // of repeats.h

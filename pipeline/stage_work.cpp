@@ -188,8 +188,9 @@ std::string trial_key_text(const Workspace& work, const plan::Study& study,
                             {"length", Json(study.insertion.length).dump()}});
 }
 
-// Trials of one level. Each is kept as soon as it is finished: a run goes on where it was stopped,
-// and a case that has a trial in common with another takes it from there.
+// Trials of one level: "scout" and "probe" on a rigid wall, "full" on the case's. Each is kept as
+// soon as it is finished: a run goes on where it was stopped, and a case that has a trial in common
+// with another takes it from there.
 class TrialLevel {
  public:
   TrialLevel(Workspace& work, const char* level, plan::Study study)
@@ -215,11 +216,13 @@ class TrialLevel {
 
   // Takes the trials of these candidates from the store or runs them. The vessel is asked for only
   // where there is one to run. Throws Interrupted.
-  void run(const std::vector<plan::Candidate>& candidates, const std::vector<int>& wanted,
-           const std::function<const simulate::VesselModel&()>& find_vessel) {
+  void run(const std::vector<plan::Candidate>& candidates, const std::vector<int>& wanted) {
     const std::vector<int> ids = find_missing(candidates, wanted);
     if (ids.empty()) return;
-    const simulate::VesselModel& vessel = find_vessel();
+    const bool scouting = level_ == kScoutLevel;
+    const simulate::VesselModel& vessel =
+        level_ == kFullLevel ? work_.model() : work_.rigid_model();
+    const Centerline path = work_.path();
     const int kept = static_cast<int>(wanted.size() - ids.size());
     const WorkOptions& options = work_.options();
     plan::BatchOptions batch{
@@ -235,7 +238,9 @@ class TrialLevel {
           const double start = plan::thread_cpu_seconds();
           const int id = ids[static_cast<std::size_t>(slot)];
           const plan::Candidate& candidate = candidates[static_cast<std::size_t>(id)];
-          const simulate::TrialResult trial = plan::run_candidate(study_, candidate, vessel);
+          const simulate::TrialResult trial = scouting
+                                                  ? plan::run_scout(study_, candidate, vessel, path)
+                                                  : plan::run_candidate(study_, candidate, vessel);
           made[static_cast<std::size_t>(slot)] =
               work_.store().keep_piece(key_of(candidate), trial_text(study_, candidate, trial));
           cpu_seconds[static_cast<std::size_t>(slot)] = plan::thread_cpu_seconds() - start;
@@ -259,7 +264,7 @@ class TrialLevel {
     }
   }
 
-  const char* name() const { return level_; }
+  const std::string& name() const { return level_; }
   int trials_run() const { return trials_run_; }
   const plan::Study& study() const { return study_; }
   simulate::TrialResult read(int id) const { return read_trial_file(pieces_.at(id)); }
@@ -275,64 +280,83 @@ class TrialLevel {
   }
 
   Workspace& work_;
-  const char* level_;
+  std::string level_;
   plan::Study study_;
   std::map<int, fs::path> pieces_;  // in the store, by candidate
   int trials_run_ = 0;              // this time
   double cpu_seconds_ = 0.0;        // of these                                            [s]
 };
 
-// A case's trials, round by round: first the scouts of all candidates on a rigid wall, then in full
+// A case's trials, round by round: first the scouts of all candidates, then probes and full runs of
 // those that may be among the best, by what is known of the rounds before; or all in full at once.
 class TrialRounds {
  public:
   explicit TrialRounds(Workspace& work)
       : work_(work),
         candidates_(plan::list_candidates(work.study())),
-        full_(work, "full", work.study()),
-        known_(candidates_.size()) {
-    if (plan::needs_search(work.study(), work.given().exhaustive)) {
-      scout_.emplace(work, "scout", plan::scout_study(work.study()));
-    }
+        full_(work, kFullLevel, work.study()) {
+    if (!plan::needs_search(work.study(), work.given().exhaustive)) return;
+    scout_.emplace(work, kScoutLevel, plan::scout_study(work.study()));
+    if (work.given().wall.elastic) probe_.emplace(work, kProbeLevel, work.study());
+    seen_.scouts.resize(candidates_.size());
+    seen_.probes.resize(candidates_.size());
+    seen_.full.resize(candidates_.size());
   }
 
   // The candidates of the next round, ascending; empty where all is known. Expects every trial of
   // the round before to be found or run.
   std::vector<int> next() {
     ++round_;
-    const bool at_scouts = round_ == 1;
-    std::vector<int> ids(at_scouts ? candidates_.size() : 0);
-    std::iota(ids.begin(), ids.end(), 0);
-    if (scout_ && !at_scouts) {
-      for (const int id : last_) {
-        if (round_ == 2) scouts_.push_back(look(*scout_, id));
-        if (round_ > 2) known_[static_cast<std::size_t>(id)] = look(full_, id);
-      }
-      ids = plan::choose_next(work_.study(), candidates_, scouts_, known_);
+    if (round_ == 1) {
+      level_ = scout_ ? &*scout_ : &full_;
+      last_.resize(candidates_.size());
+      std::iota(last_.begin(), last_.end(), 0);
+      return last_;
     }
-    last_ = ids;
-    return ids;
+    if (!scout_) return {};
+    for (const int id : last_) {
+      const auto k = static_cast<std::size_t>(id);
+      const plan::Sighting sighting = look(id);
+      if (level_ == &full_) {
+        seen_.full[k] = sighting;
+      } else if (level_ == &*scout_) {
+        seen_.scouts[k] = sighting;
+      } else {
+        seen_.probes[k] = sighting;
+      }
+    }
+    plan::NextRuns runs = plan::choose_next(work_.study(), candidates_, seen_, probe_.has_value());
+    const bool probes = !runs.probes.empty();
+    level_ = probes ? &*probe_ : &full_;
+    last_ = probes ? std::move(runs.probes) : std::move(runs.full);
+    return last_;
   }
 
-  TrialLevel& level() { return round_ == 1 && scout_ ? *scout_ : full_; }
+  TrialLevel& level() { return *level_; }
   std::vector<int> find_missing(const std::vector<int>& ids) {
     return level().find_missing(candidates_, ids);
   }
-  void run(const std::vector<int>& ids) {
-    const bool rigid = round_ == 1 && scout_;
-    level().run(candidates_, ids, [&]() -> const simulate::VesselModel& {
-      return rigid ? work_.rigid_model() : work_.model();
-    });
+  void run(const std::vector<int>& ids) { level().run(candidates_, ids); }
+
+  // Puts the trials of all levels into the folder; returns what each took.
+  Json place(const fs::path& folder) const {
+    Json timing = Json::array();
+    for (const std::optional<TrialLevel>* level : {&scout_, &probe_}) {
+      if (!*level) continue;
+      (*level)->place(folder / (*level)->name());
+      timing.push_back((*level)->timing());
+    }
+    full_.place(folder);
+    timing.push_back(full_.timing());
+    return timing;
   }
 
   std::size_t candidate_count() const { return candidates_.size(); }
-  const TrialLevel& full() const { return full_; }
-  const std::optional<TrialLevel>& scout() const { return scout_; }
 
   // What the report tells of the scouts; null where there are none.
   Json describe_scouts() const {
     if (!scout_) return nullptr;
-    const plan::ScoutError error = plan::find_scout_error(scouts_, known_);
+    const plan::ScoutError error = plan::find_scout_error(seen_.scouts, seen_.full);
     const auto number = [](const std::optional<double>& value) {
       return value ? Json(*value) : Json(nullptr);
     };
@@ -340,6 +364,8 @@ class TrialRounds {
             {"step_mm", scout_->study().insertion.step},
             {"wall", "rigid"},
             {"trials", candidates_.size()},
+            {"probed", std::count_if(seen_.probes.begin(), seen_.probes.end(),
+                                     [](const auto& probe) { return probe.has_value(); })},
             {"compared", error.compared},
             {"both_reached", error.both_reached},
             {"median_score_error", number(error.median_score)},
@@ -349,18 +375,25 @@ class TrialRounds {
   }
 
  private:
-  plan::Sighting look(const TrialLevel& level, int id) const {
-    const simulate::TrialResult trial = level.read(id);
-    return plan::look_at(trial, plan::compute_metrics(trial, level.study(), work_.path()),
-                         level.study(), work_.given().limits, work_.given().weights);
+  plan::Sighting look(int id) const {
+    const simulate::TrialResult trial = level_->read(id);
+    plan::Sighting sighting =
+        plan::look_at(trial, plan::compute_metrics(trial, level_->study(), work_.path()),
+                      level_->study(), work_.given().limits, work_.given().weights);
+    const int wire = candidates_[static_cast<std::size_t>(id)].wire;
+    sighting.pinched =
+        probe_ && level_ != &full_ &&
+        plan::is_pinched(trial, work_.study().wires[static_cast<std::size_t>(wire)].radius,
+                         work_.path());
+    return sighting;
   }
 
   Workspace& work_;
   std::vector<plan::Candidate> candidates_;
   TrialLevel full_;
-  std::optional<TrialLevel> scout_;
-  std::vector<plan::Sighting> scouts_;
-  std::vector<std::optional<plan::Sighting>> known_;
+  std::optional<TrialLevel> scout_, probe_;
+  plan::Sightings seen_;  // none where all are run in full
+  TrialLevel* level_ = nullptr;
   std::vector<int> last_;  // candidates of the round before
   int round_ = 0;
 };
@@ -518,7 +551,7 @@ const simulate::VesselModel& Workspace::rigid_model() {
     if (given_.wall.elastic) options.band = simulate::VesselModel::kYieldingBand;
     model_ = std::make_unique<simulate::VesselModel>(surface(), options);
   }
-  expects(!model_->compliance);
+  if (model_->compliance) compliance_aside_ = std::move(model_->compliance);
   return *model_;
 }
 
@@ -526,7 +559,10 @@ const simulate::VesselModel& Workspace::model() {
   if (model_ && model_->compliance) return *model_;
   rigid_model();
   if (given_.wall.elastic) {
-    model_->compliance = std::make_unique<simulate::WallCompliance>(surface(), wall());
+    if (!compliance_aside_) {
+      compliance_aside_ = std::make_unique<simulate::WallCompliance>(surface(), wall());
+    }
+    model_->compliance = std::move(compliance_aside_);
   }
   return *model_;
 }
@@ -687,12 +723,7 @@ void make_trials(Workspace& work, const fs::path& folder) {
   const plan::Study& study = work.study();
   TrialRounds rounds(work);
   for (std::vector<int> ids = rounds.next(); !ids.empty(); ids = rounds.next()) rounds.run(ids);
-  rounds.full().place(folder);
-  Json timing = Json::array({rounds.full().timing()});
-  if (rounds.scout()) {
-    rounds.scout()->place(folder / kScoutFolder);
-    timing.insert(timing.begin(), rounds.scout()->timing());
-  }
+  Json timing = rounds.place(folder);
   const simulate::VesselModel& vessel = work.model();
 
   Json figures = figures_of("trials");
@@ -823,8 +854,8 @@ void make_report(Workspace& work, const fs::path& folder) {
   ForceMap all_forces(work.surface().triangles.cols());
   for (std::size_t id = 0; id < candidates.size(); ++id) {
     const simulate::TrialResult trial = read_trial(work, id);
-    const bool scouted = is_scouted(work, id);
-    report.scouted.push_back(scouted);
+    report.levels.push_back(level_of(work, id));
+    const bool scouted = report.is_scouted(id);
     report.metrics.push_back(plan::compute_metrics(trial, study, work.path()));
     if (!scouted) all_forces.add(trial);
     page.trials.push_back(
@@ -838,7 +869,9 @@ void make_report(Workspace& work, const fs::path& folder) {
   // Rank; find errors by refining, and rank with these, until no other error matters.
   const Case& given = work.given();
   plan::Findings findings;
-  findings.scouted = report.scouted;
+  for (std::size_t id = 0; id < candidates.size(); ++id) {
+    findings.scouted.push_back(report.is_scouted(id));
+  }
   const auto rank = [&] {
     report.ranking = plan::rank(study, candidates, report.trials, report.metrics, given.limits,
                                 given.weights, findings);

@@ -52,7 +52,8 @@ class Workspace {
   const Wall& wall();
   /// The vessel as the trials feel it: with the wall only where it yields.
   const simulate::VesselModel& model();
-  /// The same with a wall that does not yield. It becomes model(), so its use ends before that.
+  /// The same with a wall that does not yield. Both are one object: the use of either ends before
+  /// the other is asked for.
   const simulate::VesselModel& rigid_model();
   /// Makes the field of the vessel a piece in the store, unless another process did: for shards, so
   /// that one of them computes it. rigid_model() takes it from there.
@@ -78,6 +79,7 @@ class Workspace {
   std::optional<Wall> wall_;
   std::optional<plan::Study> study_;
   std::unique_ptr<simulate::VesselModel> model_;
+  std::unique_ptr<const simulate::WallCompliance> compliance_aside_;  // while it is the rigid one
 
   std::string field_key_text() const;
   bool find_field();  // whether the store has it; model_ then
@@ -99,13 +101,14 @@ void make_manoeuvres(Workspace& work, const std::filesystem::path& folder);
 void make_report(Workspace& work, const std::filesystem::path& folder);
 
 /// One of several processes' part of a case's trials. They are run in rounds: the scouts of all
-/// candidates (all in full where none are scouted), then in full those that the rounds before name.
+/// candidates (all in full where none are scouted), then probes and full runs that the rounds
+/// before name.
 struct Share {
   int shard = 1, shards = 1;  // part `shard` of `shards`, from 1
   int round = 1;
 };
 struct ShareOutcome {
-  std::string level;            // "scout" or "full"
+  std::string level;            // "scout", "probe" or "full"
   int round_trials = 0;         // 0: there is no such round
   int own_trials = 0, run = 0;  // of these in the part; run this time
 };

@@ -14,7 +14,6 @@ namespace {
 using simulate::Move;
 using simulate::Trial;
 
-constexpr double kOffPath = 1.0;     // from the path's balls, still counts as in its lumen    [mm]
 constexpr double kAstray = 15.0;     // pushed so far without coming further: elsewhere        [mm]
 constexpr double kMarkEvery = 3.0;   // between two depths at which a turn is tried            [mm]
 constexpr double kMarksBack = 24.0;  // such depths, from where the wire left the path ...     [mm]
@@ -118,8 +117,7 @@ class Search {
 
   double progress_here() const {
     if (trial_.result().pushes.empty()) return 0.0;
-    const PathPlace place = find_place(trial_.result().pushes.back().tip, path_);
-    return place.from_lumen <= kOffPath ? place.arc : 0.0;
+    return find_progress(trial_.result().pushes.back().tip, path_);
   }
 
   /// Tries turns, and pulls after them, round where the branch left the path. Keeps what came
@@ -182,8 +180,7 @@ class Search {
 double find_progress(const simulate::TrialResult& trial, const Centerline& path) {
   double progress = 0.0;
   for (const simulate::Push& push : trial.pushes) {
-    const PathPlace place = find_place(push.tip, path);
-    if (place.from_lumen <= kOffPath) progress = std::max(progress, place.arc);
+    progress = std::max(progress, find_progress(push.tip, path));
   }
   return progress;
 }

@@ -27,4 +27,10 @@ PathPlace find_place(const Vec3& p, const Centerline& path) {
   return place;
 }
 
+double find_progress(const Vec3& tip, const Centerline& path) {
+  constexpr double kOffPath = 1.0;  // [mm]
+  const PathPlace place = find_place(tip, path);
+  return place.from_lumen <= kOffPath ? place.arc : 0.0;
+}
+
 }  // namespace wireplan::plan

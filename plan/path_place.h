@@ -14,4 +14,7 @@ struct PathPlace {
 /// Expects a path of at least one point.
 PathPlace find_place(const Vec3& p, const Centerline& path);
 
+/// How far along the path a tip is; 0 more than a millimetre outside of the path's lumen [mm].
+double find_progress(const Vec3& tip, const Centerline& path);
+
 }  // namespace wireplan::plan

@@ -7,6 +7,8 @@
 #include <set>
 #include <tuple>
 
+#include "plan/batch.h"
+#include "plan/path_place.h"
 #include "plan/statistics.h"
 
 namespace wireplan::plan {
@@ -24,18 +26,20 @@ constexpr std::size_t kGiveUpAfter = 32;  // ... until so many were run in full,
 constexpr std::size_t kGiveUpPart = 8;    // ... or one in so many, and none is left that reached
 constexpr std::size_t kCheckedPart = 16;  // of those that failed, one in so many is looked at
 
-/// Whether the scout itself may be why the candidate did not reach.
-bool is_doubtful(const Sighting& scout, double goal_radius) {
-  return !scout.reached && (scout.unclear || scout.nearest <= 2.0 * goal_radius);
+constexpr double kPatience = 40.0;  // a scout's push without progress               [mm]
+
+/// Whether the level itself may be why the candidate did not reach.
+bool is_doubtful(const Sighting& seen, double goal_radius) {
+  return !seen.reached && (seen.unclear || seen.pinched || seen.nearest <= 2.0 * goal_radius);
 }
 
 /// Candidates, the most promising first: by score, and those that did not reach by how near they
 /// came.
-std::vector<int> order_by_promise(const std::vector<Sighting>& scouts) {
-  std::vector<int> order(scouts.size());
+std::vector<int> order_by_promise(const std::vector<Sighting>& seen) {
+  std::vector<int> order(seen.size());
   std::iota(order.begin(), order.end(), 0);
   const auto key = [&](int k) {
-    const Sighting& s = scouts[static_cast<std::size_t>(k)];
+    const Sighting& s = seen[static_cast<std::size_t>(k)];
     return std::tuple(!s.reached, s.reached ? s.score : s.nearest, k);
   };
   std::sort(order.begin(), order.end(), [&](int a, int b) { return key(a) < key(b); });
@@ -79,6 +83,26 @@ Study scout_study(const Study& study) {
   return scout;
 }
 
+simulate::TrialResult run_scout(const Study& scout, const Candidate& candidate,
+                                const simulate::VesselModel& vessel, const Centerline& path) {
+  expects(candidate.moves.empty());
+  return run_guarded([&] {
+    simulate::Trial trial(scout.wires[static_cast<std::size_t>(candidate.wire)],
+                          make_introducer(scout, candidate), scout.goal, vessel, scout.insertion);
+    double furthest = 0.0, depth_there = 0.0;
+    while (trial.step({.push = scout.insertion.step})) {
+      const double progress = find_progress(trial.result().pushes.back().tip, path);
+      if (progress > furthest) {
+        furthest = progress;
+        depth_there = trial.depth();
+      } else if (trial.depth() - depth_there > kPatience) {
+        break;
+      }
+    }
+    return trial.finish();
+  });
+}
+
 Sighting look_at(const simulate::TrialResult& trial, const Metrics& metrics, const Study& study,
                  const Limits& limits, const Weights& weights) {
   using simulate::Outcome;
@@ -91,65 +115,106 @@ Sighting look_at(const simulate::TrialResult& trial, const Metrics& metrics, con
   return sighting;
 }
 
-std::vector<int> choose_next(const Study& study, const std::vector<Candidate>& candidates,
-                             const std::vector<Sighting>& scouts,
-                             const std::vector<std::optional<Sighting>>& full) {
-  expects(scouts.size() == candidates.size() && full.size() == candidates.size());
-  const std::vector<int> order = order_by_promise(scouts);
-  const auto scout = [&](int k) -> const Sighting& { return scouts[static_cast<std::size_t>(k)]; };
+bool is_pinched(const simulate::TrialResult& trial, double wire_radius, const Centerline& path) {
+  constexpr double kNear = 10.0;  // wire radii
+  if (trial.outcome != simulate::Outcome::kStuck) return false;
+  const PathPlace tip = find_place(trial.pushes.back().tip, path);
+  for (Eigen::Index k = 0; k < path.radius.size(); ++k) {
+    const bool near = std::abs(path.arc_length[k] - tip.arc) <= kNear * wire_radius;
+    if (near && path.radius[k] < 2.0 * wire_radius) return true;
+  }
+  return false;
+}
+
+NextRuns choose_next(const Study& study, const std::vector<Candidate>& candidates,
+                     const Sightings& seen, bool probing) {
+  const std::size_t count = candidates.size();
+  expects(seen.scouts.size() == count && seen.probes.size() == count && seen.full.size() == count);
+  const auto is_probed = [&](int k) {
+    return seen.probes[static_cast<std::size_t>(k)].has_value();
+  };
+  std::vector<Sighting> rigid = seen.scouts;  // the best that is known of the rigid wall
+  for (std::size_t k = 0; k < count; ++k) rigid[k] = seen.probes[k].value_or(rigid[k]);
+  const auto sighting = [&](int k) -> const Sighting& {
+    return rigid[static_cast<std::size_t>(k)];
+  };
+  const auto full = [&](int k) -> const std::optional<Sighting>& {
+    return seen.full[static_cast<std::size_t>(k)];
+  };
+  const auto is_known = [&](int k) {  // so that no more is to be learnt of it
+    return full(k) ||
+           (is_probed(k) && !sighting(k).reached && !is_doubtful(sighting(k), study.goal.radius));
+  };
   const auto wire_of = [&](int k) { return candidates[static_cast<std::size_t>(k)].wire; };
+  const std::vector<int> order = order_by_promise(rigid);
   std::set<int> wanted;
 
   // The best of all, and failures that may be the scout's.
+  for (std::size_t place = 0; place < std::min(kAlways, order.size()); ++place) {
+    if (sighting(order[place]).reached) wanted.insert(order[place]);
+  }
   std::size_t failed = 0, checked = 0;
-  for (const int k : order) failed += scout(k).reached ? 0 : 1;
-  for (std::size_t place = 0; place < order.size(); ++place) {
-    const int k = order[place];
-    if (place < kAlways && scout(k).reached) wanted.insert(k);
-    if (is_doubtful(scout(k), study.goal.radius) && checked * kCheckedPart < failed) {
-      wanted.insert(k);
-      ++checked;
-    }
+  for (const Sighting& scout : seen.scouts) failed += scout.reached ? 0 : 1;
+  for (const int k : order_by_promise(seen.scouts)) {
+    const bool doubtful = is_doubtful(seen.scouts[static_cast<std::size_t>(k)], study.goal.radius);
+    if (doubtful && checked++ * kCheckedPart < failed) wanted.insert(k);
   }
 
-  // Those that may beat the best plan, as far as the scout was off.
+  for (const int k : order) {
+    if (sighting(k).pinched) wanted.insert(k);
+  }
+
+  // Those that may beat the best plan, as far as their level was off.
   std::optional<double> best;
-  for (const std::optional<Sighting>& run : full) {
+  for (const std::optional<Sighting>& run : seen.full) {
     if (run && run->plan) best = std::min(best.value_or(run->score), run->score);
   }
-  double margin = kScoutMargin;
-  for (const double size : score_differences(scouts, full)) margin = std::max(margin, size);
-  for (const int k : order) {
-    if (best && scout(k).reached && scout(k).score - margin < *best) wanted.insert(k);
+  std::vector<std::optional<Sighting>> above = seen.full;  // the scouts, where it is known
+  std::vector<Sighting> probes = seen.scouts;              // where not, not compared
+  for (std::size_t k = 0; k < count; ++k) {
+    if (!above[k]) above[k] = seen.probes[k];
+    probes[k] = seen.probes[k].value_or(Sighting{});
   }
-  const auto is_known = [&](int k) { return full[static_cast<std::size_t>(k)].has_value(); };
+  const auto margin_of = [](const std::vector<double>& differences) {
+    double margin = kScoutMargin;
+    for (const double size : differences) margin = std::max(margin, size);
+    return margin;
+  };
+  const double scout_margin = margin_of(score_differences(seen.scouts, above));
+  const double probe_margin = margin_of(score_differences(probes, seen.full));
+  for (const int k : order) {
+    const double margin = is_probed(k) ? probe_margin : scout_margin;
+    if (best && sighting(k).reached && sighting(k).score - margin < *best) wanted.insert(k);
+  }
 
   // Of a wire without a plan its best, whatever it is, then the next that reached.
   std::map<int, int> tries;
   std::set<int> settled;
-  for (std::size_t k = 0; k < full.size(); ++k) {
-    if (!full[k]) continue;
-    const int wire = wire_of(static_cast<int>(k));
-    if (full[k]->plan || ++tries[wire] >= kTriesPerWire) settled.insert(wire);
+  for (int k = 0; k < static_cast<int>(count); ++k) {
+    if (!is_known(k)) continue;
+    const bool plan = full(k) && full(k)->plan;
+    if (plan || ++tries[wire_of(k)] >= kTriesPerWire) settled.insert(wire_of(k));
   }
   for (const int k : order) {
-    if (is_known(k) || (!scout(k).reached && tries.contains(wire_of(k)))) continue;
+    if (is_known(k) || (!sighting(k).reached && tries.contains(wire_of(k)))) continue;
     if (settled.insert(wire_of(k)).second) wanted.insert(k);
   }
-  std::vector<int> next;
-  std::copy_if(wanted.begin(), wanted.end(), std::back_inserter(next),
-               [&](int k) { return !is_known(k); });
-  if (!next.empty() || best) return next;
+  std::erase_if(wanted, is_known);
 
   // No plan yet.
-  const auto known = static_cast<std::size_t>(
-      std::count_if(full.begin(), full.end(), [](const auto& run) { return run.has_value(); }));
-  const bool enough = known >= std::max(kGiveUpAfter, full.size() / kGiveUpPart);
-  for (const int k : order) {
-    const bool worth = !enough || scout(k).reached;
-    if (worth && !is_known(k) && next.size() < kAtOnce) next.push_back(k);
+  if (wanted.empty() && !best) {
+    std::size_t known = 0;
+    for (const int k : order) known += is_known(k) ? 1 : 0;
+    const bool enough = known >= std::max(kGiveUpAfter, count / kGiveUpPart);
+    for (const int k : order) {
+      const bool worth = !enough || sighting(k).reached;
+      if (worth && !is_known(k) && wanted.size() < kAtOnce) wanted.insert(k);
+    }
   }
-  std::sort(next.begin(), next.end());
+  NextRuns next;
+  std::copy_if(wanted.begin(), wanted.end(), std::back_inserter(next.probes),
+               [&](int k) { return probing && !is_probed(k) && !sighting(k).pinched; });
+  if (next.probes.empty()) next.full.assign(wanted.begin(), wanted.end());
   return next;
 }
 

@@ -1,10 +1,12 @@
 #pragma once
 /// Spending time where it decides: every candidate is scouted on a rigid wall with long elements,
-/// and those that may be among the best are run in full.
+/// what may matter is probed there with the study's own elements, and what may be among the best is
+/// run in full.
 #include <optional>
 #include <vector>
 
 #include "plan/ranking.h"
+#include "preprocess/vessel.h"
 
 namespace wireplan::plan {
 
@@ -20,30 +22,59 @@ bool needs_search(const Study& study, bool exhaustive);
 /// of a study (measured: DESIGN.md), and those where no good plan goes are then never needed.
 Study scout_study(const Study& study);
 
+/// A candidate at the scout's level. One whose tip has not come further along the path for 40 mm of
+/// push is given up as `missed`: in the trials of two cases none of those reached (DESIGN.md).
+simulate::TrialResult run_scout(const Study& scout, const Candidate& candidate,
+                                const simulate::VesselModel& vessel, const Centerline& path);
+
 /// What a level says of a candidate.
 struct Sighting {
   bool reached = false, plan = false;
   bool unclear = false;  // it failed by no equilibrium or by our fault
+  bool pinched = false;  // see is_pinched()
   double score = 1.0;    // of one that reached, whatever limits it broke
   double nearest = 0.0;  // to the target                                                   [mm]
 };
+/// `pinched` is left to is_pinched().
 Sighting look_at(const simulate::TrialResult& trial, const Metrics& metrics, const Study& study,
                  const Limits& limits, const Weights& weights);
 
-/// The candidates to run in full next, ascending; empty when no more are needed. `scouts` holds one
-/// sighting per candidate, `full` those known so far. Asked again until it is empty, it names:
+/// Whether a trial on a rigid wall was stuck in a stenosis that the wall, did it yield, might let
+/// it through: with the tip where the path, within ten wire radii, leaves less room on each side
+/// than the wire's radius.
+bool is_pinched(const simulate::TrialResult& trial, double wire_radius, const Centerline& path);
+
+/// What is known of the candidates, one entry each: of all from their scouts; of some from probes,
+/// which are the study's own trials on a rigid wall, a fraction of the cost of those on one that
+/// yields; and of some in full.
+struct Sightings {
+  std::vector<Sighting> scouts;
+  std::vector<std::optional<Sighting>> probes, full;
+};
+
+/// Candidates to run next, ascending. No more than one list has any; both are empty when no more
+/// are needed.
+struct NextRuns {
+  std::vector<int> probes = {}, full = {};
+};
+
+/// What may matter is probed, unless its scout was pinched, and what a probe saw reach, was
+/// pinched, come within two radii of the goal or find no equilibrium, is run in full; without
+/// probes (`probing`; where the study's own wall is rigid) all of it is run in full at once. What a
+/// probe saw fail counts as failed. Asked again until it names none, it wants, by the best that is
+/// known of each:
 ///   1. the five that score best;
-///   2. of each wire its best, or the nearest where none reached; and while its full runs are no
-///      plans the next that reached, four in all;
-///   3. of those that did not reach one in 16, rounded up, nearest first, for which the scout may
-///      be at fault: without equilibrium, or within two radii of the goal;
-///   4. all that reached with a score that may beat the best full plan: by no more than the scout
+///   2. of each wire its best, or the nearest where none reached; and while those are no plans the
+///      next that reached, four in all;
+///   3. of those whose scouts did not reach one in 16, rounded up, nearest first, for which the
+///      scout may be at fault: without equilibrium, or within two radii of the goal;
+///   4. all that reached with a score that may beat the best full plan: by no more than that level
 ///      was ever found to be off, and at least by kScoutMargin;
 ///   5. while no full run is a plan, eight more, the best and then the nearest first: all whose
-///      scout reached, and of the others until 32 or an eighth of all were run.
-std::vector<int> choose_next(const Study& study, const std::vector<Candidate>& candidates,
-                             const std::vector<Sighting>& scouts,
-                             const std::vector<std::optional<Sighting>>& full);
+///      scout reached, and of the others until 32 or an eighth of all are known;
+///   6. all that were pinched: a rigid wall cannot tell which of them is the best.
+NextRuns choose_next(const Study& study, const std::vector<Candidate>& candidates,
+                     const Sightings& seen, bool probing);
 
 /// Scouts of 221 trials were off by 0.012 up and 0.052 down where they and the full trials were
 /// plans (DESIGN.md): what is not known of a case yet is taken to be half of that.

@@ -189,10 +189,9 @@ TrialResult Trial::finish() {
     end(Outcome::kReached, reached_reason());
   } else if (!ended_) {
     const bool all = insertion_.longest() - insertion_.depth() < 1e-9;
-    end(Outcome::kMissed, (all ? "all " : "all moves were made, ") +
-                              millimetres(insertion_.depth()) + " of wire went in, tip ended " +
-                              millimetres(best_distance_) + " from the target at " +
-                              place(insertion_.tip()));
+    end(Outcome::kMissed, (all ? "all " : "") + millimetres(insertion_.depth()) +
+                              " of wire went in, tip ended " + millimetres(best_distance_) +
+                              " from the target at " + place(insertion_.tip()));
   }
   return std::move(result_);
 }

@@ -183,7 +183,7 @@ std::string make_page(const std::string& name) {
   report.figures = figures(surface);
   report.study = make_study();
   report.candidates = plan::list_candidates(report.study);
-  report.scouted.resize(report.candidates.size());
+  report.levels.assign(report.candidates.size(), "full");
 
   PageInput page;
   page.surface = surface;

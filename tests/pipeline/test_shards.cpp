@@ -154,7 +154,7 @@ TEST_F(Shards, OfALaterRoundFollowFromAllOfTheRoundBefore) {
   }
   EXPECT_GE(rounds, 3);
   EXPECT_EQ(call("report case.json -o out").code, 0);
-  EXPECT_EQ(run_at_the_end(), (std::vector<int>{0, 0}));
+  EXPECT_EQ(run_at_the_end(), (std::vector<int>{0, 0, 0}));
   EXPECT_EQ(results(folder_ / "out"), expected);
 }
 

@@ -4,41 +4,48 @@
 #include <numeric>
 
 #include "plan/search.h"
+#include "tests/shapes.h"
 
 namespace wireplan::plan {
 namespace {
 
 using simulate::Outcome;
 
-/// Candidates of two wires as the scout and the full trials see them.
+/// Candidates of two wires as the levels see them. Probes see what the full runs do, unless told.
 struct Bench {
   Study study;
   std::vector<Candidate> candidates;
-  std::vector<Sighting> scouts;
-  std::vector<std::optional<Sighting>> full, truth;
+  Sightings seen;
+  std::vector<std::optional<Sighting>> truth, probed;
+  bool probing = false;
 
-  void reach(int wire, double scout_score, double full_score) {
+  void add(int wire, const Sighting& scout, const Sighting& full) {
     candidates.push_back({.wire = wire});
-    scouts.push_back({.reached = true, .plan = true, .score = scout_score});
-    truth.push_back(Sighting{.reached = true, .plan = true, .score = full_score});
-    full.emplace_back();
+    seen.scouts.push_back(scout);
+    seen.probes.emplace_back();
+    seen.full.emplace_back();
+    truth.push_back(full);
+    probed.push_back(full);
+  }
+  void reach(int wire, double scout_score, double full_score) {
+    add(wire, {.reached = true, .plan = true, .score = scout_score},
+        {.reached = true, .plan = true, .score = full_score});
   }
   void fail(int wire, double nearest, bool unclear = false) {
-    candidates.push_back({.wire = wire});
-    scouts.push_back({.unclear = unclear, .nearest = nearest});
-    truth.push_back(Sighting{.nearest = nearest});
-    full.emplace_back();
+    add(wire, {.unclear = unclear, .nearest = nearest}, {.nearest = nearest});
   }
-  std::vector<int> next() const { return choose_next(study, candidates, scouts, full); }
-  void run(const std::vector<int>& ids) {
-    for (const int id : ids) full[id] = truth[id];
+  NextRuns next() const { return choose_next(study, candidates, seen, probing); }
+  void run(const NextRuns& runs) {
+    EXPECT_TRUE(runs.probes.empty() || runs.full.empty());
+    for (const int id : runs.probes) seen.probes[id] = probed[id];
+    for (const int id : runs.full) seen.full[id] = truth[id];
   }
-  /// Runs what is asked for until nothing is; returns how many.
+  /// Runs what is asked for until nothing is; returns how many in full.
   int search() {
     int count = 0;
-    for (std::vector<int> ids = next(); !ids.empty(); ids = next()) {
-      run(ids);
-      count += static_cast<int>(ids.size());
+    for (NextRuns runs = next(); !runs.probes.empty() || !runs.full.empty(); runs = next()) {
+      run(runs);
+      count += static_cast<int>(runs.full.size());
     }
     return count;
   }
@@ -62,15 +69,43 @@ TEST(ScoutStudy, IsCoarserButResolvesTheTip) {
   EXPECT_EQ(scout_study(study).insertion.step, 3.0) << "never finer than the study";
 }
 
+TEST(RunScout, GivesUpWhereTheTipComesNoFurtherAlongThePath) {
+  // Straight on in a tube whose path leaves it after 30 mm.
+  const simulate::VesselModel tube(shapes::straight_tube(4.0, 120.0, 2.0));
+  Study study;
+  study.wires = {{.name = "straight",
+                  .radius = 0.4,
+                  .sections = {{.length = 150.0, .bending_stiffness = 60.0}}}};
+  study.access = Vec3(0.0, 0.0, 5.0);
+  study.goal = {.point = Vec3(30.0, 0.0, 35.0), .radius = 4.0};
+  study.insertion.length = 110.0;
+  study.insertion.step = 2.0;
+  Centerline path;
+  path.points.resize(3, 3);
+  path.points << 0.0, 0.0, 30.0, 0.0, 0.0, 0.0, 5.0, 35.0, 35.0;
+  path.arc_length = Eigen::Vector3d(0.0, 30.0, 60.0);
+  path.radius.setConstant(3, 2.0);
+  const simulate::TrialResult scout = run_scout(study, {}, tube, path);
+  EXPECT_EQ(scout.outcome, Outcome::kMissed);
+  // In the lumen of 2 mm and 1 mm beside until 33 mm on, then 40 mm more.
+  EXPECT_NEAR(scout.pushes.back().insertion, 72.0, 3.0);
+  EXPECT_NE(scout.reason.find("of wire went in, tip ended"), std::string::npos) << scout.reason;
+
+  // Where the path goes on with the tube the goal is reached, and until then nothing is given up.
+  study.goal.point = Vec3(0.0, 0.0, 100.0);
+  path.points.col(2) = Vec3(0.0, 0.0, 110.0);
+  EXPECT_EQ(run_scout(study, {}, tube, path).outcome, Outcome::kReached);
+}
+
 TEST(ChooseNext, FindsTheBestPlanThoughTheScoutHasItSixth) {
   Bench bench;
   // The scout errs by 0.1, and puts the best plan behind five.
   for (int k = 0; k < 5; ++k) bench.reach(0, 0.30 + 0.001 * k, 0.40 + 0.001 * k);
   bench.reach(0, 0.31, 0.25);
   for (int k = 0; k < 100; ++k) bench.reach(0, 0.6 + 0.001 * k, 0.6 + 0.001 * k);
-  EXPECT_EQ(bench.next(), (std::vector<int>{0, 1, 2, 3, 4}));
+  EXPECT_EQ(bench.next().full, (std::vector<int>{0, 1, 2, 3, 4}));
   EXPECT_EQ(bench.search(), 6);
-  EXPECT_TRUE(bench.full[5]);
+  EXPECT_TRUE(bench.seen.full[5]);
 }
 
 TEST(ChooseNext, RunsAllThatMayBeatTheBestByTheErrorFound) {
@@ -78,7 +113,8 @@ TEST(ChooseNext, RunsAllThatMayBeatTheBestByTheErrorFound) {
   // Off by 0.19, and the best is 0.49: what the scout has below 0.68 may still beat it.
   for (int k = 0; k < 10; ++k) bench.reach(0, 0.30 + 0.05 * k, 0.49 + 0.05 * k);
   bench.search();
-  for (int k = 0; k < 10; ++k) EXPECT_EQ(bench.full[k].has_value(), 0.30 + 0.05 * k < 0.68) << k;
+  for (int k = 0; k < 10; ++k)
+    EXPECT_EQ(bench.seen.full[k].has_value(), 0.30 + 0.05 * k < 0.68) << k;
 }
 
 TEST(ChooseNext, LooksAtTheBestOfEachWire) {
@@ -87,7 +123,7 @@ TEST(ChooseNext, LooksAtTheBestOfEachWire) {
   bench.reach(1, 0.9, 0.9);
   bench.fail(2, 80.0);
   bench.fail(2, 40.0);
-  const std::vector<int> next = bench.next();
+  const std::vector<int> next = bench.next().full;
   EXPECT_TRUE(std::count(next.begin(), next.end(), 10));
   EXPECT_TRUE(std::count(next.begin(), next.end(), 12)) << "the nearest of a wire that fails";
   EXPECT_FALSE(std::count(next.begin(), next.end(), 11));
@@ -105,7 +141,8 @@ TEST(ChooseNext, TriesToFindEachWireAPlan) {
     bench.truth.back() = Sighting{.nearest = 30.0};
   }
   bench.search();
-  for (int k = 10; k < 22; ++k) EXPECT_EQ(bench.full[k].has_value(), k < 13 || (k > 15 && k < 20));
+  for (int k = 10; k < 22; ++k)
+    EXPECT_EQ(bench.seen.full[k].has_value(), k < 13 || (k > 15 && k < 20));
 }
 
 TEST(ChooseNext, ChecksFailuresThatMayBeTheScouts) {
@@ -114,7 +151,7 @@ TEST(ChooseNext, ChecksFailuresThatMayBeTheScouts) {
   for (int k = 0; k < 30; ++k) bench.fail(0, 50.0 + k);
   bench.fail(0, 90.0, /*unclear=*/true);  // 36
   bench.fail(0, 6.0);                     // 37: within two radii of 4 mm
-  const std::vector<int> next = bench.next();
+  const std::vector<int> next = bench.next().full;
   EXPECT_TRUE(std::count(next.begin(), next.end(), 36));
   EXPECT_TRUE(std::count(next.begin(), next.end(), 37));
   EXPECT_EQ(next.size(), 7u);
@@ -125,16 +162,16 @@ TEST(ChooseNext, RunsTheNearestAndAllThatReachedBeforeItSaysThatNoPlanReaches) {
   for (int k = 0; k < 30; ++k) bench.fail(k % 2, 50.0 + k);
   EXPECT_EQ(bench.search(), 30);
   // And finds the one that the scout saw fail furthest from the target.
-  for (auto& run : bench.full) run.reset();
+  for (auto& run : bench.seen.full) run.reset();
   bench.truth[29] = Sighting{.reached = true, .plan = true, .score = 0.5};
   bench.search();
-  EXPECT_TRUE(bench.full[29]->plan);
+  EXPECT_TRUE(bench.seen.full[29]->plan);
 
   // Of many it gives up after some: the nearest.
   Bench large;
   for (int k = 0; k < 200; ++k) large.fail(0, 250.0 - k);
   EXPECT_EQ(large.search(), 33);  // the best of its wire, then eight at a time
-  for (int k = 0; k < 200; ++k) EXPECT_EQ(large.full[k].has_value(), k >= 167) << k;
+  for (int k = 0; k < 200; ++k) EXPECT_EQ(large.seen.full[k].has_value(), k >= 167) << k;
 
   // But not while there is one that the scout saw reach: the last of 50 is a plan.
   for (int k = 0; k < 50; ++k) {
@@ -143,7 +180,83 @@ TEST(ChooseNext, RunsTheNearestAndAllThatReachedBeforeItSaysThatNoPlanReaches) {
   }
   large.truth.back() = Sighting{.reached = true, .plan = true, .score = 0.8};
   large.search();
-  EXPECT_TRUE(large.full.back() && large.full.back()->plan);
+  EXPECT_TRUE(large.seen.full.back() && large.seen.full.back()->plan);
+}
+
+TEST(ChooseNext, RunsInFullWhatAProbeDoesNotSeeFail) {
+  Bench bench;
+  bench.probing = true;
+  for (int k = 0; k < 10; ++k) bench.reach(0, 0.3 + 0.001 * k, 0.3 + 0.001 * k);
+  // Of the five best a probe sees one fail far from the goal, one near it, one without equilibrium.
+  bench.probed[0] = bench.truth[0] = Sighting{.nearest = 60.0};
+  bench.probed[1] = Sighting{.nearest = 6.0};
+  bench.probed[2] = Sighting{.unclear = true, .nearest = 60.0};
+  const NextRuns first = bench.next();
+  EXPECT_EQ(first.probes, (std::vector<int>{0, 1, 2, 3, 4}));
+  EXPECT_TRUE(first.full.empty());
+  bench.search();
+  EXPECT_FALSE(bench.seen.full[0]);
+  EXPECT_FALSE(bench.seen.full[1]) << "no longer among the best, and no plan is wanting";
+  for (int k = 3; k < 10; ++k) EXPECT_TRUE(bench.seen.full[k]) << k;
+
+  // Where there is no plan yet they are run: near misses, and those without equilibrium.
+  Bench lone;
+  lone.probing = true;
+  for (int k = 0; k < 6; ++k) lone.fail(0, 60.0 + k);
+  lone.probed[3] = Sighting{.nearest = 6.0};
+  lone.probed[4] = Sighting{.unclear = true, .nearest = 60.0};
+  EXPECT_EQ(lone.search(), 2);
+  EXPECT_TRUE(lone.seen.full[3] && lone.seen.full[4]);
+  for (int k = 0; k < 6; ++k) EXPECT_TRUE(lone.seen.probes[k]) << k;
+}
+
+TEST(ChooseNext, RunsAllInFullThatARigidWallHeldInAStenosis) {
+  Bench bench;
+  bench.probing = true;
+  for (int k = 0; k < 6; ++k) bench.reach(0, 0.3, 0.3);
+  for (int k = 0; k < 20; ++k) {
+    bench.fail(0, 50.0);
+    bench.seen.scouts.back().pinched = true;
+  }
+  bench.search();
+  for (int k = 6; k < 26; ++k) {
+    EXPECT_TRUE(bench.seen.full[k]) << k;
+    EXPECT_FALSE(bench.seen.probes[k]) << k;
+  }
+}
+
+TEST(IsPinched, WhereAStuckTipHasLessRoomThanItIsThick) {
+  Centerline path;  // along x, of radius 2 mm, with a stenosis of 0.3 mm at 20 mm
+  path.points.setZero(3, 41);
+  path.points.row(0).setLinSpaced(0.0, 40.0);
+  path.arc_length = path.points.row(0);
+  path.radius.setConstant(41, 2.0);
+  path.radius[20] = 0.3;
+  simulate::TrialResult trial;
+  trial.outcome = Outcome::kStuck;
+  trial.pushes.push_back({.tip = {18.8, 0.2, 0.0}});
+  EXPECT_TRUE(is_pinched(trial, 0.18, path));
+  EXPECT_FALSE(is_pinched(trial, 0.14, path)) << "it has room";
+  trial.outcome = Outcome::kMissed;
+  EXPECT_FALSE(is_pinched(trial, 0.18, path));
+  trial.outcome = Outcome::kStuck;
+  trial.pushes.back().tip = {10.0, 1.8, 0.0};
+  EXPECT_FALSE(is_pinched(trial, 0.18, path)) << "it is stuck elsewhere";
+}
+
+TEST(ChooseNext, TrustsAProbesScoreAsFarAsProbesWereOff) {
+  Bench bench;
+  bench.probing = true;
+  // Scouts are off by 0.2, so that all are probed; probes by 0.01, so that few are run in full.
+  for (int k = 0; k < 20; ++k) {
+    bench.reach(0, 0.30 + 0.01 * k, 0.5 + 0.01 * k);
+    bench.probed.back()->score = 0.51 + 0.01 * k;
+  }
+  bench.search();
+  for (int k = 0; k < 20; ++k) {
+    EXPECT_TRUE(bench.seen.probes[k]) << k;
+    EXPECT_EQ(bench.seen.full[k].has_value(), k < 5) << k;
+  }
 }
 
 TEST(ScoutErrorOf, CountsWhatTheScoutSawWrong) {
@@ -155,15 +268,15 @@ TEST(ScoutErrorOf, CountsWhatTheScoutSawWrong) {
   bench.reach(0, 0.35, 0.0);  // none in full
   bench.truth[3] = Sighting{.reached = true, .plan = true, .score = 0.5};
   bench.truth[4] = Sighting{.nearest = 30.0};
-  bench.run({0, 1, 3, 4});
-  const ScoutError error = find_scout_error(bench.scouts, bench.full);
+  bench.run({.full = {0, 1, 3, 4}});
+  const ScoutError error = find_scout_error(bench.seen.scouts, bench.seen.full);
   EXPECT_EQ(error.compared, 4);
   EXPECT_EQ(error.both_reached, 2);
   EXPECT_EQ(error.missed, 1);
   EXPECT_EQ(error.false_reached, 1);
   EXPECT_NEAR(error.largest_score.value(), 0.1, 1e-12);
   EXPECT_NEAR(error.median_score.value(), 0.06, 1e-12);
-  EXPECT_FALSE(find_scout_error(bench.scouts, {{}, {}, {}, {}, {}}).median_score);
+  EXPECT_FALSE(find_scout_error(bench.seen.scouts, {{}, {}, {}, {}, {}}).median_score);
 }
 
 TEST(LookAt, ScoresWhatReachedWhateverLimitItBroke) {

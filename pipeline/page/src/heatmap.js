@@ -29,7 +29,7 @@ export const heatSection = (page, selection) => {
     if (!t) return el("td", {class: "empty"});
     const ranked = Boolean(t.plan);
     const color = t.reached && scale > 0 ? forceColor(t.peak_contact_force_n / scale) : null;
-    const rough = t.level === "scout";
+    const rough = t.level !== "full";
     const text = (rough ? "\u2248" : "") +
       (t.reached ? `${number(t.peak_contact_force_n)}${ranked || rough ? "" : "\u2009!"}` : outcomeMark(t.outcome));
     const what = `${planName(t)}: ${outcomeWord(t.outcome)}, largest contact ${number(t.peak_contact_force_n)} N` +
@@ -96,8 +96,8 @@ export const heatSection = (page, selection) => {
       el("span", {}, scale > 0 ? `${number(scale)}\u00a0N` : "none reached")),
     el("ul", {class: "marks"},
       el("li", {}, el("b", {}, "!"), " reached, but not ranked"),
-      trials.some((t) => t.level === "scout")
-        ? el("li", {}, el("b", {}, "\u2248"), " coarse trial: long elements in a rigid wall, forces are rough") : null,
+      trials.some((t) => t.level !== "full")
+        ? el("li", {}, el("b", {}, "\u2248"), " coarse trial: in a rigid wall, most with long elements; forces are rough") : null,
       seen.map((outcome) => el("li", {}, el("b", {}, outcomeMark(outcome)), ` ${outcomeWord(outcome)}`))),
     el("div", {class: "scroll", tabindex: "0", role: "region", "aria-label": "Grid of wires and angles"}, grid),
     el("p", {class: "note"}, "Errors of these forces are in the table of plans; those marked \u00b1\u00a0? there were not estimated."));

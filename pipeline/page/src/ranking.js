@@ -10,7 +10,7 @@ const success = ({plan}) => {
 
 /** A number of a trial with its error; of a coarse one it is rough. */
 const told = (trial, value, error) =>
-  trial.level === "scout" && value !== null ? `\u2248\u00a0${number(value)}` : withError(value, error);
+  trial.level !== "full" && value !== null ? `\u2248\u00a0${number(value)}` : withError(value, error);
 
 // Title, what to sort by, what to show.
 const kColumns = [
@@ -95,6 +95,6 @@ export const rankingSection = (page, selection) => {
         body)),
     el("p", {class: "note"},
       "\u00b1 is the estimated error of the simulation's finite elements; \u00b1\u00a0? where it was not estimated, as only the best plans are run again with finer elements. " +
-      (trials.some((t) => t.level === "scout") ? "\u2248 marks coarse trials, with long elements in a rigid wall. " : "") +
+      (trials.some((t) => t.level !== "full") ? "\u2248 marks trials against a rigid wall, most of them with long elements. " : "") +
       "Errors of the wire's, the wall's and the image's data are not in it. Plans that the errors cannot tell apart are ties."));
 };

@@ -35,11 +35,11 @@ export const answerSection = (page) => {
   if (!best) {
     const counts = new Map();
     for (const t of trials) counts.set(t.outcome, (counts.get(t.outcome) ?? 0) + 1);
-    const scouted = trials.filter((t) => t.level === "scout").length;
+    const scouted = trials.filter((t) => t.level !== "full").length;
     return section("answer", "The answer",
       el("p", {class: "answer"}, `No plan reaches the target within the limits: of ${plural(trials.length, "trial")} `,
         [...counts].map(([outcome, count]) => `${count} ${outcomeWord(outcome)}`).join(", "),
-        scouted ? `. ${scouted} of them were run with long elements and a rigid wall only; --exhaustive runs all in full.` : "."));
+        scouted ? `. ${scouted} of them were run against a rigid wall only; --exhaustive runs all in full.` : "."));
   }
   const t = trials[best.trial], errors = t.errors;
   const ties = best.tied_with.length;
@@ -96,7 +96,7 @@ const spreadRow = (robustness, trial, first) => {
 };
 
 const scoutRow = (scout) => ["Coarse trials that sorted out the rest",
-  `${plural(scout.trials, "trial")} with elements of ${number(scout.element_length_mm)}\u00a0mm in a rigid wall, ${scout.compared} of them run in full too`,
+  `${plural(scout.trials, "trial")} with elements of ${number(scout.element_length_mm)}\u00a0mm in a rigid wall; of them ${scout.probed} run there with fine elements, ${scout.compared} in full`,
   `score off by ${number(scout.median_score_error)} in the middle; ${plural(scout.missed, "plan")} seen as failing that reach, ${scout.false_reached} the other way`];
 
 export const uncertainSection = (page) => {
