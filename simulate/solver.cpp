@@ -466,7 +466,7 @@ NewtonResult Statics::solve_with(BlockBand<D>& hessian, BlockBand<D>& untouched,
       if (contact != nullptr) cap = contact->largest_safe_part(motion());
       if (twisted) cap = std::min(cap, largest_turning_step<D>(problem, step_));
       if (contact == nullptr || cap >= 1.0 || shifts == kMostShifts) break;
-      shift = std::max({kFirstShift, 0.25 * last_shift, 4.0 * shift});
+      shift = std::max(last_shift > 0.0 ? 0.25 * last_shift : kFirstShift, 4.0 * shift);
       apply_shift();
     }
     if (step_.cwiseAbs().maxCoeff() < 64.0 * kEpsilon * extent &&
