@@ -160,6 +160,7 @@ NextRuns choose_next(const Study& study, const std::vector<Candidate>& candidate
     if (doubtful && checked++ * kCheckedPart < failed) wanted.insert(k);
   }
 
+  // What a rigid wall held in a stenosis.
   for (const int k : order) {
     if (sighting(k).pinched) wanted.insert(k);
   }
@@ -169,8 +170,8 @@ NextRuns choose_next(const Study& study, const std::vector<Candidate>& candidate
   for (const std::optional<Sighting>& run : seen.full) {
     if (run && run->plan) best = std::min(best.value_or(run->score), run->score);
   }
-  std::vector<std::optional<Sighting>> above = seen.full;  // the scouts, where it is known
-  std::vector<Sighting> probes = seen.scouts;              // where not, not compared
+  std::vector<std::optional<Sighting>> above = seen.full;  // of the scouts, the highest level known
+  std::vector<Sighting> probes = seen.scouts;              // those not run are not compared
   for (std::size_t k = 0; k < count; ++k) {
     if (!above[k]) above[k] = seen.probes[k];
     probes[k] = seen.probes[k].value_or(Sighting{});
