@@ -182,10 +182,23 @@ SurfacePoint TriangleLocator::nearest(const Vec3& point) const {
   return {best.triangle, {t[0], t[1], t[2]}, weight / weight.sum()};
 }
 
-SurfacePoint TriangleLocator::pierced(const Vec3& point, const Vec3& direction) const {
+SurfacePoint TriangleLocator::pierced(const Vec3& point, const Vec3& direction,
+                                      std::int32_t from) const {
+  constexpr double kFar = 0.5;  // [mm]
+  if (from >= 0) {
+    const SurfacePoint found = walk(point, direction, from);
+    if (found.triangle >= 0 && (position(found) - point).norm() <= kFar) return found;
+  }
+  const SurfacePoint start = nearest(point);
+  const SurfacePoint found = walk(point, direction, start.triangle);
+  return found.triangle >= 0 ? found : start;
+}
+
+/// Where the line goes through the surface, from triangle to neighbour; none where that ends
+/// nowhere.
+SurfacePoint TriangleLocator::walk(const Vec3& point, const Vec3& direction,
+                                   std::int32_t triangle) const {
   constexpr int kMostSteps = 10;
-  SurfacePoint start = nearest(point);
-  std::int32_t triangle = start.triangle;
   for (int step = 0; step < kMostSteps && triangle >= 0; ++step) {
     const std::array<Vec3, 3> corner = corners(triangle);
     const Mat3 slopes = line_slopes(corner, direction);
@@ -198,7 +211,7 @@ SurfacePoint TriangleLocator::pierced(const Vec3& point, const Vec3& direction) 
     }
     triangle = neighbour_(lowest, triangle);
   }
-  return start;
+  return {};
 }
 
 Vec3 TriangleLocator::position(const SurfacePoint& at) const {

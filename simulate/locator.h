@@ -28,8 +28,10 @@ class TriangleLocator {
 
   /// Where the line through `point` along `direction`, across the surface there, goes through it:
   /// unlike the nearest point, this does not jump where the surface folds toward `point`. Found by
-  /// walking from the triangle nearest to `point`; the nearest point where the walk ends nowhere.
-  SurfacePoint pierced(const Vec3& point, const Vec3& direction) const;
+  /// walking from triangle `from`, or where there is none, or that leads nowhere or further than
+  /// half a millimetre from the point, from the one nearest to it; the nearest point where no walk
+  /// leads anywhere.
+  SurfacePoint pierced(const Vec3& point, const Vec3& direction, std::int32_t from = -1) const;
 
   Vec3 position(const SurfacePoint& at) const;  // expects one that was found                [mm]
 
@@ -53,6 +55,7 @@ class TriangleLocator {
   void find_neighbours();
   void register_triangles();
   void search(const CellBox& box, const Vec3& point, Best& best) const;
+  SurfacePoint walk(const Vec3& point, const Vec3& direction, std::int32_t triangle) const;
 
   Surface surface_;
   Eigen::Matrix3Xi neighbour_;  // of each triangle, over the edge that a corner is not on

@@ -364,6 +364,9 @@ NewtonResult Statics::solve_with(BlockBand<D>& hessian, BlockBand<D>& untouched,
   // others only where they meet the residual.
   constexpr int kEagerRefreshes = 25, kEagerAgain = 8;
   int eager_until = kEagerRefreshes;
+  // Looks along the wall for how far a step is safe: more after steps that were too long and well.
+  constexpr int kMostLooks = 32, kMoreLooks = 4;
+  int looks = 1;
   WallContact* contact = problem.contact;
   const bool twisted = D == 4;
   const bool polynomial = contact == nullptr && !twisted && !problem.tip_moment && !problem.plane;
@@ -423,6 +426,7 @@ NewtonResult Statics::solve_with(BlockBand<D>& hessian, BlockBand<D>& untouched,
     return result;
   };
   for (;; ++result.iterations) {
+    if (contact != nullptr && result.iterations == kEagerRefreshes) contact->hold_feet();
     energy = wire_energy + (contact != nullptr ? contact->energy().total() : 0.0);
     result.residual = largest_force();
     if (result.residual <= options.residual_tolerance && contact != nullptr &&
@@ -447,6 +451,7 @@ NewtonResult Statics::solve_with(BlockBand<D>& hessian, BlockBand<D>& untouched,
     };
     double slope, cap;  // of the energy along the step; largest part of the step that is safe
     shift = 0.0;
+    bool shortened = false;
     for (int shifts = 0;; ++shifts) {
       const auto solve = [&] {
         step_ = -gradient_;
@@ -463,9 +468,11 @@ NewtonResult Statics::solve_with(BlockBand<D>& hessian, BlockBand<D>& untouched,
         slope = refine_step<D>(problem, hessian, slope);
       }
       cap = std::numeric_limits<double>::infinity();
-      if (contact != nullptr) cap = contact->largest_safe_part(motion());
+      if (contact != nullptr) cap = contact->largest_safe_part(motion(), looks);
       if (twisted) cap = std::min(cap, largest_turning_step<D>(problem, step_));
-      if (contact == nullptr || cap >= 1.0 || shifts == kMostShifts) break;
+      if (contact == nullptr || cap >= 1.0) break;
+      shortened = true;
+      if (shifts == kMostShifts) break;
       shift = std::max(last_shift > 0.0 ? 0.25 * last_shift : kFirstShift, 4.0 * shift);
       apply_shift();
     }
@@ -515,6 +522,9 @@ NewtonResult Statics::solve_with(BlockBand<D>& hessian, BlockBand<D>& untouched,
       accepted = refreshed = largest_force() <= 0.5 * result.residual;
       if (!accepted) contact->restore_lag();
     }
+
+    if (!accepted) looks = 1;
+    if (accepted && shortened) looks = std::min(kMoreLooks * looks, kMostLooks);
 
     // 3. Else straight along the step to the lowest point of the exact quartic, plus a parabola for
     // the terms that are no polynomial; shorter until the energy falls.

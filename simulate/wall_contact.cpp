@@ -28,6 +28,12 @@ constexpr double kSmallestSlope = 1e-6;
 /// reaches [mm].
 constexpr double kInSight = 0.3;
 
+/// A held foot is left where it is this near to where it should be [mm].
+constexpr double kHeldFoot = 0.25;
+
+/// How deep into the wall a step may lead a point, or one of its parts [mm].
+constexpr double kInto = 0.25;
+
 /// How much further from the wall than before a point may be than its motion says: the gradient of
 /// the smooth field is not quite 1.
 constexpr double kLipschitz = 1.2;
@@ -126,6 +132,7 @@ void WallContact::begin(const Eigen::Matrix3Xd& x) {
   }
   std::fill(lag_.feet.begin(), lag_.feet.end(), SurfacePoint{});
   feet_changed_ = true;
+  feet_held_ = false;
   sample(x);
 }
 
@@ -223,7 +230,7 @@ SurfacePoint WallContact::foot_of(const Active& active) const {
   const WallSample& wall = active.wall;
   return vessel_.locator.pierced(
       active.position - (wall.distance / wall.gradient.squaredNorm()) * wall.gradient,
-      wall.gradient);
+      wall.gradient, lag_.feet[static_cast<std::size_t>(active.point)].triangle);
 }
 
 // ---------------------------------------------------------------- friction
@@ -256,9 +263,15 @@ ContactEnergy WallContact::refresh(bool fully) {
   fresh_ = true;
   if (yielding_) {
     for (const Active& active : active_) {
-      lag_.feet[static_cast<std::size_t>(active.point)] = foot_of(active);
+      SurfacePoint& foot = lag_.feet[static_cast<std::size_t>(active.point)];
+      const SurfacePoint found = foot_of(active);
+      if (feet_held_ && foot.triangle >= 0 && found.triangle >= 0 &&
+          (vessel_.locator.position(found) - vessel_.locator.position(foot)).norm() < kHeldFoot) {
+        continue;
+      }
+      foot = found;
+      feet_changed_ = true;
     }
-    feet_changed_ = true;
     find_forces();
   }
   if (options_.friction > 0.0) {
@@ -405,8 +418,7 @@ void WallContact::find_change(const Motion& motion) {
   }
   change_ = gap_;
   if (yielding_) {
-    if (fresh_)
-      coupling_.add_change_of_compliance(motion_, forces_, change_);  // else feet are held
+    if (fresh_ && !feet_held_) coupling_.add_change_of_compliance(motion_, forces_, change_);
     coupling_.multiply_by_stiffness(change_);
   } else {
     for (Eigen::Index k = 0; k < m; ++k) {
@@ -455,16 +467,35 @@ void WallContact::add_remainder(const Motion& motion, Eigen::VectorXd& product) 
   }
 }
 
-double WallContact::largest_safe_part(const Motion& motion) const {
-  constexpr double kInto = 0.25;  // [mm]
+double WallContact::largest_safe_part(const Motion& motion, int looks) const {
   double cap = std::numeric_limits<double>::infinity();
   for (std::size_t k = 0; k < points_.size(); ++k) {
     if (!is_free(points_[k])) continue;
-    const double move = motion.of(points_[k]).norm();
-    const double room = kInto + std::max(0.0, bound_[static_cast<Eigen::Index>(k)]);
-    if (move > room) cap = std::min(cap, room / move);
+    const Vec3 move = motion.of(points_[k]);
+    const Eigen::Index i = static_cast<Eigen::Index>(k);
+    const double room = kInto + std::max(0.0, bound_[i]), length = move.norm();
+    if (length > room && room < cap * length) {
+      cap = std::min(
+          cap, way_inside(position_.col(i), move / length, length, bound_[i], looks) / length);
+    }
   }
   return cap;
+}
+
+/// How far a point may go from a place that is `distance` inside the wall, of `length`; infinite:
+/// as far as it likes. Looks ahead in strides that are safe by the distance where they start.
+double WallContact::way_inside(const Vec3& from, const Vec3& toward, double length, double distance,
+                               int looks) const {
+  const double deepest = std::min(0.0, distance);
+  double way = 0.0;
+  for (int look = 0; look < looks; ++look) {
+    const double next = way + kInto + std::max(0.0, distance);
+    if (next >= length) return std::numeric_limits<double>::infinity();
+    distance = vessel_.lumen.distance(from + next * toward);
+    if (distance < deepest) return look == 0 ? next : way;
+    way = next;
+  }
+  return way;
 }
 
 }  // namespace wireplan::simulate

@@ -93,6 +93,10 @@ class WallContact {
   /// Takes the lag from the state sampled last; `fully`: and nothing of the one before. Returns the
   /// state's energy with that lag.
   ContactEnergy refresh(bool fully);
+  /// From now to the next begin() a point's place on the yielding wall is refreshed only where it
+  /// is more than a quarter of a millimetre off. The wall's stiffness has kinks along the edges of
+  /// triangles; a soft tip that rolls over one may else find no equilibrium.
+  void hold_feet() { feet_held_ = true; }
   /// The lag may be taken back to what it was when saved; the next sampling is with that.
   void save_lag() { saved_lag_ = lag_; }
   void restore_lag() {
@@ -144,8 +148,9 @@ class WallContact {
 
   /// Largest part of a motion of the state sampled last that takes no point across the wall: a
   /// point may go as far as it is from the wall and a quarter of a millimetre into it, where
-  /// contact pushes it back. Infinite where there is no bound.
-  double largest_safe_part(const Motion& motion) const;
+  /// contact pushes it back; with more looks, so far again from where that leads if it is no deeper
+  /// there, and so on, so that it may slide along the wall. Infinite where there is no bound.
+  double largest_safe_part(const Motion& motion, int looks) const;
 
  private:
   /// A point near enough to the wall to matter, in the state sampled last.
@@ -173,11 +178,13 @@ class WallContact {
   SurfacePoint foot_of(const Active& active) const;
   void find_stiffness();
   bool in_band(const Active& a, const Active& b) const;
+  double way_inside(const Vec3& from, const Vec3& toward, double length, double distance,
+                    int looks) const;
   void find_change(const Motion& motion);
 
   const VesselModel& vessel_;
   ContactOptions options_;
-  bool yielding_;
+  bool yielding_, feet_held_ = false;
   double radius_, free_from_;
   std::vector<Point> points_;
   Memory memory_;

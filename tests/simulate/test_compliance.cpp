@@ -468,6 +468,21 @@ TEST(TriangleLocator, PiercesAtTheNearestPointWhereTheLineRunsAlongTheSurface) {
   EXPECT_EQ(locator.weight_slopes(SurfacePoint{}, Vec3::UnitX()), Mat3::Zero());
 }
 
+TEST(TriangleLocator, PiercesTheSheetWhereItIsToldToStart) {
+  // Between two sheets 0.4 mm apart the line along x goes through both.
+  const TriangleLocator locator(shapes::box(Vec3::Zero(), Vec3(0.4, 8.0, 8.0)));
+  const Vec3 point(0.15, 4.0, 3.0);
+  const SurfacePoint near = locator.pierced(point, Vec3::UnitX());
+  const SurfacePoint far = locator.nearest(Vec3(0.4, 5.0, 4.0));
+  EXPECT_LT((locator.position(near) - Vec3(0.0, 4.0, 3.0)).norm(), 1e-12);
+  const SurfacePoint kept = locator.pierced(point, Vec3::UnitX(), far.triangle);
+  EXPECT_LT((locator.position(kept) - Vec3(0.4, 4.0, 3.0)).norm(), 1e-12);
+  // Not if that is more than half a millimetre away.
+  const SurfacePoint left =
+      locator.pierced(point - 0.3 * Vec3::UnitX(), Vec3::UnitX(), far.triangle);
+  EXPECT_LT((locator.position(left) - Vec3(0.0, 4.0, 3.0)).norm(), 1e-12);
+}
+
 TEST(TriangleLocator, WeightsChangeAsTheirSlopesSay) {
   const Surface surface = small_tube();
   const TriangleLocator locator(surface);

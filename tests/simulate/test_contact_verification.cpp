@@ -687,6 +687,59 @@ TEST(YieldingWall, KnowsHowForcesChangeAsTheWireMoves) {
   }
 }
 
+TEST(YieldingWall, HeldFeetAreRefreshedOnlyWhereTheyAreFarOff) {
+  const Surface surface = shapes::straight_tube(1.5, 40.0, 0.8);
+  const VesselModel vessel(surface, shapes::extruded_wall(surface, 1.0, 0.4));
+  const auto along = [](double shift) {
+    return [shift](double s) { return Vec3(0.6, 0.0, 5.0 + s + shift); };
+  };
+  // Energy with the lag of the state before, and with its own, after a shift along the wall.
+  const auto change = [&](double shift, bool held) {
+    Bench bench(uniform_wire(27.0, 1.0, 50.0), 27, vessel, {}, along(0.0));
+    bench.contact.begin(bench.state.x);
+    if (held) bench.contact.hold_feet();
+    const Bench shifted(uniform_wire(27.0, 1.0, 50.0), 27, vessel, {}, along(shift));
+    const double before = bench.contact.sample(shifted.state.x).total();
+    return bench.contact.refresh(true).total() - before;
+  };
+  EXPECT_NEAR(change(0.2, true), 0.0, 1e-12);
+  EXPECT_GT(std::abs(change(0.2, false)), 1e-6);
+  EXPECT_GT(std::abs(change(0.3, true)), 1e-6);
+  EXPECT_NEAR(change(0.3, true), change(0.3, false), 1e-12);
+}
+
+// ---------------------------------------------------------------- steps
+
+TEST(SafeStep, SlidesAlongTheWallButNotThroughIt) {
+  constexpr double kRadius = 5.0, kOff = 4.4;
+  const VesselModel vessel(shapes::straight_tube(kRadius, 100.0, 1.0));
+  Bench bench(uniform_wire(10.0, 0.5, 50.0), 10, vessel, {},
+              [&](double s) { return Vec3(kOff, 0.0, 40.0 + s); });
+  bench.contact.begin(bench.state.x);
+  const double distance = vessel.lumen.distance(Vec3(kOff, 0.0, 45.0));
+  constexpr double kInto = 0.25;  // a point may go so far past the wall                     [mm]
+  // Largest way of the whole wire in one direction, of 20 mm.
+  const auto way = [&](const Vec3& direction, int looks) {
+    const Eigen::VectorXd motion = (20.0 * direction).replicate(bench.rod.nodes(), 1);
+    return 20.0 * bench.contact.largest_safe_part({0, bench.rod.nodes(), 3, motion}, looks);
+  };
+  // One look: as far as it is from the wall and a quarter of a millimetre, whichever way.
+  EXPECT_NEAR(way(Vec3::UnitZ(), 1), distance + kInto, 0.02);
+  EXPECT_NEAR(way(Vec3::UnitX(), 1), distance + kInto, 0.02);
+  // Along the wall each look leads on; across it none does.
+  EXPECT_NEAR(way(Vec3::UnitZ(), 4), 4.0 * (distance + kInto), 0.08);
+  EXPECT_TRUE(std::isinf(way(Vec3::UnitZ(), 32)));
+  EXPECT_EQ(way(Vec3::UnitX(), 32), way(Vec3::UnitX(), 1));
+  // Inward it goes to the wall on the other side, and aslant to where it comes to this one.
+  const double across = way(-Vec3::UnitX(), 32);
+  EXPECT_GT(across, kOff + kRadius - 0.3);
+  EXPECT_LT(across, kOff + kRadius + kInto + 0.05);
+  const Vec3 aslant(std::sin(0.1), 0.0, std::cos(0.1));
+  const double slid = way(aslant, 32) * aslant[0];
+  EXPECT_GT(slid, distance - 0.1);
+  EXPECT_LT(slid, distance + kInto + 0.05);
+}
+
 // ---------------------------------------------------------------- scenes
 
 Scene wire_on_the_floor(const VesselModel& vessel, double friction) {
