@@ -281,8 +281,8 @@ BenchReport bench_preprocess(const BenchOptions& options) {
   run("centerline", [&] { preprocess::find_centerline(surface, kAccess, kTarget); });
   run("wall", [&] { wall = preprocess::extrude_wall(surface, {}); });
   run("distance field and factored wall", [&] {
-    const simulate::LumenOptions lumen_options{.openings = simulate::find_openings(surface)};
-    const simulate::VesselModel model(surface, wall.wall, lumen_options);
+    const simulate::VesselModel model(surface, wall.wall,
+                                      simulate::follow(surface, simulate::find_openings(surface)));
     expects(model.compliance != nullptr);
   });
   report.rows.push_back({{"step", "total"},

@@ -36,7 +36,7 @@ LoadedVessel load_vessel(const SceneVessel& given) {
   preprocess::require_sound(preprocess::check_surface(vessel.surface), file.path.string());
   vessel.wall = preprocess::extrude_wall(vessel.surface, given.wall.extrusion).wall;
   vessel.openings = simulate::find_openings(vessel.surface);
-  const simulate::LumenOptions options{.openings = vessel.openings};
+  const simulate::LumenOptions options = simulate::follow(vessel.surface, vessel.openings);
   vessel.model = given.wall.elastic
                      ? std::make_unique<simulate::VesselModel>(vessel.surface, vessel.wall, options)
                      : std::make_unique<simulate::VesselModel>(vessel.surface, options);

@@ -547,8 +547,9 @@ void Workspace::share_field() {
 const simulate::VesselModel& Workspace::rigid_model() {
   if (!model_ && !find_field()) {
     // The field as a yielding wall needs it, since the wall may come later.
-    simulate::LumenOptions options{.openings = simulate::find_openings(surface())};
-    if (given_.wall.elastic) options.band = simulate::VesselModel::kYieldingBand;
+    simulate::LumenOptions options =
+        simulate::follow(surface(), simulate::find_openings(surface()));
+    if (given_.wall.elastic) options.band = simulate::VesselModel::yielding_band(options);
     model_ = std::make_unique<simulate::VesselModel>(surface(), options);
   }
   if (model_->compliance) compliance_aside_ = std::move(model_->compliance);

@@ -2,6 +2,7 @@
 /// The vessel as wires feel it: built once per patient, shared read-only by all trials.
 #include <memory>
 #include <utility>
+#include <vector>
 
 #include "preprocess/vessel.h"
 #include "simulate/compliance.h"
@@ -10,11 +11,16 @@
 
 namespace wireplan::simulate {
 
-struct VesselModel {
-  /// A wall that yields is felt further out than one that does not.
-  static constexpr double kYieldingBand = 5.0;  //                                        [mm]
+/// Of a field that follows this surface: cells of half a millimetre, or of two thirds of a
+/// triangle's edge in the mean where that is less; not less than a tenth of a millimetre. The
+/// openings are those that find_openings() finds.
+LumenOptions follow(const Surface& surface, std::vector<Opening> openings);
 
-  /// Of a rigid vessel; with a wall, of one that yields: its band is at least kYieldingBand.
+struct VesselModel {
+  /// A wall that yields is felt further out than one that does not: ten cells, if that is more.
+  static double yielding_band(const LumenOptions& options);
+
+  /// Of a rigid vessel; with a wall, of one that yields, in its band.
   explicit VesselModel(const Surface& surface, const LumenOptions& options = {})
       : lumen(surface, options), locator(surface) {}
   /// With the field as from_bytes() gives it.

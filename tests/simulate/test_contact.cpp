@@ -1,9 +1,10 @@
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <random>
 
-#include "simulate/contact.h"
+#include "simulate/vessel_model.h"
 #include "tests/shapes.h"
 
 namespace wireplan::simulate {
@@ -36,6 +37,21 @@ TEST(Lumen, ComesCloserToTheTrianglesOnAFinerGrid) {
   const Lumen coarse(tube, {.grid_spacing = 1.0}), fine(tube, {.grid_spacing = 0.25});
   EXPECT_LT(fine.mean_deviation(), 0.5 * coarse.mean_deviation());
   EXPECT_GT(coarse.max_deviation(), 0.0);
+}
+
+TEST(Follow, TakesCellsOfTwoThirdsOfAnEdge) {
+  // A thin tube's triangles are small, so that the field follows them too.
+  for (const double edge : {0.3, 0.6, 1.2}) {
+    const Surface tube = shapes::straight_tube(2.0, 20.0, edge);
+    const LumenOptions options = follow(tube, find_openings(tube));
+    EXPECT_NEAR(options.grid_spacing, std::min(0.5, 2.0 / 3.0 * edge), 0.08 * edge);
+    EXPECT_EQ(options.openings.size(), 2u);
+    EXPECT_EQ(VesselModel::yielding_band(options),
+              std::max(options.band, 10.0 * options.grid_spacing));
+  }
+  const Surface tube = shapes::straight_tube(1.0, 10.0, 0.3);
+  const Lumen fine(tube, follow(tube, {})), coarse(tube);
+  EXPECT_LT(fine.max_deviation(), 0.5 * coarse.max_deviation());
 }
 
 TEST(Lumen, KnowsInsideFromOutsideBeyondTheBand) {
