@@ -219,9 +219,8 @@ class TrialLevel {
   void run(const std::vector<plan::Candidate>& candidates, const std::vector<int>& wanted) {
     const std::vector<int> ids = find_missing(candidates, wanted);
     if (ids.empty()) return;
-    const bool scouting = level_ == kScoutLevel;
-    const simulate::VesselModel& vessel =
-        level_ == kFullLevel ? work_.model() : work_.rigid_model();
+    const bool full = level_ == kFullLevel;
+    const simulate::VesselModel& vessel = full ? work_.model() : work_.rigid_model();
     const Centerline path = work_.path();
     const int kept = static_cast<int>(wanted.size() - ids.size());
     const WorkOptions& options = work_.options();
@@ -238,9 +237,9 @@ class TrialLevel {
           const double start = plan::thread_cpu_seconds();
           const int id = ids[static_cast<std::size_t>(slot)];
           const plan::Candidate& candidate = candidates[static_cast<std::size_t>(id)];
-          const simulate::TrialResult trial = scouting
-                                                  ? plan::run_scout(study_, candidate, vessel, path)
-                                                  : plan::run_candidate(study_, candidate, vessel);
+          const simulate::TrialResult trial =
+              full ? plan::run_candidate(study_, candidate, vessel)
+                   : plan::run_scout(study_, candidate, vessel, path);
           made[static_cast<std::size_t>(slot)] =
               work_.store().keep_piece(key_of(candidate), trial_text(study_, candidate, trial));
           cpu_seconds[static_cast<std::size_t>(slot)] = plan::thread_cpu_seconds() - start;

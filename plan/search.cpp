@@ -202,7 +202,13 @@ NextRuns choose_next(const Study& study, const std::vector<Candidate>& candidate
   }
   std::erase_if(wanted, is_known);
 
-  // No plan yet.
+  // No plan yet: what scout and probe do not agree on, then more of all.
+  if (wanted.empty() && !best) {
+    for (const int k : order_by_promise(seen.scouts)) {
+      const bool reached = seen.scouts[static_cast<std::size_t>(k)].reached;
+      if (reached && is_probed(k) && !full(k) && wanted.size() < kAtOnce) wanted.insert(k);
+    }
+  }
   if (wanted.empty() && !best) {
     std::size_t known = 0;
     for (const int k : order) known += is_known(k) ? 1 : 0;

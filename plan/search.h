@@ -22,8 +22,9 @@ bool needs_search(const Study& study, bool exhaustive);
 /// of a study (measured: DESIGN.md), and those where no good plan goes are then never needed.
 Study scout_study(const Study& study);
 
-/// A candidate at the scout's level. One whose tip has not come further along the path for 40 mm of
-/// push is given up as `missed`: in the trials of two cases none of those reached (DESIGN.md).
+/// A candidate at the scout's or the probe's level. One whose tip has not come further along the
+/// path for 40 mm of push is given up as `missed`: in the trials of two cases none of those reached
+/// (DESIGN.md).
 simulate::TrialResult run_scout(const Study& scout, const Candidate& candidate,
                                 const simulate::VesselModel& vessel, const Centerline& path);
 
@@ -45,8 +46,8 @@ Sighting look_at(const simulate::TrialResult& trial, const Metrics& metrics, con
 bool is_pinched(const simulate::TrialResult& trial, double wire_radius, const Centerline& path);
 
 /// What is known of the candidates, one entry each: of all from their scouts; of some from probes,
-/// which are the study's own trials on a rigid wall, a fraction of the cost of those on one that
-/// yields; and of some in full.
+/// which are the study's own trials on a rigid wall, given up as scouts are, a fraction of the cost
+/// of those on one that yields; and of some in full.
 struct Sightings {
   std::vector<Sighting> scouts;
   std::vector<std::optional<Sighting>> probes, full;
@@ -70,8 +71,9 @@ struct NextRuns {
 ///      scout may be at fault: without equilibrium, or within two radii of the goal;
 ///   4. all that reached with a score that may beat the best full plan: by no more than that level
 ///      was ever found to be off, and at least by kScoutMargin;
-///   5. while no full run is a plan, eight more, the best and then the nearest first: all whose
-///      scout reached, and of the others until 32 or an eighth of all are known;
+///   5. while no full run is a plan, in full those that a scout saw reach and a probe did not, then
+///      eight more, the best and then the nearest first: all whose scout reached, and of the others
+///      until 32 or an eighth of all are known;
 ///   6. all that were pinched: a rigid wall cannot tell which of them is the best.
 NextRuns choose_next(const Study& study, const std::vector<Candidate>& candidates,
                      const Sightings& seen, bool probing);

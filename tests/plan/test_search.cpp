@@ -210,6 +210,23 @@ TEST(ChooseNext, RunsInFullWhatAProbeDoesNotSeeFail) {
   for (int k = 0; k < 6; ++k) EXPECT_TRUE(lone.seen.probes[k]) << k;
 }
 
+TEST(ChooseNext, WithoutAPlanDoesNotLetAProbeOverruleAScoutThatReached) {
+  Bench bench;
+  bench.probing = true;
+  for (int k = 0; k < 40; ++k) bench.fail(0, 60.0 + k);
+  for (int k = 0; k < 3; ++k) {  // 40 to 42: probes fail far from the goal, the last is a plan
+    bench.reach(0, 0.4 + 0.1 * k, 0.5);
+    bench.probed.back() = Sighting{.nearest = 60.0};
+    if (k < 2) bench.truth.back() = Sighting{.nearest = 30.0};
+  }
+  EXPECT_EQ(bench.search(), 3);
+  EXPECT_TRUE(bench.seen.full[42] && bench.seen.full[42]->plan);
+  // They come before any more of those that failed.
+  EXPECT_EQ(std::count_if(bench.seen.probes.begin(), bench.seen.probes.end(),
+                          [](const auto& probe) { return probe.has_value(); }),
+            3);
+}
+
 TEST(ChooseNext, RunsAllInFullThatARigidWallHeldInAStenosis) {
   Bench bench;
   bench.probing = true;
