@@ -228,6 +228,7 @@ class TreeSolver {
       }
     }
     std::sort(path_.begin(), path_.end());
+    x_.reserve(slot_.size() / 4);  // seldom more: growing would double it
     for (const int p : path_) add_slot(p);
     for (const Force& f : forces) x_[slot_[f.place]].col(f.lane) += f.force;
     for (const int p : path_) {

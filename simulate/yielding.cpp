@@ -17,10 +17,14 @@ void Yielding::Envelope::add_row(int first) {
   first_.push_back(first);
 }
 
-int Yielding::slot_of(const WallCompliance& wall, int vertex) {
-  const auto known = std::lower_bound(
+std::vector<std::pair<int, int>>::const_iterator Yielding::find_slot(int vertex) const {
+  return std::lower_bound(
       slots_.begin(), slots_.end(), vertex,
       [](const std::pair<int, int>& entry, int wanted) { return entry.first < wanted; });
+}
+
+int Yielding::slot_of(const WallCompliance& wall, int vertex) {
+  const auto known = find_slot(vertex);
   if (known != slots_.end() && known->first == vertex) return known->second;
   const int slot = static_cast<int>(slots_.size());
   const WallCompliance::Response& response = wall.response(vertex);
@@ -43,9 +47,22 @@ void Yielding::set_feet(const WallCompliance& wall, const std::vector<SurfacePoi
   const std::size_t m = feet.size();
   // The feet's vertices in the table; when it is full, it starts anew with these.
   if (slots_.size() + 3 * m > table_side_) {
-    slots_.clear();
-    table_side_ = std::max({table_side_, kSmallestTable, 2 * 3 * m});
-    table_.resize(table_side_ * table_side_);
+    vertices_.clear();
+    for (const SurfacePoint& foot : feet) {
+      if (foot.triangle >= 0)
+        vertices_.insert(vertices_.end(), foot.vertex.begin(), foot.vertex.end());
+    }
+    std::sort(vertices_.begin(), vertices_.end());
+    vertices_.erase(std::unique(vertices_.begin(), vertices_.end()), vertices_.end());
+    const auto added = std::count_if(vertices_.begin(), vertices_.end(), [&](int vertex) {
+      const auto known = find_slot(vertex);
+      return known == slots_.end() || known->first != vertex;
+    });
+    if (slots_.size() + static_cast<std::size_t>(added) > table_side_) {
+      slots_.clear();
+      table_side_ = std::max({table_side_, kSmallestTable, 2 * vertices_.size()});
+      table_.resize(table_side_ * table_side_);
+    }
   }
   foot_slots_.resize(m);
   for (std::size_t i = 0; i < m; ++i) {

@@ -61,6 +61,8 @@ class Yielding {
     std::vector<std::ptrdiff_t> offset_;
     std::vector<double> values_;
   };
+  /// The first slot of this vertex or one after it.
+  std::vector<std::pair<int, int>>::const_iterator find_slot(int vertex) const;
   /// Place of a vertex in the table of responses, which it enters if it is new.
   int slot_of(const WallCompliance& wall, int vertex);
   void multiply_by_compliance(const Eigen::VectorXd& f, Eigen::VectorXd& w) const;
@@ -75,6 +77,7 @@ class Yielding {
   std::vector<std::pair<int, int>> slots_;  // vertex, its row in the table
   std::vector<double> table_;               // table_side_ squared                        [mm/N]
   std::vector<std::array<int, 3>> foot_slots_;
+  std::vector<int> vertices_;  // of the feet; scratch
 
   Envelope compliance_, factor_, inverse_;  // of all points; of those with a stiff law
   std::vector<int> stiff_, place_;          // those, in order; the place of each point there, or -1
