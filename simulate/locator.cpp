@@ -186,11 +186,11 @@ SurfacePoint TriangleLocator::pierced(const Vec3& point, const Vec3& direction,
                                       std::int32_t from) const {
   constexpr double kFar = 0.5;  // [mm]
   if (from >= 0) {
-    const SurfacePoint found = walk(point, direction, from);
+    SurfacePoint found = walk(point, direction, from);
     if (found.triangle >= 0 && (position(found) - point).norm() <= kFar) return found;
   }
-  const SurfacePoint start = nearest(point);
-  const SurfacePoint found = walk(point, direction, start.triangle);
+  SurfacePoint start = nearest(point);
+  SurfacePoint found = walk(point, direction, start.triangle);
   return found.triangle >= 0 ? found : start;
 }
 
