@@ -204,104 +204,27 @@ Eigen::Matrix3Xd vertex_normals(const Surface& surface) {
   return normals;
 }
 
-// ---------------------------------------------------------------- solves along the tree
+// ---------------------------------------------------------------- columns of the factor
 
-/// Solves L L' x = f for several right sides at once, each with forces on a few vertices, and the
-/// displacements of a few, reading only the columns of L between them and the root of the
-/// elimination tree: the parent of a vertex is the first one below it in its columns, and all that
-/// stand in its columns are ancestors (Davis, "Direct Methods for Sparse Linear Systems", chapters
-/// 3 and 4).
-class TreeSolver {
- public:
-  using Lanes = Eigen::Matrix<double, 3, WallCompliance::kGroup, Eigen::RowMajor>;
-  struct Force {
-    int place, lane;
-    Vec3 force;
-  };
-  TreeSolver(const SparseMatrix& L, const std::vector<Force>& forces)
-      : L_(L), slot_(static_cast<std::size_t>(L.cols()) / 3, -1) {
-    // L y = f: y is 0 off the paths from the vertices to the root, on which children come first.
-    for (const Force& f : forces) {
-      for (int p = f.place; p >= 0 && slot_[p] < 0; p = columns(p).parent()) {
-        slot_[p] = 0;
-        path_.push_back(p);
-      }
-    }
-    std::sort(path_.begin(), path_.end());
-    x_.reserve(slot_.size() / 4);  // seldom more: growing would double it
-    for (const int p : path_) add_slot(p);
-    for (const Force& f : forces) x_[slot_[f.place]].col(f.lane) += f.force;
-    for (const int p : path_) {
-      const Columns c = columns(p);
-      Lanes& y = x_[slot_[p]];
-      c.diagonal.triangularView<Eigen::Lower>().solveInPlace(y);
-      for (int e = 0; e < c.size; e += 3) {
-        Lanes& x = x_[slot_[c.row[e] / 3]];
-        for (int d = 0; d < 3; ++d) {
-          for (int k = 0; k < 3; ++k) x.row(k) -= c.value[d][e + k] * y.row(d);
-        }
-      }
-    }
-  }
+/// The three columns of a vertex in L: its own block, then rows that they have in common. The first
+/// of these is its parent in the elimination tree, and all of them are ancestors (Davis, "Direct
+/// Methods for Sparse Linear Systems", chapters 3 and 4).
+struct Columns {
+  Mat3 diagonal;
+  int size;
+  const int* row;
+  std::array<const double*, 3> value;
 
-  const Lanes& displacement(int place) {
-    // L' x = y, downward from the first ancestor that is solved.
-    path_.clear();
-    for (int p = place; p >= 0 && !is_solved(p); p = columns(p).parent()) path_.push_back(p);
-    for (auto it = path_.rbegin(); it != path_.rend(); ++it) {
-      if (slot_[*it] < 0) add_slot(*it);
-      const Columns c = columns(*it);
-      // Half of the lanes at a time: their sums then stay in registers.
-      constexpr int kHalf = WallCompliance::kGroup / 2;
-      for (int half = 0; half < WallCompliance::kGroup; half += kHalf) {
-        Eigen::Matrix<double, 3, kHalf, Eigen::RowMajor> sum =
-            x_[slot_[*it]].middleCols<kHalf>(half);
-        for (int e = 0; e < c.size; e += 3) {
-          const auto x = x_[slot_[c.row[e] / 3]].middleCols<kHalf>(half);
-          for (int d = 0; d < 3; ++d) {
-            for (int k = 0; k < 3; ++k) sum.row(d) -= c.value[d][e + k] * x.row(k);
-          }
-        }
-        x_[slot_[*it]].middleCols<kHalf>(half) = sum;
-      }
-      c.diagonal.triangularView<Eigen::Lower>().transpose().solveInPlace(x_[slot_[*it]]);
-      solved_[slot_[*it]] = 1;
-    }
-    return x_[slot_[place]];
-  }
-
- private:
-  /// The three columns of a vertex: its own block, then rows that they have in common.
-  struct Columns {
-    Mat3 diagonal;
-    int size;
-    const int* row;
-    std::array<const double*, 3> value;
-    int parent() const { return size > 0 ? row[0] / 3 : -1; }
-  };
-  Columns columns(int place) const {
-    const int* outer = L_.outerIndexPtr() + 3 * place;
-    const double* values = L_.valuePtr();
+  Columns(const SparseMatrix& L, int place) : diagonal(Mat3::Zero()) {
+    const int* outer = L.outerIndexPtr() + 3 * place;
+    const double* values = L.valuePtr();
     const double *u = values + outer[0], *v = values + outer[1], *w = values + outer[2];
-    Columns c{.diagonal = Mat3::Zero(),
-              .size = outer[3] - outer[2] - 1,
-              .row = L_.innerIndexPtr() + outer[2] + 1,
-              .value = {u + 3, v + 2, w + 1}};
-    c.diagonal << u[0], 0.0, 0.0, u[1], v[0], 0.0, u[2], v[1], w[0];
-    return c;
+    diagonal << u[0], 0.0, 0.0, u[1], v[0], 0.0, u[2], v[1], w[0];
+    size = outer[3] - outer[2] - 1;
+    row = L.innerIndexPtr() + outer[2] + 1;
+    value = {u + 3, v + 2, w + 1};
   }
-  bool is_solved(int place) const { return slot_[place] >= 0 && solved_[slot_[place]] != 0; }
-  void add_slot(int place) {
-    slot_[place] = static_cast<int>(x_.size());
-    x_.push_back(Lanes::Zero());
-    solved_.push_back(0);
-  }
-
-  const SparseMatrix& L_;
-  std::vector<int> slot_;  // of each place in x_; -1: not read so far
-  std::vector<Lanes> x_;
-  std::vector<char> solved_;  // of each slot
-  std::vector<int> path_;
+  int parent() const { return size > 0 ? row[0] / 3 : -1; }
 };
 
 }  // namespace
@@ -320,7 +243,6 @@ WallCompliance::WallCompliance(const Surface& surface, const Wall& wall)
   const SparseMatrix stiffness = expand(blocks, place_);
   neighbour_start_ = std::move(blocks.start);
   neighbour_ = std::move(blocks.neighbour);
-  find_groups();
 
   // Factor, and see that the forces that move all vertices by 1 mm do so again.
   cholesky_.compute(stiffness);
@@ -338,55 +260,22 @@ WallCompliance::WallCompliance(const Surface& surface, const Wall& wall)
 }
 
 WallCompliance::~WallCompliance() {
-  for (const std::atomic<const Response*>& response : responses_) delete response.load();
+  for (const std::atomic<const HalfResponse*>& response : responses_) delete response.load();
 }
 
-void WallCompliance::find_groups() {
-  group_of_.assign(place_.size(), -1);
-  group_start_ = {0};
-  for (int a = 0; a < static_cast<int>(place_.size()); ++a) {
-    if (place_[a] < 0 || group_of_[a] >= 0) continue;
-    // Breadth first over vertices that have no group yet.
-    const int number = static_cast<int>(group_start_.size()) - 1;
-    const std::size_t start = group_.size();
-    group_.push_back(a);
-    group_of_[a] = number;
-    for (std::size_t at = start; at < group_.size(); ++at) {
-      for (int e = neighbour_start_[group_[at]]; e < neighbour_start_[group_[at] + 1]; ++e) {
-        const int b = neighbour_[e];
-        if (group_of_[b] >= 0 || group_.size() == start + kGroup) continue;
-        group_.push_back(b);
-        group_of_[b] = number;
-      }
-    }
-    group_start_.push_back(static_cast<int>(group_.size()));
-  }
-}
-
-const WallCompliance::Response& WallCompliance::response(int vertex) const {
+const WallCompliance::HalfResponse& WallCompliance::response(int vertex) const {
   expects(vertex >= 0 && vertex < normals_.cols() && place_[vertex] >= 0);
-  const Response* kept = responses_[vertex].load(std::memory_order_acquire);
-  return kept != nullptr ? *kept : find_group(vertex);
-}
+  std::atomic<const HalfResponse*>& kept = responses_[vertex];
+  if (const HalfResponse* known = kept.load(std::memory_order_acquire)) return *known;
 
-const WallCompliance::Response& WallCompliance::find_group(int vertex) const {
-  // Two threads may find the same group; both find the same responses, and one of each is kept.
-  const int* first = group_.data() + group_start_[group_of_[vertex]];
-  const int* last = group_.data() + group_start_[group_of_[vertex] + 1];
-  std::vector<Response> found = find_responses({first, last});
-  for (const int* member = first; member != last; ++member) {
-    auto response = std::make_unique<const Response>(std::move(found[member - first]));
-    const Response* none = nullptr;
-    if (!responses_[*member].compare_exchange_strong(none, response.get(),
-                                                     std::memory_order_acq_rel)) {
-      continue;
-    }
-    ++response_count_;
-    response_bytes_ +=
-        sizeof(Response) + response->vertices.size() * (sizeof(int) + sizeof(double));
-    (void)response.release();
-  }
-  return *responses_[vertex].load(std::memory_order_acquire);
+  // Two threads may find the same one, each to the same bit; the first is kept.
+  auto found = std::make_unique<const HalfResponse>(find_response(vertex));
+  const HalfResponse* known = nullptr;
+  if (!kept.compare_exchange_strong(known, found.get(), std::memory_order_acq_rel)) return *known;
+  ++response_count_;
+  response_bytes_ +=
+      sizeof(HalfResponse) + found->places.size() * (sizeof(int) + 3 * sizeof(double));
+  return *found.release();
 }
 
 template <class Visit>
@@ -404,76 +293,68 @@ std::vector<WallCompliance::Part> WallCompliance::spread(int vertex) const {
   return parts;
 }
 
-std::vector<WallCompliance::Response> WallCompliance::find_responses(
-    const std::vector<int>& group) const {
-  using Lane = Eigen::Array<double, 1, kGroup>;
-  const int count = static_cast<int>(group.size());
-  std::vector<TreeSolver::Force> forces;
-  for (int lane = 0; lane < count; ++lane) {
-    for_each_part(group[lane], [&](int b, double part) {
-      forces.push_back({place_[b], lane, part * normals_.col(b)});
-    });
-  }
-  TreeSolver solver(cholesky_.matrixL().nestedExpression(), forces);
+WallCompliance::HalfResponse WallCompliance::find_response(int vertex) const {
+  // Far below what between() leaves out, so that what it keeps is good to rounding.
+  constexpr double kNegligible = 1e-5 * kKeptFraction;
+  const SparseMatrix& L = cholesky_.matrixL().nestedExpression();
 
-  // Normal motion of the vertices looked at so far, at their numbers.
-  std::vector<int> number(static_cast<std::size_t>(normals_.cols()), -1);
-  std::vector<Lane> normal;
-  const auto look_at = [&](int b) -> Lane {
-    const auto& displacement = solver.displacement(place_[b]);
-    if (number[b] < 0) {
-      number[b] = static_cast<int>(normal.size());
-      normal.push_back(normals_.col(b).transpose() * displacement);
+  // The places that the force is felt at: the paths from its vertices to the root.
+  std::vector<int> places, at(place_.size(), -1);
+  for_each_part(vertex, [&](int b, double) {
+    for (int p = place_[b]; p >= 0 && at[p] < 0; p = Columns(L, p).parent()) {
+      at[p] = 0;
+      places.push_back(p);
     }
-    return displacement.colwise().norm();
-  };
-  const auto motion_of_point = [&](int b) {
-    Lane displacement = Lane::Zero();
-    for_each_part(b, [&](int c, double part) { displacement += part * normal[number[c]]; });
-    return displacement;
-  };
+  });
+  std::sort(places.begin(), places.end());  // children first
+  for (std::size_t k = 0; k < places.size(); ++k) at[places[k]] = static_cast<int>(k);
+  Eigen::Matrix3Xd y = Eigen::Matrix3Xd::Zero(3, static_cast<Eigen::Index>(places.size()));
+  for_each_part(vertex, [&](int b, double part) { y.col(at[place_[b]]) = part * normals_.col(b); });
 
-  // Rings of neighbours, breadth first, until a whole ring hardly moves, in whatever direction:
-  // past a sharp edge of the surface a sideways motion is a normal one.
-  Lane least = Lane::Constant(std::numeric_limits<double>::infinity());
-  for (int lane = 0; lane < count; ++lane) {
-    for_each_part(group[lane], [&](int b, double) { look_at(b); });
-    least[lane] = kKeptFraction * motion_of_point(group[lane])[lane];
-  }
-  std::vector<char> seen(static_cast<std::size_t>(normals_.cols()), 0);
-  for (const int a : group) seen[a] = 1;
-  std::vector<int> ring = group, next, inner;
-  for (bool moves = true; moves && !ring.empty(); std::swap(ring, next)) {
-    next.clear();
-    moves = false;
-    inner.insert(inner.end(), ring.begin(), ring.end());
-    for (const int a : ring) {
-      for (int e = neighbour_start_[a]; e < neighbour_start_[a + 1]; ++e) {
-        const int b = neighbour_[e];
-        if (seen[b] != 0) continue;
-        seen[b] = 1;
-        moves = (look_at(b) >= least).any() || moves;
-        next.push_back(b);
-      }
+  // L y = f, up to the last that is not negligible.
+  double largest = 0.0;
+  Eigen::Index count = 0;
+  for (Eigen::Index k = 0; k < y.cols(); ++k) {
+    const Columns c(L, places[static_cast<std::size_t>(k)]);
+    Vec3 here = y.col(k);
+    c.diagonal.triangularView<Eigen::Lower>().solveInPlace(here);
+    y.col(k) = here;
+    const double size = here.norm();
+    if (size <= kNegligible * largest) continue;
+    largest = std::max(largest, size);
+    count = k + 1;
+    for (int e = 0; e < c.size; e += 3) {
+      auto above = y.col(at[c.row[e] / 3]);
+      for (int d = 0; d < 3; ++d) above -= here[d] * Eigen::Map<const Vec3>(c.value[d] + e);
     }
   }
+  const int above = static_cast<int>(y.cols() - count);
+  places.resize(static_cast<std::size_t>(count));
+  places.shrink_to_fit();
+  y.conservativeResize(Eigen::NoChange, count);
+  const double compliance = y.squaredNorm();
+  return {std::move(places), std::move(y), at[place_[vertex]], above, compliance};
+}
 
-  // What a point at each of them moves by, in ascending order.
-  std::sort(inner.begin(), inner.end());
-  std::vector<Response> responses(group.size());
-  for (const int b : inner) {
-    const Lane displacement = motion_of_point(b);
-    for (int lane = 0; lane < count; ++lane) {
-      if (std::abs(displacement[lane]) < least[lane]) continue;
-      responses[lane].vertices.push_back(b);
-      responses[lane].displacement.push_back(displacement[lane]);
-    }
+double WallCompliance::between(const HalfResponse& a, const HalfResponse& b) {
+  if (a.above < b.above) return between(b, a);
+  // An edge of the surface joins a vertex with an ancestor or a descendant. So the places from the
+  // vertex's own on are a path toward the root, and those before it lie below it. Two paths that
+  // meet are one from there on, as far as both are kept.
+  int i = static_cast<int>(a.places.size()) - 1;
+  int j = static_cast<int>(b.places.size()) - 1 - (a.above - b.above);
+  j = std::max(j, b.own - 1);
+  double sum = 0.0;
+  while (i >= 0 && j >= 0) {
+    const int from = i;
+    while (i >= 0 && j >= 0 && a.places[i] == b.places[j]) --i, --j;
+    sum += a.values.middleCols(i + 1, from - i)
+               .cwiseProduct(b.values.middleCols(j + 1, from - i))
+               .sum();
+    if (i < 0 || j < 0 || (i >= a.own && j >= b.own)) break;
+    --(a.places[i] > b.places[j] ? i : j);
   }
-  for (Response& response : responses) {
-    response.vertices.shrink_to_fit();
-    response.displacement.shrink_to_fit();
-  }
-  return responses;
+  return std::abs(sum) < kKeptFraction * std::min(a.compliance, b.compliance) ? 0.0 : sum;
 }
 
 Eigen::Matrix3Xd WallCompliance::displacements(const Eigen::Matrix3Xd& forces) const {
@@ -493,9 +374,7 @@ Eigen::Matrix3Xd WallCompliance::displacements(const Eigen::Matrix3Xd& forces) c
 std::size_t WallCompliance::memory_bytes() const {
   const SparseMatrix& L = cholesky_.matrixL().nestedExpression();
   return static_cast<std::size_t>(L.nonZeros()) * (sizeof(double) + sizeof(int)) +
-         (neighbour_start_.size() + neighbour_.size() + place_.size() + group_of_.size() +
-          group_start_.size() + group_.size()) *
-             sizeof(int) +
+         (neighbour_start_.size() + neighbour_.size() + place_.size()) * sizeof(int) +
          static_cast<std::size_t>(normals_.size()) * sizeof(double) +
          responses_.size() * sizeof(responses_[0]) + response_bytes_;
 }

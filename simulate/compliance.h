@@ -18,16 +18,13 @@ namespace wireplan::simulate {
 /// modulus or Poisson ratio are out of range.
 Eigen::SparseMatrix<double> wall_stiffness(const Surface& surface, const Wall& wall);
 
-/// The wall's stiffness, factored once per patient; responses to unit forces are found when first
+/// The wall's stiffness, factored once per patient; what unit forces do to it is found when first
 /// asked for and kept. Shared by all trials and threads: every answer is the same whoever asks
 /// first, and reading takes no lock.
 class WallCompliance {
  public:
-  /// What a response leaves out, as part of the displacement under the force.
+  /// Displacements below this part of those under the forces themselves count as none.
   static constexpr double kKeptFraction = 1e-8;
-  /// Responses found together, of vertices that lie together: each entry of the factor is read once
-  /// for all of them, and a wire that presses one soon presses the others.
-  static constexpr int kGroup = 8;
 
   /// Throws Error as `wall_stiffness` does, and where the factorisation does not solve it.
   WallCompliance(const Surface& surface, const Wall& wall);
@@ -45,16 +42,25 @@ class WallCompliance {
   };
   std::vector<Part> spread(int vertex) const;
 
-  /// Normal displacement of points at the vertices near `vertex`, outward, under a unit outward
-  /// normal force on a point there: c_b = sum over spread(b) and spread(vertex) of n . (K^-1 n), n
-  /// the vertices' normals [mm/N]. Vertices in ascending order; `vertex` itself is one of them.
-  /// Those left out move by less than kKeptFraction of c_a.
-  struct Response {
-    std::vector<int> vertices;
-    std::vector<double> displacement;
+  /// y = L^-1 f of a unit outward normal force on a point at a vertex, K = L L': half of the way to
+  /// the displacements, and all that their scalar products need. It is 0 but at ancestors of the
+  /// force's vertices in the elimination tree, and next to nothing at those far away, which are
+  /// left out.
+  struct HalfResponse {
+    std::vector<int> places;  // in the order of elimination, ascending
+    Eigen::Matrix3Xd values;  // (3, places)                                          [sqrt(mm/N)]
+    int own;                  // which of the places is the vertex's
+    int above;                // ancestors of the last place
+    double compliance;        // c_a, displacement under the force                         [mm/N]
   };
   /// Expects a vertex with a triangle. The reference stays good as long as this object.
-  const Response& response(int vertex) const;
+  const HalfResponse& response(int vertex) const;
+
+  /// Normal displacement of a point at a vertex, outward, under a unit outward normal force on a
+  /// point at another: c_ab = sum over spread(a) and spread(b) of n . (K^-1 n), n the vertices'
+  /// normals, = y_a . y_b [mm/N]. The same to the bit from a to b and back. 0 where it is less than
+  /// kKeptFraction of both c_a and c_b.
+  static double between(const HalfResponse& a, const HalfResponse& b);
 
   /// Displacements (3, v) under forces (3, v) on the vertices, by the factorisation alone [mm, N].
   /// Vertices without a triangle stay, whatever their force.
@@ -64,7 +70,7 @@ class WallCompliance {
   const Eigen::Matrix3Xd& normals() const { return normals_; }
 
   std::size_t response_count() const { return response_count_; }  // found so far
-  /// Of the factor and of the responses kept so far.
+  /// Of the factor and of the responses found so far.
   std::size_t memory_bytes() const;
 
  private:
@@ -72,16 +78,12 @@ class WallCompliance {
       Eigen::SimplicialLLT<Eigen::SparseMatrix<double>, Eigen::Lower, Eigen::NaturalOrdering<int>>;
   template <class Visit>
   void for_each_part(int vertex, Visit&& visit) const;  // of its spread
-  void find_groups();
-  const Response& find_group(int vertex) const;
-  std::vector<Response> find_responses(const std::vector<int>& group) const;
+  HalfResponse find_response(int vertex) const;
   Eigen::Matrix3Xd normals_;
   std::vector<int> neighbour_start_, neighbour_;  // vertices joined to each by an edge, and itself
   std::vector<int> place_;                        // of each vertex in the factor; -1: no triangle
-  std::vector<int> group_of_;                     // each vertex's group
-  std::vector<int> group_start_, group_;          // the vertices of each
   Cholesky cholesky_;
-  mutable std::vector<std::atomic<const Response*>> responses_;  // owned; null: not found yet
+  mutable std::vector<std::atomic<const HalfResponse*>> responses_;  // owned; null: not found yet
   mutable std::atomic<std::size_t> response_count_ = 0, response_bytes_ = 0;
 };
 

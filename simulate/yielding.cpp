@@ -27,18 +27,14 @@ int Yielding::slot_of(const WallCompliance& wall, int vertex) {
   const auto known = find_slot(vertex);
   if (known != slots_.end() && known->first == vertex) return known->second;
   const int slot = static_cast<int>(slots_.size());
-  const WallCompliance::Response& response = wall.response(vertex);
+  const WallCompliance::HalfResponse& response = wall.response(vertex);
   double* row = table_.data() + static_cast<std::size_t>(slot) * table_side_;
-  auto from = response.vertices.begin();
   slots_.insert(known, {vertex, slot});
-  for (const auto& [other, place] : slots_) {  // ascending, as the response is
-    from = std::lower_bound(from, response.vertices.end(), other);
-    const bool found = from != response.vertices.end() && *from == other;
-    const double c =
-        found ? response.displacement[static_cast<std::size_t>(from - response.vertices.begin())]
-              : 0.0;
-    row[place] = c;
-    table_[static_cast<std::size_t>(place) * table_side_ + static_cast<std::size_t>(slot)] = c;
+  responses_.push_back(&response);
+  for (int place = 0; place <= slot; ++place) {
+    row[place] = WallCompliance::between(response, *responses_[static_cast<std::size_t>(place)]);
+    table_[static_cast<std::size_t>(place) * table_side_ + static_cast<std::size_t>(slot)] =
+        row[place];
   }
   return slot;
 }
@@ -60,6 +56,7 @@ void Yielding::set_feet(const WallCompliance& wall, const std::vector<SurfacePoi
     });
     if (slots_.size() + static_cast<std::size_t>(added) > table_side_) {
       slots_.clear();
+      responses_.clear();
       table_side_ = std::max({table_side_, kSmallestTable, 2 * vertices_.size()});
       table_.resize(table_side_ * table_side_);
     }

@@ -63,7 +63,7 @@ class Yielding {
   };
   /// The first slot of this vertex or one after it.
   std::vector<std::pair<int, int>>::const_iterator find_slot(int vertex) const;
-  /// Place of a vertex in the table of responses, which it enters if it is new.
+  /// Place of a vertex in the table of compliances, which it enters if it is new.
   int slot_of(const WallCompliance& wall, int vertex);
   void multiply_by_compliance(const Eigen::VectorXd& f, Eigen::VectorXd& w) const;
   /// Of I + D^1/2 C D^1/2, D the law's stiffness. Points with none have rows and columns of the
@@ -71,11 +71,12 @@ class Yielding {
   void factor();
   void solve_factored(Eigen::VectorXd& v);
 
-  /// Responses between the vertices that feet stood on lately; vertices in ascending order.
+  /// Compliances between the vertices that feet stood on lately; vertices in ascending order.
   static constexpr std::size_t kSmallestTable = 300;
   std::size_t table_side_ = 0;
-  std::vector<std::pair<int, int>> slots_;  // vertex, its row in the table
-  std::vector<double> table_;               // table_side_ squared                        [mm/N]
+  std::vector<std::pair<int, int>> slots_;                      // vertex, its row in the table
+  std::vector<const WallCompliance::HalfResponse*> responses_;  // of each row
+  std::vector<double> table_;  // table_side_ squared                        [mm/N]
   std::vector<std::array<int, 3>> foot_slots_;
   std::vector<int> vertices_;  // of the feet; scratch
 
