@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
+#include <numeric>
 
 namespace wireplan::simulate {
 
@@ -26,41 +28,58 @@ std::vector<std::pair<int, int>>::const_iterator Yielding::find_slot(int vertex)
 int Yielding::slot_of(const WallCompliance& wall, int vertex) {
   const auto known = find_slot(vertex);
   if (known != slots_.end() && known->first == vertex) return known->second;
-  const int slot = static_cast<int>(slots_.size());
-  const WallCompliance::HalfResponse& response = wall.response(vertex);
-  double* row = table_.data() + static_cast<std::size_t>(slot) * table_side_;
+  const int slot = free_slots_.back();
+  free_slots_.pop_back();
   slots_.insert(known, {vertex, slot});
-  responses_.push_back(&response);
-  for (int place = 0; place <= slot; ++place) {
-    row[place] = WallCompliance::between(response, *responses_[static_cast<std::size_t>(place)]);
-    table_[static_cast<std::size_t>(place) * table_side_ + static_cast<std::size_t>(slot)] =
-        row[place];
+  responses_[static_cast<std::size_t>(slot)] = &wall.response(vertex);
+  for (int other = 0; other < static_cast<int>(table_side_); ++other) {
+    entry(slot, other) = entry(other, slot) = std::numeric_limits<double>::quiet_NaN();
   }
   return slot;
 }
 
-void Yielding::set_feet(const WallCompliance& wall, const std::vector<SurfacePoint>& feet) {
-  const std::size_t m = feet.size();
-  // The feet's vertices in the table; when it is full, it starts anew with these.
-  if (slots_.size() + 3 * m > table_side_) {
-    vertices_.clear();
-    for (const SurfacePoint& foot : feet) {
-      if (foot.triangle >= 0)
-        vertices_.insert(vertices_.end(), foot.vertex.begin(), foot.vertex.end());
-    }
-    std::sort(vertices_.begin(), vertices_.end());
-    vertices_.erase(std::unique(vertices_.begin(), vertices_.end()), vertices_.end());
-    const auto added = std::count_if(vertices_.begin(), vertices_.end(), [&](int vertex) {
-      const auto known = find_slot(vertex);
-      return known == slots_.end() || known->first != vertex;
-    });
-    if (slots_.size() + static_cast<std::size_t>(added) > table_side_) {
-      slots_.clear();
-      responses_.clear();
-      table_side_ = std::max({table_side_, kSmallestTable, 2 * vertices_.size()});
-      table_.resize(table_side_ * table_side_);
-    }
+double Yielding::between(int a, int b) {
+  double& known = entry(a, b);
+  if (std::isnan(known)) {
+    known = entry(b, a) = WallCompliance::between(*responses_[static_cast<std::size_t>(a)],
+                                                  *responses_[static_cast<std::size_t>(b)]);
   }
+  return known;
+}
+
+void Yielding::make_room(const std::vector<SurfacePoint>& feet) {
+  if (free_slots_.size() >= 3 * feet.size()) return;
+  vertices_.clear();
+  for (const SurfacePoint& foot : feet) {
+    if (foot.triangle >= 0)
+      vertices_.insert(vertices_.end(), foot.vertex.begin(), foot.vertex.end());
+  }
+  std::sort(vertices_.begin(), vertices_.end());
+  vertices_.erase(std::unique(vertices_.begin(), vertices_.end()), vertices_.end());
+  if (vertices_.size() >= table_side_) {
+    table_side_ = std::max(kSmallestTable, 2 * vertices_.size());
+    table_.resize(table_side_ * table_side_);
+    responses_.resize(table_side_);
+    slots_.clear();
+    free_slots_.resize(table_side_);
+    std::iota(free_slots_.begin(), free_slots_.end(), 0);
+    return;
+  }
+  const auto added = std::count_if(vertices_.begin(), vertices_.end(), [&](int vertex) {
+    const auto known = find_slot(vertex);
+    return known == slots_.end() || known->first != vertex;
+  });
+  if (static_cast<std::size_t>(added) <= free_slots_.size()) return;
+  std::erase_if(slots_, [&](const std::pair<int, int>& slot) {
+    if (std::binary_search(vertices_.begin(), vertices_.end(), slot.first)) return false;
+    free_slots_.push_back(slot.second);
+    return true;
+  });
+}
+
+void Yielding::set_feet(const WallCompliance& wall, const std::vector<SurfacePoint>& feet) {
+  make_room(feet);
+  const std::size_t m = feet.size();
   foot_slots_.resize(m);
   for (std::size_t i = 0; i < m; ++i) {
     for (std::size_t a = 0; a < 3; ++a) {
@@ -70,14 +89,13 @@ void Yielding::set_feet(const WallCompliance& wall, const std::vector<SurfacePoi
 
   // Rows of C, each from the first foot that moves under a force at its own.
   const auto compliance_between = [&](std::size_t i, std::size_t j) {
+    if (feet[i].triangle < 0 || feet[j].triangle < 0) return 0.0;
     double sum = 0.0;
-    for (int a = 0; a < 3; ++a) {
-      const double* row =
-          table_.data() +
-          static_cast<std::size_t>(foot_slots_[i][static_cast<std::size_t>(a)]) * table_side_;
-      sum += feet[i].weight[a] * (feet[j].weight[0] * row[foot_slots_[j][0]] +
-                                  feet[j].weight[1] * row[foot_slots_[j][1]] +
-                                  feet[j].weight[2] * row[foot_slots_[j][2]]);
+    for (std::size_t a = 0; a < 3; ++a) {
+      for (std::size_t b = 0; b < 3; ++b) {
+        sum += feet[i].weight[static_cast<int>(a)] * feet[j].weight[static_cast<int>(b)] *
+               between(foot_slots_[i][a], foot_slots_[j][b]);
+      }
     }
     return sum;
   };
@@ -99,10 +117,9 @@ void Yielding::find_slopes(const std::vector<SurfacePoint>& feet, const std::vec
          ++j) {
       Mat3 response;  // between the vertices of either foot
       for (std::size_t a = 0; a < 3; ++a) {
-        const double* row =
-            table_.data() + static_cast<std::size_t>(foot_slots_[i][a]) * table_side_;
         for (std::size_t b = 0; b < 3; ++b) {
-          response(static_cast<int>(a), static_cast<int>(b)) = row[foot_slots_[j][b]];
+          response(static_cast<int>(a), static_cast<int>(b)) =
+              entry(foot_slots_[i][a], foot_slots_[j][b]);
         }
       }
       slope[j].col(0) = slopes[i].transpose() * (response * feet[j].weight);
@@ -126,12 +143,10 @@ void Yielding::add_change_of_compliance(const Eigen::Matrix3Xd& motion, const Ei
 void Yielding::multiply_by_compliance(const Eigen::VectorXd& f, Eigen::VectorXd& w) const {
   w.setZero(size());
   for (int i = 0; i < size(); ++i) {
-    const double* row = compliance_.row(i);
-    for (int j = first_coupled(i); j < i; ++j) {
-      w[i] += row[j] * f[j];
-      w[j] += row[j] * f[i];
-    }
-    w[i] += row[i] * f[i];
+    const int first = first_coupled(i), before = i - first;
+    const Eigen::Map<const Eigen::VectorXd> row(compliance_.row(i) + first, before);
+    w[i] += row.dot(f.segment(first, before)) + compliance_.row(i)[i] * f[i];
+    w.segment(first, before) += row * f[i];
   }
 }
 

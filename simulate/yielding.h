@@ -63,18 +63,27 @@ class Yielding {
   };
   /// The first slot of this vertex or one after it.
   std::vector<std::pair<int, int>>::const_iterator find_slot(int vertex) const;
-  /// Place of a vertex in the table of compliances, which it enters if it is new.
+  /// Sees to rows in the table for the vertices of the feet: where too few are free, only they keep
+  /// theirs.
+  void make_room(const std::vector<SurfacePoint>& feet);
+  /// Row of a vertex in the table, which it enters if it is new.
   int slot_of(const WallCompliance& wall, int vertex);
+  /// Compliance between the vertices of two rows, which the table keeps.
+  double between(int a, int b);
+  double& entry(int a, int b) {
+    return table_[static_cast<std::size_t>(a) * table_side_ + static_cast<std::size_t>(b)];
+  }
   void multiply_by_compliance(const Eigen::VectorXd& f, Eigen::VectorXd& w) const;
   /// Of I + D^1/2 C D^1/2, D the law's stiffness. Points with none have rows and columns of the
   /// identity, which are left out.
   void factor();
   void solve_factored(Eigen::VectorXd& v);
 
-  /// Compliances between the vertices that feet stood on lately; vertices in ascending order.
+  /// Compliances between the vertices that feet stood on lately, NaN where not asked for yet.
   static constexpr std::size_t kSmallestTable = 300;
   std::size_t table_side_ = 0;
-  std::vector<std::pair<int, int>> slots_;                      // vertex, its row in the table
+  std::vector<std::pair<int, int>> slots_;  // vertex, its row in the table; vertices ascending
+  std::vector<int> free_slots_;
   std::vector<const WallCompliance::HalfResponse*> responses_;  // of each row
   std::vector<double> table_;  // table_side_ squared                        [mm/N]
   std::vector<std::array<int, 3>> foot_slots_;
