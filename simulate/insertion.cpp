@@ -247,7 +247,11 @@ void Insertion::turn_with_the_hub(RodState& state) const {
 /// equilibrium.
 NewtonResult Insertion::settle_guess(double distance) {
   if (rod_.twisted) {
-    transport_frames(state_, guess_, 0, rod_.nodes() - 2);
+    // Edges that stay in the introducer keep their directions, and with them their frames.
+    const int kept = distance >= 0.0 ? std::max(0, problem_.first - 1) : 0;
+    guess_.director.leftCols(kept) = state_.director.leftCols(kept);
+    guess_.reference_twist.head(kept) = state_.reference_twist.head(kept);
+    transport_frames(state_, guess_, kept, rod_.nodes() - 2);
     turn_with_the_hub(guess_);
   }
   std::swap(state_, guess_);
