@@ -18,8 +18,8 @@ bool needs_search(const Study& study, bool exhaustive);
 /// the trial cuts them anyway, and to half the goal's radius, which they would step over; contact
 /// points twice as far apart; residuals up to 1e-4 N.
 ///
-/// The vessel's wall is to be rigid: the responses of a wall that yields cost more than the trials
-/// of a study (measured: DESIGN.md), and those where no good plan goes are then never needed.
+/// The vessel's wall is to be rigid: one that yields costs several times as much (DESIGN.md), and
+/// its compliance where no good plan goes is then never needed.
 Study scout_study(const Study& study);
 
 /// A candidate at the scout's or the probe's level. One whose tip has not come further along the
