@@ -294,8 +294,9 @@ std::vector<WallCompliance::Part> WallCompliance::spread(int vertex) const {
 }
 
 WallCompliance::HalfResponse WallCompliance::find_response(int vertex) const {
-  // Far below what between() leaves out, so that what it keeps is good to rounding.
-  constexpr double kNegligible = 1e-5 * kKeptFraction;
+  // Motion fades with distance: where two vertices feel each other by kKeptFraction or more, what
+  // one of them neglects counts kNegligible^2 / kKeptFraction at most, which is below rounding.
+  constexpr double kNegligible = 1e-3 * kKeptFraction;
   const SparseMatrix& L = cholesky_.matrixL().nestedExpression();
 
   // The places that the force is felt at: the paths from its vertices to the root.

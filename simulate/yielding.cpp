@@ -91,11 +91,11 @@ void Yielding::set_feet(const WallCompliance& wall, const std::vector<SurfacePoi
   const auto compliance_between = [&](std::size_t i, std::size_t j) {
     if (feet[i].triangle < 0 || feet[j].triangle < 0) return 0.0;
     double sum = 0.0;
-    for (std::size_t a = 0; a < 3; ++a) {
-      for (std::size_t b = 0; b < 3; ++b) {
-        sum += feet[i].weight[static_cast<int>(a)] * feet[j].weight[static_cast<int>(b)] *
-               between(foot_slots_[i][a], foot_slots_[j][b]);
-      }
+    for (int a = 0; a < 3; ++a) {
+      const int row = foot_slots_[i][static_cast<std::size_t>(a)];
+      sum += feet[i].weight[a] * (feet[j].weight[0] * between(row, foot_slots_[j][0]) +
+                                  feet[j].weight[1] * between(row, foot_slots_[j][1]) +
+                                  feet[j].weight[2] * between(row, foot_slots_[j][2]));
     }
     return sum;
   };
