@@ -154,6 +154,7 @@ void Yielding::factor() {
   stiff_.clear();
   place_.clear();
   factor_.clear();
+  reciprocal_.clear();
   for (int i = 0; i < size(); ++i) {
     place_.push_back(root_[i] > 0.0 ? factor_.size() : -1);
     if (root_[i] == 0.0) continue;
@@ -169,8 +170,9 @@ void Yielding::factor() {
       const double* above = factor_.row(q);
       double sum = root_[i] * c[j] * root_[j];
       for (int k = std::max(first, factor_.first(q)); k < q; ++k) sum -= row[k] * above[k];
-      row[q] = q < p ? sum / above[q] : std::sqrt(1.0 + sum);
+      row[q] = q < p ? sum * reciprocal_[static_cast<std::size_t>(q)] : std::sqrt(1.0 + sum);
     }
+    reciprocal_.push_back(1.0 / row[p]);
   }
 }
 
@@ -182,11 +184,11 @@ void Yielding::solve_factored(Eigen::VectorXd& v) {
     const double* row = factor_.row(p);
     x[p] = v[stiff_[static_cast<std::size_t>(p)]];
     for (int q = factor_.first(p); q < p; ++q) x[p] -= row[q] * x[q];
-    x[p] /= row[p];
+    x[p] *= reciprocal_[static_cast<std::size_t>(p)];
   }
   for (int p = count - 1; p >= 0; --p) {
     const double* row = factor_.row(p);
-    x[p] /= row[p];
+    x[p] *= reciprocal_[static_cast<std::size_t>(p)];
     for (int q = factor_.first(p); q < p; ++q) x[q] -= row[q] * x[p];
     v[stiff_[static_cast<std::size_t>(p)]] = x[p];
   }

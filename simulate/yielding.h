@@ -91,6 +91,7 @@ class Yielding {
 
   Envelope compliance_, factor_, inverse_;  // of all points; of those with a stiff law
   std::vector<int> stiff_, place_;          // those, in order; the place of each point there, or -1
+  std::vector<double> reciprocal_;          // of the factor's diagonal
   std::vector<int> last_coupled_;           // of the factor: last row with an entry in each column
   std::vector<Eigen::Matrix<double, 3, 2>> slope_;  // of each entry of C, over either motion
   Eigen::VectorXd root_;                            // D^1/2
