@@ -281,8 +281,7 @@ BenchReport bench_preprocess(const BenchOptions& options) {
   run("centerline", [&] { preprocess::find_centerline(surface, kAccess, kTarget); });
   run("wall", [&] { wall = preprocess::extrude_wall(surface, {}); });
   run("distance field and factored wall", [&] {
-    const simulate::VesselModel model(surface, wall.wall,
-                                      simulate::follow(surface, simulate::find_openings(surface)));
+    const simulate::VesselModel model(surface, wall.wall, simulate::follow(surface));
     expects(model.compliance != nullptr);
   });
   report.rows.push_back({{"step", "total"},

@@ -111,8 +111,7 @@ Batch make_batch(const std::string& surface, const Vessel& vessel, const std::st
 struct Model {
   Model(const Vessel& vessel, const std::string& wall) {
     const double start = thread_milliseconds();
-    const simulate::LumenOptions options =
-        simulate::follow(vessel.surface, simulate::find_openings(vessel.surface));
+    const simulate::LumenOptions options = simulate::follow(vessel.surface);
     vessel_model = wall == "elastic"
                        ? std::make_unique<VesselModel>(vessel.surface, vessel.wall, options)
                        : std::make_unique<VesselModel>(vessel.surface, options);

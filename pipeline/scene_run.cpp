@@ -21,8 +21,7 @@ namespace fs = std::filesystem;
 /// A scene's vessel, read, checked and ready for a wire.
 struct LoadedVessel {
   Surface surface;
-  Wall wall;  // of a rigid vessel too: forces are shown on it
-  std::vector<simulate::Opening> openings;
+  Wall wall;                        // of a rigid vessel too: forces are shown on it
   std::vector<std::string> mended;  // of the file, in sentences
   std::unique_ptr<const simulate::VesselModel> model;
 };
@@ -35,8 +34,7 @@ LoadedVessel load_vessel(const SceneVessel& given) {
   vessel.mended = preprocess::tell_mends(repaired.mends);
   preprocess::require_sound(preprocess::check_surface(vessel.surface), file.path.string());
   vessel.wall = preprocess::extrude_wall(vessel.surface, given.wall.extrusion).wall;
-  vessel.openings = simulate::find_openings(vessel.surface);
-  const simulate::LumenOptions options = simulate::follow(vessel.surface, vessel.openings);
+  const simulate::LumenOptions options = simulate::follow(vessel.surface);
   vessel.model = given.wall.elastic
                      ? std::make_unique<simulate::VesselModel>(vessel.surface, vessel.wall, options)
                      : std::make_unique<simulate::VesselModel>(vessel.surface, options);
@@ -62,7 +60,7 @@ Json vessel_json(const SceneVessel& given, const LoadedVessel& vessel) {
   json["lumen_grid_mm"] = lumen.grid_spacing();
   json["lumen_max_deviation_mm"] = lumen.max_deviation();
   json["lumen_mean_deviation_mm"] = lumen.mean_deviation();
-  json["openings"] = openings_json(vessel.openings);
+  json["openings"] = openings_json(lumen.openings());
   return json;
 }
 

@@ -546,8 +546,7 @@ void Workspace::share_field() {
 const simulate::VesselModel& Workspace::rigid_model() {
   if (!model_ && !find_field()) {
     // The field as a yielding wall needs it, since the wall may come later.
-    simulate::LumenOptions options =
-        simulate::follow(surface(), simulate::find_openings(surface()));
+    simulate::LumenOptions options = simulate::follow(surface());
     if (given_.wall.elastic) options.band = simulate::VesselModel::yielding_band(options);
     model_ = std::make_unique<simulate::VesselModel>(surface(), options);
   }

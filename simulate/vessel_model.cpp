@@ -20,7 +20,7 @@ VesselModel make_yielding(const Surface& surface, const Wall& wall, LumenOptions
 
 }  // namespace
 
-LumenOptions follow(const Surface& surface, std::vector<Opening> openings) {
+LumenOptions follow(const Surface& surface) {
   constexpr double kCoarsest = 0.5, kFinest = 0.1;  // [mm]
   double area = 0.0;
   for (Eigen::Index t = 0; t < surface.triangles.cols(); ++t) {
@@ -33,7 +33,7 @@ LumenOptions follow(const Surface& surface, std::vector<Opening> openings) {
   const double edge =
       std::sqrt(4.0 / std::sqrt(3.0) * area / static_cast<double>(surface.triangles.cols()));
   return {.grid_spacing = std::clamp(2.0 / 3.0 * edge, kFinest, kCoarsest),
-          .openings = std::move(openings)};
+          .openings = find_openings(surface)};
 }
 
 double VesselModel::yielding_band(const LumenOptions& options) {

@@ -2,7 +2,6 @@
 /// The vessel as wires feel it: built once per patient, shared read-only by all trials.
 #include <memory>
 #include <utility>
-#include <vector>
 
 #include "preprocess/vessel.h"
 #include "simulate/compliance.h"
@@ -12,9 +11,9 @@
 namespace wireplan::simulate {
 
 /// Of a field that follows this surface: cells of half a millimetre, or of two thirds of a
-/// triangle's edge in the mean where that is less; not less than a tenth of a millimetre. The
-/// openings are those that find_openings() finds.
-LumenOptions follow(const Surface& surface, std::vector<Opening> openings);
+/// triangle's edge in the mean where that is less; not less than a tenth of a millimetre. Its
+/// openings are open.
+LumenOptions follow(const Surface& surface);
 
 struct VesselModel {
   /// A wall that yields is felt further out than one that does not: ten cells, if that is more.

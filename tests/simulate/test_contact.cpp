@@ -43,14 +43,14 @@ TEST(Follow, TakesCellsOfTwoThirdsOfAnEdge) {
   // A thin tube's triangles are small, so that the field follows them too.
   for (const double edge : {0.3, 0.6, 1.2}) {
     const Surface tube = shapes::straight_tube(2.0, 20.0, edge);
-    const LumenOptions options = follow(tube, find_openings(tube));
+    const LumenOptions options = follow(tube);
     EXPECT_NEAR(options.grid_spacing, std::min(0.5, 2.0 / 3.0 * edge), 0.08 * edge);
     EXPECT_EQ(options.openings.size(), 2u);
     EXPECT_EQ(VesselModel::yielding_band(options),
               std::max(options.band, 10.0 * options.grid_spacing));
   }
   const Surface tube = shapes::straight_tube(1.0, 10.0, 0.3);
-  const Lumen fine(tube, follow(tube, {})), coarse(tube);
+  const Lumen fine(tube, follow(tube)), coarse(tube, {.openings = find_openings(tube)});
   EXPECT_LT(fine.max_deviation(), 0.5 * coarse.max_deviation());
 }
 
