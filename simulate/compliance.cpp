@@ -263,7 +263,7 @@ WallCompliance::~WallCompliance() {
   for (const std::atomic<const HalfResponse*>& response : responses_) delete response.load();
 }
 
-const WallCompliance::HalfResponse& WallCompliance::response(int vertex) const {
+const WallCompliance::HalfResponse& WallCompliance::half_response(int vertex) const {
   expects(vertex >= 0 && vertex < normals_.cols() && place_[vertex] >= 0);
   std::atomic<const HalfResponse*>& kept = responses_[vertex];
   if (const HalfResponse* known = kept.load(std::memory_order_acquire)) return *known;

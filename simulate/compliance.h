@@ -54,7 +54,7 @@ class WallCompliance {
     double compliance;        // c_a, displacement under the force                         [mm/N]
   };
   /// Expects a vertex with a triangle. The reference stays good as long as this object.
-  const HalfResponse& response(int vertex) const;
+  const HalfResponse& half_response(int vertex) const;
 
   /// Normal displacement of a point at a vertex, outward, under a unit outward normal force on a
   /// point at another: c_ab = sum over spread(a) and spread(b) of n . (K^-1 n), n the vertices'

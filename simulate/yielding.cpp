@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <numeric>
+#include <utility>
 
 namespace wireplan::simulate {
 
@@ -19,71 +19,68 @@ void Yielding::Envelope::add_row(int first) {
   first_.push_back(first);
 }
 
-std::vector<std::pair<int, int>>::const_iterator Yielding::find_slot(int vertex) const {
-  return std::lower_bound(
-      slots_.begin(), slots_.end(), vertex,
-      [](const std::pair<int, int>& entry, int wanted) { return entry.first < wanted; });
+void Yielding::grow() {
+  const std::size_t side = std::max(kSmallestTable, 2 * table_side_);
+  std::vector<double> grown(side * side, std::numeric_limits<double>::quiet_NaN());
+  for (std::size_t row = 0; row < table_side_; ++row) {
+    std::copy_n(table_.begin() + static_cast<std::ptrdiff_t>(row * table_side_), table_side_,
+                grown.begin() + static_cast<std::ptrdiff_t>(row * side));
+  }
+  table_ = std::move(grown);
+  for (std::size_t row = side; row-- > table_side_;) free_rows_.push_back(static_cast<int>(row));
+  vertex_.resize(side, -1);
+  half_.resize(side);
+  table_side_ = side;
 }
 
-int Yielding::slot_of(const WallCompliance& wall, int vertex) {
-  const auto known = find_slot(vertex);
-  if (known != slots_.end() && known->first == vertex) return known->second;
-  const int slot = free_slots_.back();
-  free_slots_.pop_back();
-  slots_.insert(known, {vertex, slot});
-  responses_[static_cast<std::size_t>(slot)] = &wall.response(vertex);
-  for (int other = 0; other < static_cast<int>(table_side_); ++other) {
-    entry(slot, other) = entry(other, slot) = std::numeric_limits<double>::quiet_NaN();
+void Yielding::free_rows(const std::vector<SurfacePoint>& feet) {
+  needed_.assign(table_side_, 0);
+  for (const SurfacePoint& foot : feet) {
+    if (foot.triangle < 0) continue;
+    for (const int vertex : foot.vertex) {
+      const int row = row_[static_cast<std::size_t>(vertex)];
+      if (row >= 0) needed_[static_cast<std::size_t>(row)] = 1;
+    }
   }
-  return slot;
+  for (std::size_t row = 0; row < table_side_; ++row) {
+    if (needed_[row] != 0) continue;
+    row_[static_cast<std::size_t>(std::exchange(vertex_[row], -1))] = -1;
+    free_rows_.push_back(static_cast<int>(row));
+  }
+}
+
+int Yielding::row_of(const WallCompliance& wall, int vertex,
+                     const std::vector<SurfacePoint>& feet) {
+  int& row = row_[static_cast<std::size_t>(vertex)];
+  if (row >= 0) return row;
+  if (free_rows_.empty()) free_rows(feet);
+  if (free_rows_.empty()) grow();
+  row = free_rows_.back();
+  free_rows_.pop_back();
+  vertex_[static_cast<std::size_t>(row)] = vertex;
+  half_[static_cast<std::size_t>(row)] = &wall.half_response(vertex);
+  for (int other = 0; other < static_cast<int>(table_side_); ++other) {
+    entry(row, other) = entry(other, row) = std::numeric_limits<double>::quiet_NaN();
+  }
+  return row;
 }
 
 double Yielding::between(int a, int b) {
   double& known = entry(a, b);
   if (std::isnan(known)) {
-    known = entry(b, a) = WallCompliance::between(*responses_[static_cast<std::size_t>(a)],
-                                                  *responses_[static_cast<std::size_t>(b)]);
+    known = entry(b, a) = WallCompliance::between(*half_[static_cast<std::size_t>(a)],
+                                                  *half_[static_cast<std::size_t>(b)]);
   }
   return known;
 }
 
-void Yielding::make_room(const std::vector<SurfacePoint>& feet) {
-  if (free_slots_.size() >= 3 * feet.size()) return;
-  vertices_.clear();
-  for (const SurfacePoint& foot : feet) {
-    if (foot.triangle >= 0)
-      vertices_.insert(vertices_.end(), foot.vertex.begin(), foot.vertex.end());
-  }
-  std::sort(vertices_.begin(), vertices_.end());
-  vertices_.erase(std::unique(vertices_.begin(), vertices_.end()), vertices_.end());
-  if (vertices_.size() >= table_side_) {
-    table_side_ = std::max(kSmallestTable, 2 * vertices_.size());
-    table_.resize(table_side_ * table_side_);
-    responses_.resize(table_side_);
-    slots_.clear();
-    free_slots_.resize(table_side_);
-    std::iota(free_slots_.begin(), free_slots_.end(), 0);
-    return;
-  }
-  const auto added = std::count_if(vertices_.begin(), vertices_.end(), [&](int vertex) {
-    const auto known = find_slot(vertex);
-    return known == slots_.end() || known->first != vertex;
-  });
-  if (static_cast<std::size_t>(added) <= free_slots_.size()) return;
-  std::erase_if(slots_, [&](const std::pair<int, int>& slot) {
-    if (std::binary_search(vertices_.begin(), vertices_.end(), slot.first)) return false;
-    free_slots_.push_back(slot.second);
-    return true;
-  });
-}
-
 void Yielding::set_feet(const WallCompliance& wall, const std::vector<SurfacePoint>& feet) {
-  make_room(feet);
+  row_.resize(static_cast<std::size_t>(wall.normals().cols()), -1);
   const std::size_t m = feet.size();
-  foot_slots_.resize(m);
+  foot_rows_.resize(m);
   for (std::size_t i = 0; i < m; ++i) {
     for (std::size_t a = 0; a < 3; ++a) {
-      foot_slots_[i][a] = feet[i].triangle < 0 ? 0 : slot_of(wall, feet[i].vertex[a]);
+      foot_rows_[i][a] = feet[i].triangle < 0 ? 0 : row_of(wall, feet[i].vertex[a], feet);
     }
   }
 
@@ -92,10 +89,10 @@ void Yielding::set_feet(const WallCompliance& wall, const std::vector<SurfacePoi
     if (feet[i].triangle < 0 || feet[j].triangle < 0) return 0.0;
     double sum = 0.0;
     for (int a = 0; a < 3; ++a) {
-      const int row = foot_slots_[i][static_cast<std::size_t>(a)];
-      sum += feet[i].weight[a] * (feet[j].weight[0] * between(row, foot_slots_[j][0]) +
-                                  feet[j].weight[1] * between(row, foot_slots_[j][1]) +
-                                  feet[j].weight[2] * between(row, foot_slots_[j][2]));
+      const int row = foot_rows_[i][static_cast<std::size_t>(a)];
+      sum += feet[i].weight[a] * (feet[j].weight[0] * between(row, foot_rows_[j][0]) +
+                                  feet[j].weight[1] * between(row, foot_rows_[j][1]) +
+                                  feet[j].weight[2] * between(row, foot_rows_[j][2]));
     }
     return sum;
   };
@@ -115,11 +112,15 @@ void Yielding::find_slopes(const std::vector<SurfacePoint>& feet, const std::vec
     auto* slope = slope_.data() + compliance_.offset(static_cast<int>(i));
     for (std::size_t j = static_cast<std::size_t>(first_coupled(static_cast<int>(i))); j <= i;
          ++j) {
+      if (feet[i].triangle < 0 || feet[j].triangle < 0) {
+        slope[j].setZero();
+        continue;
+      }
       Mat3 response;  // between the vertices of either foot
       for (std::size_t a = 0; a < 3; ++a) {
         for (std::size_t b = 0; b < 3; ++b) {
           response(static_cast<int>(a), static_cast<int>(b)) =
-              entry(foot_slots_[i][a], foot_slots_[j][b]);
+              entry(foot_rows_[i][a], foot_rows_[j][b]);
         }
       }
       slope[j].col(0) = slopes[i].transpose() * (response * feet[j].weight);

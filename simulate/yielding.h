@@ -2,7 +2,6 @@
 /// Contact points on a wall that yields: their forces couple through the wall (compliance.h).
 #include <Eigen/Core>
 #include <array>
-#include <utility>
 #include <vector>
 
 #include "simulate/compliance.h"
@@ -61,13 +60,11 @@ class Yielding {
     std::vector<std::ptrdiff_t> offset_;
     std::vector<double> values_;
   };
-  /// The first slot of this vertex or one after it.
-  std::vector<std::pair<int, int>>::const_iterator find_slot(int vertex) const;
-  /// Sees to rows in the table for the vertices of the feet: where too few are free, only they keep
-  /// theirs.
-  void make_room(const std::vector<SurfacePoint>& feet);
-  /// Row of a vertex in the table, which it enters if it is new.
-  int slot_of(const WallCompliance& wall, int vertex);
+  /// Row of a vertex in the table, which it enters if it is new. Where the table is full, rows of
+  /// vertices that none of the feet needs are freed; where there are none, the table grows.
+  int row_of(const WallCompliance& wall, int vertex, const std::vector<SurfacePoint>& feet);
+  void free_rows(const std::vector<SurfacePoint>& feet);
+  void grow();
   /// Compliance between the vertices of two rows, which the table keeps.
   double between(int a, int b);
   double& entry(int a, int b) {
@@ -82,12 +79,13 @@ class Yielding {
   /// Compliances between the vertices that feet stood on lately, NaN where not asked for yet.
   static constexpr std::size_t kSmallestTable = 300;
   std::size_t table_side_ = 0;
-  std::vector<std::pair<int, int>> slots_;  // vertex, its row in the table; vertices ascending
-  std::vector<int> free_slots_;
-  std::vector<const WallCompliance::HalfResponse*> responses_;  // of each row
   std::vector<double> table_;  // table_side_ squared                        [mm/N]
-  std::vector<std::array<int, 3>> foot_slots_;
-  std::vector<int> vertices_;  // of the feet; scratch
+  std::vector<int> row_;       // of each of the wall's vertices in the table, or -1
+  std::vector<int> vertex_;    // of each row, or -1
+  std::vector<const WallCompliance::HalfResponse*> half_;  // of each row
+  std::vector<int> free_rows_;
+  std::vector<char> needed_;  // rows; scratch
+  std::vector<std::array<int, 3>> foot_rows_;
 
   Envelope compliance_, factor_, inverse_;  // of all points; of those with a stiff law
   std::vector<int> stiff_, place_;          // those, in order; the place of each point there, or -1

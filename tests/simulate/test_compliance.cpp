@@ -203,11 +203,11 @@ TEST(WallCompliance, CouplesAsADirectSolveSaysAndLeavesOutLittle) {
         for (const auto& [c, part] : compliance.spread(b)) expected[b] += part * moved[c];
       }
       // Those that count as none are below 1e-8 of c_a; rounding is far less.
-      const WallCompliance::HalfResponse& here = compliance.response(a);
+      const WallCompliance::HalfResponse& here = compliance.half_response(a);
       EXPECT_NEAR(here.compliance, expected[a], 1e-12 * expected[a]);
       EXPECT_NEAR(WallCompliance::between(here, here), expected[a], 1e-12 * expected[a]);
       for (int b = 0; b < vertices; ++b) {
-        const WallCompliance::HalfResponse& there = compliance.response(b);
+        const WallCompliance::HalfResponse& there = compliance.half_response(b);
         const double found = WallCompliance::between(here, there);
         if (found == 0.0) {
           EXPECT_LT(std::abs(expected[b]), 1.001e-8 * expected[a]);
@@ -226,7 +226,7 @@ TEST(WallCompliance, IsAsMuchFromHereToThereAsBack) {
   const WallCompliance compliance(tube, extruded(tube, kThickness));
   for (int a = 0; a < tube.vertices.cols(); ++a) {
     for (int b = 0; b < a; ++b) {
-      const auto &one = compliance.response(a), &other = compliance.response(b);
+      const auto &one = compliance.half_response(a), &other = compliance.half_response(b);
       ASSERT_EQ(WallCompliance::between(one, other), WallCompliance::between(other, one));
     }
   }
@@ -241,13 +241,13 @@ TEST(WallCompliance, AnswersSeveralThreadsAsIfAlone) {
   std::vector<std::thread> threads;
   for (int k = 0; k < 4; ++k) {
     threads.emplace_back([&shared, vertices] {
-      for (int a = 0; a < vertices; ++a) shared.response(a);
+      for (int a = 0; a < vertices; ++a) shared.half_response(a);
     });
   }
   for (std::thread& thread : threads) thread.join();
   for (int a = 0; a < vertices; ++a) {
-    EXPECT_EQ(shared.response(a).places, alone.response(a).places);
-    EXPECT_EQ(shared.response(a).values, alone.response(a).values);  // every bit
+    EXPECT_EQ(shared.half_response(a).places, alone.half_response(a).places);
+    EXPECT_EQ(shared.half_response(a).values, alone.half_response(a).values);  // every bit
   }
   EXPECT_EQ(shared.response_count(), static_cast<std::size_t>(vertices));
   EXPECT_EQ(shared.memory_bytes(), alone.memory_bytes());
@@ -258,11 +258,11 @@ TEST(WallCompliance, KeepsWhatItFound) {
   const WallCompliance compliance(tube, extruded(tube, kThickness));
   const std::size_t before = compliance.memory_bytes();
   EXPECT_EQ(compliance.response_count(), 0U);
-  const WallCompliance::HalfResponse* const first = &compliance.response(7);
+  const WallCompliance::HalfResponse* const first = &compliance.half_response(7);
   const std::size_t after = compliance.memory_bytes();
   EXPECT_GT(after, before);
   EXPECT_EQ(compliance.response_count(), 1U);
-  EXPECT_EQ(&compliance.response(7), first);
+  EXPECT_EQ(&compliance.half_response(7), first);
   EXPECT_EQ(compliance.memory_bytes(), after);
   EXPECT_EQ(compliance.response_count(), 1U);
 }
@@ -306,7 +306,7 @@ TEST(WallCompliance, LeavesVerticesWithoutTrianglesAlone) {
   EXPECT_TRUE(moved.rightCols(tube.vertices.cols())
                   .isApprox(expected.displacements(force.rightCols(tube.vertices.cols())), 1e-12));
   EXPECT_TRUE(compliance.normals().col(0).isZero(0.0));
-  EXPECT_THROW(compliance.response(0), LogicError);
+  EXPECT_THROW(compliance.half_response(0), LogicError);
 }
 
 // ---------------------------------------------------------------- locator
