@@ -170,21 +170,9 @@ NextRuns choose_next(const Study& study, const std::vector<Candidate>& candidate
   for (const std::optional<Sighting>& run : seen.full) {
     if (run && run->plan) best = std::min(best.value_or(run->score), run->score);
   }
-  std::vector<std::optional<Sighting>> above = seen.full;  // of the scouts, the highest level known
-  std::vector<Sighting> probes = seen.scouts;              // those not run are not compared
-  for (std::size_t k = 0; k < count; ++k) {
-    if (!above[k]) above[k] = seen.probes[k];
-    probes[k] = seen.probes[k].value_or(Sighting{});
-  }
-  const auto margin_of = [](const std::vector<double>& differences) {
-    double margin = kScoutMargin;
-    for (const double size : differences) margin = std::max(margin, size);
-    return margin;
-  };
-  const double scout_margin = margin_of(score_differences(seen.scouts, above));
-  const double probe_margin = margin_of(score_differences(probes, seen.full));
+  double margin = kScoutMargin;
+  for (const double size : score_differences(rigid, seen.full)) margin = std::max(margin, size);
   for (const int k : order) {
-    const double margin = is_probed(k) ? probe_margin : scout_margin;
     if (best && sighting(k).reached && sighting(k).score - margin < *best) wanted.insert(k);
   }
 
@@ -202,13 +190,7 @@ NextRuns choose_next(const Study& study, const std::vector<Candidate>& candidate
   }
   std::erase_if(wanted, is_known);
 
-  // No plan yet: what scout and probe do not agree on, then more of all.
-  if (wanted.empty() && !best) {
-    for (const int k : order_by_promise(seen.scouts)) {
-      const bool reached = seen.scouts[static_cast<std::size_t>(k)].reached;
-      if (reached && is_probed(k) && !full(k) && wanted.size() < kAtOnce) wanted.insert(k);
-    }
-  }
+  // No plan yet: more of all.
   if (wanted.empty() && !best) {
     std::size_t known = 0;
     for (const int k : order) known += is_known(k) ? 1 : 0;
@@ -219,9 +201,12 @@ NextRuns choose_next(const Study& study, const std::vector<Candidate>& candidate
     }
   }
   NextRuns next;
-  std::copy_if(wanted.begin(), wanted.end(), std::back_inserter(next.probes),
-               [&](int k) { return probing && !is_probed(k) && !sighting(k).pinched; });
-  if (next.probes.empty()) next.full.assign(wanted.begin(), wanted.end());
+  for (const int k : wanted) {
+    const Sighting& scout = seen.scouts[static_cast<std::size_t>(k)];
+    const bool probes_first = probing && !is_probed(k) && !scout.reached && !scout.pinched;
+    (probes_first ? next.probes : next.full).push_back(k);
+  }
+  if (!next.full.empty()) next.probes.clear();
   return next;
 }
 

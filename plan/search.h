@@ -1,7 +1,7 @@
 #pragma once
 /// Spending time where it decides: every candidate is scouted on a rigid wall with long elements,
-/// what may matter is probed there with the study's own elements, and what may be among the best is
-/// run in full.
+/// and what may be among the best is run in full; failures that may be the scout's are probed
+/// first, on the rigid wall with the study's own elements.
 #include <optional>
 #include <vector>
 
@@ -53,27 +53,25 @@ struct Sightings {
   std::vector<std::optional<Sighting>> probes, full;
 };
 
-/// Candidates to run next, ascending. No more than one list has any; both are empty when no more
-/// are needed.
+/// Candidates to run next, ascending. No more than one list has any: what is run in full at once
+/// comes before probes. Both are empty when no more are needed.
 struct NextRuns {
   std::vector<int> probes = {}, full = {};
 };
 
-/// What may matter is probed, unless its scout was pinched, and what a probe saw reach, was
-/// pinched, come within two radii of the goal or find no equilibrium, is run in full; without
-/// probes (`probing`; where the study's own wall is rigid) all of it is run in full at once. What a
-/// probe saw fail counts as failed. Asked again until it names none, it wants, by the best that is
-/// known of each:
+/// What may matter is run in full. Where its scout failed, and was not pinched, it is probed first
+/// (if `probing`; not where the study's own wall is rigid), and run in full where the probe
+/// reached, was pinched, came within two radii of the goal or found no equilibrium; else it counts
+/// as failed. Asked again until it names none, it wants, by the best that is known of each:
 ///   1. the five that score best;
 ///   2. of each wire its best, or the nearest where none reached; and while those are no plans the
 ///      next that reached, four in all;
 ///   3. of those whose scouts did not reach one in 16, rounded up, nearest first, for which the
 ///      scout may be at fault: without equilibrium, or within two radii of the goal;
-///   4. all that reached with a score that may beat the best full plan: by no more than that level
-///      was ever found to be off, and at least by kScoutMargin;
-///   5. while no full run is a plan, in full those that a scout saw reach and a probe did not, then
-///      eight more, the best and then the nearest first: all whose scout reached, and of the others
-///      until 32 or an eighth of all are known;
+///   4. all that reached with a score that may beat the best full plan: by no more than the rigid
+///      wall was ever found to be off, and at least by kScoutMargin;
+///   5. while no full run is a plan, eight more, the best and then the nearest first: all whose
+///      scout reached, and of the others until 32 or an eighth of all are known;
 ///   6. all that were pinched: a rigid wall cannot tell which of them is the best.
 NextRuns choose_next(const Study& study, const std::vector<Candidate>& candidates,
                      const Sightings& seen, bool probing);

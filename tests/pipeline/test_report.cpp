@@ -113,7 +113,7 @@ TEST(Report, ScoutedCandidatesLeaveTheBestPlansAsTheyAre) {
   const int compared = scout.at("compared");
   EXPECT_GE(compared, 5);
   EXPECT_LT(compared, 13);
-  EXPECT_GE(scout.at("probed"), compared);
+  EXPECT_EQ(scout.at("probed"), 0);  // all that may matter were seen to reach
   EXPECT_EQ(some.at("timing").at("trials").at("levels").size(), 3u);  // scouts, probes, in full
 
   ASSERT_FALSE(every.at("ranking").empty());
