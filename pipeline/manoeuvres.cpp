@@ -6,6 +6,7 @@
 #include "pipeline/disk.h"
 #include "pipeline/trial_file.h"
 #include "plan/manoeuvre.h"
+#include "plan/search.h"
 
 namespace wireplan::pipeline {
 namespace {
@@ -14,6 +15,8 @@ namespace fs = std::filesystem;
 
 // Straight pushes of each wire that a search goes on from.
 constexpr int kStartsPerWire = 2;
+// Turns of the hub in one script: that scouts find, and that are searched for in full.
+constexpr int kTurnsOfScouts = 3, kTurns = 1;
 
 // Of a straight push: that of the highest level that ran it.
 struct StraightFile {
@@ -84,32 +87,57 @@ void make_manoeuvres(Workspace& work, const fs::path& folder) {
   study.insertion.record_every = study.insertion.length;  // shapes on the way are not kept
   const std::vector<plan::Candidate> straight = plan::list_candidates(study);
   const std::vector<plan::Candidate> starts = find_starts(work, straight);
-  plan::Manoeuvres search;
-  if (!starts.empty()) {
-    search = plan::find_manoeuvres(study, starts, work.path(), work.model(),
-                                   {.threads = work.options().threads,
-                                    .progress = work.options().progress,
-                                    .cancelled = work.options().cancelled});
-  }
-  if (work.options().cancelled && work.options().cancelled()) throw Interrupted();
+  const plan::BatchOptions batch{.threads = work.options().threads,
+                                 .progress = work.options().progress,
+                                 .cancelled = work.options().cancelled};
 
-  // Each script from start to end, as it is written down.
+  // Thousands of pushes are tried, so the search is a scout's. What it finds is run in full, from
+  // start to end, as it is written down. Where nothing of that reaches, turns are tried in full.
+  std::vector<plan::Candidate> scripts;
+  std::vector<simulate::TrialResult> trials;
+  long branches = 0;
+  for (const bool scouting : {true, false}) {
+    if (starts.empty() || !scripts.empty()) break;
+    plan::Manoeuvres search =
+        scouting ? plan::find_manoeuvres(plan::scout_study(study), starts, work.path(),
+                                         work.rigid_model(), kTurnsOfScouts, batch)
+                 : plan::find_manoeuvres(study, starts, work.path(), work.model(), kTurns, batch);
+    branches += search.branches;
+    for (plan::Candidate& candidate : search.found) {
+      candidate.moves = moves_of(moves_json(candidate.moves));
+    }
+    std::vector<simulate::TrialResult> results(search.found.size());
+    const simulate::VesselModel& vessel = work.model();
+    plan::for_each_slot(
+        static_cast<int>(results.size()),
+        [&](int slot) {
+          const auto k = static_cast<std::size_t>(slot);
+          results[k] = plan::run_candidate(study, search.found[k], vessel);
+        },
+        batch);
+    if (work.options().cancelled && work.options().cancelled()) throw Interrupted();
+    for (std::size_t k = 0; k < results.size(); ++k) {
+      if (results[k].outcome != simulate::Outcome::kReached) continue;
+      scripts.push_back(std::move(search.found[k]));
+      trials.push_back(std::move(results[k]));
+    }
+  }
+
   Json figures = figures_of("manoeuvres");
   figures["starts"] = starts.size();
-  figures["branches"] = search.branches;
+  figures["branches"] = branches;
   figures["scripts"] = Json::array();
-  if (!search.found.empty()) fs::create_directories(folder / "trials");
-  for (plan::Candidate candidate : search.found) {
-    const Json moves = moves_json(candidate.moves);
-    candidate.moves = moves_of(moves);
+  if (!scripts.empty()) fs::create_directories(folder / "trials");
+  for (std::size_t k = 0; k < scripts.size(); ++k) {
+    const plan::Candidate& script = scripts[k];
     const auto start = std::find_if(straight.begin(), straight.end(), [&](const auto& other) {
-      return other.wire == candidate.wire && other.inclination == candidate.inclination &&
-             other.azimuth == candidate.azimuth && other.roll == candidate.roll;
+      return other.wire == script.wire && other.inclination == script.inclination &&
+             other.azimuth == script.azimuth && other.roll == script.roll;
     });
-    const std::size_t id = straight.size() + figures["scripts"].size();
-    figures["scripts"].push_back({{"start", start - straight.begin()}, {"moves", moves}});
-    write_whole(trial_text(study, candidate, plan::run_candidate(study, candidate, work.model())),
-                folder / trial_file_name(static_cast<int>(id)));
+    figures["scripts"].push_back(
+        {{"start", start - straight.begin()}, {"moves", moves_json(script.moves)}});
+    write_whole(trial_text(study, script, trials[k]),
+                folder / trial_file_name(static_cast<int>(straight.size() + k)));
   }
   write_figures(figures, folder);
 }

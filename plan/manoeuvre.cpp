@@ -19,11 +19,10 @@ constexpr double kMarkEvery = 3.0;   // between two depths at which a turn is tr
 constexpr double kMarksBack = 24.0;  // such depths, from where the wire left the path ...     [mm]
 constexpr double kMarksOn = 18.0;    // ... and so much deeper, to pull back from              [mm]
 constexpr double kFurther = 2.0;     // along the path: worth going on from                    [mm]
-constexpr int kTurns = 8;            // directions of the tip
+constexpr int kDirections = 8;       // of the tip
 constexpr double kPull = 6.0;        // pulled back between two tries to push on ...           [mm]
 constexpr int kPulls = 3;            // ... so many times
 constexpr int kBeam = 3;             // branches that are gone on from
-constexpr int kLevels = 3;           // turns of the hub in one script
 constexpr std::size_t kKept = 3;     // scripts per start
 
 /// A script on its way, and what came of it.
@@ -66,11 +65,11 @@ class Search {
         trial_(study.wires[static_cast<std::size_t>(start.wire)], make_introducer(study, start),
                study.goal, vessel, study.insertion) {}
 
-  std::vector<Branch> run() {
+  std::vector<Branch> run(int most_turns) {
     trial_.save(begin_);
     std::vector<Branch> front(1), found;
     front[0] = push_on({}, nullptr);
-    for (int level = 0; level < kLevels && found.empty(); ++level) {
+    for (int turns = 0; turns < most_turns && found.empty(); ++turns) {
       std::vector<Branch> next;
       for (const Branch& branch : front) expand(branch, next);
       std::stable_sort(next.begin(), next.end(), [](const Branch& a, const Branch& b) {
@@ -135,9 +134,9 @@ class Search {
       if (stop.depth < branch.depth - kMarksBack || stop.depth > branch.depth + kMarksOn) continue;
       std::vector<Move> moves = before;
       if (stop.depth > from) moves = joined(moves, {.push = stop.depth - from});
-      for (int k = 1; k < kTurns; ++k) {
+      for (int k = 1; k < kDirections; ++k) {
         if (cancelled_ && cancelled_()) return;
-        const double angle = 2.0 * kPi * (k <= kTurns / 2 ? k : k - kTurns) / kTurns;
+        const double angle = 2.0 * kPi * (k <= kDirections / 2 ? k : k - kDirections) / kDirections;
         trial_.restore(stop.mark);
         try_turn(joined(moves, {.turn = angle}), branch, stop.depth > branch.depth, kept);
       }
@@ -212,7 +211,7 @@ std::vector<int> choose_starts(const Study& study, const std::vector<Candidate>&
 
 Manoeuvres find_manoeuvres(const Study& study, const std::vector<Candidate>& starts,
                            const Centerline& path, const simulate::VesselModel& vessel,
-                           const BatchOptions& options) {
+                           int most_turns, const BatchOptions& options) {
   std::vector<std::vector<Branch>> found(starts.size());
   std::vector<long> branches(starts.size(), 0);
   for_each_slot(
@@ -220,7 +219,7 @@ Manoeuvres find_manoeuvres(const Study& study, const std::vector<Candidate>& sta
       [&](int slot) {
         const std::size_t k = static_cast<std::size_t>(slot);
         Search search(study, starts[k], path, vessel, options.cancelled);
-        found[k] = search.run();
+        found[k] = search.run(most_turns);
         branches[k] = search.branches();
       },
       options);

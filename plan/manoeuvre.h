@@ -25,11 +25,12 @@ struct Manoeuvres {
 
 /// Searches from each start, in parallel, for the moves that bring the tip into the target: where
 /// the wire leaves the path it is turned, or pulled back and turned, and pushed on; the branches
-/// that come further are gone on from in the same way. Up to three scripts per start, those of few
-/// moves first, then those that press the wall least. The same at any thread count.
+/// that come further are gone on from in the same way, up to `most_turns` turns of the hub. Up to
+/// three scripts per start, those of few turns first, then those that press the wall least. The
+/// same at any thread count.
 Manoeuvres find_manoeuvres(const Study& study, const std::vector<Candidate>& starts,
                            const Centerline& path, const simulate::VesselModel& vessel,
-                           const BatchOptions& options);
+                           int most_turns, const BatchOptions& options);
 
 /// "push 112.0 mm, turn 90 deg clockwise, pull back 10.0 mm, then push on to 140.0 mm": as the hand
 /// does it, seen from the hub toward the patient; the last as deep as the trial went in [mm]. Empty

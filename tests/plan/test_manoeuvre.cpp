@@ -100,7 +100,8 @@ TEST(Manoeuvres, FindTheWayPastADecoyIntoABranchAtARightAngle) {
   for (const Candidate& start : pushes.starts) EXPECT_EQ(start.wire, 1);
 
   const Centerline path = path_into_the_branch();
-  const Manoeuvres search = find_manoeuvres(study, pushes.starts, path, side_branches(), {});
+  const Manoeuvres search =
+      find_manoeuvres(study, pushes.starts, path, side_branches(), /*most_turns=*/3, {});
   ASSERT_FALSE(search.found.empty());
   for (const Candidate& candidate : search.found) {
     SCOPED_TRACE(describe_moves(candidate.moves, 0.0));
@@ -113,13 +114,15 @@ TEST(Manoeuvres, FindTheWayPastADecoyIntoABranchAtARightAngle) {
 
   // The same on any number of threads, and whatever else is searched.
   const Manoeuvres alone =
-      find_manoeuvres(study, {pushes.starts[0]}, path, side_branches(), {.threads = 1});
+      find_manoeuvres(study, {pushes.starts[0]}, path, side_branches(), 3, {.threads = 1});
   ASSERT_LE(alone.found.size(), search.found.size());
   EXPECT_LT(alone.branches, search.branches);
   for (std::size_t k = 0; k < alone.found.size(); ++k) {
     EXPECT_EQ(describe_moves(alone.found[k].moves, 0.0),
               describe_moves(search.found[k].moves, 0.0));
   }
+  EXPECT_TRUE(find_manoeuvres(study, pushes.starts, path, side_branches(), /*most_turns=*/0, {})
+                  .found.empty());
 }
 
 TEST(Manoeuvres, StopWhenCancelled) {
@@ -127,7 +130,7 @@ TEST(Manoeuvres, StopWhenCancelled) {
   Candidate start;
   start.wire = 1;
   const Manoeuvres search = find_manoeuvres(study, {start}, path_into_the_branch(), side_branches(),
-                                            {.cancelled = [] { return true; }});
+                                            3, {.cancelled = [] { return true; }});
   EXPECT_TRUE(search.found.empty());
   EXPECT_LT(search.branches, 10);
 }
