@@ -21,14 +21,14 @@ void Yielding::Envelope::add_row(int first) {
 
 void Yielding::grow() {
   const std::size_t side = std::max(kSmallestTable, 2 * table_side_);
-  std::vector<double> grown(side * side, std::numeric_limits<double>::quiet_NaN());
+  std::vector<double> grown(side * side);
   for (std::size_t row = 0; row < table_side_; ++row) {
     std::copy_n(table_.begin() + static_cast<std::ptrdiff_t>(row * table_side_), table_side_,
                 grown.begin() + static_cast<std::ptrdiff_t>(row * side));
   }
   table_ = std::move(grown);
   for (std::size_t row = side; row-- > table_side_;) free_rows_.push_back(static_cast<int>(row));
-  vertex_.resize(side, -1);
+  vertex_.resize(side);
   half_.resize(side);
   table_side_ = side;
 }
@@ -44,7 +44,7 @@ void Yielding::free_rows(const std::vector<SurfacePoint>& feet) {
   }
   for (std::size_t row = 0; row < table_side_; ++row) {
     if (needed_[row] != 0) continue;
-    row_[static_cast<std::size_t>(std::exchange(vertex_[row], -1))] = -1;
+    row_[static_cast<std::size_t>(vertex_[row])] = kNoRow;
     free_rows_.push_back(static_cast<int>(row));
   }
 }
@@ -75,18 +75,18 @@ double Yielding::between(int a, int b) {
 }
 
 void Yielding::set_feet(const WallCompliance& wall, const std::vector<SurfacePoint>& feet) {
-  row_.resize(static_cast<std::size_t>(wall.normals().cols()), -1);
+  row_.resize(static_cast<std::size_t>(wall.normals().cols()), kNoRow);
   const std::size_t m = feet.size();
   foot_rows_.resize(m);
   for (std::size_t i = 0; i < m; ++i) {
     for (std::size_t a = 0; a < 3; ++a) {
-      foot_rows_[i][a] = feet[i].triangle < 0 ? 0 : row_of(wall, feet[i].vertex[a], feet);
+      foot_rows_[i][a] = feet[i].triangle < 0 ? kNoRow : row_of(wall, feet[i].vertex[a], feet);
     }
   }
 
   // Rows of C, each from the first foot that moves under a force at its own.
   const auto compliance_between = [&](std::size_t i, std::size_t j) {
-    if (feet[i].triangle < 0 || feet[j].triangle < 0) return 0.0;
+    if (!both_stand(i, j)) return 0.0;
     double sum = 0.0;
     for (int a = 0; a < 3; ++a) {
       const int row = foot_rows_[i][static_cast<std::size_t>(a)];
@@ -112,7 +112,7 @@ void Yielding::find_slopes(const std::vector<SurfacePoint>& feet, const std::vec
     auto* slope = slope_.data() + compliance_.offset(static_cast<int>(i));
     for (std::size_t j = static_cast<std::size_t>(first_coupled(static_cast<int>(i))); j <= i;
          ++j) {
-      if (feet[i].triangle < 0 || feet[j].triangle < 0) {
+      if (!both_stand(i, j)) {
         slope[j].setZero();
         continue;
       }

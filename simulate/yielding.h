@@ -65,6 +65,10 @@ class Yielding {
   int row_of(const WallCompliance& wall, int vertex, const std::vector<SurfacePoint>& feet);
   void free_rows(const std::vector<SurfacePoint>& feet);
   void grow();
+  /// Whether both points have feet; one that has none feels no wall move.
+  bool both_stand(std::size_t i, std::size_t j) const {
+    return foot_rows_[i][0] != kNoRow && foot_rows_[j][0] != kNoRow;
+  }
   /// Compliance between the vertices of two rows, which the table keeps.
   double between(int a, int b);
   double& entry(int a, int b) {
@@ -78,14 +82,15 @@ class Yielding {
 
   /// Compliances between the vertices that feet stood on lately, NaN where not asked for yet.
   static constexpr std::size_t kSmallestTable = 300;
+  static constexpr int kNoRow = -1;
   std::size_t table_side_ = 0;
   std::vector<double> table_;  // table_side_ squared                        [mm/N]
-  std::vector<int> row_;       // of each of the wall's vertices in the table, or -1
-  std::vector<int> vertex_;    // of each row, or -1
+  std::vector<int> row_;       // of each of the wall's vertices in the table, or kNoRow
+  std::vector<int> vertex_;    // of each row; meaningless where it is free
   std::vector<const WallCompliance::HalfResponse*> half_;  // of each row
   std::vector<int> free_rows_;
-  std::vector<char> needed_;  // rows; scratch
-  std::vector<std::array<int, 3>> foot_rows_;
+  std::vector<char> needed_;                   // rows; scratch
+  std::vector<std::array<int, 3>> foot_rows_;  // kNoRow: without a foot
 
   Envelope compliance_, factor_, inverse_;  // of all points; of those with a stiff law
   std::vector<int> stiff_, place_;          // those, in order; the place of each point there, or -1
