@@ -56,6 +56,43 @@ std::vector<plan::Candidate> find_starts(Workspace& work,
   return starts;
 }
 
+// Scripts of moves that reach the target, and their trials in full.
+struct Scripts {
+  std::vector<plan::Candidate> found;
+  std::vector<simulate::TrialResult> trials;
+  long branches = 0;  // that were tried for them
+};
+
+// Thousands of pushes are tried, so the search is a scout's. What it finds is run in full, from
+// start to end, as it is written down. Where nothing of that reaches, turns are tried in full.
+// Throws Interrupted.
+Scripts find_scripts(Workspace& work, const plan::Study& study,
+                     const std::vector<plan::Candidate>& starts) {
+  const plan::BatchOptions batch{.threads = work.options().threads,
+                                 .progress = work.options().progress,
+                                 .cancelled = work.options().cancelled};
+  Scripts scripts;
+  const auto run_in_full = [&](plan::Manoeuvres search) {
+    scripts.branches += search.branches;
+    for (plan::Candidate& candidate : search.found) {
+      candidate.moves = moves_of(moves_json(candidate.moves));
+    }
+    plan::BatchResult run = plan::run_batch(study, search.found, work.model(), batch);
+    if (batch.cancelled && batch.cancelled()) throw Interrupted();
+    for (std::size_t k = 0; k < run.trials.size(); ++k) {
+      if (run.trials[k].outcome != simulate::Outcome::kReached) continue;
+      scripts.found.push_back(std::move(search.found[k]));
+      scripts.trials.push_back(std::move(run.trials[k]));
+    }
+  };
+  if (starts.empty()) return scripts;
+  run_in_full(plan::find_manoeuvres(plan::scout_study(study), starts, work.path(),
+                                    work.rigid_model(), kTurnsOfScouts, batch));
+  if (!scripts.found.empty()) return scripts;
+  run_in_full(plan::find_manoeuvres(study, starts, work.path(), work.model(), kTurns, batch));
+  return scripts;
+}
+
 }  // namespace
 
 std::vector<plan::Candidate> list_tried(Workspace& work) {
@@ -87,56 +124,22 @@ void make_manoeuvres(Workspace& work, const fs::path& folder) {
   study.insertion.record_every = study.insertion.length;  // shapes on the way are not kept
   const std::vector<plan::Candidate> straight = plan::list_candidates(study);
   const std::vector<plan::Candidate> starts = find_starts(work, straight);
-  const plan::BatchOptions batch{.threads = work.options().threads,
-                                 .progress = work.options().progress,
-                                 .cancelled = work.options().cancelled};
-
-  // Thousands of pushes are tried, so the search is a scout's. What it finds is run in full, from
-  // start to end, as it is written down. Where nothing of that reaches, turns are tried in full.
-  std::vector<plan::Candidate> scripts;
-  std::vector<simulate::TrialResult> trials;
-  long branches = 0;
-  for (const bool scouting : {true, false}) {
-    if (starts.empty() || !scripts.empty()) break;
-    plan::Manoeuvres search =
-        scouting ? plan::find_manoeuvres(plan::scout_study(study), starts, work.path(),
-                                         work.rigid_model(), kTurnsOfScouts, batch)
-                 : plan::find_manoeuvres(study, starts, work.path(), work.model(), kTurns, batch);
-    branches += search.branches;
-    for (plan::Candidate& candidate : search.found) {
-      candidate.moves = moves_of(moves_json(candidate.moves));
-    }
-    std::vector<simulate::TrialResult> results(search.found.size());
-    const simulate::VesselModel& vessel = work.model();
-    plan::for_each_slot(
-        static_cast<int>(results.size()),
-        [&](int slot) {
-          const auto k = static_cast<std::size_t>(slot);
-          results[k] = plan::run_candidate(study, search.found[k], vessel);
-        },
-        batch);
-    if (work.options().cancelled && work.options().cancelled()) throw Interrupted();
-    for (std::size_t k = 0; k < results.size(); ++k) {
-      if (results[k].outcome != simulate::Outcome::kReached) continue;
-      scripts.push_back(std::move(search.found[k]));
-      trials.push_back(std::move(results[k]));
-    }
-  }
+  const Scripts scripts = find_scripts(work, study, starts);
 
   Json figures = figures_of("manoeuvres");
   figures["starts"] = starts.size();
-  figures["branches"] = branches;
+  figures["branches"] = scripts.branches;
   figures["scripts"] = Json::array();
-  if (!scripts.empty()) fs::create_directories(folder / "trials");
-  for (std::size_t k = 0; k < scripts.size(); ++k) {
-    const plan::Candidate& script = scripts[k];
+  if (!scripts.found.empty()) fs::create_directories(folder / "trials");
+  for (std::size_t k = 0; k < scripts.found.size(); ++k) {
+    const plan::Candidate& script = scripts.found[k];
     const auto start = std::find_if(straight.begin(), straight.end(), [&](const auto& other) {
       return other.wire == script.wire && other.inclination == script.inclination &&
              other.azimuth == script.azimuth && other.roll == script.roll;
     });
     figures["scripts"].push_back(
         {{"start", start - straight.begin()}, {"moves", moves_json(script.moves)}});
-    write_whole(trial_text(study, script, trials[k]),
+    write_whole(trial_text(study, script, scripts.trials[k]),
                 folder / trial_file_name(static_cast<int>(straight.size() + k)));
   }
   write_figures(figures, folder);
