@@ -99,16 +99,23 @@ void WallContact::start_at(const Eigen::Matrix3Xd& x) {
 }
 
 void WallContact::predict(double distance) {
-  // Tip distances fall along the points; walk through them and through where they will be.
+  // Tip distances fall along the points: walk through them and through where their forces go, from
+  // the tip on. The tip's own goes with it.
   predicted_.setZero();
-  std::size_t ahead = 0;
-  for (std::size_t k = 0; k < points_.size(); ++k) {
-    const double wanted = points_[k].tip_distance - distance;
-    while (ahead + 1 < points_.size() && points_[ahead + 1].tip_distance >= wanted - 1e-9) ++ahead;
-    const double found = points_[ahead].tip_distance;
-    if (std::abs(found - wanted) > options_.spacing) continue;
-    const Eigen::Index i = static_cast<Eigen::Index>(k), j = static_cast<Eigen::Index>(ahead);
-    predicted_[i] = memory_.normal_force[j] * points_[k].share / points_[ahead].share;
+  Eigen::Index to = predicted_.size() - 1;
+  const auto tip_distance = [&](Eigen::Index k) {
+    return points_[static_cast<std::size_t>(k)].tip_distance;
+  };
+  for (Eigen::Index k = predicted_.size() - 1; k >= 0; --k) {
+    const double force = memory_.normal_force[k];
+    if (force == 0.0) continue;
+    const double wanted = tip_distance(k) > 0.0 ? tip_distance(k) + distance : 0.0;
+    while (to > 0 && tip_distance(to - 1) <= wanted) --to;
+    const double past = wanted - tip_distance(to);  // `to`, toward the point before it
+    const double part =
+        to > 0 && past > 0.0 ? past / (tip_distance(to - 1) - tip_distance(to)) : 0.0;
+    predicted_[to] += (1.0 - part) * force;
+    if (part > 0.0) predicted_[to - 1] += part * force;
   }
   lag_.force = expected_ = predicted_;
 }
