@@ -29,6 +29,7 @@ constexpr double kDriftInto = 0.5;      // a wire's drift may lead this much dee
                                         // than the wire did [mm]
 constexpr double kSnap = 2.0;           // way off the path per push that is a jump, not to go on
 constexpr double kKeptDrift = 0.8;      // of the last push's way off the path, in the next
+constexpr double kBent = 16.0;          // wire that a guess bends to keep its tip off the wall [mm]
 constexpr double kSmallestPart = 0.05;  // of a node's share of wire that bends at the exit
 constexpr double kLongestPart = 2.0;  // of a push: friction turns with the path               [mm]
 constexpr double kLongestTurn = 15.0 * kRadPerDeg;  // of the hub in one go
@@ -177,10 +178,12 @@ NewtonResult Insertion::advance(double distance) {
   last_distance_ = distance;
   // Nodes in the introducer lie on its axis; the others go where the wire ahead of them was, and
   // most of what they came off that path in the last push, per length of it, unless that leads
-  // through the wall.
+  // through the wall. The tip has no wire ahead, or another shape: see below.
   const int n = rod_.nodes();
   problem_.first = n;
   ahead_ = 0;
+  int tip = std::min(n, first_curved_ + 1);
+  while (tip > 1 && rod_.tip_distance[tip - 1] < distance) --tip;
   bool through = false;
   for (int i = 0; i < n; ++i) {
     const double behind = rod_.tip_distance[i] - depth_;
@@ -189,6 +192,7 @@ NewtonResult Insertion::advance(double distance) {
       guess_ahead_.col(i) = path_.col(i) = guess_.x.col(i);
     } else {
       problem_.first = std::min(problem_.first, i);
+      if (i >= tip) break;
       path_.col(i) = ahead_of(i, distance);
       const Vec3 way = (kKeptDrift * distance) * drift_.col(i);
       guess_ahead_.col(i) = path_.col(i) + way;
@@ -198,24 +202,60 @@ NewtonResult Insertion::advance(double distance) {
   }
   if (through) guess_ahead_ = path_;
   // Keep the edges' lengths of before: a guess that strains a stiff wire costs more than one that
-  // lies a little in the wall. A curved tip keeps its shape, and most of how it turned and changed
-  // in the last push.
+  // lies a little in the wall. The tip keeps its shape, and most of how it turned and changed in
+  // the last push.
   for (int i = problem_.first; i < n; ++i) {
     const Vec3 before = state_.x.col(i) - state_.x.col(i - 1);
     Vec3 edge = guess_ahead_.col(i) - guess_ahead_.col(i - 1);
-    if (i > first_curved_) {
-      edge = before + (kKeptDrift * distance) * (moved_.col(i) - moved_.col(i - 1));
-      edge = out_of_wall(guess_.x.col(i - 1) + edge) - guess_.x.col(i - 1);
-    }
+    if (i >= tip) edge = before + (kKeptDrift * distance) * (moved_.col(i) - moved_.col(i - 1));
     guess_.x.col(i) = guess_.x.col(i - 1) + (before.norm() / edge.norm()) * edge;
   }
+  bend_off_wall(tip);
   const NewtonResult result = settle_guess(distance);  // swaps the state of before into guess_
   if (result.converged) {
-    drift_ = (state_.x - path_) / distance;
     moved_ = (state_.x - guess_.x) / distance;
-    if (drift_.colwise().norm().maxCoeff() > kSnap) forget_drift();
+    drift_.leftCols(tip) = (state_.x - path_).leftCols(tip) / distance;
+    drift_.rightCols(n - tip).colwise() = drift_.col(tip - 1).eval();
+    double off = drift_.colwise().norm().maxCoeff();
+    for (int i = tip; i < n; ++i) {
+      off = std::max(off, (moved_.col(i) - moved_.col(tip - 1)).norm());
+    }
+    if (off > kSnap) forget_drift();
   }
   return result;
+}
+
+/// Bends the guess's last wire so that no node from `tip` on lies deeper in the wall than the wire
+/// did, or nearly so: a tip that was pushed out of the wall alone would leave a kink.
+void Insertion::bend_off_wall(int tip) {
+  constexpr int kRounds = 2;
+  const int n = rod_.nodes();
+  for (int round = 0; round < kRounds; ++round) {
+    double deep = 0.0, reach = 0.0;  // past the wall, of the deepest node; its tip distance
+    Vec3 inward = Vec3::Zero();
+    for (int i = std::max(tip, problem_.first); i < n; ++i) {
+      const WallSample wall = vessel_.lumen.sample(guess_.x.col(i));
+      const double here = rod_.radius - wall.distance - deepest_;
+      if (here <= deep) continue;
+      deep = here;
+      reach = rod_.tip_distance[i];
+      inward = wall.gradient;
+    }
+    if (deep == 0.0) return;
+    // By a parabola from so far behind that node on, past it by all; edges keep their lengths.
+    const double length = std::min(kBent, depth_ - reach);
+    const auto part = [&](int i) {
+      const double rest = std::clamp(1.0 - (rod_.tip_distance[i] - reach) / length, 0.0, 1.0);
+      return rest * rest;
+    };
+    Vec3 before = guess_.x.col(problem_.first - 1);
+    for (int i = problem_.first; i < n; ++i) {
+      const Vec3 here = guess_.x.col(i), edge = here - before;
+      const Vec3 bent = edge + ((part(i) - part(i - 1)) * deep) * inward;
+      guess_.x.col(i) = guess_.x.col(i - 1) + (edge.norm() / bent.norm()) * bent;
+      before = here;
+    }
+  }
 }
 
 /// Turns the hub by `angle`, guesses that the whole wire spins with it, its curved tip about the
@@ -282,30 +322,13 @@ double Insertion::part_outside(int i) const {
   return std::clamp(out / rod_.share[i], 0.0, 1.0);
 }
 
-/// Point of the present shape `distance` further along the wire than node i; past the tip,
-/// straight on, but not into the wall. Called for rising i.
+/// Point of the present shape `distance` further along the wire than node i, which is that far from
+/// the tip at least. Called for rising i.
 Vec3 Insertion::ahead_of(int i, double distance) {
-  const int n = rod_.nodes();
   const double wanted = rod_.tip_distance[i] - distance;
-  if (wanted >= 0.0) {
-    while (ahead_ + 2 < n && rod_.tip_distance[ahead_ + 1] > wanted) ++ahead_;
-    const double part = (rod_.tip_distance[ahead_] - wanted) / rod_.rest_length[ahead_];
-    return (1.0 - part) * state_.x.col(ahead_) + part * state_.x.col(ahead_ + 1);
-  }
-  const Vec3 end = state_.x.col(n - 1);
-  const Vec3 tangent = (end - state_.x.col(n - 2)).normalized();
-  return out_of_wall(end - wanted * tangent);
-}
-
-/// The point, or if a wire there would lie deeper in the wall than the wire did, the nearest one
-/// where it does not.
-Vec3 Insertion::out_of_wall(Vec3 p) const {
-  for (int round = 0; round < 2; ++round) {
-    const WallSample wall = vessel_.lumen.sample(p);
-    const double deep = rod_.radius - wall.distance - deepest_;
-    if (deep > 0.0) p += deep * wall.gradient;
-  }
-  return p;
+  while (ahead_ + 2 < rod_.nodes() && rod_.tip_distance[ahead_ + 1] > wanted) ++ahead_;
+  const double part = (rod_.tip_distance[ahead_] - wanted) / rod_.rest_length[ahead_];
+  return (1.0 - part) * state_.x.col(ahead_) + part * state_.x.col(ahead_ + 1);
 }
 
 /// The hand's force on the wire along the introducer. What it holds against is the wire, and the

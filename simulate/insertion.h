@@ -142,7 +142,7 @@ class Insertion {
   void bend_at_the_exit();
   double part_outside(int i) const;
   Vec3 ahead_of(int i, double distance);
-  Vec3 out_of_wall(Vec3 p) const;
+  void bend_off_wall(int tip);
   void forget_drift() {
     drift_.setZero();
     moved_.setZero();
