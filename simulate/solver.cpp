@@ -412,9 +412,10 @@ NewtonResult Statics::solve_with(BlockBand<D>& hessian, BlockBand<D>& untouched,
   result.rounding_floor = 8.0 * kEpsilon * extent *
                           (rod.stretch.cwiseQuotient(rod.rest_length).maxCoeff() +
                            4.0 * rod.largest_bend() / (shortest * shortest));
-  double shift = 0.0;  // of the Hessian's diagonal
-  double wire_energy;  // without contact
-  double energy;       // that falls: of wire, contact and lagged friction
+  double shift = 0.0;                                            // of the Hessian's diagonal
+  double last_halved = std::numeric_limits<double>::infinity();  // see below                [N]
+  double wire_energy;                                            // without contact
+  double energy;  // that falls: of wire, contact and lagged friction
   trial_ = state;
   if (contact != nullptr) contact->begin(state.x);
   wire_energy = differentiate(state);
@@ -513,13 +514,16 @@ NewtonResult Statics::solve_with(BlockBand<D>& hessian, BlockBand<D>& untouched,
     };
     turn_edges<D>(problem, state, step_, std::min(1.0, cap), trial_);
     try_trial(std::min(1.0, cap));
-    // What friction and yielding lag has no energy: a full step may be a good one all the same.
+    // What friction and yielding lag has no energy: a full step may be a good one all the same. The
+    // residual of each such step is no more than half of the last one's, so that none goes round.
     bool refreshed = false;
     if (!accepted && shift == 0.0 && contact != nullptr && contact->has_remainder()) {
       contact->save_lag();
       contact->refresh(false);
       trial_wire_energy = differentiate(trial_);
-      accepted = refreshed = largest_force() <= 0.5 * result.residual;
+      const double force = largest_force();
+      accepted = refreshed = force <= 0.5 * std::min(result.residual, last_halved);
+      if (accepted) last_halved = force;
       if (!accepted) contact->restore_lag();
     }
 
