@@ -112,17 +112,32 @@ bool tied_over_repeats(const RepeatedPlan& a, const RepeatedPlan& b, double erro
   return spread.low - error <= 0.0 && spread.high + error >= 0.0;
 }
 
+/// How far the disturbances move two plans' mean scores against each other: the median over pairs
+/// of repeated plans. 0 with fewer than two.
+double shift_by_repeats(const std::vector<RankedPlan>& plans) {
+  std::vector<double> shifts, sizes;  // of each plan, of each pair
+  for (const RankedPlan& plan : plans) {
+    if (!plan.robust_score) continue;
+    const double shift = *plan.robust_score - plan.score.total;
+    for (const double other : shifts) sizes.push_back(std::abs(shift - other));
+    shifts.push_back(shift);
+  }
+  return sizes.empty() ? 0.0 : find_spread(sizes).median;
+}
+
 void find_ties(std::vector<RankedPlan>& plans, const std::vector<RepeatedPlan>& repeated) {
+  const double shift = shift_by_repeats(plans);
   for (RankedPlan& a : plans) {
     const RepeatedPlan* repeats_a = find_repeated(repeated, a.trial);
     for (const RankedPlan& b : plans) {
       if (a.trial == b.trial) continue;
       const double error = a.score_error + b.score_error;
+      const double difference = std::abs(a.score.total - b.score.total);
       const RepeatedPlan* repeats_b = find_repeated(repeated, b.trial);
-      const bool by_error = std::abs(a.score.total - b.score.total) <= error;
-      const bool by_repeats = repeats_a != nullptr && repeats_b != nullptr &&
-                              tied_over_repeats(*repeats_a, *repeats_b, error);
-      if (by_error || by_repeats) a.tied_with.push_back(b.trial);
+      const bool by_repeats = repeats_a != nullptr && repeats_b != nullptr
+                                  ? tied_over_repeats(*repeats_a, *repeats_b, error)
+                                  : difference <= error + shift;
+      if (difference <= error || by_repeats) a.tied_with.push_back(b.trial);
     }
   }
 }

@@ -117,8 +117,10 @@ struct Findings {
 /// after them the others by their score, which knows no disturbance; equals by index of the
 /// candidate. Two plans are tied if their scores differ by no more than both errors, or if the
 /// central 90 % of their paired differences over the repeats, widened by both errors, holds 0: then
-/// the unknowns decide which is better. A trial that was only scouted is no plan. Of a trial only
-/// its outcome and reason are looked at. Expects one trial and one Metrics per candidate, and
+/// the unknowns decide which is better. Where one has no repeats, they are tied if their scores
+/// differ by no more than both errors and what the unknowns typically move repeated plans against
+/// each other, the median over their pairs. A trial that was only scouted is no plan. Of a trial
+/// only its outcome and reason are looked at. Expects one trial and one Metrics per candidate, and
 /// positive limits.
 Ranking rank(const Study& study, const std::vector<Candidate>& candidates,
              const std::vector<simulate::TrialResult>& trials, const std::vector<Metrics>& metrics,

@@ -285,6 +285,25 @@ TEST(Rank, PlansWhoseOrderTheUnknownsDecideAreTied) {
   EXPECT_EQ(ranking.plans[1].tied_with, std::vector<int>{0});
 }
 
+TEST(Rank, APlanWithoutRepeatsMayMoveAsFarAsThoseWithThem) {
+  // Scores without error. Disturbances move 1 against 0 by more than 2, which has no repeats, is
+  // behind 1, and by less than it is behind 0.
+  Plans plans({0.1, 0.2, 0.35, 0.6});
+  const Ranking before = plans.ranked();
+  for (const RankedPlan& plan : before.plans) EXPECT_TRUE(plan.tied_with.empty());
+  const auto score = [&](std::size_t place) { return before.plans[place].score.total; };
+  const double moves = 0.5 * (score(2) - score(1) + score(2) - score(0));
+  plans.repeat(0, std::vector<double>(4, score(0)));
+  plans.repeat(1, std::vector<double>(4, score(1) + moves));
+  const Ranking ranking = plans.ranked();
+  ASSERT_EQ(ranking.plans.size(), 4u);
+  EXPECT_EQ(ranking.plans[0].trial, 0);
+  EXPECT_TRUE(ranking.plans[0].tied_with.empty());
+  EXPECT_EQ(ranking.plans[1].trial, 1);
+  EXPECT_EQ(ranking.plans[1].tied_with, std::vector<int>{2});
+  EXPECT_EQ(ranking.plans[2].tied_with, (std::vector<int>{1, 3}));
+}
+
 TEST(ChoosePlansToRepeat, TakesTheFirstAndTheBestOfEachWireOnce) {
   Plans plans({0.1, 0.2, 0.3, 0.4});
   plans.candidates[3].wire = 1;
