@@ -203,7 +203,8 @@ NextRuns choose_next(const Study& study, const std::vector<Candidate>& candidate
   NextRuns next;
   for (const int k : wanted) {
     const Sighting& scout = seen.scouts[static_cast<std::size_t>(k)];
-    const bool probes_first = probing && !is_probed(k) && !scout.reached && !scout.pinched;
+    const bool probes_first =
+        probing && !is_probed(k) && !scout.reached && !is_doubtful(scout, study.goal.radius);
     (probes_first ? next.probes : next.full).push_back(k);
   }
   if (!next.full.empty()) next.probes.clear();

@@ -1,7 +1,7 @@
 #pragma once
 /// Spending time where it decides: every candidate is scouted on a rigid wall with long elements,
-/// and what may be among the best is run in full; failures that may be the scout's are probed
-/// first, on the rigid wall with the study's own elements.
+/// and what may be among the best is run in full; clear failures that matter are probed first, on
+/// the rigid wall with the study's own elements.
 #include <optional>
 #include <vector>
 
@@ -59,10 +59,10 @@ struct NextRuns {
   std::vector<int> probes = {}, full = {};
 };
 
-/// What may matter is run in full. Where its scout failed, and was not pinched, it is probed first
-/// (if `probing`; not where the study's own wall is rigid), and run in full where the probe
-/// reached, was pinched, came within two radii of the goal or found no equilibrium; else it counts
-/// as failed. Asked again until it names none, it wants, by the best that is known of each:
+/// What may matter is run in full. Where its scout clearly failed (it was not pinched, stayed more
+/// than two radii off the goal and found its equilibria) it is probed first (if `probing`; not
+/// where the study's own wall is rigid), and run in full unless the probe clearly failed too. Asked
+/// again until it names none, it wants, by the best that is known of each:
 ///   1. the five that score best;
 ///   2. of each wire its best, or the nearest where none reached; and while those are no plans the
 ///      next that reached, four in all;

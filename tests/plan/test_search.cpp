@@ -200,6 +200,12 @@ TEST(ChooseNext, RunsInFullWhatScoutOrProbeSawReach) {
   EXPECT_TRUE(bench.seen.full[10]->plan);
   EXPECT_FALSE(bench.seen.full[11]);
 
+  // One that came near has no need of a probe.
+  bench.fail(1, 6.0);  // 12
+  EXPECT_EQ(bench.next().full, std::vector<int>{12});
+  bench.search();
+  EXPECT_FALSE(bench.seen.probes[12]);
+
   // Near misses of probes are run, and those without equilibrium.
   Bench lone;
   lone.probing = true;
