@@ -26,7 +26,8 @@ Study coarsened(const Study& study, double factor, double insertion) {
   changed.insertion.contact_spacing *= factor;
   changed.insertion.length = insertion;
   changed.insertion.record_every = insertion;  // no shapes on the way
-  changed.goal.radius = 1e-9;                  // no push ends that near, so none ends the trial
+  changed.insertion.map_forces = false;
+  changed.goal.radius = 1e-9;  // no push ends that near, so none ends the trial
   return changed;
 }
 

@@ -68,7 +68,6 @@ void multiply_forces(simulate::TrialResult& trial, double factor) {
     contact.normal_force *= factor;
     contact.friction_force *= factor;
   }
-  for (simulate::TriangleForce& peak : trial.peak_forces) peak.force *= factor;
   for (simulate::Shape& shape : trial.shapes) shape.contact_force *= factor;
 }
 
@@ -148,6 +147,7 @@ simulate::TrialResult run_disturbed(const Study& study, const Candidate& candida
   insertion.friction *= disturbance.friction_factor;
   insertion.residual_tolerance /= factor;
   insertion.record_every = insertion.length;
+  insertion.map_forces = false;
 
   // The introducer, moved and turned across the vessel.
   const Vec3 t = study.tangent.normalized();

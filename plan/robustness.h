@@ -44,8 +44,8 @@ struct Disturbance {
 /// Conover, Technometrics 1979). The same on every machine.
 std::vector<Disturbance> draw_disturbances(const RobustnessOptions& options);
 
-/// The trial of a candidate under a disturbance; shapes on the way are not kept. Never throws, as
-/// run_candidate does not.
+/// The trial of a candidate under a disturbance; no shapes on the way, no forces per triangle.
+/// Never throws, as run_candidate does not.
 ///
 /// A wall that is f times as stiff is had from the wall as it is: equilibrium depends on the ratio
 /// of wire and wall, so EI, EA, GJ and the tolerance are divided by f, and all forces and works

@@ -80,6 +80,7 @@ Study scout_study(const Study& study) {
   insertion.step = std::max(
       insertion.step, std::min({kCoarser * insertion.step, kLongestPush, 0.5 * study.goal.radius}));
   insertion.residual_tolerance = std::max(insertion.residual_tolerance, kScoutTolerance);
+  insertion.map_forces = false;
   return scout;
 }
 

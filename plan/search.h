@@ -16,7 +16,7 @@ bool needs_search(const Study& study, bool exhaustive);
 /// The study at the scout's level: elements four times as long, but not so long that one of a
 /// curved section turns by more than 1/3 rad at rest; pushes four times as long, up to 2 mm, where
 /// the trial cuts them anyway, and to half the goal's radius, which they would step over; contact
-/// points twice as far apart; residuals up to 1e-4 N.
+/// points twice as far apart; residuals up to 1e-4 N; no forces per triangle.
 ///
 /// The vessel's wall is to be rigid: one that yields costs several times as much (DESIGN.md), and
 /// its compliance where no good plan goes is then never needed.

@@ -405,6 +405,7 @@ void Insertion::measure(Push& record) {
     if (touch.tip_distance <= kTipRegion) at_tip += force;
     forces_.col(touch.edge) += (1.0 - touch.part) * force;
     forces_.col(touch.edge + 1) += touch.part * force;
+    if (!options_.map_forces) continue;
     const int triangle =
         vessel_.locator.nearest(touch.position - rod_.radius * touch.normal).triangle;
     if (triangle >= 0) triangle_forces_.emplace_back(triangle, touch.normal_force);

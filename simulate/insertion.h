@@ -25,6 +25,7 @@ struct InsertionOptions {
   double residual_tolerance = 1e-6;  // largest nodal force out of balance               [N]
   int max_iterations = 200;          // Newton iterations per push
   double record_every = 5.0;         // spacing of the stored shapes                     [mm]
+  bool map_forces = true;            // whether the wall's triangles remember their peak forces
 };
 
 /// The introducer: wire slides along its axis and is free beyond its point.
@@ -113,7 +114,7 @@ class Insertion {
   const Eigen::Matrix3Xd& forces() const { return forces_; }
   /// Contacts of the present shape; nodes counted from the first free one.
   std::vector<WireContact> contacts();
-  std::vector<TriangleForce> peak_forces() const;  // over all moves so far
+  std::vector<TriangleForce> peak_forces() const;  // over all moves so far, if mapped
 
   /// Where the wire has turned back on itself, within a short length and more than at rest, so that
   /// its bow leads and its tip is behind.

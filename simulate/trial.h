@@ -40,7 +40,7 @@ struct TrialResult {
   std::vector<Push> pushes;  // in the order in which they were made
   Eigen::Matrix3Xd nodes;    // (3, k) final shape beyond the introducer, proximal to distal
   std::vector<WireContact> contacts;       // of the final shape
-  std::vector<TriangleForce> peak_forces;  // over all pushes, ascending triangles
+  std::vector<TriangleForce> peak_forces;  // over all pushes, ascending triangles; if mapped
   std::vector<Shape> shapes;       // every `record_every` of the hand's way, and the final one
   std::vector<std::string> terms;  // energy terms that the scene built: "stretch", "bend", ...
 };

@@ -80,6 +80,7 @@ WallContact::WallContact(const Rod& rod, const VesselModel& vessel, const Contac
   touches_.reserve(points_.size());
   if (yielding_) {
     lag_.feet.resize(points_.size());
+    memory_.triangle.assign(points_.size(), -1);
     press_.setZero(m);
   }
 }
@@ -235,9 +236,11 @@ void WallContact::find_forces() {
 
 SurfacePoint WallContact::foot_of(const Active& active) const {
   const WallSample& wall = active.wall;
+  const std::size_t point = static_cast<std::size_t>(active.point);
+  const std::int32_t now = lag_.feet[point].triangle;
   return vessel_.locator.pierced(
       active.position - (wall.distance / wall.gradient.squaredNorm()) * wall.gradient,
-      wall.gradient, lag_.feet[static_cast<std::size_t>(active.point)].triangle);
+      wall.gradient, now >= 0 ? now : memory_.triangle[point]);
 }
 
 // ---------------------------------------------------------------- friction
@@ -318,6 +321,7 @@ ContactEnergy WallContact::refresh(bool fully) {
 }
 
 double WallContact::settle() {
+  for (std::size_t k = 0; k < lag_.feet.size(); ++k) memory_.triangle[k] = lag_.feet[k].triangle;
   if (options_.friction == 0.0) return 0.0;
   // A point that rubbed keeps its anchor `slip` behind it; one that does not touch, where it is.
   // The heat is the friction now, times the way that the anchor went.

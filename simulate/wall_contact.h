@@ -77,8 +77,9 @@ class WallContact {
 
   /// What the points remember from one equilibrium to the next.
   struct Memory {
-    Eigen::Matrix3Xd anchor;       // (3, m) where friction holds a point to              [mm]
-    Eigen::VectorXd normal_force;  // (m)                                                 [N]
+    Eigen::Matrix3Xd anchor;             // (3, m) where friction holds a point to              [mm]
+    Eigen::VectorXd normal_force;        // (m)                                                 [N]
+    std::vector<std::int32_t> triangle;  // (m) of its foot on a wall that yields; -1: none
   };
   const Memory& memory() const { return memory_; }
   void restore(const Memory& memory) { memory_ = memory; }
