@@ -325,8 +325,10 @@ WallCompliance::HalfResponse WallCompliance::find_response(int vertex) const {
     largest = std::max(largest, size);
     count = k + 1;
     for (int e = 0; e < c.size; e += 3) {
-      auto above = y.col(at[c.row[e] / 3]);
-      for (int d = 0; d < 3; ++d) above -= here[d] * Eigen::Map<const Vec3>(c.value[d] + e);
+      const auto part = [&](int d) -> Vec3 {
+        return here[d] * Eigen::Map<const Vec3>(c.value[d] + e);
+      };
+      y.col(at[c.row[e] / 3]) -= part(0) + part(1) + part(2);  // read and written once
     }
   }
   const int above = static_cast<int>(y.cols() - count);
