@@ -533,19 +533,21 @@ std::vector<double> spline_coefficients(const SampleGrid& grid) {
   return coefficients;
 }
 
-/// Values, first and second derivatives of the four cubic B-splines at a fraction of a cell, in
-/// cells.
+/// The four cubic B-splines at a fraction t of a cell, and their derivatives over it.
 struct SplineWeights {
-  double value[4], first[4], second[4];
-};
+  using Row = Eigen::Array4d;
+  double t;
 
-SplineWeights spline_weights(double t) {
-  const double u = 1.0 - t;
-  return {{u * u * u / 6.0, (4.0 - 6.0 * t * t + 3.0 * t * t * t) / 6.0,
-           (4.0 - 6.0 * u * u + 3.0 * u * u * u) / 6.0, t * t * t / 6.0},
-          {-0.5 * u * u, -2.0 * t + 1.5 * t * t, 2.0 * u - 1.5 * u * u, 0.5 * t * t},
-          {u, -2.0 + 3.0 * t, -2.0 + 3.0 * u, t}};
-}
+  // Coefficients of the powers of t.
+  static Row c0() { return Row(1.0, 4.0, 1.0, 0.0) / 6.0; }
+  static Row c1() { return Row(-0.5, 0.0, 0.5, 0.0); }
+  static Row c2() { return Row(0.5, -1.0, 0.5, 0.0); }
+  static Row c3() { return Row(-1.0, 3.0, -3.0, 1.0) / 6.0; }
+
+  Row value() const { return c0() + t * (c1() + t * (c2() + t * c3())); }
+  Row first() const { return c1() + t * (2.0 * c2() + t * (3.0 * c3())); }
+  Row second() const { return 2.0 * c2() + t * (6.0 * c3()); }
+};
 
 }  // namespace
 
@@ -660,22 +662,21 @@ Lumen::Place Lumen::find_place(const Vec3& point) const {
   return place;
 }
 
+Eigen::Array4d Lumen::Place::row(int j, int k) const {
+  const float* first = coefficients + cell[0] + kNodes * (cell[1] + j + kNodes * (cell[2] + k));
+  return Eigen::Map<const Eigen::Array4f>(first).cast<double>();
+}
+
 double Lumen::distance(const Vec3& point) const {
   const Place place = find_place(point);
   if (place.coefficients == nullptr) return place.sign * band_;
-  const SplineWeights x = spline_weights(place.fraction[0]), y = spline_weights(place.fraction[1]),
-                      z = spline_weights(place.fraction[2]);
-  double sum = 0.0;
+  const SplineWeights x{place.fraction[0]}, y{place.fraction[1]}, z{place.fraction[2]};
+  const Eigen::Array4d wy = y.value(), wz = z.value();
+  Eigen::Array4d sum = Eigen::Array4d::Zero();
   for (int k = 0; k < 4; ++k) {
-    for (int j = 0; j < 4; ++j) {
-      const float* row = place.coefficients + place.cell[0] +
-                         kNodes * (place.cell[1] + j + kNodes * (place.cell[2] + k));
-      const double along =
-          x.value[0] * row[0] + x.value[1] * row[1] + x.value[2] * row[2] + x.value[3] * row[3];
-      sum += z.value[k] * y.value[j] * along;
-    }
+    for (int j = 0; j < 4; ++j) sum += (wz[k] * wy[j]) * place.row(j, k);
   }
-  return std::clamp(sum, -band_, band_);
+  return std::clamp((x.value() * sum).sum(), -band_, band_);
 }
 
 WallSample Lumen::sample(const Vec3& point) const {
@@ -683,50 +684,41 @@ WallSample Lumen::sample(const Vec3& point) const {
   WallSample result;
   result.distance = place.sign * band_;
   if (place.coefficients == nullptr) return result;
-  const SplineWeights x = spline_weights(place.fraction[0]), y = spline_weights(place.fraction[1]),
-                      z = spline_weights(place.fraction[2]);
-  // Sums over z of (sums over y of (sums over x)); names tell the derivatives taken.
-  double f = 0.0, fx = 0.0, fy = 0.0, fz = 0.0, fxx = 0.0, fxy = 0.0, fxz = 0.0, fyy = 0.0,
-         fyz = 0.0, fzz = 0.0;
+  // Sums over z of sums over y, of four values along x each; names tell the derivatives taken.
+  using Row = Eigen::Array4d;
+  const SplineWeights x{place.fraction[0]}, y{place.fraction[1]}, z{place.fraction[2]};
+  const Row y0 = y.value(), y1 = y.first(), y2 = y.second();
+  const Row z0 = z.value(), z1 = z.first(), z2 = z.second();
+  Row f = Row::Zero(), fy = Row::Zero(), fyy = Row::Zero(), fz = Row::Zero(), fyz = Row::Zero(),
+      fzz = Row::Zero();
   for (int k = 0; k < 4; ++k) {
-    double g = 0.0, gx = 0.0, gy = 0.0, gxx = 0.0, gxy = 0.0, gyy = 0.0;
+    Row g = Row::Zero(), gy = Row::Zero(), gyy = Row::Zero();
     for (int j = 0; j < 4; ++j) {
-      const float* row = place.coefficients + place.cell[0] +
-                         kNodes * (place.cell[1] + j + kNodes * (place.cell[2] + k));
-      double h = 0.0, hx = 0.0, hxx = 0.0;
-      for (int i = 0; i < 4; ++i) {
-        const double c = row[i];
-        h += x.value[i] * c;
-        hx += x.first[i] * c;
-        hxx += x.second[i] * c;
-      }
-      g += y.value[j] * h;
-      gx += y.value[j] * hx;
-      gy += y.first[j] * h;
-      gxx += y.value[j] * hxx;
-      gxy += y.first[j] * hx;
-      gyy += y.second[j] * h;
+      const Row c = place.row(j, k);
+      g += y0[j] * c;
+      gy += y1[j] * c;
+      gyy += y2[j] * c;
     }
-    f += z.value[k] * g;
-    fx += z.value[k] * gx;
-    fy += z.value[k] * gy;
-    fz += z.first[k] * g;
-    fxx += z.value[k] * gxx;
-    fxy += z.value[k] * gxy;
-    fyy += z.value[k] * gyy;
-    fxz += z.first[k] * gx;
-    fyz += z.first[k] * gy;
-    fzz += z.second[k] * g;
+    f += z0[k] * g;
+    fy += z0[k] * gy;
+    fyy += z0[k] * gyy;
+    fz += z1[k] * g;
+    fyz += z1[k] * gy;
+    fzz += z2[k] * g;
   }
-  if (std::abs(f) >= band_) {
-    result.distance = std::copysign(band_, f);
+  const Row x0 = x.value(), x1 = x.first(), x2 = x.second();
+  const double value = (x0 * f).sum();
+  if (std::abs(value) >= band_) {
+    result.distance = std::copysign(band_, value);
     return result;
   }
-  const double per_mm = 1.0 / spacing_, per_mm2 = per_mm * per_mm;
-  result.distance = f;
-  result.gradient = per_mm * Vec3(fx, fy, fz);
-  result.hessian << fxx, fxy, fxz, fxy, fyy, fyz, fxz, fyz, fzz;
-  result.hessian *= per_mm2;
+  result.distance = value;
+  result.gradient << (x1 * f).sum(), (x0 * fy).sum(), (x0 * fz).sum();
+  result.gradient /= spacing_;
+  const double xx = (x2 * f).sum(), xy = (x1 * fy).sum(), xz = (x1 * fz).sum();
+  const double yy = (x0 * fyy).sum(), yz = (x0 * fyz).sum(), zz = (x0 * fzz).sum();
+  result.hessian << xx, xy, xz, xy, yy, yz, xz, yz, zz;
+  result.hessian /= spacing_ * spacing_;
   return result;
 }
 

@@ -75,6 +75,9 @@ class Lumen {
     double sign;                // of the distance there
     std::array<int, 3> cell;    // within the brick
     Vec3 fraction;              // within the cell
+
+    /// Coefficients of the cell along x, in its support's row j, k along y, z.
+    Eigen::Array4d row(int j, int k) const;
   };
   Place find_place(const Vec3& point) const;
 
