@@ -44,8 +44,7 @@ WallContact::WallContact(const Rod& rod, const VesselModel& vessel, const Contac
     : vessel_(vessel),
       options_(options),
       yielding_(vessel.compliance != nullptr),
-      radius_(rod.radius),
-      free_from_(std::numeric_limits<double>::infinity()) {
+      radius_(rod.radius) {
   expects(options.spacing > 0.0 && options.friction >= 0.0 && options.slip > 0.0);
   expects(vessel.lumen.band() > reach());
   const int edges = rod.nodes() - 1;
@@ -90,6 +89,16 @@ Vec3 WallContact::position_of(const Point& point, const Eigen::Matrix3Xd& x) con
   return (1.0 - point.part) * x.col(point.edge) + point.part * x.col(point.edge + 1);
 }
 
+void WallContact::free_from(double tip_distance) {
+  const auto first = std::partition_point(
+      points_.begin(), points_.end() - 1,
+      [&](const Point& point) { return point.tip_distance > tip_distance + 1e-9; });
+  first_free_ = static_cast<std::size_t>(first - points_.begin());
+  // The edge that comes out of the introducer moves, and so do points on its part in there.
+  first_moving_ = first_free_;
+  while (first_moving_ > 0 && points_[first_moving_ - 1].edge + 1 >= first->edge) --first_moving_;
+}
+
 void WallContact::start_at(const Eigen::Matrix3Xd& x) {
   for (std::size_t k = 0; k < points_.size(); ++k) {
     memory_.anchor.col(static_cast<Eigen::Index>(k)) = position_of(points_[k], x);
@@ -124,24 +133,32 @@ void WallContact::predict(double distance) {
 // ---------------------------------------------------------------- normal forces
 
 void WallContact::begin(const Eigen::Matrix3Xd& x) {
+  for (std::size_t k = 0; k < first_moving_; ++k) {
+    position_.col(static_cast<Eigen::Index>(k)) = position_of(points_[k], x);
+  }
+  std::fill(lag_.feet.begin(), lag_.feet.end(), SurfacePoint{});
+  feet_changed_ = true;
+  feet_held_ = false;
+  find_active(x);
+
   // Points that friction is predicted for rub along the wall where they are now.
   lag_.points.clear();
-  fresh_ = false;
   const double near = radius_ + options_.law.smoothing;
   if (options_.friction > 0.0) {
-    for (std::size_t k = 0; k < points_.size(); ++k) {
+    auto active = active_.begin();
+    for (std::size_t k = first_free_; k < points_.size(); ++k) {
       const Eigen::Index i = static_cast<Eigen::Index>(k);
-      if (lag_.force[i] <= 0.0 || !is_free(points_[k])) continue;
-      const WallSample wall = vessel_.lumen.sample(position_of(points_[k], x));
+      if (lag_.force[i] <= 0.0) continue;
+      while (active != active_.end() && active->point < static_cast<int>(k)) ++active;
+      const bool known = active != active_.end() && active->point == static_cast<int>(k);
+      const WallSample wall = known ? active->wall : vessel_.lumen.sample(position_.col(i));
       if (wall.distance > near + 1.0 || wall.gradient.norm() < kSmallestSlope) continue;
       lag_.normal.col(i) = wall.gradient.normalized();
       lag_.points.push_back(static_cast<int>(k));
     }
   }
-  std::fill(lag_.feet.begin(), lag_.feet.end(), SurfacePoint{});
-  feet_changed_ = true;
-  feet_held_ = false;
-  sample(x);
+  find_forces();
+  energy_ = lagged_energy();
 }
 
 double WallContact::reach() const {
@@ -151,14 +168,20 @@ double WallContact::reach() const {
 }
 
 ContactEnergy WallContact::sample(const Eigen::Matrix3Xd& x) {
+  find_active(x);
+  find_forces();
+  return energy_ = lagged_energy();
+}
+
+void WallContact::find_active(const Eigen::Matrix3Xd& x) {
   // Points near the wall. One that was far enough for its motion since is not looked at.
   fresh_ = lost_ = false;
   active_.clear();
-  for (std::size_t k = 0; k < points_.size(); ++k) {
+  for (std::size_t k = first_moving_; k < points_.size(); ++k) {
     const Eigen::Index i = static_cast<Eigen::Index>(k);
     const Vec3 p = position_of(points_[k], x);
     position_.col(i) = p;
-    if (!is_free(points_[k])) continue;
+    if (k < first_free_) continue;
     const double moved = (p - known_position_.col(i)).norm();
     bound_[i] = known_distance_[i] - kLipschitz * moved;
     const double near = reach() + (expected_[i] > 0.0 ? kInSight : 0.0);
@@ -180,8 +203,6 @@ ContactEnergy WallContact::sample(const Eigen::Matrix3Xd& x) {
     }
     active_.push_back({.point = static_cast<int>(k), .position = p, .wall = wall});
   }
-  find_forces();
-  return energy_ = lagged_energy();
 }
 
 void WallContact::find_forces() {
@@ -480,8 +501,7 @@ void WallContact::add_remainder(const Motion& motion, Eigen::VectorXd& product) 
 
 double WallContact::largest_safe_part(const Motion& motion, int looks) const {
   double cap = std::numeric_limits<double>::infinity();
-  for (std::size_t k = 0; k < points_.size(); ++k) {
-    if (!is_free(points_[k])) continue;
+  for (std::size_t k = first_free_; k < points_.size(); ++k) {
     const Vec3 move = motion.of(points_[k]);
     const Eigen::Index i = static_cast<Eigen::Index>(k);
     const double room = kInto + std::max(0.0, bound_[i]), length = move.norm();

@@ -60,7 +60,7 @@ class WallContact {
 
   /// Only points nearer to the tip than this touch; those behind it are still in the introducer
   /// [mm]. At the start: all.
-  void free_from(double tip_distance) { free_from_ = tip_distance; }
+  void free_from(double tip_distance);
   /// Takes the state as one in which nothing has slipped yet.
   void start_at(const Eigen::Matrix3Xd& x);
   /// Before a push by `distance`: each point will feel what the wire ahead of it felt.
@@ -171,8 +171,8 @@ class WallContact {
     double energy, slope, curvature;  // of the potential per `limit`
   };
   Vec3 position_of(const Point& point, const Eigen::Matrix3Xd& x) const;
-  bool is_free(const Point& point) const { return point.tip_distance <= free_from_ + 1e-9; }
   double reach() const;  // of contact, from the wire's axis                              [mm]
+  void find_active(const Eigen::Matrix3Xd& x);
   void find_forces();
   ContactEnergy lagged_energy() const;
   Rubbing rubbing_at(int k) const;
@@ -186,8 +186,9 @@ class WallContact {
   const VesselModel& vessel_;
   ContactOptions options_;
   bool yielding_, feet_held_ = false;
-  double radius_, free_from_;
-  std::vector<Point> points_;
+  double radius_;
+  std::vector<Point> points_;                      // proximal to distal
+  std::size_t first_free_ = 0, first_moving_ = 0;  // those before do not touch, do not move
   Memory memory_;
   std::vector<Active> active_;
   std::vector<Touch> touches_;
