@@ -1,6 +1,6 @@
 #pragma once
 /// Symmetric block-pentadiagonal matrices: a wire is a chain, its Hessian couples a node with two
-/// neighbours on each side. Cholesky in place, linear in the number of nodes, nothing allocated.
+/// neighbours on each side. Factored in place, linear in the number of nodes, nothing allocated.
 /// Leading block rows may lack their last unknown: those of the part of a wire whose twist is no
 /// unknown (twist_chain.h).
 #include <Eigen/Core>
@@ -36,8 +36,9 @@ class BlockBand {
   Block& one(int i) { return rows_[static_cast<std::size_t>(i)].one; }  // (i, i-1)
   Block& two(int i) { return rows_[static_cast<std::size_t>(i)].two; }  // (i, i-2)
 
-  /// A = L L'. Only the lower triangle of own(i) is read. Returns false at the first pivot that is
-  /// not positive: A is then not positive definite, and its contents are lost.
+  /// A = L D L', L with ones on its diagonal: no pivot waits for a root. Only the lower triangle of
+  /// own(i) is read. Returns false at the first pivot that is not positive: A is then not positive
+  /// definite, and its contents are lost.
   bool factor() {
     for (int i = 0; i < narrow_; ++i) {
       if (!factor_row<D - 1>(i)) return false;
@@ -62,7 +63,13 @@ class BlockBand {
     for (int i = first; i < narrow_; ++i) solve_forward<D - 1, K>(i, b, known);
     for (int i = std::max(first, narrow_); i < size_; ++i) solve_forward<D, K>(i, b, known);
   }
-  /// The second half, b <- L^-T b.
+  /// b <- D^-1 b, for what needs no more than that half: b' A^-1 b is L^-1 b times D^-1 L^-1 b.
+  void divide_by_pivots(Eigen::Ref<Eigen::VectorXd> b) const {
+    for (int i = 0; i < size_; ++i) {
+      b.segment<D>(D * i).array() *= rows_[static_cast<std::size_t>(i)].own.diagonal().array();
+    }
+  }
+  /// The second half, b <- L^-T D^-1 b.
   void solve_upper(Eigen::Ref<Eigen::VectorXd> b) const {
     Pair<1> known;
     // The last two narrow rows couple with all unknowns of those after them.
@@ -80,19 +87,30 @@ class BlockBand {
 
   template <int R>
   bool factor_row(int i) {
+    using Square = Eigen::Matrix<double, R, R>;
     Row& row = rows_[static_cast<std::size_t>(i)];
     auto own = row.own.template topLeftCorner<R, R>();
     auto one = row.one.template topLeftCorner<R, R>();
     auto two = row.two.template topLeftCorner<R, R>();
-    if (i >= 2) solve_right<R>(row.two, rows_[static_cast<std::size_t>(i - 2)].own);
-    if (i >= 1) {
-      const Row& above = rows_[static_cast<std::size_t>(i - 1)];
-      if (i >= 2) one.noalias() -= two * above.one.template topLeftCorner<R, R>().transpose();
-      solve_right<R>(row.one, above.own);
-      own.noalias() -= one * one.transpose();
-      if (i >= 2) own.noalias() -= two * two.transpose();
+    // First L's blocks times pivots, then without.
+    if (i >= 2) {
+      const Row& far = rows_[static_cast<std::size_t>(i - 2)];
+      solve_right<R>(row.two, far.own);
+      one.noalias() -=
+          two *
+          rows_[static_cast<std::size_t>(i - 1)].one.template topLeftCorner<R, R>().transpose();
+      const Square scaled = two;
+      two *= far.own.diagonal().template head<R>().asDiagonal();
+      own.noalias() -= two * scaled.transpose();
     }
-    return cholesky<R>(row.own);
+    if (i >= 1) {
+      const Row& near = rows_[static_cast<std::size_t>(i - 1)];
+      solve_right<R>(row.one, near.own);
+      const Square scaled = one;
+      one *= near.own.diagonal().template head<R>().asDiagonal();
+      own.noalias() -= one * scaled.transpose();
+    }
+    return factor_block<R>(row.own);
   }
 
   /// Unknowns of K right sides in the rows next to the one at hand, and those after.
@@ -116,7 +134,7 @@ class BlockBand {
           sum -= row.one(r, c) * known.near[c][k] + row.two(r, c) * known.far[c][k];
         }
         for (int c = 0; c < r; ++c) sum -= row.own(r, c) * v[c][k];
-        x[k][D * i + r] = v[r][k] = sum * row.own(r, r);  // holds 1 / L_rr
+        x[k][D * i + r] = v[r][k] = sum;
       }
     }
     known.take(v);
@@ -131,42 +149,39 @@ class BlockBand {
     double v[D][K] = {};
     for (int r = R - 1; r >= 0; --r) {
       for (int k = 0; k < K; ++k) {
-        double sum = x[k][D * i + r];
+        double sum = x[k][D * i + r] * row.own(r, r);  // holds 1 / D_rr
         for (int c = 0; c < R; ++c) {
           sum -= next.one(c, r) * known.near[c][k] + after.two(c, r) * known.far[c][k];
         }
         for (int c = r + 1; c < R; ++c) sum -= row.own(c, r) * v[c][k];
-        x[k][D * i + r] = v[r][k] = sum * row.own(r, r);
+        x[k][D * i + r] = v[r][k] = sum;
       }
     }
     known.take(v);
   }
 
-  /// Lower Cholesky factor in place, its diagonal inverted.
+  /// L and 1 / D in place of the lower triangle.
   template <int R>
-  static bool cholesky(Block& a) {
+  static bool factor_block(Block& a) {
     for (int c = 0; c < R; ++c) {
-      double pivot = a(c, c);
-      for (int k = 0; k < c; ++k) pivot -= a(c, k) * a(c, k);
-      if (!(pivot > 0.0)) return false;
-      const double inverse = 1.0 / std::sqrt(pivot);
+      if (!(a(c, c) > 0.0)) return false;
+      const double inverse = 1.0 / a(c, c);
       a(c, c) = inverse;
       for (int r = c + 1; r < R; ++r) {
-        double v = a(r, c);
-        for (int k = 0; k < c; ++k) v -= a(r, k) * a(c, k);
-        a(r, c) = v * inverse;
+        const double part = a(r, c) * inverse;
+        for (int k = c + 1; k <= r; ++k) a(r, k) -= part * a(k, c);
       }
+      for (int r = c + 1; r < R; ++r) a(r, c) *= inverse;
     }
     return true;
   }
 
-  /// b <- b L^-T, for the factor L made by cholesky().
+  /// b <- b L^-T, for the L made by factor_block().
   template <int R>
   static void solve_right(Block& b, const Block& factor) {
-    for (int c = 0; c < R; ++c) {
+    for (int c = 1; c < R; ++c) {
       auto column = b.col(c).template head<R>();
       for (int k = 0; k < c; ++k) column -= factor(c, k) * b.col(k).template head<R>();
-      column *= factor(c, c);
     }
   }
 

@@ -72,10 +72,10 @@ inline void spread_chain(const TwistChain& chain, const Rod& rod, RodState& stat
   }
 }
 
-/// Solves with a banded matrix A = L L' that has been factored and what add_chain() left out of it:
-/// H = A + k ((p + e)(p + e)' - e e'), e the last theta's unit vector, p psi's derivatives with the
-/// nodes (Sherman, Morrison and Woodbury). Between the halves of a solve with A, so that p + e and
-/// e need the first half alone.
+/// Solves with a banded matrix A = L D L' that has been factored and what add_chain() left out of
+/// it: H = A + k ((p + e)(p + e)' - e e'), e the last theta's unit vector, p psi's derivatives with
+/// the nodes (Sherman, Morrison and Woodbury). Between the halves of a solve with A, so that p + e
+/// and e need the first half alone.
 class CoupledChain {
  public:
   Eigen::VectorXd psi;  // p
@@ -97,10 +97,14 @@ class CoupledChain {
     theta_[place] = 1.0;
     factored.template solve_lower<2>({v.data(), together_.data()});
     factored.template solve_lower<1>({theta_.data()}, theta);
-    const double mixed = together_.dot(theta_);
+    together_part_ = together_;
+    theta_part_ = theta_;
+    factored.divide_by_pivots(together_part_);
+    factored.divide_by_pivots(theta_part_);
+    const double mixed = together_.dot(theta_part_);
     Eigen::Matrix2d inner;
-    inner << 1.0 / chain.stiffness + together_.squaredNorm(), mixed, mixed,
-        theta_.squaredNorm() - 1.0 / chain.stiffness;
+    inner << 1.0 / chain.stiffness + together_.dot(together_part_), mixed, mixed,
+        theta_.dot(theta_part_) - 1.0 / chain.stiffness;
     inverse_ = inner.inverse();
     correct(v);
     factored.solve_upper(v);
@@ -118,12 +122,14 @@ class CoupledChain {
 
  private:
   void correct(Eigen::VectorXd& v) const {
-    const Eigen::Vector2d share = inverse_ * Eigen::Vector2d(together_.dot(v), theta_.dot(v));
+    const Eigen::Vector2d share =
+        inverse_ * Eigen::Vector2d(together_part_.dot(v), theta_part_.dot(v));
     v -= share[0] * together_ + share[1] * theta_;
   }
 
   bool exists_ = false;
-  Eigen::VectorXd together_, theta_;  // L^-1 (p + e), L^-1 e
+  Eigen::VectorXd together_, theta_;            // L^-1 (p + e), L^-1 e
+  Eigen::VectorXd together_part_, theta_part_;  // D^-1 of those
   Eigen::Matrix2d inverse_;
 };
 
