@@ -348,12 +348,22 @@ double WallCompliance::between(const HalfResponse& a, const HalfResponse& b) {
   int j = static_cast<int>(b.places.size()) - 1 - (a.above - b.above);
   j = std::max(j, b.own - 1);
   double sum = 0.0;
-  while (i >= 0 && j >= 0) {
-    const int from = i;
-    while (i >= 0 && j >= 0 && a.places[i] == b.places[j]) --i, --j;
-    sum += a.values.middleCols(i + 1, from - i)
-               .cwiseProduct(b.values.middleCols(j + 1, from - i))
-               .sum();
+  const auto take = [&](int count) {  // the next ones toward the leaves, the same in both
+    i -= count;
+    j -= count;
+    sum += a.values.middleCols(i + 1, count).cwiseProduct(b.values.middleCols(j + 1, count)).sum();
+  };
+  // The paths, which part once: where is found by bisection.
+  int same = 0, apart = std::min(i - a.own, j - b.own) + 2;
+  while (apart - same > 1) {
+    const int middle = same == 0 ? 1 : (same + apart) / 2;
+    (a.places[i + 1 - middle] == b.places[j + 1 - middle] ? same : apart) = middle;
+  }
+  take(same);
+  while (i >= 0 && j >= 0 && (i < a.own || j < b.own)) {
+    int count = 0;
+    while (i >= count && j >= count && a.places[i - count] == b.places[j - count]) ++count;
+    take(count);
     if (i < 0 || j < 0 || (i >= a.own && j >= b.own)) break;
     --(a.places[i] > b.places[j] ? i : j);
   }
