@@ -576,10 +576,10 @@ template <int D>
 double Statics::refine_step(const Problem& problem, const BlockBand<D>& factored, double slope) {
   // What the banded Hessian H lacks of the exact one, R: (I + H^-1 R) step = -H^-1 gradient, by
   // GMRES (Saad & Schultz 1986) from the banded step, as few directions as it takes.
-  constexpr double kEnough = 0.1;  // of the first residual: more saved no iterations
+  constexpr double kEnough = 0.01;  // of the first residual
   const Eigen::Index size = step_.size();
   krylov_.resize(size, kKrylov + 1);
-  constexpr double kSmall = 0.02;  // of the gradient: not worth a solve
+  constexpr double kSmall = 5e-4;  // of the gradient: not worth a solve
   const auto find_rest = [&](const Eigen::VectorXd& v) {
     refined_.setZero(size);
     problem.contact->add_remainder({problem.first, problem.last, D, v}, refined_);
