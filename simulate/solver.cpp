@@ -460,7 +460,7 @@ NewtonResult Statics::solve_with(BlockBand<D>& hessian, BlockBand<D>& untouched,
                coupled_.solve_first(chain, hessian, chain.last - problem.first, step_);
       };
       while (!solve()) {
-        shift = shift == 0.0 ? std::max(kSmallestShift, 0.1 * last_shift) : 8.0 * shift;
+        shift = shift == 0.0 ? std::max(kSmallestShift, 0.1 * last_shift) : 4.0 * shift;
         if (!(shift < kLargestShift)) return finish(false);  // a number in it is not finite
         apply_shift();
       }

@@ -523,7 +523,7 @@ double WallContact::way_inside(const Vec3& from, const Vec3& toward, double leng
     const double next = way + kInto + std::max(0.0, distance);
     if (next >= length) return std::numeric_limits<double>::infinity();
     distance = vessel_.lumen.distance(from + next * toward);
-    if (distance < deepest) return look == 0 ? next : way;
+    if (distance < deepest - kInto) return look == 0 ? next : way;
     way = next;
   }
   return way;

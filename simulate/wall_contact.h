@@ -149,8 +149,9 @@ class WallContact {
 
   /// Largest part of a motion of the state sampled last that takes no point across the wall: a
   /// point may go as far as it is from the wall and a quarter of a millimetre into it, where
-  /// contact pushes it back; with more looks, so far again from where that leads if it is no deeper
-  /// there, and so on, so that it may slide along the wall. Infinite where there is no bound.
+  /// contact pushes it back; with more looks, so far again from where that leads if it is at most
+  /// as much deeper there, and so on, so that it may slide along the wall. Infinite where there is
+  /// no bound.
   double largest_safe_part(const Motion& motion, int looks) const;
 
  private:
