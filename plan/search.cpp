@@ -142,9 +142,11 @@ NextRuns choose_next(const Study& study, const std::vector<Candidate>& candidate
   const auto full = [&](int k) -> const std::optional<Sighting>& {
     return seen.full[static_cast<std::size_t>(k)];
   };
+  const auto clearly_failed = [&](int k) {
+    return !sighting(k).reached && !is_doubtful(sighting(k), study.goal.radius);
+  };
   const auto is_known = [&](int k) {  // so that no more is to be learnt of it
-    return full(k) ||
-           (is_probed(k) && !sighting(k).reached && !is_doubtful(sighting(k), study.goal.radius));
+    return full(k) || (is_probed(k) && clearly_failed(k));
   };
   const auto wire_of = [&](int k) { return candidates[static_cast<std::size_t>(k)].wire; };
   const std::vector<int> order = order_by_promise(rigid);
@@ -203,9 +205,7 @@ NextRuns choose_next(const Study& study, const std::vector<Candidate>& candidate
   }
   NextRuns next;
   for (const int k : wanted) {
-    const Sighting& scout = seen.scouts[static_cast<std::size_t>(k)];
-    const bool probes_first =
-        probing && !is_probed(k) && !scout.reached && !is_doubtful(scout, study.goal.radius);
+    const bool probes_first = probing && !is_probed(k) && clearly_failed(k);
     (probes_first ? next.probes : next.full).push_back(k);
   }
   if (!next.full.empty()) next.probes.clear();
