@@ -150,7 +150,7 @@ std::vector<Stage> stages_of(const Case& given) {
        .parameters = {"/wall/thickness_mm", "/wall/young_modulus_kpa", "/wall/poisson_ratio"},
        .make = make_wall});
   Stage trials{.name = "trials",
-               .version = 13,
+               .version = 14,
                .after = {"surface", "centerline"},
                .parameters = {"/access", "/target", "/wires", "/tip_roll_deg", "/friction",
                               "/wall/model", "/insertion"},

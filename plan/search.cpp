@@ -26,7 +26,8 @@ constexpr std::size_t kGiveUpAfter = 32;  // ... until so many were run in full,
 constexpr std::size_t kGiveUpPart = 8;    // ... or one in so many, and none is left that reached
 constexpr std::size_t kCheckedPart = 16;  // of those that failed, one in so many is looked at
 
-constexpr double kPatience = 40.0;  // a scout's push without progress               [mm]
+constexpr double kPatience = 40.0;        // a scout's push without progress ...       [mm]
+constexpr double kPatienceBeyond = 10.0;  // ... where it has come as far as the target
 
 /// Whether the level itself may be why the candidate did not reach.
 bool is_doubtful(const Sighting& seen, double goal_radius) {
@@ -90,13 +91,14 @@ simulate::TrialResult run_scout(const Study& scout, const Candidate& candidate,
   return run_guarded([&] {
     simulate::Trial trial(scout.wires[static_cast<std::size_t>(candidate.wire)],
                           make_introducer(scout, candidate), scout.goal, vessel, scout.insertion);
+    const double target = path.arc_length[path.arc_length.size() - 1] - scout.goal.radius;
     double furthest = 0.0, depth_there = 0.0;
     while (trial.step({.push = scout.insertion.step})) {
       const double progress = find_progress(trial.result().pushes.back().tip, path);
       if (progress > furthest) {
         furthest = progress;
         depth_there = trial.depth();
-      } else if (trial.depth() - depth_there > kPatience) {
+      } else if (trial.depth() - depth_there > (furthest < target ? kPatience : kPatienceBeyond)) {
         break;
       }
     }

@@ -23,8 +23,8 @@ bool needs_search(const Study& study, bool exhaustive);
 Study scout_study(const Study& study);
 
 /// A candidate at the scout's or the probe's level. One whose tip has not come further along the
-/// path for 40 mm of push is given up as `missed`: in the trials of two cases none of those reached
-/// (DESIGN.md).
+/// path for 40 mm of push, or 10 mm once it was beside the target, is given up as `missed`: in the
+/// trials of five cases none of those reached (DESIGN.md).
 simulate::TrialResult run_scout(const Study& scout, const Candidate& candidate,
                                 const simulate::VesselModel& vessel, const Centerline& path);
 

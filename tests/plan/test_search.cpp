@@ -91,6 +91,19 @@ TEST(RunScout, GivesUpWhereTheTipComesNoFurtherAlongThePath) {
   EXPECT_NEAR(scout.pushes.back().insertion, 72.0, 3.0);
   EXPECT_NE(scout.reason.find("of wire went in, tip ended"), std::string::npos) << scout.reason;
 
+  // A path that ends in the tube, with the goal at its end but too small for a tip that the lean
+  // keeps off the axis: 10 mm on from there.
+  Study passing = study;
+  passing.goal = {.point = Vec3(3.5, 0.0, 50.0), .radius = 1.0};
+  Centerline straight;
+  straight.points.resize(3, 2);
+  straight.points << 0.0, 0.0, 0.0, 0.0, 5.0, 50.0;
+  straight.arc_length = Eigen::Vector2d(0.0, 45.0);
+  straight.radius.setConstant(2, 4.0);
+  const simulate::TrialResult passed = run_scout(passing, {}, tube, straight);
+  EXPECT_EQ(passed.outcome, Outcome::kMissed);
+  EXPECT_NEAR(passed.pushes.back().insertion, 57.0, 2.0);
+
   // Where the path goes on with the tube the goal is reached, and until then nothing is given up.
   study.goal.point = Vec3(0.0, 0.0, 100.0);
   path.points.col(2) = Vec3(0.0, 0.0, 110.0);
