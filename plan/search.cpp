@@ -47,6 +47,26 @@ std::vector<int> order_by_promise(const std::vector<Sighting>& seen) {
   return order;
 }
 
+/// Of the failures that may be the scout's as many as are looked at, the nearest first. The best of
+/// a wire counts before all others: it is run anyway.
+std::vector<int> choose_doubtful(const std::vector<Candidate>& candidates,
+                                 const std::vector<Sighting>& scouts, double goal_radius) {
+  std::vector<int> doubtful;
+  std::ptrdiff_t best = 0;  // of their wires, at the front
+  std::set<int> wires;
+  std::size_t failed = 0;
+  for (const int k : order_by_promise(scouts)) {
+    const Sighting& scout = scouts[static_cast<std::size_t>(k)];
+    const bool first = wires.insert(candidates[static_cast<std::size_t>(k)].wire).second;
+    failed += scout.reached ? 0 : 1;
+    if (is_doubtful(scout, goal_radius)) {
+      doubtful.insert(first ? doubtful.begin() + best++ : doubtful.end(), k);
+    }
+  }
+  doubtful.resize(std::min(doubtful.size(), (failed + kCheckedPart - 1) / kCheckedPart));
+  return doubtful;
+}
+
 std::vector<double> score_differences(const std::vector<Sighting>& scouts,
                                       const std::vector<std::optional<Sighting>>& full) {
   std::vector<double> sizes;
@@ -158,12 +178,8 @@ NextRuns choose_next(const Study& study, const std::vector<Candidate>& candidate
   for (std::size_t place = 0; place < std::min(kAlways, order.size()); ++place) {
     if (sighting(order[place]).reached) wanted.insert(order[place]);
   }
-  std::size_t failed = 0, checked = 0;
-  for (const Sighting& scout : seen.scouts) failed += scout.reached ? 0 : 1;
-  for (const int k : order_by_promise(seen.scouts)) {
-    const bool doubtful = is_doubtful(seen.scouts[static_cast<std::size_t>(k)], study.goal.radius);
-    if (doubtful && checked++ * kCheckedPart < failed) wanted.insert(k);
-  }
+  const std::vector<int> checked = choose_doubtful(candidates, seen.scouts, study.goal.radius);
+  wanted.insert(checked.begin(), checked.end());
 
   // What a rigid wall held in a stenosis.
   for (const int k : order) {

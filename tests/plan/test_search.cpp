@@ -170,6 +170,16 @@ TEST(ChooseNext, ChecksFailuresThatMayBeTheScouts) {
   EXPECT_EQ(next.size(), 7u);
 }
 
+TEST(ChooseNext, CountsTheBestOfAWireAmongTheFailuresThatItChecks) {
+  Bench bench;
+  for (int k = 0; k < 5; ++k) bench.reach(0, 0.2, 0.2);
+  for (int k = 0; k < 30; ++k) bench.fail(0, 50.0 + k);
+  for (int k = 0; k < 5; ++k) bench.fail(0, 4.5 + 0.1 * k);  // 35 to 39
+  bench.fail(1, 6.0);                                        // 40
+  bench.fail(2, 7.0);                                        // 41: 37 failures, three are checked
+  EXPECT_EQ(bench.next().full, (std::vector<int>{0, 1, 2, 3, 4, 35, 40, 41}));
+}
+
 TEST(ChooseNext, RunsTheNearestAndAllThatReachedBeforeItSaysThatNoPlanReaches) {
   Bench bench;
   for (int k = 0; k < 30; ++k) bench.fail(k % 2, 50.0 + k);
