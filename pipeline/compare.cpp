@@ -40,12 +40,6 @@ std::string describe_way(const Json& plan) {
                 plan.at("azimuth_deg").get<double>(), plan.at("roll_deg").get<double>());
 }
 
-/// What plans are ordered by within a report: repeated ones first.
-std::tuple<bool, double> place_of(const Json& plan) {
-  const Json& mean = plan.at("mean_score");
-  return {mean.is_null(), mean.is_null() ? plan.at("score") : mean};
-}
-
 std::vector<std::string> plan_cells(const Json& report, const Json& plan) {
   const Json& trial = report.at("trials").at(plan.at("trial").get<std::size_t>());
   return {describe_way(plan),
@@ -118,16 +112,17 @@ std::string list_wire_table(const std::vector<Json>& reports) {
 
 std::string list_best_plans(const std::vector<Json>& reports) {
   struct Place {
-    std::tuple<bool, double> place;
+    double score;  // that orders plans within a report
     std::size_t report, rank;
   };
   std::vector<Place> places;
   for (std::size_t k = 0; k < reports.size(); ++k) {
     const Json& ranking = reports[k].at("ranking");
-    for (std::size_t r = 0; r < ranking.size(); ++r) places.push_back({place_of(ranking[r]), k, r});
+    for (std::size_t r = 0; r < ranking.size(); ++r)
+      places.push_back({ranking[r].at("expected_score"), k, r});
   }
   std::sort(places.begin(), places.end(), [](const Place& a, const Place& b) {
-    return std::tie(a.place, a.report, a.rank) < std::tie(b.place, b.report, b.rank);
+    return std::tie(a.score, a.report, a.rank) < std::tie(b.score, b.report, b.rank);
   });
   if (places.size() > kPlansListed) places.resize(kPlansListed);
 

@@ -893,9 +893,14 @@ void make_report(Workspace& work, const fs::path& folder) {
   };
   refine();
 
-  // Repeat the best under disturbances until the best are repeated ones.
+  // Repeat the best under disturbances until the best are repeated ones, the very best at least.
   Repeats repeats = prepare_repeats(work);
-  for (int round = 0; round < kRepeatRounds && repeats.options.repeats > 0; ++round) {
+  const auto best_is_repeated = [&] {
+    const auto& plans = report.ranking.plans;
+    return plans.empty() || plans.front().robust_score;
+  };
+  for (int round = 0; repeats.options.repeats > 0; ++round) {
+    if (round >= kRepeatRounds && best_is_repeated()) break;
     const std::vector<int> chosen =
         plan::choose_plans_to_repeat(report.ranking, repeats.plans, repeats.options);
     if (chosen.empty()) break;

@@ -168,7 +168,7 @@ std::vector<Stage> stages_of(const Case& given) {
   manoeuvres.make = make_manoeuvres;
   stages.push_back(manoeuvres);
   Stage report{.name = "report",
-               .version = 7,
+               .version = 8,
                .reads_input = true,
                .after = {},
                .parameters = {""},

@@ -95,7 +95,7 @@ const RepeatedPlan* find_repeated(const std::vector<RepeatedPlan>& repeated, int
 
 void sort_plans(std::vector<RankedPlan>& plans) {
   const auto key = [](const RankedPlan& plan) {
-    return std::tuple(!plan.robust_score, plan.robust_score.value_or(plan.score.total), plan.trial);
+    return std::pair(plan.expected_score, plan.trial);
   };
   std::sort(plans.begin(), plans.end(),
             [&](const RankedPlan& a, const RankedPlan& b) { return key(a) < key(b); });
@@ -112,9 +112,13 @@ bool tied_over_repeats(const RepeatedPlan& a, const RepeatedPlan& b, double erro
   return spread.low - error <= 0.0 && spread.high + error >= 0.0;
 }
 
-/// How far the disturbances move two plans' mean scores against each other: the median over pairs
-/// of repeated plans. 0 with fewer than two.
-double shift_by_repeats(const std::vector<RankedPlan>& plans) {
+/// What the disturbances do to mean scores, as the repeated plans show it.
+struct Shifts {
+  double typical = 0.0;  // added to a plan's, the median; 0 without any
+  double between = 0.0;  // by which they move two against each other, the median over pairs
+};
+
+Shifts find_shifts(const std::vector<RankedPlan>& plans) {
   std::vector<double> shifts, sizes;  // of each plan, of each pair
   for (const RankedPlan& plan : plans) {
     if (!plan.robust_score) continue;
@@ -122,11 +126,14 @@ double shift_by_repeats(const std::vector<RankedPlan>& plans) {
     for (const double other : shifts) sizes.push_back(std::abs(shift - other));
     shifts.push_back(shift);
   }
-  return sizes.empty() ? 0.0 : find_spread(sizes).median;
+  const auto median = [](const std::vector<double>& values) {
+    return values.empty() ? 0.0 : find_spread(values).median;
+  };
+  return {.typical = median(shifts), .between = median(sizes)};
 }
 
-void find_ties(std::vector<RankedPlan>& plans, const std::vector<RepeatedPlan>& repeated) {
-  const double shift = shift_by_repeats(plans);
+void find_ties(std::vector<RankedPlan>& plans, const std::vector<RepeatedPlan>& repeated,
+               double shift) {
   for (RankedPlan& a : plans) {
     const RepeatedPlan* repeats_a = find_repeated(repeated, a.trial);
     for (const RankedPlan& b : plans) {
@@ -192,9 +199,9 @@ std::string compare_with_first(const RankedPlan& plan, const RankedPlan& first,
                      compare_forces(metrics[plan.trial].peak_contact_force,
                                     metrics[first.trial].peak_contact_force) +
                      " the first plan";
-  if (largest->size > 0.0) {
+  if (plan.score.total > first.score.total) {
     text += std::string("; behind it mostly by ") + largest->name;
-  } else if (plan.robust_score) {
+  } else if (first.robust_score) {
     text += "; behind it under the perturbations alone";
   }
   const auto& ties = plan.tied_with;
@@ -403,8 +410,12 @@ Ranking rank(const Study& study, const std::vector<Candidate>& candidates,
   }
 
   // The order, and then all that is said relative to the others.
+  const Shifts shifts = find_shifts(ranking.plans);
+  for (RankedPlan& plan : ranking.plans) {
+    plan.expected_score = plan.robust_score.value_or(plan.score.total + shifts.typical);
+  }
   sort_plans(ranking.plans);
-  find_ties(ranking.plans, findings.repeated);
+  find_ties(ranking.plans, findings.repeated, shifts.between);
   write_sentences(ranking, study, candidates, metrics, limits, weights, findings.repeated);
   ranking.wires = summarise_wires(study, candidates, metrics, ranking.plans);
   ranking.pareto = find_pareto_front(ranking.plans, metrics);

@@ -80,6 +80,7 @@ struct RankedPlan {
   double score_error = 0.0;              // from the known error, else from the assumed one
   std::optional<double> position_error;  // from halving the elements; empty if not known   [mm]
   std::optional<double> robust_score;    // mean over the repeats; empty without them
+  double expected_score = 0.0;           // the same, or what it would be, see rank()
   std::vector<int> tied_with;            // trials that cannot be told from it, best first
   std::string sentence;                  // why it stands here
 };
@@ -113,15 +114,15 @@ struct Findings {
   std::vector<bool> scouted = {};  // per trial: its numbers are a scout's (search.h); empty: none
 };
 
-/// Plans with repeats come first, by their mean score over the repeats, in which a failure costs 1;
-/// after them the others by their score, which knows no disturbance; equals by index of the
-/// candidate. Two plans are tied if their scores differ by no more than both errors, or if the
-/// central 90 % of their paired differences over the repeats, widened by both errors, holds 0: then
-/// the unknowns decide which is better. Where one has no repeats, they are tied if their scores
-/// differ by no more than both errors and what the unknowns typically move repeated plans against
-/// each other, the median over their pairs. A trial that was only scouted is no plan. Of a trial
-/// only its outcome and reason are looked at. Expects one trial and one Metrics per candidate, and
-/// positive limits.
+/// Plans are ordered by their mean score over the repeats, in which a failure costs 1, and those
+/// without repeats by what that is expected to be: their score, and what the disturbances typically
+/// add, the median over the repeated plans; equals by index of the candidate. Two plans are tied if
+/// their scores differ by no more than both errors, or if the central 90 % of their paired
+/// differences over the repeats, widened by both errors, holds 0: then the unknowns decide which is
+/// better. Where one has no repeats, they are tied if their scores differ by no more than both
+/// errors and what the unknowns typically move repeated plans against each other, the median over
+/// their pairs. A trial that was only scouted is no plan. Of a trial only its outcome and reason
+/// are looked at. Expects one trial and one Metrics per candidate, and positive limits.
 Ranking rank(const Study& study, const std::vector<Candidate>& candidates,
              const std::vector<simulate::TrialResult>& trials, const std::vector<Metrics>& metrics,
              const Limits& limits, const Weights& weights, const Findings& findings = {});

@@ -30,6 +30,7 @@ Json report_of(const std::string& wire, double score, const std::string& sha = "
                                     {"score", score},
                                     {"score_error", 0.01},
                                     {"mean_score", score + 0.1},
+                                    {"expected_score", score + 0.1},
                                     {"success_rate", 0.75}}});
   report["wires"] = Json::array({{{"wire", wire},
                                   {"reached", 1},

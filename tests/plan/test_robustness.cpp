@@ -257,14 +257,21 @@ TEST(Rank, PlansThatStaySafeUnderDisturbancesComeFirst) {
   plans.repeat(1, {0.3, 0.3, 0.3, 0.3});
   const Ranking ranking = plans.ranked();
   ASSERT_EQ(ranking.plans.size(), 3u);
-  EXPECT_EQ(ranking.plans[0].trial, 1);
-  EXPECT_DOUBLE_EQ(ranking.plans[0].robust_score.value(), 0.3);
-  EXPECT_EQ(ranking.plans[1].trial, 0);
-  EXPECT_DOUBLE_EQ(ranking.plans[1].robust_score.value(), 0.6);
-  EXPECT_EQ(ranking.plans[2].trial, 2) << "not repeated";
-  EXPECT_FALSE(ranking.plans[2].robust_score);
-  EXPECT_NE(ranking.plans[1].sentence.find("works in 2 of 4 perturbed repeats"), std::string::npos)
-      << ranking.plans[1].sentence;
+  const RankedPlan &first = ranking.plans[0], &second = ranking.plans[1], &last = ranking.plans[2];
+  EXPECT_EQ(first.trial, 1);
+  EXPECT_DOUBLE_EQ(first.robust_score.value(), 0.3);
+  EXPECT_EQ(first.expected_score, first.robust_score);
+  EXPECT_EQ(last.trial, 0);
+  EXPECT_DOUBLE_EQ(last.robust_score.value(), 0.6);
+  EXPECT_NE(last.sentence.find("works in 2 of 4 perturbed repeats"), std::string::npos)
+      << last.sentence;
+  EXPECT_NE(last.sentence.find("behind it under the perturbations alone"), std::string::npos)
+      << last.sentence;
+  // Not repeated: by what disturbances add to the others, in the median.
+  EXPECT_EQ(second.trial, 2);
+  EXPECT_FALSE(second.robust_score);
+  EXPECT_NEAR(second.expected_score - second.score.total,
+              0.5 * (0.3 - first.score.total + 0.6 - last.score.total), 1e-12);
 }
 
 TEST(Rank, PairedDifferencesTellPlansApartThatSpreadMoreThanTheyDiffer) {
@@ -312,11 +319,11 @@ TEST(ChoosePlansToRepeat, TakesTheFirstAndTheBestOfEachWireOnce) {
   plans.repeat(0, {1.0});
   plans.repeat(1, {0.3});
   plans.repeat(3, {0.5});
-  // 0 fell behind; the first two are 1 and 3, and the best of either wire.
-  EXPECT_TRUE(choose_plans_to_repeat(plans.ranked(), plans.findings.repeated, two).empty());
-  const RobustnessOptions all{.plans = 4};
-  EXPECT_EQ(choose_plans_to_repeat(plans.ranked(), plans.findings.repeated, all),
+  // 0 fell behind, and 3 behind what is expected of 2.
+  EXPECT_EQ(choose_plans_to_repeat(plans.ranked(), plans.findings.repeated, two),
             std::vector<int>{2});
+  plans.repeat(2, {0.6});
+  EXPECT_TRUE(choose_plans_to_repeat(plans.ranked(), plans.findings.repeated, two).empty());
 }
 
 TEST(Sensitivity, FindsTheUnknownThatMovesThePlansAgainstEachOther) {
