@@ -4,7 +4,7 @@
 #include <array>
 #include <cmath>
 #include <cstdio>
-#include <tuple>
+#include <utility>
 
 #include "plan/statistics.h"
 
