@@ -150,7 +150,7 @@ std::vector<Stage> stages_of(const Case& given) {
        .parameters = {"/wall/thickness_mm", "/wall/young_modulus_kpa", "/wall/poisson_ratio"},
        .make = make_wall});
   Stage trials{.name = "trials",
-               .version = 14,
+               .version = 15,
                .after = {"surface", "centerline"},
                .parameters = {"/access", "/target", "/wires", "/tip_roll_deg", "/friction",
                               "/wall/model", "/insertion"},
@@ -162,13 +162,13 @@ std::vector<Stage> stages_of(const Case& given) {
   stages.push_back(trials);
   Stage manoeuvres = trials;
   manoeuvres.name = "manoeuvres";
-  manoeuvres.version = 8;
+  manoeuvres.version = 9;
   manoeuvres.after.push_back("trials");
   manoeuvres.parameters.push_back("/manoeuvres");
   manoeuvres.make = make_manoeuvres;
   stages.push_back(manoeuvres);
   Stage report{.name = "report",
-               .version = 8,
+               .version = 9,
                .reads_input = true,
                .after = {},
                .parameters = {""},

@@ -367,6 +367,11 @@ NewtonResult Statics::solve_with(BlockBand<D>& hessian, BlockBand<D>& untouched,
   // Looks along the wall for how far a step is safe: more after steps that were too long and well.
   constexpr int kMostLooks = 32, kMoreLooks = 4;
   int looks = 1;
+  // So many steps in a row of which the energy lets no more than this part be taken: it jumps
+  // there, as where the field of the wall begins, and no equilibrium is near.
+  constexpr double kStalled = 0.01;
+  constexpr int kMostStalled = 5;
+  int stalled = 0;
   WallContact* contact = problem.contact;
   const bool twisted = D == 4;
   const bool polynomial = contact == nullptr && !twisted && !problem.tip_moment && !problem.plane;
@@ -540,7 +545,7 @@ NewtonResult Statics::solve_with(BlockBand<D>& hessian, BlockBand<D>& untouched,
         along.a1 = slope;
         along.a2 += 0.5 * second;
       }
-      length = lowest_point(along, cap);
+      length = lowest_point(along, contact != nullptr ? std::min(1.0, cap) : cap);
     }
     for (int cut = 0; cut < 40 && !accepted; ++cut) {
       for (int k = 0; k < count; ++k) {
@@ -554,7 +559,8 @@ NewtonResult Statics::solve_with(BlockBand<D>& hessian, BlockBand<D>& untouched,
       const double parabola = curvature > 0.0 ? -slope / (2.0 * curvature) : 0.5 * length;
       length = std::clamp(parabola, 0.1 * length, 0.5 * length);
     }
-    if (!accepted) return finish(false);
+    stalled = length > 0.0 && length < kStalled ? stalled + 1 : 0;
+    if (!accepted || stalled == kMostStalled) return finish(false);
     std::swap(state, trial_);
     if (problem.tip_moment) {
       state.tip_angle = tip_angle(*problem.tip_moment, state, last_edge(state));

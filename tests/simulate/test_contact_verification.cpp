@@ -710,6 +710,44 @@ TEST(YieldingWall, HeldFeetAreRefreshedOnlyWhereTheyAreFarOff) {
 
 // ---------------------------------------------------------------- steps
 
+TEST(Newton, GivesUpSoonWhereTheEnergyJumps) {
+  // Beyond the field's band, 2 mm outside the lumen, a wire feels nothing; within it the wall's
+  // whole force. A load bends a wire from out there to where that starts, and no further.
+  const VesselModel vessel(shapes::straight_tube(2.0, 40.0, 0.6), {.band = 2.0});
+  Bench bench(uniform_wire(30.0, 0.5, 50.0), 30, vessel, {},
+              [](double s) { return Vec3(4.5, 0.0, 5.0 + s); });
+  bench.problem.proximal = pinned();
+  bench.problem.proximal.tangent = Vec3::UnitZ();
+  Eigen::Matrix3Xd load = Eigen::Matrix3Xd::Zero(3, bench.rod.nodes());
+  load(0, bench.rod.nodes() - 1) = -0.01;  // bends the tip by 1.8 mm
+  bench.problem.load = &load;
+  const NewtonResult result = bench.statics.solve(bench.problem, bench.state, {});
+  EXPECT_FALSE(result.converged);
+  EXPECT_NEAR(bench.state.x(0, bench.rod.nodes() - 1), 4.0, 0.5);
+  EXPECT_LT(result.iterations, 60);
+}
+
+TEST(SafeStep, IsNeverLengthened) {
+  // A load pulls a wire out of an open end, where nothing holds it: the lowest energy along a step
+  // is infinitely far on, but how far it is safe was looked at for the step alone.
+  const Surface surface = shapes::straight_tube(2.0, 40.0, 0.6);
+  const VesselModel vessel(surface, {.band = 2.0, .openings = find_openings(surface)});
+  Bench bench(uniform_wire(30.0, 0.5, 50.0), 30, vessel, {},
+              [](double s) { return Vec3(0.0, 0.0, 12.0 + s); });
+  bench.problem.proximal = held_across(Vec3::UnitZ());
+  bench.problem.proximal.tangent = Vec3::UnitZ();
+  Eigen::Matrix3Xd load = Eigen::Matrix3Xd::Zero(3, bench.rod.nodes());
+  load(2, bench.rod.nodes() - 1) = 0.01;
+  bench.problem.load = &load;
+  constexpr int kIterations = 60;
+  const NewtonResult result =
+      bench.statics.solve(bench.problem, bench.state, {.max_iterations = kIterations});
+  EXPECT_FALSE(result.converged);
+  const double way = bench.state.x(2, bench.rod.nodes() - 1) - 42.0;
+  EXPECT_GT(way, 5.0);
+  EXPECT_LT(way, kIterations * (vessel.lumen.band() + 0.25));
+}
+
 TEST(SafeStep, SlidesAlongTheWallButNotThroughIt) {
   constexpr double kRadius = 5.0, kOff = 4.4;
   const VesselModel vessel(shapes::straight_tube(kRadius, 100.0, 1.0));
