@@ -28,7 +28,7 @@ constexpr double kSmallestSlope = 1e-6;
 /// reaches [mm].
 constexpr double kInSight = 0.3;
 
-/// A held foot is left where it is this near to where it should be [mm].
+/// A held foot is left where it is while its point is this near to where the foot was found [mm].
 constexpr double kHeldFoot = 0.25;
 
 /// How deep into the wall a step may lead a point, or one of its parts [mm].
@@ -79,6 +79,7 @@ WallContact::WallContact(const Rod& rod, const VesselModel& vessel, const Contac
   touches_.reserve(points_.size());
   if (yielding_) {
     lag_.feet.resize(points_.size());
+    lag_.foot_from.setZero(3, m);
     memory_.triangle.assign(points_.size(), -1);
     press_.setZero(m);
   }
@@ -222,7 +223,7 @@ void WallContact::find_forces() {
   bool same = !feet_changed_ && active_.size() == coupled_points_.size();
   for (std::size_t k = 0; k < active_.size(); ++k) {
     const std::size_t point = static_cast<std::size_t>(active_[k].point);
-    if (lag_.feet[point].triangle < 0) lag_.feet[point] = foot_of(active_[k]);
+    if (lag_.feet[point].triangle < 0) find_foot(active_[k]);
     same = same && coupled_points_[k] == active_[k].point;
   }
   if (!same) {
@@ -255,13 +256,14 @@ void WallContact::find_forces() {
   }
 }
 
-SurfacePoint WallContact::foot_of(const Active& active) const {
+void WallContact::find_foot(const Active& active) {
   const WallSample& wall = active.wall;
   const std::size_t point = static_cast<std::size_t>(active.point);
-  const std::int32_t now = lag_.feet[point].triangle;
-  return vessel_.locator.pierced(
+  SurfacePoint& foot = lag_.feet[point];
+  foot = vessel_.locator.pierced(
       active.position - (wall.distance / wall.gradient.squaredNorm()) * wall.gradient,
-      wall.gradient, now >= 0 ? now : memory_.triangle[point]);
+      wall.gradient, foot.triangle >= 0 ? foot.triangle : memory_.triangle[point]);
+  lag_.foot_from.col(active.point) = active.position;
 }
 
 // ---------------------------------------------------------------- friction
@@ -294,13 +296,10 @@ ContactEnergy WallContact::refresh(bool fully) {
   fresh_ = true;
   if (yielding_) {
     for (const Active& active : active_) {
-      SurfacePoint& foot = lag_.feet[static_cast<std::size_t>(active.point)];
-      const SurfacePoint found = foot_of(active);
-      if (feet_held_ && foot.triangle >= 0 && found.triangle >= 0 &&
-          (vessel_.locator.position(found) - vessel_.locator.position(foot)).norm() < kHeldFoot) {
-        continue;
-      }
-      foot = found;
+      const bool has_foot = lag_.feet[static_cast<std::size_t>(active.point)].triangle >= 0;
+      const double moved = (active.position - lag_.foot_from.col(active.point)).norm();
+      if (feet_held_ && has_foot && moved < kHeldFoot) continue;
+      find_foot(active);
       feet_changed_ = true;
     }
     find_forces();

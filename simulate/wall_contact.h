@@ -94,9 +94,10 @@ class WallContact {
   /// Takes the lag from the state sampled last; `fully`: and nothing of the one before. Returns the
   /// state's energy with that lag.
   ContactEnergy refresh(bool fully);
-  /// From now to the next begin() a point's place on the yielding wall is refreshed only where it
-  /// is more than a quarter of a millimetre off. The wall's stiffness has kinks along the edges of
-  /// triangles; a soft tip that rolls over one may else find no equilibrium.
+  /// From now to the next begin() a point's place on the yielding wall is refreshed only where the
+  /// point has moved by more than a quarter of a millimetre since. The wall's stiffness has kinks
+  /// along the edges of triangles, and the place jumps where these fold: a soft tip there may else
+  /// find no equilibrium.
   void hold_feet() { feet_held_ = true; }
   /// The lag may be taken back to what it was when saved; the next sampling is with that.
   void save_lag() { saved_lag_ = lag_; }
@@ -177,7 +178,7 @@ class WallContact {
   void find_forces();
   ContactEnergy lagged_energy() const;
   Rubbing rubbing_at(int k) const;
-  SurfacePoint foot_of(const Active& active) const;
+  void find_foot(const Active& active);
   void find_stiffness();
   bool in_band(const Active& a, const Active& b) const;
   double way_inside(const Vec3& from, const Vec3& toward, double length, double distance,
@@ -196,12 +197,13 @@ class WallContact {
   ContactEnergy energy_;
 
   /// Per point: normal force and normal, for friction; the points that have one; and the place on
-  /// the yielding wall.
+  /// the yielding wall, with where the point was when that was found.
   struct Lag {
     Eigen::VectorXd force;    // [N]
     Eigen::Matrix3Xd normal;  // unit
     std::vector<int> points;
     std::vector<SurfacePoint> feet;
+    Eigen::Matrix3Xd foot_from;  // [mm]
   };
   Lag lag_, saved_lag_;
   std::vector<int> kept_points_;
