@@ -20,7 +20,7 @@ struct InsertionOptions {
   /// If not empty: of each section of the wire, tip first, shortened so that whole elements fill
   /// it; 0: element_length [mm].
   std::vector<double> section_element_length = {};
-  double contact_spacing = 1.0;      // most between two contact points along the wire   [mm]
+  double contact_spacing = 1.0;      // see ContactOptions::spacing                      [mm]
   double friction = 0.0;             // Coulomb's coefficient
   double residual_tolerance = 1e-6;  // largest nodal force out of balance               [N]
   int max_iterations = 200;          // Newton iterations per push

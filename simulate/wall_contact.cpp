@@ -31,6 +31,10 @@ constexpr double kInSight = 0.3;
 /// A held foot is left where it is while its point is this near to where the foot was found [mm].
 constexpr double kHeldFoot = 0.25;
 
+/// Points are half as far apart in so much wire behind the tip: it alone slides across ridges,
+/// round the mouths of branches [mm].
+constexpr double kFineTip = 20.0;
+
 /// How deep into the wall a step may lead a point, or one of its parts [mm].
 constexpr double kInto = 0.25;
 
@@ -51,7 +55,8 @@ WallContact::WallContact(const Rod& rod, const VesselModel& vessel, const Contac
   double before = 0.0;  // length of wire that the next point gets from behind it
   for (int e = 0; e < edges; ++e) {
     const double l = rod.rest_length[e];
-    const int parts = std::max(1, static_cast<int>(std::ceil(l / options.spacing - 1e-9)));
+    const double spacing = (rod.tip_distance[e] <= kFineTip + 1e-9 ? 0.5 : 1.0) * options.spacing;
+    const int parts = std::max(1, static_cast<int>(std::ceil(l / spacing - 1e-9)));
     const double half = 0.5 * l / parts;
     for (int k = 0; k < parts; ++k) {
       const double part = static_cast<double>(k) / parts;

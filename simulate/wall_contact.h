@@ -12,7 +12,7 @@ namespace wireplan::simulate {
 
 struct ContactOptions {
   ContactLaw law;
-  double spacing = 1.0;   // most between two contact points along the wire               [mm]
+  double spacing = 1.0;   // most between two contact points; half of it near the tip     [mm]
   double friction = 0.0;  // Coulomb's coefficient
   double slip = 0.02;     // displacement along the wall that develops friction fully     [mm]
 };

@@ -621,7 +621,10 @@ TEST(YieldingWall, BalancesTheWireAsOneLargeSystemDoes) {
     return Vec3(bend_radius * (1.0 - std::cos(at)), 0.0, bend_radius * std::sin(at));
   };
   const Wire wire = uniform_wire(27.0, 1.0, 50.0);
-  Bench bench(wire, 27, yielding, {}, along_the_bend), start(wire, 27, rigid, {}, along_the_bend);
+  ContactOptions at_nodes;
+  at_nodes.spacing = 2.0;  // half of it in the last 20 mm
+  Bench bench(wire, 27, yielding, at_nodes, along_the_bend);
+  Bench start(wire, 27, rigid, at_nodes, along_the_bend);
   for (Bench* each : {&bench, &start}) {
     each->problem.proximal = pinned();
     each->problem.proximal.tangent = Vec3(std::sin(0.15), 0.0, std::cos(0.15));
@@ -819,7 +822,13 @@ TEST(SceneWithAVessel, FloorAndClampCarryTheWeight) {
     EXPECT_TRUE(touch.normal.isApprox(Vec3::UnitZ(), 1e-4));
     carried += touch.normal_force;
   }
-  EXPECT_EQ(result.contacts.size(), 41u);   // every millimetre: nodes and middles of edges
+  // Every millimetre, and every half of one in the last 20 mm; nodes among them.
+  ASSERT_EQ(result.contacts.size(), 61u);
+  for (std::size_t k = 0; k < 61; ++k) {
+    const double expected =
+        k <= 20 ? 40.0 - static_cast<double>(k) : 0.5 * static_cast<double>(60 - k);
+    EXPECT_NEAR(result.contacts[k].tip_distance, expected, 1e-9);
+  }
   EXPECT_NEAR(carried, weight, 21 * 1e-6);  // residual of each node
   EXPECT_GT(result.energy.contact, 0.0);
   EXPECT_EQ(result.friction_work, 0.0);
