@@ -22,8 +22,8 @@ constexpr std::size_t kNoScouting = 8;
 constexpr std::size_t kAlways = 5;        // the best so many are run in full
 constexpr int kTriesPerWire = 4;          // to find it a plan
 constexpr std::size_t kAtOnce = 8;        // while no plan is found ...
-constexpr std::size_t kGiveUpAfter = 32;  // ... until so many were run in full, ...
-constexpr std::size_t kGiveUpPart = 8;    // ... or one in so many, and none is left that reached
+constexpr std::size_t kGiveUpAfter = 8;   // ... until so many were run in full, ...
+constexpr std::size_t kGiveUpPart = 12;   // ... or one in so many, and none is left that reached
 constexpr std::size_t kCheckedPart = 16;  // of those that failed, one in so many is looked at
 
 constexpr double kPatience = 40.0;        // a scout's push without progress ...       [mm]
@@ -215,9 +215,9 @@ NextRuns choose_next(const Study& study, const std::vector<Candidate>& candidate
   if (wanted.empty() && !best) {
     std::size_t known = 0;
     for (const int k : order) known += is_known(k) ? 1 : 0;
-    const bool enough = known >= std::max(kGiveUpAfter, count / kGiveUpPart);
+    const std::size_t enough = std::max(kGiveUpAfter, count / kGiveUpPart);
     for (const int k : order) {
-      const bool worth = !enough || sighting(k).reached;
+      const bool worth = sighting(k).reached || known + wanted.size() < enough;
       if (worth && !is_known(k) && wanted.size() < kAtOnce) wanted.insert(k);
     }
   }

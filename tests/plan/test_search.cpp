@@ -183,18 +183,19 @@ TEST(ChooseNext, CountsTheBestOfAWireAmongTheFailuresThatItChecks) {
 TEST(ChooseNext, RunsTheNearestAndAllThatReachedBeforeItSaysThatNoPlanReaches) {
   Bench bench;
   for (int k = 0; k < 30; ++k) bench.fail(k % 2, 50.0 + k);
-  EXPECT_EQ(bench.search(), 30);
-  // And finds the one that the scout saw fail furthest from the target.
+  EXPECT_EQ(bench.search(), 8);
+  for (int k = 0; k < 30; ++k) EXPECT_EQ(bench.seen.full[k].has_value(), k < 8) << k;
+  // And finds the one that the scout saw fail furthest from the target of those.
   for (auto& run : bench.seen.full) run.reset();
-  bench.truth[29] = Sighting{.reached = true, .plan = true, .score = 0.5};
+  bench.truth[7] = Sighting{.reached = true, .plan = true, .score = 0.5};
   bench.search();
-  EXPECT_TRUE(bench.seen.full[29]->plan);
+  EXPECT_TRUE(bench.seen.full[7]->plan);
 
-  // Of many it gives up after some: the nearest.
+  // Of many, one in twelve.
   Bench large;
   for (int k = 0; k < 200; ++k) large.fail(0, 250.0 - k);
-  EXPECT_EQ(large.search(), 33);  // the best of its wire, then eight at a time
-  for (int k = 0; k < 200; ++k) EXPECT_EQ(large.seen.full[k].has_value(), k >= 167) << k;
+  EXPECT_EQ(large.search(), 16);
+  for (int k = 0; k < 200; ++k) EXPECT_EQ(large.seen.full[k].has_value(), k >= 184) << k;
 
   // But not while there is one that the scout saw reach: the last of 50 is a plan.
   for (int k = 0; k < 50; ++k) {
