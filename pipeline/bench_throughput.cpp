@@ -52,7 +52,7 @@ const Size kFull = {.tree_edge = 1.6,
                     .s_pushes = {0.2, 1.0, 5.0},
                     .s_EI = {50.0, 521.0},
                     .copies = 4,
-                    .repeats = 3};
+                    .repeats = 7};
 const Size kQuick = {.tree_edge = 4.0,
                      .length = 60.0,
                      .EI = {50.0, 521.0},
