@@ -367,7 +367,7 @@ NewtonResult Statics::solve_with(BlockBand<D>& hessian, BlockBand<D>& untouched,
   // Looks along the wall for how far a step is safe: more after steps that were too long and well.
   constexpr int kMostLooks = 32, kMoreLooks = 4;
   int looks = 1;
-  // So many steps in a row of which the energy lets no more than this part be taken: it jumps
+  // So many steps in a row of which a vessel lets no more than this part be taken: the energy jumps
   // there, as where the field of the wall begins, and no equilibrium is near.
   constexpr double kStalled = 0.01;
   constexpr int kMostStalled = 5;
@@ -559,7 +559,7 @@ NewtonResult Statics::solve_with(BlockBand<D>& hessian, BlockBand<D>& untouched,
       const double parabola = curvature > 0.0 ? -slope / (2.0 * curvature) : 0.5 * length;
       length = std::clamp(parabola, 0.1 * length, 0.5 * length);
     }
-    stalled = length > 0.0 && length < kStalled ? stalled + 1 : 0;
+    stalled = contact != nullptr && length > 0.0 && length < kStalled ? stalled + 1 : 0;
     if (!accepted || stalled == kMostStalled) return finish(false);
     std::swap(state, trial_);
     if (problem.tip_moment) {
