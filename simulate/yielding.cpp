@@ -65,13 +65,10 @@ int Yielding::row_of(const WallCompliance& wall, int vertex,
   return row;
 }
 
-double Yielding::between(int a, int b) {
-  double& known = entry(a, b);
-  if (std::isnan(known)) {
-    known = entry(b, a) = WallCompliance::between(*half_[static_cast<std::size_t>(a)],
-                                                  *half_[static_cast<std::size_t>(b)]);
-  }
-  return known;
+void Yielding::find_entry(int a, int b) {
+  if (!std::isnan(entry(a, b))) return;
+  entry(a, b) = entry(b, a) = WallCompliance::between(*half_[static_cast<std::size_t>(a)],
+                                                      *half_[static_cast<std::size_t>(b)]);
 }
 
 void Yielding::set_feet(const WallCompliance& wall, const std::vector<SurfacePoint>& feet) {
@@ -84,17 +81,25 @@ void Yielding::set_feet(const WallCompliance& wall, const std::vector<SurfacePoi
     }
   }
 
-  // Rows of C, each from the first foot that moves under a force at its own.
+  // Rows of C, each from the first foot that moves under a force at its own. What the table does
+  // not know yet makes a sum that is no number.
   const auto compliance_between = [&](std::size_t i, std::size_t j) {
     if (!both_stand(i, j)) return 0.0;
-    double sum = 0.0;
-    for (int a = 0; a < 3; ++a) {
-      const int row = foot_rows_[i][static_cast<std::size_t>(a)];
-      sum += feet[i].weight[a] * (feet[j].weight[0] * between(row, foot_rows_[j][0]) +
-                                  feet[j].weight[1] * between(row, foot_rows_[j][1]) +
-                                  feet[j].weight[2] * between(row, foot_rows_[j][2]));
+    const std::array<int, 3>&rows = foot_rows_[i], &columns = foot_rows_[j];
+    const Vec3 &u = feet[i].weight, &v = feet[j].weight;
+    const auto sum = [&] {
+      const auto part = [&](std::size_t a) {
+        const double* row = &entry(rows[a], 0);
+        return v[0] * row[columns[0]] + v[1] * row[columns[1]] + v[2] * row[columns[2]];
+      };
+      return u[0] * part(0) + u[1] * part(1) + u[2] * part(2);
+    };
+    const double known = sum();
+    if (!std::isnan(known)) return known;
+    for (const int row : rows) {
+      for (const int column : columns) find_entry(row, column);
     }
-    return sum;
+    return sum();
   };
   compliance_.clear();
   for (std::size_t i = 0; i < m; ++i) {

@@ -69,8 +69,8 @@ class Yielding {
   bool both_stand(std::size_t i, std::size_t j) const {
     return foot_rows_[i][0] != kNoRow && foot_rows_[j][0] != kNoRow;
   }
-  /// Compliance between the vertices of two rows, which the table keeps.
-  double between(int a, int b);
+  /// Has the table know the compliance between the vertices of two rows.
+  void find_entry(int a, int b);
   double& entry(int a, int b) {
     return table_[static_cast<std::size_t>(a) * table_side_ + static_cast<std::size_t>(b)];
   }
