@@ -53,6 +53,15 @@ std::string repeat_text(const plan::Repeat& repeat) {
       .dump();
 }
 
+// Place of a trial's plan in the list, at whose end it is put if it is not there.
+std::size_t plan_of(int trial, std::vector<plan::RepeatedPlan>& plans) {
+  const auto found =
+      std::find_if(plans.begin(), plans.end(), [&](const auto& p) { return p.trial == trial; });
+  const auto place = static_cast<std::size_t>(found - plans.begin());
+  if (found == plans.end()) plans.push_back({trial, {}});
+  return place;
+}
+
 Json spread_json(const plan::RepeatedPlan& plan, double plan::Repeat::*member) {
   std::vector<double> values;
   for (const plan::Repeat& repeat : plan.repeats) values.push_back(repeat.*member);
@@ -73,6 +82,7 @@ Json plan_json(const plan::RepeatedPlan& plan) {
   const int successes = count - static_cast<int>(failures.size());
   Json json;
   json["trial"] = plan.trial;
+  json["repeats"] = count;
   json["successes"] = successes;
   json["success_rate"] = static_cast<double>(successes) / count;
   json["success_rate_interval"] = plan::wilson_interval(successes, count);
@@ -126,25 +136,37 @@ Repeats prepare_repeats(Workspace& work) {
 }
 
 void add_repeats(Workspace& work, const std::vector<plan::Candidate>& candidates,
-                 const std::vector<int>& trials, Repeats& repeats) {
+                 const std::vector<int>& trials, int count, Repeats& repeats) {
   const plan::Study& study = work.study();
   const simulate::VesselModel& vessel = work.model();
   const Centerline& path = work.path();
   const Case& given = work.given();
 
-  const std::size_t first = repeats.plans.size(), count = repeats.disturbances.size();
+  // Repeat by repeat, so that plans under one disturbance run at about the same time.
+  struct Job {
+    std::size_t plan, repeat;
+  };
+  std::vector<Job> jobs;
+  std::vector<std::size_t> plans, done;
   for (const int trial : trials) {
-    repeats.plans.push_back({trial, std::vector<plan::Repeat>(count)});
+    plans.push_back(plan_of(trial, repeats.plans));
+    std::vector<plan::Repeat>& own = repeats.plans[plans.back()].repeats;
+    done.push_back(own.size());
+    own.resize(std::max(own.size(), static_cast<std::size_t>(count)));
   }
-  std::vector<double> cpu_seconds(trials.size() * count);
+  for (std::size_t k = 0; k < static_cast<std::size_t>(count); ++k) {
+    for (std::size_t p = 0; p < plans.size(); ++p) {
+      if (k >= done[p]) jobs.push_back({plans[p], k});
+    }
+  }
+
+  std::vector<double> cpu_seconds(jobs.size());
   const std::vector<bool> finished = plan::for_each_slot(
-      static_cast<int>(cpu_seconds.size()),
+      static_cast<int>(jobs.size()),
       [&](int slot) {
-        // Repeat by repeat, so that plans under one disturbance run at about the same time.
-        const std::size_t k = static_cast<std::size_t>(slot) / trials.size();
-        plan::RepeatedPlan& plan =
-            repeats.plans[first + static_cast<std::size_t>(slot) % trials.size()];
-        const std::string key = repeat_key_text(work, plan.trial, k);
+        const Job job = jobs[static_cast<std::size_t>(slot)];
+        plan::RepeatedPlan& plan = repeats.plans[job.plan];
+        const std::string key = repeat_key_text(work, plan.trial, job.repeat);
         const double start = plan::thread_cpu_seconds();
         const std::optional<fs::path> kept = work.store().find_piece(key);
         std::optional<plan::Repeat> repeat;
@@ -152,12 +174,12 @@ void add_repeats(Workspace& work, const std::vector<plan::Candidate>& candidates
         if (!repeat) {
           const simulate::TrialResult trial =
               plan::run_disturbed(study, candidates[static_cast<std::size_t>(plan.trial)], vessel,
-                                  repeats.disturbances[k]);
+                                  repeats.disturbances[job.repeat]);
           repeat = plan::judge_repeat(trial, plan::compute_metrics(trial, study, path), study,
                                       given.limits, given.weights);
           work.store().keep_piece(key, repeat_text(*repeat));
         }
-        plan.repeats[k] = *repeat;
+        plan.repeats[job.repeat] = *repeat;
         cpu_seconds[static_cast<std::size_t>(slot)] = plan::thread_cpu_seconds() - start;
       },
       {.threads = work.options().threads,

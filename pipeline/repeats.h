@@ -18,11 +18,11 @@ struct Repeats {
 /// The case's unknowns with what it leaves open, and their disturbances. No plan is repeated yet.
 Repeats prepare_repeats(Workspace& work);
 
-/// Repeats the plans of these trials and adds them. Each repeat is a piece in the store as soon
-/// as it is done, and is taken from there if an interrupted run left it. Throws
+/// Repeats the plans of these trials until each has `count` repeats. Each repeat is a piece in the
+/// store as soon as it is done, and is taken from there if an interrupted run left it. Throws
 /// Interrupted.
 void add_repeats(Workspace& work, const std::vector<plan::Candidate>& candidates,
-                 const std::vector<int>& trials, Repeats& repeats);
+                 const std::vector<int>& trials, int count, Repeats& repeats);
 
 /// The report's "robustness".
 Json robustness_json(const Repeats& repeats);

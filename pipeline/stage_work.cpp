@@ -893,20 +893,26 @@ void make_report(Workspace& work, const fs::path& folder) {
   };
   refine();
 
-  // Repeat the best under disturbances until the best are repeated ones, the very best at least.
+  // Repeat the best under disturbances until the best are repeated ones, the very best at least;
+  // then what is best, as often as the case asks for, and what has come up by that.
   Repeats repeats = prepare_repeats(work);
-  const auto best_is_repeated = [&] {
-    const auto& plans = report.ranking.plans;
-    return plans.empty() || plans.front().robust_score;
+  const auto repeat_best = [&](int count, int rounds) {
+    for (int round = 0; count > 0; ++round) {
+      // In the end the first, and the best of each wire, alone.
+      const std::vector<int> chosen = plan::choose_plans_to_repeat(
+          report.ranking, repeats.plans, round < rounds ? repeats.options.plans : 1, count);
+      if (chosen.empty()) break;
+      add_repeats(work, candidates, chosen, count, repeats);
+      findings.repeated = repeats.plans;
+      rank();
+    }
   };
-  for (int round = 0; repeats.options.repeats > 0; ++round) {
-    if (round >= kRepeatRounds && best_is_repeated()) break;
-    const std::vector<int> chosen =
-        plan::choose_plans_to_repeat(report.ranking, repeats.plans, repeats.options);
-    if (chosen.empty()) break;
-    add_repeats(work, candidates, chosen, repeats);
-    findings.repeated = repeats.plans;
-    rank();
+  const int asked = repeats.options.repeats, few = std::min(plan::kFirstRepeats, asked);
+  repeat_best(few, kRepeatRounds);
+  if (asked > few) {
+    repeat_best(asked, 1);
+    repeat_best(few, kRepeatRounds);
+    repeat_best(asked, 0);
   }
   refine();  // the repeats may have put others first
   report.robustness = robustness_json(repeats);

@@ -168,7 +168,7 @@ std::vector<Stage> stages_of(const Case& given) {
   manoeuvres.make = make_manoeuvres;
   stages.push_back(manoeuvres);
   Stage report{.name = "report",
-               .version = 9,
+               .version = 10,
                .reads_input = true,
                .after = {},
                .parameters = {""},

@@ -81,10 +81,12 @@ std::string broken_limits(const Metrics& metrics, const Limits& limits) {
   return reason;
 }
 
-double mean_score(const RepeatedPlan& plan) {
+/// Over the first `count` repeats.
+double mean_score(const RepeatedPlan& plan, std::size_t count) {
+  expects(count > 0 && count <= plan.repeats.size());
   double sum = 0.0;
-  for (const Repeat& repeat : plan.repeats) sum += repeat.score;
-  return sum / static_cast<double>(plan.repeats.size());
+  for (std::size_t k = 0; k < count; ++k) sum += plan.repeats[k].score;
+  return sum / static_cast<double>(count);
 }
 
 const RepeatedPlan* find_repeated(const std::vector<RepeatedPlan>& repeated, int trial) {
@@ -103,26 +105,31 @@ void sort_plans(std::vector<RankedPlan>& plans) {
 
 /// Whether the unknowns decide which of the two is better.
 bool tied_over_repeats(const RepeatedPlan& a, const RepeatedPlan& b, double error) {
-  expects(a.repeats.size() == b.repeats.size());
   std::vector<double> differences;
-  for (std::size_t k = 0; k < a.repeats.size(); ++k) {
+  for (std::size_t k = 0; k < std::min(a.repeats.size(), b.repeats.size()); ++k) {
     differences.push_back(a.repeats[k].score - b.repeats[k].score);
   }
   const Spread spread = find_spread(differences);
   return spread.low - error <= 0.0 && spread.high + error >= 0.0;
 }
 
-/// What the disturbances do to mean scores, as the repeated plans show it.
+/// What the repeats beyond the first so many do to mean scores, as the plans with most of them show
+/// it; of none beyond the first 0, what they do to scores.
 struct Shifts {
   double typical = 0.0;  // added to a plan's, the median; 0 without any
   double between = 0.0;  // by which they move two against each other, the median over pairs
 };
 
-Shifts find_shifts(const std::vector<RankedPlan>& plans) {
+Shifts find_shifts(const std::vector<RankedPlan>& plans, const std::vector<RepeatedPlan>& repeated,
+                   std::size_t count) {
+  std::size_t most = 0;
+  for (const RepeatedPlan& plan : repeated) most = std::max(most, plan.repeats.size());
   std::vector<double> shifts, sizes;  // of each plan, of each pair
   for (const RankedPlan& plan : plans) {
-    if (!plan.robust_score) continue;
-    const double shift = *plan.robust_score - plan.score.total;
+    const RepeatedPlan* repeats = find_repeated(repeated, plan.trial);
+    if (repeats == nullptr || repeats->repeats.size() < most) continue;
+    const double before = count > 0 ? mean_score(*repeats, count) : plan.score.total;
+    const double shift = mean_score(*repeats, most) - before;
     for (const double other : shifts) sizes.push_back(std::abs(shift - other));
     shifts.push_back(shift);
   }
@@ -405,17 +412,22 @@ Ranking rank(const Study& study, const std::vector<Candidate>& candidates,
     plan.score_error = compute_score_error(metrics[k], known.value_or(assumed_error(metrics[k])),
                                            study.goal, limits, weights);
     const RepeatedPlan* repeated = find_repeated(findings.repeated, k);
-    if (repeated != nullptr) plan.robust_score = mean_score(*repeated);
+    if (repeated != nullptr) plan.robust_score = mean_score(*repeated, repeated->repeats.size());
     ranking.plans.push_back(plan);
   }
 
   // The order, and then all that is said relative to the others.
-  const Shifts shifts = find_shifts(ranking.plans);
+  const Shifts all = find_shifts(ranking.plans, findings.repeated, 0);
   for (RankedPlan& plan : ranking.plans) {
-    plan.expected_score = plan.robust_score.value_or(plan.score.total + shifts.typical);
+    const RepeatedPlan* own = find_repeated(findings.repeated, plan.trial);
+    plan.expected_score =
+        own == nullptr
+            ? plan.score.total + all.typical
+            : *plan.robust_score +
+                  find_shifts(ranking.plans, findings.repeated, own->repeats.size()).typical;
   }
   sort_plans(ranking.plans);
-  find_ties(ranking.plans, findings.repeated, shifts.between);
+  find_ties(ranking.plans, findings.repeated, all.between);
   write_sentences(ranking, study, candidates, metrics, limits, weights, findings.repeated);
   ranking.wires = summarise_wires(study, candidates, metrics, ranking.plans);
   ranking.pareto = find_pareto_front(ranking.plans, metrics);

@@ -71,7 +71,7 @@ struct Repeat {
 
 struct RepeatedPlan {
   int trial = 0;                // index of the candidate
-  std::vector<Repeat> repeats;  // under the same disturbances for all plans
+  std::vector<Repeat> repeats;  // the k-th of every plan under the same disturbance; at least one
 };
 
 struct RankedPlan {
@@ -79,8 +79,8 @@ struct RankedPlan {
   Score score;
   double score_error = 0.0;              // from the known error, else from the assumed one
   std::optional<double> position_error;  // from halving the elements; empty if not known   [mm]
-  std::optional<double> robust_score;    // mean over the repeats; empty without them
-  double expected_score = 0.0;           // the same, or what it would be, see rank()
+  std::optional<double> robust_score;    // mean over its repeats; empty without them
+  double expected_score = 0.0;           // the same over as many as any plan has, see rank()
   std::vector<int> tied_with;            // trials that cannot be told from it, best first
   std::string sentence;                  // why it stands here
 };
@@ -110,15 +110,16 @@ struct Ranking {
 /// What was found out about single plans besides their trials.
 struct Findings {
   std::vector<std::optional<NumericalError>> errors = {};  // per trial; empty: nothing was refined
-  std::vector<RepeatedPlan> repeated = {};                 // of equally many repeats
+  std::vector<RepeatedPlan> repeated = {};
   std::vector<bool> scouted = {};  // per trial: its numbers are a scout's (search.h); empty: none
 };
 
 /// Plans are ordered by their mean score over the repeats, in which a failure costs 1, and those
-/// without repeats by what that is expected to be: their score, and what the disturbances typically
-/// add, the median over the repeated plans; equals by index of the candidate. Two plans are tied if
-/// their scores differ by no more than both errors, or if the central 90 % of their paired
-/// differences over the repeats, widened by both errors, holds 0: then the unknowns decide which is
+/// with fewer repeats than others, or none, by what that is expected to be: the mean over those
+/// they have, or their score, and what the further disturbances typically add, the median over the
+/// plans that have them; equals by index of the candidate. Two plans are tied if their scores
+/// differ by no more than both errors, or if the central 90 % of their paired differences over the
+/// repeats that both have, widened by both errors, holds 0: then the unknowns decide which is
 /// better. Where one has no repeats, they are tied if their scores differ by no more than both
 /// errors and what the unknowns typically move repeated plans against each other, the median over
 /// their pairs. A trial that was only scouted is no plan. Of a trial only its outcome and reason

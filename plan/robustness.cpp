@@ -193,24 +193,29 @@ Repeat judge_repeat(const simulate::TrialResult& trial, const Metrics& metrics, 
 }
 
 std::vector<int> choose_plans_to_repeat(const Ranking& ranking,
-                                        const std::vector<RepeatedPlan>& repeated,
-                                        const RobustnessOptions& options) {
+                                        const std::vector<RepeatedPlan>& repeated, int plans,
+                                        int count) {
   std::vector<int> chosen;
   for (std::size_t k = 0; k < ranking.plans.size(); ++k) {
     const int trial = ranking.plans[k].trial;
-    const bool among_first = static_cast<int>(k) < options.plans;
+    const bool among_first = static_cast<int>(k) < plans;
     const bool best_of_wire =
         std::any_of(ranking.wires.begin(), ranking.wires.end(),
                     [&](const WireSummary& wire) { return wire.best_trial == trial; });
-    const bool done = std::any_of(repeated.begin(), repeated.end(),
-                                  [&](const RepeatedPlan& plan) { return plan.trial == trial; });
+    const bool done = std::any_of(repeated.begin(), repeated.end(), [&](const RepeatedPlan& plan) {
+      return plan.trial == trial && std::ssize(plan.repeats) >= count;
+    });
     if ((among_first || best_of_wire) && !done) chosen.push_back(trial);
   }
   return chosen;
 }
 
 Sensitivity find_sensitivity(const std::vector<Disturbance>& disturbances,
-                             const std::vector<RepeatedPlan>& repeated) {
+                             const std::vector<RepeatedPlan>& plans) {
+  std::vector<RepeatedPlan> repeated;
+  for (const RepeatedPlan& plan : plans) {
+    if (plan.repeats.size() == disturbances.size()) repeated.push_back(plan);
+  }
   Sensitivity result;
   const std::vector<Predictor> predictors = list_predictors(disturbances);
   const auto count = static_cast<Eigen::Index>(disturbances.size());
@@ -239,7 +244,6 @@ Sensitivity find_sensitivity(const std::vector<Disturbance>& disturbances,
   // Each plan's score over the mean of all in the same repeat, on the unknowns.
   std::vector<double> mean(disturbances.size(), 0.0);
   for (const RepeatedPlan& plan : repeated) {
-    expects(plan.repeats.size() == disturbances.size());
     for (std::size_t k = 0; k < mean.size(); ++k) {
       mean[k] += plan.repeats[k].score / static_cast<double>(repeated.size());
     }

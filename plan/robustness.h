@@ -22,8 +22,11 @@ struct Unknowns {
   double lumen = 0.25;              // of the wall, in or out; assumed                     [mm]
 };
 
+/// Which plans are the best under disturbances is found from so many repeats of each that may be.
+inline constexpr int kFirstRepeats = 32;
+
 struct RobustnessOptions {
-  int repeats = 16;        // per plan; 0: none
+  int repeats = 16;        // of each of the best plans; 0: none
   int plans = 5;           // the best so many are repeated, and the best of each wire
   std::uint64_t seed = 1;  // of the disturbances
   Unknowns unknowns = {};
@@ -65,11 +68,11 @@ double largest_entry_shift(const Study& study, const simulate::VesselModel& vess
 Repeat judge_repeat(const simulate::TrialResult& trial, const Metrics& metrics, const Study& study,
                     const Limits& limits, const Weights& weights);
 
-/// The plans to repeat next: of the first `options.plans` and of the first of each wire, those that
-/// are in `repeated` not yet. Trials, best first.
+/// The plans to repeat next: of the first `plans` and of the first of each wire, those that have
+/// fewer than `count` repeats. Trials, best first.
 std::vector<int> choose_plans_to_repeat(const Ranking& ranking,
-                                        const std::vector<RepeatedPlan>& repeated,
-                                        const RobustnessOptions& options);
+                                        const std::vector<RepeatedPlan>& repeated, int plans,
+                                        int count);
 
 /// Which unknown moves the ranking most.
 struct Sensitivity {
@@ -86,8 +89,9 @@ struct Sensitivity {
 /// What moves the order is how far each plan's score is from the mean of all in the same repeat.
 /// Its ranks over the repeats are regressed on those of the unknowns (standardised rank regression:
 /// Helton and Davis, Reliab. Eng. Syst. Saf. 2003); an unknown's share is its squared coefficients,
-/// of both directions where it has two, summed over plans by how much each moves.
+/// of both directions where it has two, summed over plans by how much each moves. Plans with fewer
+/// repeats than there are disturbances are left out.
 Sensitivity find_sensitivity(const std::vector<Disturbance>& disturbances,
-                             const std::vector<RepeatedPlan>& repeated);
+                             const std::vector<RepeatedPlan>& plans);
 
 }  // namespace wireplan::plan

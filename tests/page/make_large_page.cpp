@@ -146,6 +146,7 @@ Json robustness(const plan::Ranking& ranking) {
   Json plans = Json::array();
   for (std::size_t k = 0; k < 5; ++k) {
     plans.push_back({{"trial", ranking.plans.at(k).trial},
+                     {"repeats", 16},
                      {"successes", 14},
                      {"success_rate", 0.875},
                      {"success_rate_interval", {0.64, 0.965}},

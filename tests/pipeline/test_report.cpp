@@ -167,6 +167,30 @@ TEST(Report, TellsHowThePlansFareUnderDisturbances) {
   expect_valid(report, folder.path());
 }
 
+TEST(Report, RepeatsMoreThan32TimesWhatIsTheBestOf32) {
+  const TemporaryFolder folder;
+  write_tube_case(folder.path());
+  const Json report = run_to_report(
+      folder / "case.json", folder / "cache", 0,
+      {"robustness.repeats=36", "robustness.plans=1", "access.azimuth_deg=[0, 90, 180, 270]"});
+  const Json& robustness = report.at("robustness");
+  ASSERT_EQ(robustness.at("disturbances").size(), 36u);
+  ASSERT_GT(report.at("ranking").size(), 1u);
+  int in_full = 0;
+  for (const Json& plan : robustness.at("plans")) {
+    const int repeats = plan.at("repeats");
+    EXPECT_TRUE(repeats == 32 || repeats == 36) << repeats;
+    EXPECT_EQ(plan.at("scores").size(), static_cast<std::size_t>(repeats));
+    const bool first = plan.at("trial") == report.at("ranking")[0].at("trial");
+    EXPECT_TRUE(!first || repeats == 36);
+    in_full += repeats == 36 ? 1 : 0;
+  }
+  EXPECT_LT(in_full, static_cast<int>(report.at("ranking").size()));
+  EXPECT_NE(report.at("ranking")[0].at("sentence").dump().find(" of 36 perturbed"),
+            std::string::npos);
+  expect_valid(report, folder.path());
+}
+
 TEST(Report, RanksWithoutRepeatsWhereTheCaseAsksForNone) {
   const TemporaryFolder folder;
   write_tube_case(folder.path());

@@ -292,6 +292,26 @@ TEST(Rank, PlansWhoseOrderTheUnknownsDecideAreTied) {
   EXPECT_EQ(ranking.plans[1].tied_with, std::vector<int>{0});
 }
 
+TEST(Rank, APlanWithFewerRepeatsGetsWhatTheFurtherOnesTypicallyAdd) {
+  // Further repeats add 0.05 and 0.15 to the plans that have them. So 2 comes behind 1, though its
+  // mean over the first two is smaller.
+  Plans plans({0.1, 0.2, 0.3});
+  plans.repeat(0, {0.1, 0.3, 0.3, 0.3});
+  plans.repeat(1, {0.1, 0.3, 0.5, 0.5});
+  plans.repeat(2, {0.28, 0.28});
+  const Ranking ranking = plans.ranked();
+  ASSERT_EQ(ranking.plans.size(), 3u);
+  EXPECT_EQ(ranking.plans[0].trial, 0);
+  EXPECT_EQ(ranking.plans[1].trial, 1);
+  EXPECT_EQ(ranking.plans[2].trial, 2);
+  EXPECT_DOUBLE_EQ(ranking.plans[0].expected_score, 0.25);
+  EXPECT_DOUBLE_EQ(ranking.plans[2].robust_score.value(), 0.28);
+  EXPECT_NEAR(ranking.plans[2].expected_score, 0.28 + 0.1, 1e-12);
+  // Pairs are compared over the repeats that both have: 2 is worse in one of two, better in one.
+  EXPECT_EQ(ranking.plans[2].tied_with, (std::vector<int>{0, 1}));
+  EXPECT_NE(ranking.plans[2].sentence.find("works in 2 of 2"), std::string::npos);
+}
+
 TEST(Rank, APlanWithoutRepeatsMayMoveAsFarAsThoseWithThem) {
   // Scores without error. Disturbances move 1 against 0 by more than 2, which has no repeats, is
   // behind 1, and by less than it is behind 0.
@@ -314,16 +334,19 @@ TEST(Rank, APlanWithoutRepeatsMayMoveAsFarAsThoseWithThem) {
 TEST(ChoosePlansToRepeat, TakesTheFirstAndTheBestOfEachWireOnce) {
   Plans plans({0.1, 0.2, 0.3, 0.4});
   plans.candidates[3].wire = 1;
-  const RobustnessOptions two{.plans = 2};
-  EXPECT_EQ(choose_plans_to_repeat(plans.ranked(), {}, two), (std::vector<int>{0, 1, 3}));
+  const auto choose_of_two = [&](int count) {
+    return choose_plans_to_repeat(plans.ranked(), plans.findings.repeated, 2, count);
+  };
+  EXPECT_EQ(choose_of_two(1), (std::vector<int>{0, 1, 3}));
   plans.repeat(0, {1.0});
   plans.repeat(1, {0.3});
   plans.repeat(3, {0.5});
   // 0 fell behind, and 3 behind what is expected of 2.
-  EXPECT_EQ(choose_plans_to_repeat(plans.ranked(), plans.findings.repeated, two),
-            std::vector<int>{2});
+  EXPECT_EQ(choose_of_two(1), std::vector<int>{2});
   plans.repeat(2, {0.6});
-  EXPECT_TRUE(choose_plans_to_repeat(plans.ranked(), plans.findings.repeated, two).empty());
+  EXPECT_TRUE(choose_of_two(1).empty());
+  // More of those that are the best now.
+  EXPECT_EQ(choose_of_two(2), (std::vector<int>{1, 3}));
 }
 
 TEST(Sensitivity, FindsTheUnknownThatMovesThePlansAgainstEachOther) {
@@ -343,6 +366,12 @@ TEST(Sensitivity, FindsTheUnknownThatMovesThePlansAgainstEachOther) {
   double sum = 0.0;
   for (const auto& share : found.shares) sum += share.of_all;
   EXPECT_NEAR(sum, 1.0, 1e-12);
+
+  // A plan with fewer repeats says nothing.
+  const RepeatedPlan few{.trial = 2, .repeats = {{.success = true, .score = 0.9}}};
+  const Sensitivity again = find_sensitivity(disturbances, {a, few, b});
+  EXPECT_EQ(again.explained.value(), found.explained.value());
+  EXPECT_EQ(again.shares[0].of_all, found.shares[0].of_all);
 }
 
 TEST(Sensitivity, ExplainsNothingOfNoise) {

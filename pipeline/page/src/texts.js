@@ -90,7 +90,7 @@ const spreadRow = (robustness, trial, first) => {
   if (!row) return null;
   const {low, median, high} = row.peak_contact_force_n;
   return ["All of these together, best plan",
-    `succeeds in ${row.successes} of ${robustness.repeats}: ${percent(first.success_rate)}, interval ${first.success_rate_interval.map(percent).join(" to ")}`,
+    `succeeds in ${row.successes} of ${row.repeats}: ${percent(first.success_rate)}, interval ${first.success_rate_interval.map(percent).join(" to ")}`,
     `largest contact ${number(median)}\u00a0N in the middle, ${number(low)} to ${number(high)}\u00a0N in 90\u00a0% of repeats` +
       (row.failures.length ? `; fails because: ${[...new Set(row.failures.map((f) => shown(f.reason)))].slice(0, 3).join("; ")}` : "")];
 };
