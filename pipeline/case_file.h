@@ -44,7 +44,8 @@ struct WallInput {
 };
 
 /// When scripts of pushes, pulls and turns are searched.
-enum class Manoeuvring { kNever, kWhenNeeded, kAlways };  // when needed: no straight push reaches
+/// When needed: no straight push reaches, or none that does holds under disturbances.
+enum class Manoeuvring { kNever, kWhenNeeded, kAlways };
 
 struct Case {
   std::filesystem::path file;  // the case file itself

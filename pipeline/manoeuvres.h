@@ -1,6 +1,6 @@
 #pragma once
 /// What a case tried: its straight pushes, and the manoeuvres that were found where none of those
-/// reaches.
+/// reaches and holds under disturbances.
 #include <vector>
 
 #include "pipeline/stage_work.h"

@@ -121,10 +121,11 @@ Json sensitivity_json(const Repeats& repeats) {
 
 }  // namespace
 
-Repeats prepare_repeats(Workspace& work) {
+Repeats prepare_repeats(Workspace& work, int count) {
   const plan::Study& study = work.study();
   Repeats repeats;
   repeats.options = work.given().robustness;
+  repeats.options.repeats = count;
   plan::Unknowns& unknowns = repeats.options.unknowns;
   if (unknowns.lumen == 0.0) unknowns.lumen = choose_lumen_offset(work);
   unknowns.lumen = std::min(unknowns.lumen, plan::largest_lumen_offset(study));
@@ -135,13 +136,18 @@ Repeats prepare_repeats(Workspace& work) {
   return repeats;
 }
 
+plan::Repeat run_repeat(Workspace& work, const plan::Candidate& candidate,
+                        const plan::Disturbance& disturbance) {
+  const plan::Study& study = work.study();
+  const Case& given = work.given();
+  const simulate::TrialResult trial =
+      plan::run_disturbed(study, candidate, work.model(), disturbance);
+  return plan::judge_repeat(trial, plan::compute_metrics(trial, study, work.path()), study,
+                            given.limits, given.weights);
+}
+
 void add_repeats(Workspace& work, const std::vector<plan::Candidate>& candidates,
                  const std::vector<int>& trials, int count, Repeats& repeats) {
-  const plan::Study& study = work.study();
-  const simulate::VesselModel& vessel = work.model();
-  const Centerline& path = work.path();
-  const Case& given = work.given();
-
   // Repeat by repeat, so that plans under one disturbance run at about the same time.
   struct Job {
     std::size_t plan, repeat;
@@ -172,11 +178,8 @@ void add_repeats(Workspace& work, const std::vector<plan::Candidate>& candidates
         std::optional<plan::Repeat> repeat;
         if (kept) repeat = find_repeat(*kept);
         if (!repeat) {
-          const simulate::TrialResult trial =
-              plan::run_disturbed(study, candidates[static_cast<std::size_t>(plan.trial)], vessel,
-                                  repeats.disturbances[job.repeat]);
-          repeat = plan::judge_repeat(trial, plan::compute_metrics(trial, study, path), study,
-                                      given.limits, given.weights);
+          repeat = run_repeat(work, candidates[static_cast<std::size_t>(plan.trial)],
+                              repeats.disturbances[job.repeat]);
           work.store().keep_piece(key, repeat_text(*repeat));
         }
         plan.repeats[job.repeat] = *repeat;

@@ -15,8 +15,13 @@ struct Repeats {
   double cpu_seconds = 0.0;  // of those run this time; timing                             [s]
 };
 
-/// The case's unknowns with what it leaves open, and their disturbances. No plan is repeated yet.
-Repeats prepare_repeats(Workspace& work);
+/// The case's unknowns with what it leaves open, and so many disturbances. No plan is repeated yet.
+Repeats prepare_repeats(Workspace& work, int count);
+
+/// What comes of a candidate under a disturbance, by the case's limits and weights. May be called
+/// by several threads, after prepare_repeats().
+plan::Repeat run_repeat(Workspace& work, const plan::Candidate& candidate,
+                        const plan::Disturbance& disturbance);
 
 /// Repeats the plans of these trials until each has `count` repeats. Each repeat is a piece in the
 /// store as soon as it is done, and is taken from there if an interrupted run left it. Throws

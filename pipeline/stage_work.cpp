@@ -895,7 +895,7 @@ void make_report(Workspace& work, const fs::path& folder) {
 
   // Repeat the best under disturbances until the best are repeated ones, the very best at least;
   // then what is best, as often as the case asks for, and what has come up by that.
-  Repeats repeats = prepare_repeats(work);
+  Repeats repeats = prepare_repeats(work, work.given().robustness.repeats);
   const auto repeat_best = [&](int count, int rounds) {
     for (int round = 0; count > 0; ++round) {
       // In the end the first, and the best of each wire, alone.

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <initializer_list>
 #include <utility>
 
 #include "pipeline/hash.h"
@@ -113,6 +114,16 @@ Artifact make_artifact(const Stage& stage, const Store& store, const std::string
   return act_for(stage, key_text, work, [&] { return store.commit(stage.name, key_text, make); });
 }
 
+/// Adds parameters that the stage does not read yet.
+void read_too(Stage& stage, std::initializer_list<const char*> pointers) {
+  for (const char* pointer : pointers) {
+    const auto& known = stage.parameters;
+    if (std::find(known.begin(), known.end(), pointer) == known.end()) {
+      stage.parameters.emplace_back(pointer);
+    }
+  }
+}
+
 }  // namespace
 
 std::vector<Stage> stages_of(const Case& given) {
@@ -157,14 +168,21 @@ std::vector<Stage> stages_of(const Case& given) {
                .make = make_trials};
   if (given.wall.elastic) trials.after.push_back("wall");  // a rigid one does not act
   if (plan::needs_search(given.study, given.exhaustive)) {
-    for (const char* key : {"/search", "/limits", "/ranking"}) trials.parameters.push_back(key);
+    read_too(trials, {"/search", "/limits", "/ranking"});
   }
   stages.push_back(trials);
   Stage manoeuvres = trials;
   manoeuvres.name = "manoeuvres";
-  manoeuvres.version = 9;
+  manoeuvres.version = 10;
   manoeuvres.after.push_back("trials");
-  manoeuvres.parameters.push_back("/manoeuvres");
+  read_too(manoeuvres, {"/manoeuvres"});
+  if (given.manoeuvres == Manoeuvring::kWhenNeeded) {
+    // Plans are tried under disturbances; the voxels tell how well the lumen is known.
+    if (from_volume) manoeuvres.after.push_back("volume");
+    read_too(manoeuvres, {"/limits", "/ranking", "/robustness/seed", "/robustness/friction_factor",
+                          "/robustness/wall_factor", "/robustness/angle_deg",
+                          "/robustness/entry_mm", "/robustness/lumen_mm"});
+  }
   manoeuvres.make = make_manoeuvres;
   stages.push_back(manoeuvres);
   Stage report{.name = "report",

@@ -1,5 +1,5 @@
 #pragma once
-/// Where no straight push reaches the target: scripts of pushes, pulls and turns that do.
+/// Where no straight push reaches the target and holds: scripts of pushes, pulls and turns.
 #include <string>
 #include <vector>
 

@@ -191,6 +191,31 @@ TEST(Report, RepeatsMoreThan32TimesWhatIsTheBestOf32) {
   expect_valid(report, folder.path());
 }
 
+TEST(Report, LooksForManoeuvresWhereNoStraightPlanHolds) {
+  // A bent tip and a target beside the axis: some rolls reach.
+  const TemporaryFolder folder;
+  Json file = write_tube_case(folder.path());
+  file["wires"][0]["sections"] =
+      Json::array({{{"length_mm", 8}, {"bending_stiffness_n_mm2", 5}, {"rest_radius_mm", 10}},
+                   {{"length_mm", 200}, {"bending_stiffness_n_mm2", 50}}});
+  file["access"]["inclination_deg"] = {0};
+  file["tip_roll_deg"] = {0, 90, 180, 270};
+  file["target"] = {{"point_mm", {0, 2, 28}}, {"radius_mm", 1.5}};
+  write_json(file, folder / "case.json");
+  const auto starts = [&](const std::vector<std::string>& changes) {
+    RunOptions options;
+    options.cache = folder / "cache";
+    options.to = "manoeuvres";
+    const RunResult result = run_stages(read_case(folder / "case.json", changes), options);
+    return read_json(result.artifacts.back().folder / kFiguresFile, "wireplan.manoeuvres/1")
+        .at("starts")
+        .get<int>();
+  };
+  EXPECT_EQ(starts({"robustness.angle_deg=0", "robustness.entry_mm=0", "robustness.lumen_mm=0.01"}),
+            0);
+  EXPECT_GT(starts({"robustness.angle_deg=45", "robustness.entry_mm=2"}), 0);
+}
+
 TEST(Report, RanksWithoutRepeatsWhereTheCaseAsksForNone) {
   const TemporaryFolder folder;
   write_tube_case(folder.path());

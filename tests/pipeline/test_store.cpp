@@ -294,15 +294,17 @@ std::map<std::string, std::vector<std::string>> common_table() {
                           "residual_tolerance_n", "max_iterations", "record_every_mm"}) {
     table[std::string("/insertion/") + key] = trials;
   }
+  const Names manoeuvres = {"manoeuvres", "report"};  // for which plans are tried
   for (const char* key :
        {"limits/tip_force_warn_n", "limits/tip_force_fail_n", "limits/penetration_fail_mm",
         "limits/off_path_fail_mm", "ranking/weights/reach", "ranking/weights/peak_force",
-        "ranking/weights/mean_force", "ranking/weights/margin", "robustness/repeats",
-        "robustness/plans", "robustness/seed", "robustness/friction_factor/0",
-        "robustness/friction_factor/1", "robustness/wall_factor/0", "robustness/wall_factor/1",
-        "robustness/angle_deg", "robustness/entry_mm", "robustness/lumen_mm"}) {
-    table[std::string("/") + key] = report;
+        "ranking/weights/mean_force", "ranking/weights/margin", "robustness/seed",
+        "robustness/friction_factor/0", "robustness/friction_factor/1", "robustness/wall_factor/0",
+        "robustness/wall_factor/1", "robustness/angle_deg", "robustness/entry_mm",
+        "robustness/lumen_mm"}) {
+    table[std::string("/") + key] = manoeuvres;
   }
+  table["/robustness/repeats"] = table["/robustness/plans"] = report;
   return table;
 }
 
