@@ -219,8 +219,13 @@ std::string compare_with_first(const RankedPlan& plan, const RankedPlan& first,
 }
 
 /// What a reader must know of a plan that is ranked all the same.
-std::string warnings_of(const Metrics& m, const Limits& limits) {
+std::string warnings_of(const RankedPlan& plan, const Metrics& m, const simulate::Goal& goal,
+                        const Limits& limits) {
   std::string text;
+  if (plan.tip_error && m.tip_to_target + *plan.tip_error >= goal.radius) {
+    text += "; warning: the tip's numerical error of " + two_digits(*plan.tip_error) +
+            " mm may put it outside the target (radius " + two_digits(goal.radius) + " mm)";
+  }
   if (m.peak_tip_force > limits.tip_force_warn) {
     text += "; warning: tip force " + four_digits(m.peak_tip_force) +
             " N over the warning level of " + four_digits(limits.tip_force_warn) + " N";
@@ -263,7 +268,7 @@ void write_sentences(Ranking& ranking, const Study& study, const std::vector<Can
                          : compare_with_first(plan, first, metrics, weights);
     const RepeatedPlan* repeats = find_repeated(repeated, plan.trial);
     if (repeats != nullptr) plan.sentence += success_of(*repeats);
-    plan.sentence += warnings_of(m, limits);
+    plan.sentence += warnings_of(plan, m, study.goal, limits);
   }
 }
 
@@ -408,7 +413,10 @@ Ranking rank(const Study& study, const std::vector<Candidate>& candidates,
     plan.trial = k;
     plan.score = compute_score(metrics[k], study.goal, limits, weights);
     const std::optional<NumericalError> known = errors.empty() ? std::nullopt : errors[k];
-    if (known) plan.position_error = known->position;
+    if (known) {
+      plan.position_error = known->position;
+      plan.tip_error = known->tip;
+    }
     plan.score_error = compute_score_error(metrics[k], known.value_or(assumed_error(metrics[k])),
                                            study.goal, limits, weights);
     const RepeatedPlan* repeated = find_repeated(findings.repeated, k);

@@ -8,8 +8,9 @@
 
 namespace wireplan::plan {
 
-/// Beyond these a trial is excluded; beyond `tip_force_warn`, or where the wall moved beyond linear
-/// theory (metrics.h), its sentence warns.
+/// Beyond these a trial is excluded; beyond `tip_force_warn`, where the wall moved beyond linear
+/// theory (metrics.h), or where the tip's numerical error is as large as what it is inside the
+/// target, its sentence warns.
 struct Limits {
   double tip_force_warn = 0.3;    // references B3                                          [N]
   double tip_force_fail = 1.5;    // references B3                                          [N]
@@ -79,6 +80,7 @@ struct RankedPlan {
   Score score;
   double score_error = 0.0;              // from the known error, else from the assumed one
   std::optional<double> position_error;  // from halving the elements; empty if not known   [mm]
+  std::optional<double> tip_error;       // as that, of the tip alone                       [mm]
   std::optional<double> robust_score;    // mean over its repeats; empty without them
   double expected_score = 0.0;           // the same over as many as any plan has, see rank()
   std::vector<int> tied_with;            // trials that cannot be told from it, best first

@@ -218,6 +218,21 @@ TEST(Rank, RanksATipForceOverTheWarningLevelWithAWarning) {
             "tip force 0.42 N over the warning level of 0.3 N");
 }
 
+TEST(Rank, RanksATipThatItsErrorMayPutOutsideTheTargetWithAWarning) {
+  // The target's radius is 4 mm. The third was not refined.
+  Bench bench(1);
+  for (const double force : {0.1, 0.2, 0.3}) bench.add(0, 1.0, force);
+  bench.errors = {NumericalError{.tip = 2.9}, NumericalError{.tip = 3.1}, std::nullopt};
+  const Ranking ranking = bench.ranked();
+  ASSERT_EQ(ranking.plans.size(), 3u);
+  for (const RankedPlan& plan : ranking.plans) {
+    EXPECT_EQ(plan.sentence.find("; warning: the tip's numerical error of 3.1 mm may put it "
+                                 "outside the target (radius 4.0 mm)") != std::string::npos,
+              plan.trial == 1)
+        << plan.sentence;
+  }
+}
+
 TEST(Rank, SaysWhyThePlansStandWhereTheyDo) {
   Bench bench;
   bench.add(0, 1.2, 0.21);
