@@ -55,7 +55,7 @@ Straight read_straight(Workspace& work, const std::vector<plan::Candidate>& cand
     const simulate::TrialResult trial = read_trial_file(file.path);
     straight.progress.push_back(plan::find_progress(trial, work.path()));
     straight.outcomes.push_back(trial.outcome);
-    if (file.level != kFullLevel) continue;
+    if (file.level != kFullLevel || trial.outcome != simulate::Outcome::kReached) continue;
     const plan::Repeat as_assumed =
         plan::judge_repeat(trial, plan::compute_metrics(trial, study, work.path()), study,
                            given.limits, given.weights);
