@@ -8,7 +8,6 @@
 #include "pipeline/repeats.h"
 #include "pipeline/trial_file.h"
 #include "plan/manoeuvre.h"
-#include "plan/metrics.h"
 #include "plan/search.h"
 
 namespace wireplan::pipeline {
@@ -39,40 +38,24 @@ StraightFile straight_file(const Workspace& work, int id) {
   return {kFullLevel, folder / trial_file_name(id)};
 }
 
-// Straight pushes as they ended, each at its highest level.
-struct Straight {
-  std::vector<double> progress;
-  std::vector<simulate::Outcome> outcomes;
-  std::vector<std::pair<double, int>> plans;  // score and trial of those that may be ranked, sorted
-};
-
-Straight read_straight(Workspace& work, const std::vector<plan::Candidate>& candidates) {
-  const plan::Study& study = work.study();
-  const Case& given = work.given();
-  Straight straight;
-  for (int id = 0; id < std::ssize(candidates); ++id) {
-    const StraightFile file = straight_file(work, id);
-    const simulate::TrialResult trial = read_trial_file(file.path);
-    straight.progress.push_back(plan::find_progress(trial, work.path()));
-    straight.outcomes.push_back(trial.outcome);
-    if (file.level != kFullLevel || trial.outcome != simulate::Outcome::kReached) continue;
-    const plan::Repeat as_assumed =
-        plan::judge_repeat(trial, plan::compute_metrics(trial, study, work.path()), study,
-                           given.limits, given.weights);
-    if (as_assumed.success) straight.plans.emplace_back(as_assumed.score, id);
-  }
-  std::sort(straight.plans.begin(), straight.plans.end());
-  return straight;
-}
-
 // Whether one of the best straight plans works in at least half of a few tries under disturbances.
-bool has_steady_plan(Workspace& work, const std::vector<plan::Candidate>& candidates,
-                     const Straight& straight) {
-  if (straight.plans.empty()) return false;
+bool has_steady_plan(Workspace& work, const std::vector<plan::Candidate>& straight,
+                     const std::vector<simulate::Outcome>& outcomes) {
+  std::vector<std::pair<double, int>> plans;  // score and trial
+  for (int id = 0; id < std::ssize(straight); ++id) {
+    const StraightFile file = straight_file(work, id);
+    const bool reached = outcomes[static_cast<std::size_t>(id)] == simulate::Outcome::kReached;
+    if (!reached || file.level != kFullLevel) continue;
+    const plan::Repeat as_assumed = judge_trial(work, read_trial_file(file.path));
+    if (as_assumed.success) plans.emplace_back(as_assumed.score, id);
+  }
+  if (plans.empty()) return false;
+  std::sort(plans.begin(), plans.end());
+  plans.resize(std::min(kPlansTried, plans.size()));
+
   const Repeats tries = prepare_repeats(work, kTries);
-  const std::size_t tried = std::min(kPlansTried, straight.plans.size());
-  for (std::size_t k = 0; k < tried; ++k) {
-    const plan::Candidate& plan = candidates[static_cast<std::size_t>(straight.plans[k].second)];
+  for (const auto& [score, id] : plans) {
+    const plan::Candidate& plan = straight[static_cast<std::size_t>(id)];
     std::array<bool, kTries> works{};
     plan::for_each_slot(
         kTries,
@@ -89,17 +72,24 @@ bool has_steady_plan(Workspace& work, const std::vector<plan::Candidate>& candid
 
 // The straight pushes that a search goes on from; none where no search is wanted or needed.
 std::vector<plan::Candidate> find_starts(Workspace& work,
-                                         const std::vector<plan::Candidate>& candidates) {
+                                         const std::vector<plan::Candidate>& straight) {
   const Manoeuvring wanted = work.given().manoeuvres;
   if (wanted == Manoeuvring::kNever) return {};
-  const Straight straight = read_straight(work, candidates);
+  std::vector<double> progress;
+  std::vector<simulate::Outcome> outcomes;
+  for (int id = 0; id < std::ssize(straight); ++id) {
+    const simulate::TrialResult trial = read_trial_file(straight_file(work, id).path);
+    progress.push_back(plan::find_progress(trial, work.path()));
+    outcomes.push_back(trial.outcome);
+  }
   std::vector<plan::Candidate> starts;
-  for (const int id : plan::choose_starts(work.study(), candidates, straight.progress,
-                                          straight.outcomes, kStartsPerWire)) {
-    starts.push_back(candidates[static_cast<std::size_t>(id)]);
+  for (const int id :
+       plan::choose_starts(work.study(), straight, progress, outcomes, kStartsPerWire)) {
+    starts.push_back(straight[static_cast<std::size_t>(id)]);
   }
   if (starts.empty() || wanted == Manoeuvring::kAlways) return starts;
-  return has_steady_plan(work, candidates, straight) ? std::vector<plan::Candidate>{} : starts;
+  if (has_steady_plan(work, straight, outcomes)) return {};
+  return starts;
 }
 
 // Scripts of moves that reach the target, and their trials in full.

@@ -55,11 +55,10 @@ std::string repeat_text(const plan::Repeat& repeat) {
 
 // Place of a trial's plan in the list, at whose end it is put if it is not there.
 std::size_t plan_of(int trial, std::vector<plan::RepeatedPlan>& plans) {
-  const auto found =
-      std::find_if(plans.begin(), plans.end(), [&](const auto& p) { return p.trial == trial; });
-  const auto place = static_cast<std::size_t>(found - plans.begin());
-  if (found == plans.end()) plans.push_back({trial, {}});
-  return place;
+  const plan::RepeatedPlan* found = plan::find_repeated(plans, trial);
+  if (found != nullptr) return static_cast<std::size_t>(found - plans.data());
+  plans.push_back({trial, {}});
+  return plans.size() - 1;
 }
 
 Json spread_json(const plan::RepeatedPlan& plan, double plan::Repeat::*member) {
@@ -136,14 +135,16 @@ Repeats prepare_repeats(Workspace& work, int count) {
   return repeats;
 }
 
-plan::Repeat run_repeat(Workspace& work, const plan::Candidate& candidate,
-                        const plan::Disturbance& disturbance) {
+plan::Repeat judge_trial(Workspace& work, const simulate::TrialResult& trial) {
   const plan::Study& study = work.study();
   const Case& given = work.given();
-  const simulate::TrialResult trial =
-      plan::run_disturbed(study, candidate, work.model(), disturbance);
   return plan::judge_repeat(trial, plan::compute_metrics(trial, study, work.path()), study,
                             given.limits, given.weights);
+}
+
+plan::Repeat run_repeat(Workspace& work, const plan::Candidate& candidate,
+                        const plan::Disturbance& disturbance) {
+  return judge_trial(work, plan::run_disturbed(work.study(), candidate, work.model(), disturbance));
 }
 
 void add_repeats(Workspace& work, const std::vector<plan::Candidate>& candidates,

@@ -18,8 +18,11 @@ struct Repeats {
 /// The case's unknowns with what it leaves open, and so many disturbances. No plan is repeated yet.
 Repeats prepare_repeats(Workspace& work, int count);
 
-/// What comes of a candidate under a disturbance, by the case's limits and weights. May be called
-/// by several threads, after prepare_repeats().
+/// How a trial of the case ended and what it cost, by the case's limits and weights.
+plan::Repeat judge_trial(Workspace& work, const simulate::TrialResult& trial);
+
+/// What comes of a candidate under a disturbance, judged. May be called by several threads, after
+/// prepare_repeats().
 plan::Repeat run_repeat(Workspace& work, const plan::Candidate& candidate,
                         const plan::Disturbance& disturbance);
 

@@ -36,7 +36,9 @@ constexpr double kTangentSpan = 10.0;
 // Wire that is brought along where the case leaves it open: a wire does not keep to the middle.
 constexpr double kInsertionFactor = 1.25, kInsertionExtra = 20.0;
 
-// Plans that fall behind under disturbances let others up, which are repeated next.
+// Which plans are the best is found from so many repeats of each that may be. Plans that fall
+// behind let others up, which are repeated next.
+constexpr int kFirstRepeats = 32;
 constexpr int kRepeatRounds = 3;
 
 constexpr std::array kStagesBeforeReport = {"volume", "segment", "surface",   "centerline",
@@ -907,7 +909,7 @@ void make_report(Workspace& work, const fs::path& folder) {
       rank();
     }
   };
-  const int asked = repeats.options.repeats, few = std::min(plan::kFirstRepeats, asked);
+  const int asked = repeats.options.repeats, few = std::min(kFirstRepeats, asked);
   repeat_best(few, kRepeatRounds);
   if (asked > few) {
     repeat_best(asked, 1);

@@ -89,12 +89,6 @@ double mean_score(const RepeatedPlan& plan, std::size_t count) {
   return sum / static_cast<double>(count);
 }
 
-const RepeatedPlan* find_repeated(const std::vector<RepeatedPlan>& repeated, int trial) {
-  const auto found = std::find_if(repeated.begin(), repeated.end(),
-                                  [&](const RepeatedPlan& plan) { return plan.trial == trial; });
-  return found == repeated.end() ? nullptr : &*found;
-}
-
 void sort_plans(std::vector<RankedPlan>& plans) {
   const auto key = [](const RankedPlan& plan) {
     return std::pair(plan.expected_score, plan.trial);
@@ -129,7 +123,7 @@ Shifts find_shifts(const std::vector<RankedPlan>& plans, const std::vector<Repea
     const RepeatedPlan* repeats = find_repeated(repeated, plan.trial);
     if (repeats == nullptr || repeats->repeats.size() < most) continue;
     const double before = count > 0 ? mean_score(*repeats, count) : plan.score.total;
-    const double shift = mean_score(*repeats, most) - before;
+    const double shift = *plan.robust_score - before;
     for (const double other : shifts) sizes.push_back(std::abs(shift - other));
     shifts.push_back(shift);
   }
@@ -323,6 +317,12 @@ std::vector<int> find_pareto_front(const std::vector<RankedPlan>& plans,
 }
 
 }  // namespace
+
+const RepeatedPlan* find_repeated(const std::vector<RepeatedPlan>& repeated, int trial) {
+  const auto found = std::find_if(repeated.begin(), repeated.end(),
+                                  [&](const RepeatedPlan& plan) { return plan.trial == trial; });
+  return found == repeated.end() ? nullptr : &*found;
+}
 
 NumericalError assumed_error(const Metrics& metrics) {
   return {.position = kAssumedPositionError,

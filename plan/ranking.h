@@ -75,6 +75,9 @@ struct RepeatedPlan {
   std::vector<Repeat> repeats;  // the k-th of every plan under the same disturbance; at least one
 };
 
+/// The repeats of a trial's plan; null where it is not among them.
+const RepeatedPlan* find_repeated(const std::vector<RepeatedPlan>& repeated, int trial);
+
 struct RankedPlan {
   int trial = 0;  // index of the candidate
   Score score;

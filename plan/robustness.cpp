@@ -202,9 +202,8 @@ std::vector<int> choose_plans_to_repeat(const Ranking& ranking,
     const bool best_of_wire =
         std::any_of(ranking.wires.begin(), ranking.wires.end(),
                     [&](const WireSummary& wire) { return wire.best_trial == trial; });
-    const bool done = std::any_of(repeated.begin(), repeated.end(), [&](const RepeatedPlan& plan) {
-      return plan.trial == trial && std::ssize(plan.repeats) >= count;
-    });
+    const RepeatedPlan* own = find_repeated(repeated, trial);
+    const bool done = own != nullptr && std::ssize(own->repeats) >= count;
     if ((among_first || best_of_wire) && !done) chosen.push_back(trial);
   }
   return chosen;

@@ -22,9 +22,6 @@ struct Unknowns {
   double lumen = 0.25;              // of the wall, in or out; assumed                     [mm]
 };
 
-/// Which plans are the best under disturbances is found from so many repeats of each that may be.
-inline constexpr int kFirstRepeats = 32;
-
 struct RobustnessOptions {
   int repeats = 16;        // of each of the best plans; 0: none
   int plans = 5;           // the best so many are repeated, and the best of each wire
