@@ -34,6 +34,7 @@ constexpr double kSmallestPart = 0.05;  // of a node's share of wire that bends 
 constexpr double kLongestPart = 2.0;  // of a push: friction turns with the path               [mm]
 constexpr double kLongestTurn = 15.0 * kRadPerDeg;  // of the hub in one go
 constexpr double kSmallestCut = 1.0 / 16.0;         // of a push, when one does not converge
+constexpr int kFollowed = 6;                        // solves more of a wire that jumps
 constexpr double kSlippedOut =
     3.0 * Lumen::kFreeLength;  // a tip beyond an opening, without balance
 
@@ -119,8 +120,12 @@ std::optional<Push> Insertion::move(double amount, double longest_part, const Pa
   while (std::abs(amount - done) > 1e-9) {
     save(before_cut_);
     const double now = std::copysign(std::min(cut, std::abs(amount - done)), amount);
-    const NewtonResult solve = part(now);
+    NewtonResult solve = part(now);
     record.iterations += solve.iterations;
+    for (int k = 0; k < kFollowed && solve.iterations == newton_.max_iterations; ++k) {
+      solve = follow_jump();
+      record.iterations += solve.iterations;
+    }
     if (solve.converged) {
       record.residual = solve.residual;
       totals_.stored_energy = solve.energy;
@@ -298,6 +303,17 @@ NewtonResult Insertion::settle_guess(double distance) {
   bend_at_the_exit();
   contact_.free_from(depth_);
   contact_.predict(distance);
+  return statics_.solve(problem_, state_, newton_);
+}
+
+/// Goes on from where a solve ran out of iterations. That wire jumps, and its points slide by
+/// millimetres: friction that is held to where they were, and lagged with points that others took
+/// over from at the wall, may have no equilibrium. So anchors follow, and friction opposes the
+/// rest of the jump.
+NewtonResult Insertion::follow_jump() {
+  forget_drift();
+  totals_.friction_work += contact_.settle();
+  contact_.predict(0.0);
   return statics_.solve(problem_, state_, newton_);
 }
 

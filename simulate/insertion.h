@@ -23,7 +23,7 @@ struct InsertionOptions {
   double contact_spacing = 1.0;      // see ContactOptions::spacing                      [mm]
   double friction = 0.0;             // Coulomb's coefficient
   double residual_tolerance = 1e-6;  // largest nodal force out of balance               [N]
-  int max_iterations = 200;          // Newton iterations per push
+  int max_iterations = 50;           // Newton iterations per solve; see Insertion::push()
   double record_every = 5.0;         // spacing of the stored shapes                     [mm]
   bool map_forces = true;            // whether the wall's triangles remember their peak forces
 };
@@ -90,9 +90,10 @@ class Insertion {
             const InsertionOptions& options);
 
   /// Pushes the wire in by `distance`, or pulls it back by -`distance` [mm], in parts that friction
-  /// can follow, cut smaller where one has no equilibrium. Empty when even the smallest cut has
-  /// none; the wire is then somewhere on the way. Expects wire that is left to push, or in the
-  /// body.
+  /// can follow. A part that runs out of iterations is a jump: it is solved again from where it
+  /// got, up to six times. One that has no equilibrium is cut smaller. Empty when even the smallest
+  /// cut has none; the wire is then somewhere on the way. Expects wire that is left to push, or in
+  /// the body.
   std::optional<Push> push(double distance);
 
   /// Turns the hub by `angle`, right-handed about the introducer's direction [rad], in the same
@@ -137,6 +138,7 @@ class Insertion {
   NewtonResult advance(double distance);
   NewtonResult spin(double angle);
   NewtonResult settle_guess(double distance);
+  NewtonResult follow_jump();
   template <class Part>
   std::optional<Push> move(double amount, double longest_part, const Part& part);
   void turn_with_the_hub(RodState& state) const;

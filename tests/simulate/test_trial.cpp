@@ -288,12 +288,14 @@ TEST(Trial, LongElementsFeelARidgeShorterThanTheyAre) {
 
 // ---------------------------------------------------------------- friction
 
-TrialResult rubbed(double friction, double step, double length = 150.0, double EI = 520.0) {
+TrialResult rubbed(double friction, double step,
+                   int max_iterations = InsertionOptions{}.max_iterations) {
   InsertionOptions some = options();
+  some.max_iterations = max_iterations;
   some.friction = friction;
   some.step = step;
-  some.length = length;
-  return run_trial(straight_wire(EI), along_z(), {.point = Vec3(0.0, 0.0, 1e3)}, bend(), some);
+  some.length = 150.0;
+  return run_trial(straight_wire(520.0), along_z(), {.point = Vec3(0.0, 0.0, 1e3)}, bend(), some);
 }
 
 TEST(FrictionTrial, PushOvercomesWhatTheWallHoldsBack) {
@@ -335,6 +337,29 @@ TEST(FrictionTrial, PushLengthHardlyChangesTheAnswer) {
     const TrialResult trial = rubbed(0.1, step);
     ASSERT_EQ(trial.outcome, Outcome::kMissed) << trial.reason;
     EXPECT_LT((trial.pushes.back().tip - tip).norm(), 0.5) << step;
+  }
+}
+
+TEST(FrictionTrial, AWireThatRunsOutOfIterationsIsFollowed) {
+  // With three iterations per solve most pushes take several, each with anchors that followed the
+  // last one. They end in equilibrium, where one solve does.
+  for (const double friction : {0.0, 0.1}) {
+    SCOPED_TRACE(friction);
+    const TrialResult whole = rubbed(friction, 2.0), followed = rubbed(friction, 2.0, 3);
+    ASSERT_EQ(followed.outcome, Outcome::kMissed) << followed.reason;
+    ASSERT_EQ(followed.pushes.size(), whole.pushes.size());
+    int several = 0;
+    for (const Push& push : followed.pushes) {
+      EXPECT_LE(push.residual, 1e-6);
+      several += push.iterations > 3 ? 1 : 0;
+    }
+    EXPECT_GT(several, 20);
+    const Push &last = followed.pushes.back(), &of_one = whole.pushes.back();
+    EXPECT_LT((last.tip - of_one.tip).norm(), 1e-4);
+    EXPECT_NEAR(last.push_force, of_one.push_force, 1e-4);
+    // Anchors follow through states that are not quite in equilibrium.
+    EXPECT_NEAR(last.friction_work, of_one.friction_work, 0.01 * last.push_work);
+    EXPECT_NEAR(last.push_work, last.stored_energy + last.friction_work, 0.02 * last.push_work);
   }
 }
 
