@@ -722,19 +722,6 @@ WallSample Lumen::sample(const Vec3& point) const {
   return result;
 }
 
-std::optional<int> Lumen::passed_opening(const Vec3& tip, double reach) const {
-  constexpr double kPassed = 1.0;  // beyond the cap's plane                               [mm]
-  for (std::size_t k = 0; k < openings_.size(); ++k) {
-    const Opening& opening = openings_[k];
-    const Vec3 offset = tip - opening.center;
-    const double depth = opening.normal.dot(offset);
-    if (depth < kPassed || depth > reach) continue;
-    const double lateral = (offset - depth * opening.normal).norm();
-    if (lateral < 1.5 * opening.radius + depth) return static_cast<int>(k);
-  }
-  return std::nullopt;
-}
-
 std::size_t Lumen::memory_bytes() const {
   return coefficients_.size() * sizeof(float) + brick_.size() * sizeof(std::int32_t);
 }

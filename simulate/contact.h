@@ -46,11 +46,6 @@ class Lumen {
   WallSample sample(const Vec3& point) const;
 
   const std::vector<Opening>& openings() const { return openings_; }
-  /// The opening that a wire with its tip here has left through: the tip is 1 mm to `reach` beyond
-  /// the cap's plane, within a cone of 45 degrees from 1.5 radii at the cap, which covers oval
-  /// ones.
-  std::optional<int> passed_opening(const Vec3& tip, double reach = kFreeLength) const;
-
   double grid_spacing() const { return spacing_; }
   double band() const { return band_; }
   /// Largest and mean |distance| of the field at vertices and centroids of the wall's triangles,

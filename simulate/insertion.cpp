@@ -35,8 +35,6 @@ constexpr double kLongestPart = 2.0;  // of a push: friction turns with the path
 constexpr double kLongestTurn = 15.0 * kRadPerDeg;  // of the hub in one go
 constexpr double kSmallestCut = 1.0 / 16.0;         // of a push, when one does not converge
 constexpr int kFollowed = 6;                        // solves more of a wire that jumps
-constexpr double kSlippedOut =
-    3.0 * Lumen::kFreeLength;  // a tip beyond an opening, without balance
 
 /// Edges of the part of the wire that goes in, proximal to distal, and two more, so that the
 /// innermost free node bends against a straight introducer.
@@ -116,13 +114,16 @@ template <class Part>
 std::optional<Push> Insertion::move(double amount, double longest_part, const Part& part) {
   Push record;
   slipped_out_.reset();
+  const auto ran_out = [&](const NewtonResult& solve) {
+    return !solve.converged && solve.iterations == newton_.max_iterations;
+  };
   double done = 0.0, cut = std::min(std::abs(amount), longest_part);
   while (std::abs(amount - done) > 1e-9) {
     save(before_cut_);
     const double now = std::copysign(std::min(cut, std::abs(amount - done)), amount);
     NewtonResult solve = part(now);
     record.iterations += solve.iterations;
-    for (int k = 0; k < kFollowed && solve.iterations == newton_.max_iterations; ++k) {
+    for (int k = 0; k < kFollowed && ran_out(solve); ++k) {
       solve = follow_jump();
       record.iterations += solve.iterations;
     }
@@ -133,7 +134,7 @@ std::optional<Push> Insertion::move(double amount, double longest_part, const Pa
       done += now;
       continue;
     }
-    if (!slipped_out_) slipped_out_ = vessel_.lumen.passed_opening(tip(), kSlippedOut);
+    if (!slipped_out_) slipped_out_ = left_through();
     restore(before_cut_);
     cut *= 0.5;
     if (cut < kSmallestCut * std::abs(amount)) return std::nullopt;
@@ -483,6 +484,11 @@ std::optional<Vec3> Insertion::find_fold() const {
     }
   }
   return {};
+}
+
+std::optional<int> Insertion::left_through() const {
+  return simulate::left_through(vessel_.lumen.openings(),
+                                state_.x.rightCols(rod_.nodes() - problem_.first));
 }
 
 Vec3 Insertion::most_bent() const {

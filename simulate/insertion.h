@@ -100,8 +100,10 @@ class Insertion {
   /// way. A straight round wire does not feel it.
   std::optional<Push> turn(double angle);
 
-  /// The opening that the tip was beyond when a part of the last move found no equilibrium: it
-  /// springs out further than the free space before an opening goes.
+  /// The opening that the wire has left through, and the one that it was through when a part of the
+  /// last move found no equilibrium: it springs out further than the free space before an opening
+  /// goes.
+  std::optional<int> left_through() const;
   std::optional<int> slipped_out() const { return slipped_out_; }
 
   double longest() const { return longest_; }      // that can be brought into the body      [mm]

@@ -265,4 +265,30 @@ std::vector<Opening> find_openings(const Surface& surface) {
   return CapFinder(surface).find();
 }
 
+std::optional<int> left_through(const std::vector<Opening>& openings,
+                                const Eigen::Ref<const Eigen::Matrix3Xd>& wire) {
+  constexpr double kBeyond = 1.0;     // a cap                                             [mm]
+  constexpr double kLookedAt = 40.0;  // of the wire, from the tip                         [mm]
+  constexpr double kOval = 1.5;       // reach of a cap in its radii
+  const int tip = static_cast<int>(wire.cols()) - 1;
+  for (std::size_t k = 0; k < openings.size(); ++k) {
+    const Opening& opening = openings[k];
+    if ((wire.col(tip) - opening.center).norm() > kLookedAt + kOval * opening.radius) continue;
+    double beyond = 0.0;
+    for (int i = tip; i > 0 && beyond < kLookedAt; --i) {
+      const double from = opening.normal.dot(wire.col(i - 1) - opening.center);
+      const double to = opening.normal.dot(wire.col(i) - opening.center);
+      const Vec3 edge = wire.col(i) - wire.col(i - 1);
+      if (from <= 0.0 && to > 0.0) {
+        const Vec3 pierced = wire.col(i) - to / (to - from) * edge;
+        const double out = beyond + (wire.col(i) - pierced).norm();
+        const double off = (pierced - opening.center).norm();
+        if (out >= kBeyond && off < kOval * opening.radius) return static_cast<int>(k);
+      }
+      beyond += edge.norm();
+    }
+  }
+  return std::nullopt;
+}
+
 }  // namespace wireplan::simulate

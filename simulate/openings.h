@@ -1,6 +1,7 @@
 #pragma once
 /// Where a closed vessel surface is open: the flat caps at which arteries were cut, by the border
 /// of the volume or by whoever made the surface. A wire may leave through them.
+#include <optional>
 #include <vector>
 
 #include "preprocess/vessel.h"
@@ -22,5 +23,11 @@ struct Opening {
 /// rounded rim, steeper than 30 degrees, stays wall. Caps are ordered by their first triangle.
 /// Expects a closed, manifold surface with outward triangles.
 std::vector<Opening> find_openings(const Surface& surface);
+
+/// The opening that a wire, whose nodes (3, n) end with the tip [mm], has left through: at least
+/// 1 mm of it is beyond where it comes out of the cap, a disc of 1.5 radii, which covers oval ones.
+/// Looks at the last 40 mm of the wire.
+std::optional<int> left_through(const std::vector<Opening>& openings,
+                                const Eigen::Ref<const Eigen::Matrix3Xd>& wire);
 
 }  // namespace wireplan::simulate

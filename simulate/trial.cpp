@@ -121,8 +121,8 @@ std::string Trial::place_of(int opening) const {
 /// False where the last step ended the trial.
 bool Trial::check_progress() {
   const Push& push = result_.pushes.back();
-  if (const std::optional<int> opening = vessel_.lumen.passed_opening(push.tip)) {
-    return end(Outcome::kLeftOpening, "the tip left the vessel through the opening at " +
+  if (const std::optional<int> opening = insertion_.left_through()) {
+    return end(Outcome::kLeftOpening, "the wire left the vessel through the opening at " +
                                           place_of(*opening) + " after " +
                                           millimetres(push.insertion) + " of insertion");
   }

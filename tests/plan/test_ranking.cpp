@@ -151,7 +151,7 @@ TEST(Rank, ExcludesEveryTrialThatIsNoPlanWithItsReason) {
   bench.add(0, 61.0, 0.2, Outcome::kProlapsed);
   bench.trials.back().reason = "it folded back at (1, 2, 3) mm";
   bench.add(0, 62.0, 0.2, Outcome::kLeftOpening);
-  bench.trials.back().reason = "the tip left the vessel through the opening at (1, 2, 3) mm";
+  bench.trials.back().reason = "the wire left the vessel through the opening at (1, 2, 3) mm";
   bench.add(0, 70.0, 0.2, Outcome::kNotConverged);
   bench.trials.back().reason = "no equilibrium after 200 iterations";
   bench.add(0, 80.0, 0.0, Outcome::kFailed);
@@ -170,7 +170,7 @@ TEST(Rank, ExcludesEveryTrialThatIsNoPlanWithItsReason) {
       "left the lumen at 120.0 mm of wire, tip 60.0 mm from the target",
       "prolapsed at 120.0 mm of wire, tip 61.0 mm from the target: it folded back at (1, 2, 3) mm",
       "left the vessel at 120.0 mm of wire, tip 62.0 mm from the target: "
-      "the tip left the vessel through the opening at (1, 2, 3) mm",
+      "the wire left the vessel through the opening at (1, 2, 3) mm",
       "did not converge at 120.0 mm of wire, tip 70.0 mm from the target: "
       "no equilibrium after 200 iterations",
       "internal error: out of paper",

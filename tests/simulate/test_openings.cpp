@@ -1,6 +1,8 @@
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
+#include <vector>
 
 #include "simulate/contact.h"
 #include "simulate/openings.h"
@@ -255,18 +257,39 @@ TEST(OpenLumen, MeasuresItsDeviationOnTheWallAlone) {
   EXPECT_LT(open.mean_deviation(), 0.02);
 }
 
-TEST(OpenLumen, NamesTheOpeningThatATipHasPassed) {
-  const Lumen open = open_tube(2.0, 20.0, 0.5);
-  EXPECT_EQ(open.passed_opening(Vec3(0.0, 0.0, 21.5)), 1);
-  EXPECT_EQ(open.passed_opening(Vec3(3.0, 0.0, 23.0)), 1);  // bent away
-  EXPECT_EQ(open.passed_opening(Vec3(0.5, 0.0, -2.0)), 0);
-  EXPECT_EQ(open.passed_opening(Vec3(0.0, 0.0, 20.5)), std::nullopt);  // not 1 mm yet
-  EXPECT_EQ(open.passed_opening(Vec3(0.0, 0.0, 15.0)), std::nullopt);  // inside
-  EXPECT_EQ(open.passed_opening(Vec3(9.0, 0.0, 21.5)), std::nullopt);  // beside
-  EXPECT_EQ(open.passed_opening(Vec3(0.0, 0.0, 40.0)), std::nullopt);  // elsewhere
-  EXPECT_EQ(open.passed_opening(Vec3(0.0, 0.0, 40.0), 24.0), 1);
-  const Lumen closed(shapes::straight_tube(2.0, 20.0, 0.5));
-  EXPECT_EQ(closed.passed_opening(Vec3(0.0, 0.0, 21.5)), std::nullopt);
+// ---------------------------------------------------------------- leaving through them
+
+/// Nodes (3, n) of a wire that goes through the points, 0.5 mm apart.
+Eigen::Matrix3Xd wire_through(const std::vector<Vec3>& points) {
+  std::vector<Vec3> nodes = {points.front()};
+  for (std::size_t k = 1; k < points.size(); ++k) {
+    const Vec3 way = points[k] - points[k - 1];
+    const int parts = std::max(1, static_cast<int>(std::ceil(way.norm() / 0.5)));
+    for (int p = 1; p <= parts; ++p) nodes.push_back(points[k - 1] + way * p / parts);
+  }
+  Eigen::Matrix3Xd wire(3, nodes.size());
+  for (std::size_t k = 0; k < nodes.size(); ++k) wire.col(k) = nodes[k];
+  return wire;
+}
+
+TEST(LeftThrough, NamesTheCapThatTheWireComesOutOf) {
+  const std::vector<Opening> openings = find_openings(shapes::straight_tube(2.0, 20.0, 0.5));
+  ASSERT_EQ(openings.size(), 2u);
+  const Vec3 inside(0.0, 0.0, 10.0);
+  const auto left = [&](const std::vector<Vec3>& points) {
+    return left_through(openings, wire_through(points));
+  };
+  EXPECT_EQ(left({inside, Vec3(0.0, 0.0, 21.1)}), 1);
+  EXPECT_EQ(left({inside, Vec3(0.0, 0.0, 20.9)}), std::nullopt);  // not 1 mm yet
+  EXPECT_EQ(left({inside, Vec3(0.0, 0.0, 19.0)}), std::nullopt);
+  EXPECT_EQ(left({inside, Vec3(0.5, 0.0, -2.0)}), 0);
+  EXPECT_EQ(left({inside, Vec3(0.0, 0.0, 45.0)}), 1);                        // sprang out
+  EXPECT_EQ(left({inside, Vec3(1.5, 0.0, 20.0), Vec3(8.0, 0.0, 20.6)}), 1);  // flat over the rim
+  EXPECT_EQ(left({inside, Vec3(1.5, 0.0, 20.2), Vec3(8.0, 0.0, 19.0)}), 1);  // and back beside it
+  EXPECT_EQ(left({Vec3(9.0, 0.0, 10.0), Vec3(9.0, 0.0, 25.0)}), std::nullopt);  // another vessel
+  EXPECT_EQ(left({Vec3(0.0, 0.0, 25.0), inside}), std::nullopt);                // came in by it
+  EXPECT_EQ(left_through(openings, wire_through({inside})), std::nullopt);
+  EXPECT_EQ(left_through({}, wire_through({inside, Vec3(0.0, 0.0, 25.0)})), std::nullopt);
 }
 
 }  // namespace

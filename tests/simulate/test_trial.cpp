@@ -181,6 +181,23 @@ TEST(Trial, WireThatLeavesThroughAnOpenEndIsNamedSo) {
   EXPECT_NE(trial.reason.find(" mm"), std::string::npos) << trial.reason;
 }
 
+TEST(Trial, ATipThatTurnsAsideBeyondAnOpenEndHasLeftThroughIt) {
+  // A tip that curls by 8 mm comes out of a tube of 2 mm and runs over its rim, beside the end.
+  const Wire hook = {
+      .name = "hook",
+      .radius = 0.3,
+      .sections = {{.length = 40.0, .bending_stiffness = 300.0, .rest_curvature = 1.0 / 8.0},
+                   {.length = 200.0, .bending_stiffness = 300.0}}};
+  for (const double step : {0.5, 1.0, 5.0, 20.0}) {
+    InsertionOptions some = options();
+    some.step = step;
+    const TrialResult trial = run_trial(hook, along_z(), {.point = Vec3(0.0, 0.0, 1e3)},
+                                        straight_lumen(2.0, 60.0, true), some);
+    EXPECT_EQ(trial.outcome, Outcome::kLeftOpening)
+        << step << " " << outcome_name(trial.outcome) << ": " << trial.reason;
+  }
+}
+
 TEST(Trial, NoPushGoesThroughTheWall) {
   // In a bend that 20 mm straight on leave, beyond the field of the wall; with another vessel 1 mm
   // outside it, which a wire that gets through would go on in.
