@@ -66,6 +66,10 @@ class WallCompliance {
   /// Vertices without a triangle stay, whatever their force.
   Eigen::Matrix3Xd displacements(const Eigen::Matrix3Xd& forces) const;
 
+  /// Vertices further apart than this do not feel each other's forces: `between` is 0 [mm].
+  double reach() const { return reach_; }
+
+  const Eigen::Matrix3Xd& vertices() const { return vertices_; }  // (3, v)             [mm]
   /// Outward unit normals of the vertices (3, v), angle-weighted; 0 without a triangle.
   const Eigen::Matrix3Xd& normals() const { return normals_; }
 
@@ -79,10 +83,12 @@ class WallCompliance {
   template <class Visit>
   void for_each_part(int vertex, Visit&& visit) const;  // of its spread
   HalfResponse find_response(int vertex) const;
-  Eigen::Matrix3Xd normals_;
+  double find_reach() const;
+  Eigen::Matrix3Xd vertices_, normals_;
   std::vector<int> neighbour_start_, neighbour_;  // vertices joined to each by an edge, and itself
   std::vector<int> place_;                        // of each vertex in the factor; -1: no triangle
   Cholesky cholesky_;
+  double reach_ = 0.0;  //                                                              [mm]
   mutable std::vector<std::atomic<const HalfResponse*>> responses_;  // owned; null: not found yet
   mutable std::atomic<std::size_t> response_count_ = 0, response_bytes_ = 0;
 };

@@ -74,17 +74,22 @@ void Yielding::find_entry(int a, int b) {
 void Yielding::set_feet(const WallCompliance& wall, const std::vector<SurfacePoint>& feet) {
   row_.resize(static_cast<std::size_t>(wall.normals().cols()), kNoRow);
   const std::size_t m = feet.size();
+  squared_reach_ = wall.reach() * wall.reach();
   foot_rows_.resize(m);
+  foot_place_.resize(3, static_cast<Eigen::Index>(m));
   for (std::size_t i = 0; i < m; ++i) {
+    const bool stands = feet[i].triangle >= 0;
     for (std::size_t a = 0; a < 3; ++a) {
-      foot_rows_[i][a] = feet[i].triangle < 0 ? kNoRow : row_of(wall, feet[i].vertex[a], feet);
+      foot_rows_[i][a] = stands ? row_of(wall, feet[i].vertex[a], feet) : kNoRow;
     }
+    if (stands)
+      foot_place_.col(static_cast<Eigen::Index>(i)) = wall.vertices().col(feet[i].vertex[0]);
   }
 
   // Rows of C, each from the first foot that moves under a force at its own. What the table does
   // not know yet makes a sum that is no number.
   const auto compliance_between = [&](std::size_t i, std::size_t j) {
-    if (!both_stand(i, j)) return 0.0;
+    if (!may_couple(i, j)) return 0.0;
     const std::array<int, 3>&rows = foot_rows_[i], &columns = foot_rows_[j];
     const Vec3 &u = feet[i].weight, &v = feet[j].weight;
     const auto sum = [&] {
@@ -117,7 +122,7 @@ void Yielding::find_slopes(const std::vector<SurfacePoint>& feet, const std::vec
     auto* slope = slope_.data() + compliance_.offset(static_cast<int>(i));
     for (std::size_t j = static_cast<std::size_t>(first_coupled(static_cast<int>(i))); j <= i;
          ++j) {
-      if (!both_stand(i, j)) {
+      if (!may_couple(i, j)) {
         slope[j].setZero();
         continue;
       }

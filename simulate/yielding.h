@@ -65,9 +65,12 @@ class Yielding {
   int row_of(const WallCompliance& wall, int vertex, const std::vector<SurfacePoint>& feet);
   void free_rows(const std::vector<SurfacePoint>& feet);
   void grow();
-  /// Whether both points have feet; one that has none feels no wall move.
-  bool both_stand(std::size_t i, std::size_t j) const {
-    return foot_rows_[i][0] != kNoRow && foot_rows_[j][0] != kNoRow;
+  /// Whether both points have feet, near enough to each other to feel each other's forces.
+  bool may_couple(std::size_t i, std::size_t j) const {
+    if (foot_rows_[i][0] == kNoRow || foot_rows_[j][0] == kNoRow) return false;
+    const auto from = foot_place_.col(static_cast<Eigen::Index>(i));
+    const auto to = foot_place_.col(static_cast<Eigen::Index>(j));
+    return (from - to).squaredNorm() <= squared_reach_;
   }
   /// Has the table know the compliance between the vertices of two rows.
   void find_entry(int a, int b);
@@ -91,6 +94,8 @@ class Yielding {
   std::vector<int> free_rows_;
   std::vector<char> needed_;                   // rows; scratch
   std::vector<std::array<int, 3>> foot_rows_;  // kNoRow: without a foot
+  Eigen::Matrix3Xd foot_place_;                // a vertex under each                  [mm]
+  double squared_reach_ = 0.0;                 // of the wall                        [mm^2]
 
   Envelope compliance_, factor_, inverse_;  // of all points; of those with a stiff law
   std::vector<int> stiff_, place_;          // those, in order; the place of each point there, or -1

@@ -221,6 +221,37 @@ TEST(WallCompliance, CouplesAsADirectSolveSaysAndLeavesOutLittle) {
   }
 }
 
+TEST(WallCompliance, FeelsNothingBeyondItsReach) {
+  struct Case {
+    double thickness, poisson_ratio;
+  };
+  const Surface tube = shapes::bend_tube(2.0, 60.0, 1.0, 30.0, 30.0, 1.2);
+  std::mt19937_64 random(5);
+  for (const auto& [thickness, poisson_ratio] :
+       {Case{0.3, 0.3}, Case{1.0, 0.3}, Case{0.5, 0.45}, Case{1.0, 0.0}}) {
+    SCOPED_TRACE(thickness);
+    Wall wall = extruded(tube, thickness);
+    wall.poisson_ratio = poisson_ratio;
+    const WallCompliance compliance(tube, wall);
+    ASSERT_EQ(compliance.vertices(), tube.vertices);
+    double farthest = 0.0;  // of what is felt
+    int beyond = 0;
+    for (int k = 0; k < 60; ++k) {
+      const int a = static_cast<int>(random() % static_cast<std::uint64_t>(tube.vertices.cols()));
+      for (int b = 0; b < tube.vertices.cols(); ++b) {
+        const double distance = (tube.vertices.col(a) - tube.vertices.col(b)).norm();
+        const bool felt = WallCompliance::between(compliance.half_response(a),
+                                                  compliance.half_response(b)) != 0.0;
+        if (felt) farthest = std::max(farthest, distance);
+        beyond += distance > compliance.reach() ? 1 : 0;
+      }
+    }
+    EXPECT_GT(beyond, 1000);
+    EXPECT_LT(farthest, compliance.reach());
+    EXPECT_GT(farthest, 0.5 * compliance.reach());  // or it would spare nothing
+  }
+}
+
 TEST(WallCompliance, IsAsMuchFromHereToThereAsBack) {
   const Surface tube = small_tube();
   const WallCompliance compliance(tube, extruded(tube, kThickness));

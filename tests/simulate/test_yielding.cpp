@@ -114,5 +114,33 @@ TEST(Yielding, PointsWithoutAFootFeelNoWallMove) {
   EXPECT_NE(w[2], 0.0);
 }
 
+TEST(Yielding, WireThatComesBackFeelsNothingOfTheFarPointsBetween) {
+  const Surface surface = shapes::bend_tube(3.0, 15.0, 1.2, 6.0, 40.0, 1.0);
+  const WallCompliance wall(surface, shapes::extruded_wall(surface, 0.3, kYoung));
+  const Vec3 middle = Vec3::Constant(1.0 / 3.0);
+  const SurfacePoint here = foot_in(surface, 0, middle),
+                     beside = foot_in(surface, 0, Vec3(0.5, 0.25, 0.25)),
+                     far = foot_in(surface, static_cast<int>(surface.triangles.cols()) - 1, middle);
+  ASSERT_GT((surface.vertices.col(here.vertex[0]) - surface.vertices.col(far.vertex[0])).norm(),
+            wall.reach());
+  // With the far point between them, two neighbours are to each other what they are without it.
+  const auto change = [&](const std::vector<SurfacePoint>& feet) {
+    Yielding points;
+    points.set_feet(wall, feet);
+    EXPECT_EQ(points.first_coupled(points.size() - 1), 0);
+    points.find_slopes(feet, std::vector<Mat3>(feet.size(), Mat3::Identity()));
+    const auto m = static_cast<Eigen::Index>(feet.size());
+    Eigen::VectorXd w = Eigen::VectorXd::Zero(m);
+    points.add_change_of_compliance(Eigen::Matrix3Xd::Constant(3, m, 0.1), Eigen::VectorXd::Ones(m),
+                                    w);
+    return w;
+  };
+  const Eigen::VectorXd with = change({here, far, beside}), without = change({here, beside});
+  EXPECT_EQ(with[0], without[0]);
+  EXPECT_EQ(with[2], without[1]);
+  EXPECT_NE(with[0], 0.0);
+  EXPECT_EQ(with[1], change({far})[0]);
+}
+
 }  // namespace
 }  // namespace wireplan::simulate
