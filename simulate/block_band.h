@@ -149,10 +149,10 @@ class BlockBand {
     for (int r = R - 1; r >= 0; --r) {
       for (int k = 0; k < K; ++k) {
         double sum = x[k][D * i + r] * row.own(r, r);  // holds 1 / D_rr
-        for (int c = 0; c < R; ++c) {
-          sum -= next.one(c, r) * known.near[c][k] + after.two(c, r) * known.far[c][k];
-        }
-        for (int c = r + 1; c < R; ++c) sum -= row.own(c, r) * v[c][k];
+        // In the order in which they became known, so as not to wait for the last of them.
+        for (int c = R - 1; c >= 0; --c) sum -= after.two(c, r) * known.far[c][k];
+        for (int c = R - 1; c >= 0; --c) sum -= next.one(c, r) * known.near[c][k];
+        for (int c = R - 1; c > r; --c) sum -= row.own(c, r) * v[c][k];
         x[k][D * i + r] = v[r][k] = sum;
       }
     }

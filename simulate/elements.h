@@ -376,7 +376,7 @@ double add_chain(const TwistChain& chain, const Rod& rod, const RodState& state,
   constexpr double kSmallTorque = 1e-3;
   const double torque = chain.stiffness * chain.angle(state);
   sink.gradient_theta(chain.last, torque);
-  sink.hessian_theta_theta(chain.last, chain.last, chain.stiffness);
+  if constexpr (Sink::kHessian) sink.hessian_theta_theta(chain.last, chain.last, chain.stiffness);
   Tangent behind = tangent_at(state, chain.first - 1);
   for (int i = chain.first; i <= chain.last; ++i) {
     const Tangent ahead = tangent_at(state, i);
@@ -385,10 +385,12 @@ double add_chain(const TwistChain& chain, const Rod& rod, const RodState& state,
     sink.add_to(psi, i - 1, -twist.by_a);
     sink.add_to(psi, i, twist.by_a - twist.by_b);
     sink.add_to(psi, i + 1, twist.by_b);
-    if (std::abs(torque) <= kSmallTorque * rod.bend[i]) continue;
-    Mat3 H_aa = Mat3::Zero(), H_ab = Mat3::Zero(), H_bb = Mat3::Zero();
-    twist.add_curvature(torque, H_aa, H_ab, H_bb);
-    add_edge_hessian(i, H_aa, H_ab, H_bb, sink);
+    if constexpr (Sink::kHessian) {
+      if (std::abs(torque) <= kSmallTorque * rod.bend[i]) continue;
+      Mat3 H_aa = Mat3::Zero(), H_ab = Mat3::Zero(), H_bb = Mat3::Zero();
+      twist.add_curvature(torque, H_aa, H_ab, H_bb);
+      add_edge_hessian(i, H_aa, H_ab, H_bb, sink);
+    }
   }
   gradient += torque * psi;
   return chain.energy(state);

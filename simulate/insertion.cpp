@@ -108,6 +108,7 @@ Insertion::Insertion(const Wire& wire, const Introducer& introducer, const Vesse
   guess_ahead_.resize(3, n);
   path_.resize(3, n);
   drift_ = moved_ = Eigen::Matrix3Xd::Zero(3, n);
+  mapped_.assign(static_cast<std::size_t>(contact_.memory().normal_force.size()), -1);
 }
 
 template <class Part>
@@ -423,8 +424,10 @@ void Insertion::measure(Push& record) {
     forces_.col(touch.edge) += (1.0 - touch.part) * force;
     forces_.col(touch.edge + 1) += touch.part * force;
     if (!options_.map_forces) continue;
-    const int triangle =
-        vessel_.locator.nearest(touch.position - rod_.radius * touch.normal).triangle;
+    std::int32_t& triangle = mapped_[static_cast<std::size_t>(touch.point)];
+    triangle =
+        vessel_.locator.pierced(touch.position - rod_.radius * touch.normal, touch.normal, triangle)
+            .triangle;
     if (triangle >= 0) triangle_forces_.emplace_back(triangle, touch.normal_force);
   }
   if (contact_.lost()) {

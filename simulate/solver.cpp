@@ -138,14 +138,12 @@ struct DenseSink {
   }
 };
 
-/// Gradient and banded Hessian of the free nodes: block k holds x and, for D = 4, theta of node
-/// first + k.
+/// Gradient of the free nodes: block k holds x and, for D = 4, theta of node first + k.
 template <int D>
-struct BandSink {
-  static constexpr bool kHessian = true;
+struct FreeSink {
+  static constexpr bool kHessian = false;
   int first, last;
   Eigen::VectorXd& g;
-  BlockBand<D>& H;
 
   bool is_free(int i) const { return i >= first && i < last; }
   void add_to(Eigen::VectorXd& vector, int i, const Vec3& v) {
@@ -155,6 +153,16 @@ struct BandSink {
   void gradient_theta(int e, double v) {
     if (D == 4 && is_free(e)) g[D * (e - first) + 3] += v;
   }
+};
+
+/// And their banded Hessian.
+template <int D>
+struct BandSink : FreeSink<D> {
+  static constexpr bool kHessian = true;
+  using FreeSink<D>::first;
+  using FreeSink<D>::is_free;
+  BlockBand<D>& H;
+
   typename BlockBand<D>::Block& block(int i, int j) {  // i >= j
     return i == j ? H.own(i - first) : i == j + 1 ? H.one(i - first) : H.two(i - first);
   }
@@ -224,11 +232,12 @@ void hold(const Mat3& P, bool hold_theta, int k, Eigen::VectorXd& g, BlockBand<D
 template <int D>
 void project(const Problem& problem, Eigen::VectorXd& v) {
   const int n = problem.rod->nodes();
-  const auto project_node = [&](const EndSupport& support, int k) {
-    v.segment<3>(D * k) = (free_directions(support) * v.segment<3>(D * k)).eval();
+  const auto project_end = [&](const EndSupport& support, int node, int edge) {
+    v.segment<3>(D * node) = (free_directions(support) * v.segment<3>(D * node)).eval();
+    if (D == 4 && support.hold_roll && edge >= 0) v[D * edge + 3] = 0.0;
   };
-  if (problem.first == 0) project_node(problem.proximal, 0);
-  if (problem.last == n) project_node(problem.distal, n - 1 - problem.first);
+  if (problem.first == 0) project_end(problem.proximal, 0, 0);
+  if (problem.last == n) project_end(problem.distal, n - 1 - problem.first, n - 2 - problem.first);
 }
 
 template <int D>
@@ -372,6 +381,13 @@ NewtonResult Statics::solve_with(BlockBand<D>& hessian, BlockBand<D>& untouched,
   constexpr double kStalled = 0.01;
   constexpr int kMostStalled = 5;
   int stalled = 0;
+  // After a full step in a vessel from a residual of no more than this the Hessian is not built
+  // anew. Mostly the wire is then in equilibrium; and where it is not, but the residual fell to
+  // this part of itself, the factor of before does for one more step.
+  constexpr double kNearlyThere = 0.01;  // [N]
+  constexpr double kFallen = 0.003;
+  bool old_hessian = false;
+  double last_residual = 0.0;  // before the last step                                       [N]
   WallContact* contact = problem.contact;
   const bool twisted = D == 4;
   const bool polynomial = contact == nullptr && !twisted && !problem.tip_moment && !problem.plane;
@@ -381,17 +397,28 @@ NewtonResult Statics::solve_with(BlockBand<D>& hessian, BlockBand<D>& untouched,
       twisted && out_of_introducer ? find_chain(*problem.rod, problem.first) : TwistChain{};
   gather_chain(chain, state);
 
-  // Gradient and Hessian of the wire, and of contact as it was sampled last; energy of the wire.
-  const auto differentiate = [&](const RodState& where) {
+  // Gradient and, unless the old one does, Hessian of the wire, and of contact as it was sampled
+  // last; energy of the wire.
+  const auto add_all = [&](const RodState& where, auto& sink) {
     gradient_.setZero();
-    hessian.reset(count, chain.edges());
-    BandSink<D> sink{problem.first, problem.last, gradient_, hessian};
     double sum = assemble(problem, where, sink, chain).total();
     if (chain.exists()) {
       coupled_.psi.setZero(D * count);
       sum += add_chain(chain, *problem.rod, where, sink, coupled_.psi, gradient_);
     }
     if (contact != nullptr) contact->add(sink);
+    return sum;
+  };
+  const auto differentiate = [&](const RodState& where) {
+    FreeSink<D> gradient{problem.first, problem.last, gradient_};
+    if (old_hessian) {
+      const double sum = add_all(where, gradient);
+      project<D>(problem, gradient_);
+      return sum;
+    }
+    hessian.reset(count, chain.edges());
+    BandSink<D> both{gradient, hessian};
+    const double sum = add_all(where, both);
     apply_supports<D>(problem, gradient_, hessian);
     return sum;
   };
@@ -447,18 +474,43 @@ NewtonResult Statics::solve_with(BlockBand<D>& hessian, BlockBand<D>& untouched,
     if (result.iterations == options.max_iterations || !std::isfinite(result.residual))
       return finish(false);
 
-    // 1. Direction: Newton's, with the Hessian shifted just far enough to be positive definite, and
-    // for the whole step to be safe: a floppy wire would else go far and be cut short.
-    untouched = hessian;
+    // 1. Direction: with the factor of before, or Newton's, with the Hessian shifted just far
+    // enough to be positive definite, and for the whole step to be safe: a floppy wire would else
+    // go far and be cut short.
+    double slope, cap;  // of the energy along the step; largest part of the step that is safe
+    const auto refine_and_bound = [&] {
+      slope = gradient_.dot(step_);
+      cap = std::numeric_limits<double>::infinity();
+      if (contact != nullptr) {
+        if (shift == 0.0 && contact->has_remainder()) {
+          slope = refine_step<D>(problem, hessian, slope);
+        }
+        cap = contact->largest_safe_part(motion(), looks);
+      }
+      if (twisted) cap = std::min(cap, largest_turning_step<D>(problem, step_));
+    };
+    bool found = false;
+    if (old_hessian && result.residual <= kFallen * last_residual) {
+      step_ = -gradient_;
+      coupled_.solve(hessian, step_);
+      refine_and_bound();
+      found = slope < 0.0 && cap >= 1.0;
+    }
+    if (!found) {
+      if (old_hessian) {
+        old_hessian = false;
+        differentiate(state);
+      }
+      untouched = hessian;
+    }
     const double last_shift = shift;
     const auto apply_shift = [&] {
       hessian = untouched;
       for (int k = 0; k < count; ++k) hessian.own(k).diagonal().array() += shift;
     };
-    double slope, cap;  // of the energy along the step; largest part of the step that is safe
     shift = 0.0;
     bool shortened = false;
-    for (int shifts = 0;; ++shifts) {
+    for (int shifts = 0; !found; ++shifts) {
       const auto solve = [&] {
         step_ = -gradient_;
         return hessian.factor() &&
@@ -469,13 +521,7 @@ NewtonResult Statics::solve_with(BlockBand<D>& hessian, BlockBand<D>& untouched,
         if (!(shift < kLargestShift)) return finish(false);  // a number in it is not finite
         apply_shift();
       }
-      slope = gradient_.dot(step_);
-      if (contact != nullptr && shift == 0.0 && contact->has_remainder()) {
-        slope = refine_step<D>(problem, hessian, slope);
-      }
-      cap = std::numeric_limits<double>::infinity();
-      if (contact != nullptr) cap = contact->largest_safe_part(motion(), looks);
-      if (twisted) cap = std::min(cap, largest_turning_step<D>(problem, step_));
+      refine_and_bound();
       if (contact == nullptr || cap >= 1.0) break;
       shortened = true;
       if (shifts == kMostShifts) break;
@@ -525,6 +571,7 @@ NewtonResult Statics::solve_with(BlockBand<D>& hessian, BlockBand<D>& untouched,
     if (!accepted && shift == 0.0 && contact != nullptr && contact->has_remainder()) {
       contact->save_lag();
       contact->refresh(false);
+      old_hessian = false;
       trial_wire_energy = differentiate(trial_);
       const double force = largest_force();
       accepted = refreshed = force <= 0.5 * std::min(result.residual, last_halved);
@@ -573,6 +620,8 @@ NewtonResult Statics::solve_with(BlockBand<D>& hessian, BlockBand<D>& untouched,
     wire_energy = trial_wire_energy;
     if (contact != nullptr && !refreshed) {
       if (result.iterations < eager_until) contact->refresh(false);
+      old_hessian = shift == 0.0 && length == 0.0 && result.residual <= kNearlyThere;
+      last_residual = result.residual;
       differentiate(state);
     }
   }

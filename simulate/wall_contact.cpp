@@ -213,6 +213,7 @@ void WallContact::find_active(const Eigen::Matrix3Xd& x) {
 
 void WallContact::find_forces() {
   energy_ = {};
+  stiffness_known_ = false;
   if (!yielding_) {
     for (Active& active : active_) {
       const double share = points_[static_cast<std::size_t>(active.point)].share;
@@ -402,6 +403,8 @@ bool WallContact::in_band(const Active& a, const Active& b) const {
 }
 
 void WallContact::find_stiffness() {
+  if (stiffness_known_) return;
+  stiffness_known_ = true;
   const Eigen::Index m = static_cast<Eigen::Index>(active_.size());
   change_.resize(m);  // scratch: of the contact law
   for (Eigen::Index k = 0; k < m; ++k) {
@@ -444,6 +447,7 @@ void WallContact::find_stiffness() {
 }
 
 void WallContact::find_change(const Motion& motion) {
+  find_stiffness();
   const Eigen::Index m = static_cast<Eigen::Index>(active_.size());
   gap_.resize(m);
   motion_.resize(3, m);

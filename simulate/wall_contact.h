@@ -162,7 +162,7 @@ class WallContact {
     Vec3 position;
     WallSample wall;
     double force = 0.0;      // normal, of the potential: times the gradient's norm in newtons
-    double stiffness = 0.0;  // of the contact law, see expect_after(); found by add()   [N/mm]
+    double stiffness = 0.0;  // of the contact law, see expect_after()                   [N/mm]
     double yield = 0.0;      // displacement of the wall                                 [mm]
   };
   /// Where a point is, from where friction holds it, along the wall.
@@ -188,6 +188,7 @@ class WallContact {
   const VesselModel& vessel_;
   ContactOptions options_;
   bool yielding_, feet_held_ = false;
+  bool stiffness_known_ = false;  // of the state sampled last: see find_stiffness()
   double radius_;
   std::vector<Point> points_;                      // proximal to distal
   std::size_t first_free_ = 0, first_moving_ = 0;  // those before do not touch, do not move
