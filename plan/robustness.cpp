@@ -145,7 +145,7 @@ simulate::TrialResult run_disturbed(const Study& study, const Candidate& candida
   wire.radius += disturbance.inward;
   simulate::InsertionOptions insertion = study.insertion;
   insertion.friction *= disturbance.friction_factor;
-  insertion.residual_tolerance /= factor;
+  insertion.residual_tolerance *= kRepeatTolerance / factor;
   insertion.record_every = insertion.length;
   insertion.map_forces = false;
 
