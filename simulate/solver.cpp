@@ -210,16 +210,15 @@ struct BandSink : FreeSink<D> {
 
 // ---------------------------------------------------------------- supports
 
-/// Takes what a support holds out of the system: rows and columns of block k are projected and the
+/// Takes what a support holds out of the Hessian: rows and columns of block k are projected and the
 /// held directions get a unit pivot.
 template <int D>
-void hold(const Mat3& P, bool hold_theta, int k, Eigen::VectorXd& g, BlockBand<D>& H) {
+void hold(const Mat3& P, bool hold_theta, int k, BlockBand<D>& H) {
   typename BlockBand<D>::Block Q = BlockBand<D>::Block::Identity();
   Q.template topLeftCorner<3, 3>() = P;
   if constexpr (D == 4) {
     if (hold_theta) Q(3, 3) = 0.0;
   }
-  g.template segment<D>(D * k) = (Q * g.template segment<D>(D * k)).eval();
   H.own(k) = (Q * H.own(k).template selfadjointView<Eigen::Lower>() * Q).eval();
   H.own(k) += BlockBand<D>::Block::Identity() - Q;
   if (k >= 1) H.one(k) = (Q * H.one(k)).eval();
@@ -240,16 +239,17 @@ void project(const Problem& problem, Eigen::VectorXd& v) {
   if (problem.last == n) project_end(problem.distal, n - 1 - problem.first, n - 2 - problem.first);
 }
 
+/// And out of their Hessian.
 template <int D>
-void apply_supports(const Problem& problem, Eigen::VectorXd& g, BlockBand<D>& H) {
+void apply_supports(const Problem& problem, BlockBand<D>& H) {
   const int n = problem.rod->nodes();
   if (problem.first == 0) {
-    hold<D>(free_directions(problem.proximal), problem.proximal.hold_roll, 0, g, H);
+    hold<D>(free_directions(problem.proximal), problem.proximal.hold_roll, 0, H);
   }
   if (problem.last == n) {
-    hold<D>(free_directions(problem.distal), true, n - 1 - problem.first, g, H);  // no edge n-1
+    hold<D>(free_directions(problem.distal), true, n - 1 - problem.first, H);  // no edge n-1
     if (D == 4 && problem.distal.hold_roll && n - 2 >= problem.first) {
-      hold<D>(Mat3::Identity(), true, n - 2 - problem.first, g, H);
+      hold<D>(Mat3::Identity(), true, n - 2 - problem.first, H);
     }
   }
 }
@@ -407,19 +407,16 @@ NewtonResult Statics::solve_with(BlockBand<D>& hessian, BlockBand<D>& untouched,
       sum += add_chain(chain, *problem.rod, where, sink, coupled_.psi, gradient_);
     }
     if (contact != nullptr) contact->add(sink);
+    project<D>(problem, gradient_);
     return sum;
   };
   const auto differentiate = [&](const RodState& where) {
     FreeSink<D> gradient{problem.first, problem.last, gradient_};
-    if (old_hessian) {
-      const double sum = add_all(where, gradient);
-      project<D>(problem, gradient_);
-      return sum;
-    }
+    if (old_hessian) return add_all(where, gradient);
     hessian.reset(count, chain.edges());
     BandSink<D> both{gradient, hessian};
     const double sum = add_all(where, both);
-    apply_supports<D>(problem, gradient_, hessian);
+    apply_supports<D>(problem, hessian);
     return sum;
   };
   const auto largest_force = [&] {
