@@ -36,9 +36,9 @@ inline Mat3 symmetric_product(const Vec3& a, const Vec3& b) {
 // ---------------------------------------------------------------- elements
 //
 // Each element adds its derivatives to a sink: gradient(node, g), gradient_theta(edge, g),
-// hessian(i, j, H) for x_i x_j, hessian_of_edge(i, H) for edge i's twice, hessian_theta(edge, i, h)
-// for theta x_i, hessian_theta_theta(e, f, h). Both halves of the symmetric matrix are implied: a
-// pair i != j is given once.
+// hessian(i, j, H) for x_i x_j, hessian_scaled(i, j, s, H) for s H, hessian_of_edge(i, H) for edge
+// i's twice, hessian_theta(edge, i, h) for theta x_i, hessian_theta_theta(e, f, h). Both halves of
+// the symmetric matrix are implied: a pair i != j is given once.
 
 /// Stretch of edge i, paper Eq. (5): W = k_s/4 (|e|^2 - l^2)^2 with k_s = EA/(2 l^3).
 template <class Sink>

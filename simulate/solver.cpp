@@ -122,6 +122,9 @@ struct DenseSink {
     H.block<3, 3>(3 * i, 3 * j) += block;
     if (i != j) H.block<3, 3>(3 * j, 3 * i) += block.transpose();
   }
+  void hessian_scaled(int i, int j, double scale, const Mat3& block) {
+    hessian(i, j, scale * block);
+  }
   void hessian_of_edge(int i, const Mat3& block) {
     hessian(i, i, block);
     hessian(i + 1, i + 1, block);
@@ -166,8 +169,13 @@ struct BandSink : FreeSink<D> {
   typename BlockBand<D>::Block& block(int i, int j) {  // i >= j
     return i == j ? H.own(i - first) : i == j + 1 ? H.one(i - first) : H.two(i - first);
   }
-  void hessian(int i, int j, const Mat3& v) {
-    if (is_free(i) && is_free(j)) block(i, j).template topLeftCorner<3, 3>() += v;
+  void hessian(int i, int j, const Mat3& v) { hessian_scaled(i, j, 1.0, v); }
+  void hessian_scaled(int i, int j, double scale, const Mat3& v) {
+    if (!is_free(i) || !is_free(j)) return;
+    auto& target = block(i, j);
+    for (int c = 0; c < 3; ++c) {
+      for (int r = 0; r < 3; ++r) target(r, c) += scale * v(r, c);
+    }
   }
   void hessian_of_edge(int i, const Mat3& v) {
     if (!is_free(i) || !is_free(i + 1)) {

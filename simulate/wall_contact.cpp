@@ -35,6 +35,9 @@ constexpr double kHeldFoot = 0.25;
 /// round the mouths of branches [mm].
 constexpr double kFineTip = 20.0;
 
+/// Of a point that is looked at in every sampling, see WallContact::asleep_until_.
+constexpr double kAwake = -1.0;
+
 /// How deep into the wall a step may lead a point, or one of its parts [mm].
 constexpr double kInto = 0.25;
 
@@ -67,15 +70,17 @@ WallContact::WallContact(const Rod& rod, const VesselModel& vessel, const Contac
   points_.push_back({edges - 1, 1.0, before, 0.0});
 
   const Eigen::Index m = static_cast<Eigen::Index>(points_.size());
+  memory_.x.setZero(3, rod.nodes());
   memory_.anchor.setZero(3, m);
   memory_.normal_force.setZero(m);
   lag_.force.setZero(m);
   lag_.normal.setZero(3, m);
-  position_.setZero(3, m);
+  x_.setZero(3, rod.nodes());
+  asleep_until_.setConstant(m, kAwake);
   known_position_.setConstant(3, m, std::numeric_limits<double>::infinity());
   known_distance_.setZero(m);
-  bound_.setConstant(m, std::numeric_limits<double>::infinity());
   touched_.assign(points_.size(), 0);
+  rubbing_.resize(points_.size());
   predicted_.setZero(m);
   expected_.setConstant(m, kNoExpectation);
   lag_.points.reserve(points_.size());
@@ -90,7 +95,7 @@ WallContact::WallContact(const Rod& rod, const VesselModel& vessel, const Contac
   }
 }
 
-Vec3 WallContact::position_of(const Point& point, const Eigen::Matrix3Xd& x) const {
+Vec3 WallContact::position_of(const Point& point, const Eigen::Matrix3Xd& x) {
   if (point.part == 0.0) return x.col(point.edge);
   return (1.0 - point.part) * x.col(point.edge) + point.part * x.col(point.edge + 1);
 }
@@ -100,15 +105,11 @@ void WallContact::free_from(double tip_distance) {
       points_.begin(), points_.end() - 1,
       [&](const Point& point) { return point.tip_distance > tip_distance + 1e-9; });
   first_free_ = static_cast<std::size_t>(first - points_.begin());
-  // The edge that comes out of the introducer moves, and so do points on its part in there.
-  first_moving_ = first_free_;
-  while (first_moving_ > 0 && points_[first_moving_ - 1].edge + 1 >= first->edge) --first_moving_;
+  asleep_until_.head(static_cast<Eigen::Index>(first_free_)).setConstant(kAwake);
 }
 
 void WallContact::start_at(const Eigen::Matrix3Xd& x) {
-  for (std::size_t k = 0; k < points_.size(); ++k) {
-    memory_.anchor.col(static_cast<Eigen::Index>(k)) = position_of(points_[k], x);
-  }
+  memory_.x = x;
   memory_.normal_force.setZero();
   lag_.force.setZero();
   expect_nothing();
@@ -132,6 +133,7 @@ void WallContact::predict(double distance) {
         to > 0 && past > 0.0 ? past / (tip_distance(to - 1) - tip_distance(to)) : 0.0;
     predicted_[to] += (1.0 - part) * force;
     if (part > 0.0) predicted_[to - 1] += part * force;
+    asleep_until_.segment(std::max<Eigen::Index>(0, to - 1), to > 0 ? 2 : 1).setConstant(kAwake);
   }
   lag_.force = expected_ = predicted_;
 }
@@ -139,9 +141,6 @@ void WallContact::predict(double distance) {
 // ---------------------------------------------------------------- normal forces
 
 void WallContact::begin(const Eigen::Matrix3Xd& x) {
-  for (std::size_t k = 0; k < first_moving_; ++k) {
-    position_.col(static_cast<Eigen::Index>(k)) = position_of(points_[k], x);
-  }
   std::fill(lag_.feet.begin(), lag_.feet.end(), SurfacePoint{});
   feet_changed_ = true;
   feet_held_ = false;
@@ -157,7 +156,7 @@ void WallContact::begin(const Eigen::Matrix3Xd& x) {
       if (lag_.force[i] <= 0.0) continue;
       while (active != active_.end() && active->point < static_cast<int>(k)) ++active;
       const bool known = active != active_.end() && active->point == static_cast<int>(k);
-      const WallSample wall = known ? active->wall : vessel_.lumen.sample(position_.col(i));
+      const WallSample wall = known ? active->wall : vessel_.lumen.sample(position_of(i));
       if (wall.distance > near + 1.0 || wall.gradient.norm() < kSmallestSlope) continue;
       lag_.normal.col(i) = wall.gradient.normalized();
       lag_.points.push_back(static_cast<int>(k));
@@ -179,19 +178,28 @@ ContactEnergy WallContact::sample(const Eigen::Matrix3Xd& x) {
   return energy_ = lagged_energy();
 }
 
+/// How far from the wall a point is at least, now that it is at `position`.
+double WallContact::least_distance(Eigen::Index k, const Vec3& position) const {
+  return known_distance_[k] - kLipschitz * (position - known_position_.col(k)).norm();
+}
+
 void WallContact::find_active(const Eigen::Matrix3Xd& x) {
   // Points near the wall. One that was far enough for its motion since is not looked at.
+  const Eigen::Index moving = x.cols() - points_[first_free_].edge;
+  travelled_ += std::sqrt((x - x_).rightCols(moving).colwise().squaredNorm().maxCoeff());
+  x_ = x;
   fresh_ = lost_ = false;
   active_.clear();
-  for (std::size_t k = first_moving_; k < points_.size(); ++k) {
+  for (std::size_t k = first_free_; k < points_.size(); ++k) {
     const Eigen::Index i = static_cast<Eigen::Index>(k);
-    const Vec3 p = position_of(points_[k], x);
-    position_.col(i) = p;
-    if (k < first_free_) continue;
-    const double moved = (p - known_position_.col(i)).norm();
-    bound_[i] = known_distance_[i] - kLipschitz * moved;
+    if (asleep_until_[i] >= travelled_) continue;
+    const Vec3 p = position_of(i);
     const double near = reach() + (expected_[i] > 0.0 ? kInSight : 0.0);
-    if (bound_[i] >= near) continue;
+    const double least = least_distance(i, p);
+    if (least >= near) {
+      asleep_until_[i] = travelled_ + (least - near) / kLipschitz;
+      continue;
+    }
     WallSample wall;
     if (touched_[k] == 0) {
       wall.distance = vessel_.lumen.distance(p);
@@ -200,7 +208,8 @@ void WallContact::find_active(const Eigen::Matrix3Xd& x) {
       wall = vessel_.lumen.sample(p);
     }
     known_position_.col(i) = p;
-    known_distance_[i] = bound_[i] = wall.distance;
+    known_distance_[i] = wall.distance;
+    asleep_until_[i] = travelled_ + (wall.distance - near) / kLipschitz;
     touched_[k] = wall.distance < near ? 1 : 0;
     if (touched_[k] == 0) continue;
     if (wall.gradient.squaredNorm() < kSmallestSlope * kSmallestSlope) {
@@ -274,25 +283,35 @@ void WallContact::find_foot(const Active& active) {
 
 // ---------------------------------------------------------------- friction
 
-WallContact::Rubbing WallContact::rubbing_at(int k) const {
-  const Vec3 normal = lag_.normal.col(k);
-  const Vec3 moved = position_.col(k) - memory_.anchor.col(k);
-  const Vec3 along = moved - moved.dot(normal) * normal;
-  const double length = along.norm();
-  const Rub potential = rub(length, options_.slip);
-  return {.length = length,
-          .toward = length > 0.0 ? Vec3(along / length) : Vec3::Zero(),
-          .limit = options_.friction * lag_.force[k],
-          .energy = potential.energy,
-          .slope = potential.slope,
-          .curvature = potential.curvature};
+/// Where friction holds a point, or where it was in the last equilibrium.
+Vec3 WallContact::anchor_of(Eigen::Index k) const {
+  if (memory_.normal_force[k] > 0.0) return memory_.anchor.col(k);
+  return position_of(points_[static_cast<std::size_t>(k)], memory_.x);
 }
 
-ContactEnergy WallContact::lagged_energy() const {
+void WallContact::find_rubbing() {
+  for (const int k : lag_.points) {
+    const Vec3 normal = lag_.normal.col(k);
+    const Vec3 moved = position_of(k) - anchor_of(k);
+    const Vec3 along = moved - moved.dot(normal) * normal;
+    const double length = along.norm();
+    const Rub potential = rub(length, options_.slip);
+    rubbing_[static_cast<std::size_t>(k)] = {
+        .length = length,
+        .toward = length > 0.0 ? Vec3(along / length) : Vec3::Zero(),
+        .limit = options_.friction * lag_.force[k],
+        .energy = potential.energy,
+        .slope = potential.slope,
+        .curvature = potential.curvature};
+  }
+}
+
+ContactEnergy WallContact::lagged_energy() {
+  find_rubbing();
   ContactEnergy energy = energy_;
   energy.friction = 0.0;
   for (const int k : lag_.points) {
-    const Rubbing rubbing = rubbing_at(k);
+    const Rubbing& rubbing = rubbing_[static_cast<std::size_t>(k)];
     energy.friction += rubbing.limit * rubbing.energy;
   }
   return energy;
@@ -317,7 +336,7 @@ ContactEnergy WallContact::refresh(bool fully) {
     kept_points_.swap(lag_.points);
     lag_.points.clear();
     for (const int k : kept_points_) {
-      const bool sticks = rubbing_at(k).length < 2.0 * options_.slip;
+      const bool sticks = rubbing_[static_cast<std::size_t>(k)].length < 2.0 * options_.slip;
       lag_.force[k] *= sticks && !fully ? kKept : 0.0;
     }
     for (const Active& active : active_) {
@@ -354,18 +373,17 @@ double WallContact::settle() {
   double work = 0.0;
   predicted_.setZero();
   for (const int k : lag_.points) {
-    const Rubbing rubbing = rubbing_at(k);
+    const Rubbing& rubbing = rubbing_[static_cast<std::size_t>(k)];
     predicted_[k] = lag_.force[k];
     const double slipped = rubbing.length - options_.slip;
+    memory_.anchor.col(k) = anchor_of(k);
     if (slipped > 0.0) {
       work += rubbing.limit * slipped;
-      memory_.anchor.col(k) = position_.col(k) - options_.slip * rubbing.toward;
+      memory_.anchor.col(k) = position_of(k) - options_.slip * rubbing.toward;
     }
   }
-  for (Eigen::Index k = 0; k < predicted_.size(); ++k) {
-    if (predicted_[k] == 0.0) memory_.anchor.col(k) = position_.col(k);
-  }
   memory_.normal_force = predicted_;
+  memory_.x = x_;
   return work;
 }
 
@@ -385,7 +403,7 @@ const std::vector<Touch>& WallContact::touches() {
                 .wall_displacement = active.yield,
                 .tip_distance = point.tip_distance};
     if (options_.friction > 0.0) {
-      const Rubbing rubbing = rubbing_at(active.point);
+      const Rubbing& rubbing = rubbing_[static_cast<std::size_t>(active.point)];
       touch.friction = -(rubbing.limit * rubbing.slope) * rubbing.toward;
     }
     touches_.push_back(touch);
@@ -498,7 +516,7 @@ void WallContact::add_remainder(const Motion& motion, Eigen::VectorXd& product) 
     const Active& active = active_[static_cast<std::size_t>(k)];
     Vec3 out_of_balance = left_out_[k] * active.wall.gradient;
     if (options_.friction > 0.0 && fresh_ && active.force > 0.0) {
-      const Rubbing rubbing = rubbing_at(active.point);
+      const Rubbing& rubbing = rubbing_[static_cast<std::size_t>(active.point)];
       out_of_balance -=
           (options_.friction * rubbing.slope * change_[k] * active.wall.gradient.norm()) *
           rubbing.toward;
@@ -508,14 +526,16 @@ void WallContact::add_remainder(const Motion& motion, Eigen::VectorXd& product) 
 }
 
 double WallContact::largest_safe_part(const Motion& motion, int looks) const {
+  const double longest = motion.longest();
   double cap = std::numeric_limits<double>::infinity();
   for (std::size_t k = first_free_; k < points_.size(); ++k) {
-    const Vec3 move = motion.of(points_[k]);
     const Eigen::Index i = static_cast<Eigen::Index>(k);
-    const double room = kInto + std::max(0.0, bound_[i]), length = move.norm();
+    if (asleep_until_[i] >= travelled_ && longest <= kInto + reach()) continue;
+    const Vec3 move = motion.of(points_[k]), from = position_of(i);
+    const double distance = least_distance(i, from);
+    const double room = kInto + std::max(0.0, distance), length = move.norm();
     if (length > room && room < cap * length) {
-      cap = std::min(
-          cap, way_inside(position_.col(i), move / length, length, bound_[i], looks) / length);
+      cap = std::min(cap, way_inside(from, move / length, length, distance, looks) / length);
     }
   }
   return cap;

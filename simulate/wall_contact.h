@@ -2,6 +2,7 @@
 /// The wire against the wall of the vessel: where it touches, with which normal and friction
 /// forces, and how the wall gives way. Part of the energy that solver.h minimises.
 #include <algorithm>
+#include <cmath>
 #include <vector>
 
 #include "simulate/rod.h"
@@ -77,8 +78,9 @@ class WallContact {
 
   /// What the points remember from one equilibrium to the next.
   struct Memory {
-    Eigen::Matrix3Xd anchor;             // (3, m) where friction holds a point to              [mm]
-    Eigen::VectorXd normal_force;        // (m)                                                 [N]
+    Eigen::Matrix3Xd x;                  // (3, n) the wire's nodes in that equilibrium         [mm]
+    Eigen::VectorXd normal_force;        // (m); 0: nothing holds the point                     [N]
+    Eigen::Matrix3Xd anchor;             // (3, m) where friction holds those that have one     [mm]
     std::vector<std::int32_t> triangle;  // (m) of its foot on a wall that yields; -1: none
   };
   const Memory& memory() const { return memory_; }
@@ -105,6 +107,7 @@ class WallContact {
     lag_ = saved_lag_;
     fresh_ = false;
     feet_changed_ = true;
+    find_rubbing();
   }
   /// Whether the lag is that of the state sampled last; always so where nothing is lagged.
   bool lag_is_fresh() const { return fresh_ || (!yielding_ && options_.friction == 0.0); }
@@ -119,6 +122,7 @@ class WallContact {
 
     Vec3 of_node(int i) const;
     Vec3 of(const Point& point) const;
+    double longest() const;  // of a node                                                  [mm]
     /// Adds a force at a point to its nodes, in the same layout.
     void scatter(const Point& point, const Vec3& force, Eigen::VectorXd& target) const;
   };
@@ -172,12 +176,17 @@ class WallContact {
     double limit;                     // friction's largest force                         [N]
     double energy, slope, curvature;  // of the potential per `limit`
   };
-  Vec3 position_of(const Point& point, const Eigen::Matrix3Xd& x) const;
+  static Vec3 position_of(const Point& point, const Eigen::Matrix3Xd& x);
+  Vec3 position_of(Eigen::Index k) const {
+    return position_of(points_[static_cast<std::size_t>(k)], x_);
+  }
+  Vec3 anchor_of(Eigen::Index k) const;
   double reach() const;  // of contact, from the wire's axis                              [mm]
   void find_active(const Eigen::Matrix3Xd& x);
+  double least_distance(Eigen::Index k, const Vec3& position) const;
   void find_forces();
-  ContactEnergy lagged_energy() const;
-  Rubbing rubbing_at(int k) const;
+  void find_rubbing();
+  ContactEnergy lagged_energy();
   void find_foot(const Active& active);
   void find_stiffness();
   bool in_band(const Active& a, const Active& b) const;
@@ -190,8 +199,8 @@ class WallContact {
   bool yielding_, feet_held_ = false;
   bool stiffness_known_ = false;  // of the state sampled last: see find_stiffness()
   double radius_;
-  std::vector<Point> points_;                      // proximal to distal
-  std::size_t first_free_ = 0, first_moving_ = 0;  // those before do not touch, do not move
+  std::vector<Point> points_;   // proximal to distal
+  std::size_t first_free_ = 0;  // those before do not touch
   Memory memory_;
   std::vector<Active> active_;
   std::vector<Touch> touches_;
@@ -211,11 +220,16 @@ class WallContact {
   bool fresh_ = false;
   bool lost_ = false;
 
-  // Per point: where it is, and the last known distance of the wall, with the place of that.
-  Eigen::Matrix3Xd position_, known_position_;  // [mm]
-  Eigen::VectorXd known_distance_;              // [mm]
-  Eigen::VectorXd bound_;                       // at least so far from the wall now         [mm]
-  std::vector<char> touched_;                   // when the wall was last looked at
+  // The nodes in the state sampled last, and how far any of them went at most, from sampling to
+  // sampling. Until that comes to a point's `asleep_until_`, the point is too far from the wall to
+  // matter. Per point also: where the wall was looked at last, and how far it was there.
+  Eigen::Matrix3Xd x_;               // (3, n)                                              [mm]
+  double travelled_ = 0.0;           // [mm]
+  Eigen::VectorXd asleep_until_;     // [mm]
+  Eigen::Matrix3Xd known_position_;  // [mm]
+  Eigen::VectorXd known_distance_;   // [mm]
+  std::vector<char> touched_;        // when the wall was last looked at
+  std::vector<Rubbing> rubbing_;     // of the points in lag_.points, in the state sampled last
 
   // The yielding wall: the coupling of the points that touch, and their feet.
   Yielding coupling_;
@@ -246,6 +260,12 @@ inline Vec3 WallContact::Motion::of(const Point& point) const {
   return (1.0 - point.part) * of_node(point.edge) + point.part * of_node(point.edge + 1);
 }
 
+inline double WallContact::Motion::longest() const {
+  double longest = 0.0;
+  for (int i = first; i < last; ++i) longest = std::max(longest, of_node(i).squaredNorm());
+  return std::sqrt(longest);
+}
+
 inline void WallContact::Motion::scatter(const Point& point, const Vec3& force,
                                          Eigen::VectorXd& target) const {
   const auto add_to = [&](int i, double weight) {
@@ -258,51 +278,57 @@ inline void WallContact::Motion::scatter(const Point& point, const Vec3& force,
 
 template <class Sink>
 void WallContact::add(Sink& sink) {
-  // A point stands for up to two nodes, a pair of points for up to four pairs of nodes.
-  const auto point_of = [&](const Active& active) -> const Point& {
-    return points_[static_cast<std::size_t>(active.point)];
-  };
+  // A point stands for up to two nodes, a pair of points for up to four pairs of nodes. Matrices
+  // are written entry by entry: as Eigen's outer products they are function calls.
+  const auto point_of = [&](int k) -> const Point& { return points_[static_cast<std::size_t>(k)]; };
   const auto for_each_node = [](const Point& point, const auto& visit) {
     if (point.part < 1.0) visit(point.edge, 1.0 - point.part);
     if (point.part > 0.0) visit(point.edge + 1, point.part);
   };
-  const auto add_own = [&](const Point& point, const Vec3& g, const Mat3& H) {
+  const auto add_gradient = [&](const Point& point, const Vec3& g) {
+    for_each_node(point, [&](int i, double w) { sink.gradient(i, w * g); });
+  };
+  const auto add_hessian = [&](const Point& point, const auto& entry) {
+    Mat3 H;
+    for (int c = 0; c < 3; ++c) {
+      for (int r = 0; r < 3; ++r) H(r, c) = entry(r, c);
+    }
     for_each_node(point, [&](int i, double w_i) {
-      sink.gradient(i, w_i * g);
-      if constexpr (Sink::kHessian) {
-        for_each_node(point, [&](int j, double w_j) {
-          if (j <= i) sink.hessian(i, j, (w_i * w_j) * H);
-        });
-      }
+      for_each_node(point, [&](int j, double w_j) {
+        if constexpr (Sink::kHessian) {
+          if (j <= i) sink.hessian_scaled(i, j, w_i * w_j, H);
+        }
+      });
     });
   };
 
   // Normal forces: each by itself, and through the wall with its neighbours.
-  const bool coupled = Sink::kHessian && yielding_;
   if constexpr (Sink::kHessian) find_stiffness();
-  for (std::size_t k = 0; k < active_.size(); ++k) {
-    const Active& active = active_[k];
+  for (int k = 0; k < static_cast<int>(active_.size()); ++k) {
+    const Active& active = active_[static_cast<std::size_t>(k)];
+    const Point& point = point_of(active.point);
     const Vec3& n = active.wall.gradient;
-    const int row = static_cast<int>(k);
-    const double stiffness =
-        coupled ? coupling_.stiffness(row, row) + folded_[row] : active.stiffness;
-    const double expected = expected_[active.point];
-    add_own(point_of(active), -active.force * n,
-            stiffness * n * n.transpose() -
-                (expected >= 0.0 ? expected : active.force) * active.wall.hessian);
+    add_gradient(point, -active.force * n);
     if constexpr (Sink::kHessian) {
-      for (int j = coupled ? coupling_.first_coupled(row) : row; j < row; ++j) {
+      const double stiffness =
+          yielding_ ? coupling_.stiffness(k, k) + folded_[k] : active.stiffness;
+      const double expected = expected_[active.point];
+      const double force = expected >= 0.0 ? expected : active.force;
+      add_hessian(point, [&](int r, int c) {
+        return stiffness * n[r] * n[c] - force * active.wall.hessian(r, c);
+      });
+      for (int j = yielding_ ? coupling_.first_coupled(k) : k; j < k; ++j) {
         const Active& other = active_[static_cast<std::size_t>(j)];
         if (!in_band(active, other)) continue;
-        const Vec3 m = coupling_.stiffness(row, j) * other.wall.gradient;
+        const Vec3 m = coupling_.stiffness(k, j) * other.wall.gradient;
         const Mat3 H = n * m.transpose(), H_transposed = m * n.transpose();
-        for_each_node(point_of(active), [&](int p, double w_p) {
-          for_each_node(point_of(other), [&](int q, double w_q) {
+        for_each_node(point, [&](int p, double w_p) {
+          for_each_node(point_of(other.point), [&](int q, double w_q) {
             if (p == q) {
-              sink.hessian(p, q, (w_p * w_q) * (H + H_transposed));
+              sink.hessian_scaled(p, q, w_p * w_q, H + H_transposed);
             } else {
-              sink.hessian(std::max(p, q), std::min(p, q),
-                           (w_p * w_q) * (p > q ? H : H_transposed));
+              sink.hessian_scaled(std::max(p, q), std::min(p, q), w_p * w_q,
+                                  p > q ? H : H_transposed);
             }
           });
         });
@@ -312,20 +338,18 @@ void WallContact::add(Sink& sink) {
 
   // Friction, with the normal force and normal of the lag.
   for (const int k : lag_.points) {
-    const Rubbing rubbing = rubbing_at(k);
-    if (rubbing.length == 0.0) {  // at its anchor: as stiff to all sides
+    const Rubbing& rubbing = rubbing_[static_cast<std::size_t>(k)];
+    const Vec3& t = rubbing.toward;  // 0 at the anchor, where friction is as stiff to all sides
+    add_gradient(point_of(k), (rubbing.limit * rubbing.slope) * t);
+    if constexpr (Sink::kHessian) {
       const Vec3 normal = lag_.normal.col(k);
-      add_own(
-          points_[static_cast<std::size_t>(k)], Vec3::Zero(),
-          (rubbing.limit * rubbing.curvature) * (Mat3::Identity() - normal * normal.transpose()));
-      continue;
+      const double across =
+          rubbing.length > 0.0 ? rubbing.slope / rubbing.length : rubbing.curvature;
+      add_hessian(point_of(k), [&](int r, int c) {
+        const double along = t[r] * t[c], off = normal[r] * normal[c], own = r == c ? 1.0 : 0.0;
+        return rubbing.limit * (rubbing.curvature * along + across * (own - along - off));
+      });
     }
-    const Vec3 normal = lag_.normal.col(k), &t = rubbing.toward;
-    const double across = rubbing.slope / rubbing.length;
-    const Mat3 along = t * t.transpose(), off = normal * normal.transpose();
-    add_own(
-        points_[static_cast<std::size_t>(k)], (rubbing.limit * rubbing.slope) * t,
-        rubbing.limit * (rubbing.curvature * along + across * (Mat3::Identity() - along - off)));
   }
 }
 
