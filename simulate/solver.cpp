@@ -367,7 +367,7 @@ Mat3 free_directions(const EndSupport& support) {
 // ---------------------------------------------------------------- Newton
 
 template <int D>
-NewtonResult Statics::solve_with(BlockBand<D>& hessian, BlockBand<D>& untouched,
+NewtonResult Statics::solve_with(BlockBand<D>& hessian, BlockBand<D>& factored,
                                  const Problem& problem, RodState& state,
                                  const NewtonOptions& options) {
   const int count = problem.last - problem.first;
@@ -404,6 +404,10 @@ NewtonResult Statics::solve_with(BlockBand<D>& hessian, BlockBand<D>& untouched,
   const TwistChain chain =
       twisted && out_of_introducer ? find_chain(*problem.rod, problem.first) : TwistChain{};
   gather_chain(chain, state);
+  // With all that contact leaves out of the symmetric band: then nothing is left to GMRES.
+  const bool unsymmetric = D == 3 && out_of_introducer && !problem.distal.hold_along &&
+                           !problem.distal.hold_across && contact != nullptr &&
+                           contact->remainder_is_banded();
 
   // Gradient and, unless the old one does, Hessian of the wire, and of contact as it was sampled
   // last; energy of the wire.
@@ -487,8 +491,8 @@ NewtonResult Statics::solve_with(BlockBand<D>& hessian, BlockBand<D>& untouched,
       slope = gradient_.dot(step_);
       cap = std::numeric_limits<double>::infinity();
       if (contact != nullptr) {
-        if (shift == 0.0 && contact->has_remainder()) {
-          slope = refine_step<D>(problem, hessian, slope);
+        if (shift == 0.0 && !unsymmetric && contact->has_remainder()) {
+          slope = refine_step<D>(problem, factored, slope);
         }
         cap = contact->largest_safe_part(motion(), looks);
       }
@@ -497,41 +501,51 @@ NewtonResult Statics::solve_with(BlockBand<D>& hessian, BlockBand<D>& untouched,
     bool found = false;
     if (old_hessian && result.residual <= kFallen * last_residual) {
       step_ = -gradient_;
-      coupled_.solve(hessian, step_);
+      if (unsymmetric) {
+        unsymmetric_.solve(step_);
+      } else {
+        coupled_.solve(factored, step_);
+      }
       refine_and_bound();
       found = slope < 0.0 && cap >= 1.0;
     }
-    if (!found) {
-      if (old_hessian) {
-        old_hessian = false;
-        differentiate(state);
-      }
-      untouched = hessian;
+    if (!found && old_hessian) {
+      old_hessian = false;
+      differentiate(state);
     }
     const double last_shift = shift;
-    const auto apply_shift = [&] {
-      hessian = untouched;
-      for (int k = 0; k < count; ++k) hessian.own(k).diagonal().array() += shift;
-    };
     shift = 0.0;
     bool shortened = false;
     for (int shifts = 0; !found; ++shifts) {
       const auto solve = [&] {
+        if constexpr (D == 3) {
+          if (unsymmetric && shift == 0.0) {
+            unsymmetric_.take(hessian);
+            step_ = gradient_;
+            contact->add_remainder(problem.first, unsymmetric_, step_);
+            if (!unsymmetric_.factor()) return false;
+            step_ *= -1.0;
+            unsymmetric_.solve(step_);
+            return gradient_.dot(step_) < 0.0;
+          }
+        }
         step_ = -gradient_;
-        return hessian.factor() &&
-               coupled_.solve_first(chain, hessian, chain.last - problem.first, step_);
+        factored = hessian;
+        if (shift > 0.0) {
+          for (int k = 0; k < count; ++k) factored.own(k).diagonal().array() += shift;
+        }
+        return factored.factor() &&
+               coupled_.solve_first(chain, factored, chain.last - problem.first, step_);
       };
       while (!solve()) {
         shift = shift == 0.0 ? std::max(kSmallestShift, 0.1 * last_shift) : 4.0 * shift;
         if (!(shift < kLargestShift)) return finish(false);  // a number in it is not finite
-        apply_shift();
       }
       refine_and_bound();
       if (contact == nullptr || cap >= 1.0) break;
       shortened = true;
       if (shifts == kMostShifts) break;
       shift = std::max(last_shift > 0.0 ? 0.25 * last_shift : kFirstShift, 4.0 * shift);
-      apply_shift();
     }
     if (step_.cwiseAbs().maxCoeff() < 64.0 * kEpsilon * extent &&
         result.residual <= result.rounding_floor) {
@@ -697,8 +711,8 @@ double Statics::refine_step(const Problem& problem, const BlockBand<D>& factored
 NewtonResult Statics::solve(const Problem& problem, RodState& state, const NewtonOptions& options) {
   expects(problem.rod != nullptr && problem.first >= 0 && problem.first < problem.last &&
           problem.last <= problem.rod->nodes());
-  if (problem.rod->twisted) return solve_with<4>(hessian4_, untouched4_, problem, state, options);
-  return solve_with<3>(hessian3_, untouched3_, problem, state, options);
+  if (problem.rod->twisted) return solve_with<4>(hessian4_, factored4_, problem, state, options);
+  return solve_with<3>(hessian3_, factored3_, problem, state, options);
 }
 
 Energy Statics::evaluate(const Problem& problem, const RodState& state,

@@ -96,15 +96,16 @@ class Statics {
 
  private:
   template <int D>
-  NewtonResult solve_with(BlockBand<D>& hessian, BlockBand<D>& untouched, const Problem& problem,
+  NewtonResult solve_with(BlockBand<D>& hessian, BlockBand<D>& factored, const Problem& problem,
                           RodState& state, const NewtonOptions& options);
 
   static constexpr int kKrylov = 10;
   template <int D>
   double refine_step(const Problem& problem, const BlockBand<D>& factored, double slope);
 
-  BlockBand<3> hessian3_, untouched3_;
-  BlockBand<4> hessian4_, untouched4_;
+  BlockBand<3> hessian3_, factored3_;
+  BlockBand<4> hessian4_, factored4_;
+  UnsymmetricBand unsymmetric_;
   RodState trial_;
   Eigen::VectorXd gradient_, step_, first_step_, refined_, direction_;
   Eigen::MatrixXd krylov_;

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <vector>
 
+#include "simulate/block_band.h"
 #include "simulate/rod.h"
 #include "simulate/vessel_model.h"
 #include "simulate/yielding.h"
@@ -150,6 +151,12 @@ class WallContact {
   /// friction's dependence on normal forces, and how the wall yields less or more where the wire
   /// slides to.
   void add_remainder(const Motion& motion, Eigen::VectorXd& product);
+  /// On a wall that does not yield that is friction's dependence on normal forces alone, and lies
+  /// within an unsymmetric band: adds it there, and to `gradient` how friction will change as the
+  /// lag comes to be the state's own. A Newton step with both is one for positions and lag
+  /// together.
+  void add_remainder(int first, UnsymmetricBand& band, Eigen::VectorXd& gradient);
+  bool remainder_is_banded() const { return !yielding_ && options_.friction > 0.0; }
   bool has_remainder() const { return !active_.empty() && (yielding_ || options_.friction > 0.0); }
 
   /// Largest part of a motion of the state sampled last that takes no point across the wall: a
