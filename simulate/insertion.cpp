@@ -223,7 +223,7 @@ NewtonResult Insertion::advance(double distance) {
     moved_ = (state_.x - guess_.x) / distance;
     drift_.leftCols(tip) = (state_.x - path_).leftCols(tip) / distance;
     drift_.rightCols(n - tip).colwise() = drift_.col(tip - 1).eval();
-    double off = drift_.colwise().norm().maxCoeff();
+    double off = std::sqrt(drift_.colwise().squaredNorm().maxCoeff());
     for (int i = tip; i < n; ++i) {
       off = std::max(off, (moved_.col(i) - moved_.col(tip - 1)).norm());
     }
@@ -255,8 +255,10 @@ void Insertion::bend_off_wall(int tip) {
       const double rest = std::clamp(1.0 - (rod_.tip_distance[i] - reach) / length, 0.0, 1.0);
       return rest * rest;
     };
-    Vec3 before = guess_.x.col(problem_.first - 1);
-    for (int i = problem_.first; i < n; ++i) {
+    int start = problem_.first;
+    while (part(start) == 0.0) ++start;
+    Vec3 before = guess_.x.col(start - 1);
+    for (int i = start; i < n; ++i) {
       const Vec3 here = guess_.x.col(i), edge = here - before;
       const Vec3 bent = edge + ((part(i) - part(i - 1)) * deep) * inward;
       guess_.x.col(i) = guess_.x.col(i - 1) + (edge.norm() / bent.norm()) * bent;
