@@ -65,7 +65,7 @@ double add_stretch(const Problem& problem, const RodState& state, int i, Sink& s
 template <class Sink>
 double add_bend(const Problem& problem, const RodState& state, int i, Sink& sink) {
   const Rod& rod = *problem.rod;
-  const double a = 1.0 / rod.rest_length[i - 1], c = 1.0 / rod.rest_length[i], b = -(a + c);
+  const double a = rod.per_length[i - 1], c = rod.per_length[i], b = -(a + c);
   const bool curved = rod.twisted && rod.rest_angle[i] != 0.0;
   const double cosine = curved ? std::cos(rod.rest_angle[i]) : 1.0;
   const double B = rod.bend[i] * cosine;

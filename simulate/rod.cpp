@@ -76,6 +76,7 @@ Rod build_rod(const Wire& wire, const Eigen::VectorXd& edge_lengths, bool twiste
   rod.radius = wire.radius;
   rod.twisted = twisted;
   rod.rest_length = edge_lengths;
+  rod.per_length = edge_lengths.cwiseInverse();
   rod.stretch.resize(elements);
   rod.bend = rod.strip = rod.twist = rod.rest_angle = Eigen::VectorXd::Zero(n);
   rod.share = rod.mass = Eigen::VectorXd::Zero(n);

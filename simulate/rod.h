@@ -41,6 +41,7 @@ struct Wire {
 /// per wire, shared read-only. Node quantities vanish where the node has no two edges.
 struct Rod {
   Eigen::VectorXd rest_length;   // (n-1)  l                                              [mm]
+  Eigen::VectorXd per_length;    // (n-1)  1/l: divisions are slow                      [1/mm]
   Eigen::VectorXd stretch;       // (n-1)  EA                                             [N]
   Eigen::VectorXd bend;          // (n)    EI over the node's share of length, of a strip the
                                  //        smaller one                                    [N mm]

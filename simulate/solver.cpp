@@ -391,9 +391,8 @@ NewtonResult Statics::solve_with(BlockBand<D>& hessian, BlockBand<D>& factored,
   int stalled = 0;
   // After a full step in a vessel from a residual of no more than this the Hessian is not built
   // anew. Mostly the wire is then in equilibrium; and where it is not, but the residual fell to
-  // this part of itself, the factor of before does for one more step.
+  // a small part of itself, the factor of before does for one more step.
   constexpr double kNearlyThere = 0.01;  // [N]
-  constexpr double kFallen = 0.003;
   bool old_hessian = false;
   double last_residual = 0.0;  // before the last step                                       [N]
   WallContact* contact = problem.contact;
@@ -404,10 +403,12 @@ NewtonResult Statics::solve_with(BlockBand<D>& hessian, BlockBand<D>& factored,
   const TwistChain chain =
       twisted && out_of_introducer ? find_chain(*problem.rod, problem.first) : TwistChain{};
   gather_chain(chain, state);
-  // With all that contact leaves out of the symmetric band: then nothing is left to GMRES.
-  const bool unsymmetric = D == 3 && out_of_introducer && !problem.distal.hold_along &&
-                           !problem.distal.hold_across && contact != nullptr &&
-                           contact->remainder_is_banded();
+  // What contact leaves out of the symmetric Hessian may fit into an unsymmetric one, which needs
+  // no GMRES.
+  const bool banded = D == 3 && out_of_introducer && !problem.distal.hold_along &&
+                      !problem.distal.hold_across && contact != nullptr &&
+                      contact->remainder_is_banded();
+  bool unsymmetric = false;  // the last factor
 
   // Gradient and, unless the old one does, Hessian of the wire, and of contact as it was sampled
   // last; energy of the wire.
@@ -499,7 +500,8 @@ NewtonResult Statics::solve_with(BlockBand<D>& hessian, BlockBand<D>& factored,
       if (twisted) cap = std::min(cap, largest_turning_step<D>(problem, step_));
     };
     bool found = false;
-    if (old_hessian && result.residual <= kFallen * last_residual) {
+    const double fallen = unsymmetric ? 0.03 : 0.003;  // a wall that yields has kinks
+    if (old_hessian && result.residual <= fallen * last_residual) {
       step_ = -gradient_;
       if (unsymmetric) {
         unsymmetric_.solve(step_);
@@ -519,12 +521,12 @@ NewtonResult Statics::solve_with(BlockBand<D>& hessian, BlockBand<D>& factored,
     for (int shifts = 0; !found; ++shifts) {
       const auto solve = [&] {
         if constexpr (D == 3) {
-          if (unsymmetric && shift == 0.0) {
+          unsymmetric = banded && shift == 0.0 && contact->lag_is_fresh();
+          if (unsymmetric) {
             unsymmetric_.take(hessian);
-            step_ = gradient_;
-            contact->add_remainder(problem.first, unsymmetric_, step_);
+            contact->add_remainder(problem.first, unsymmetric_);
             if (!unsymmetric_.factor()) return false;
-            step_ *= -1.0;
+            step_ = -gradient_;
             unsymmetric_.solve(step_);
             return gradient_.dot(step_) < 0.0;
           }

@@ -526,29 +526,24 @@ void WallContact::add_remainder(const Motion& motion, Eigen::VectorXd& product) 
   }
 }
 
-void WallContact::add_remainder(int first, UnsymmetricBand& band, Eigen::VectorXd& gradient) {
+void WallContact::add_remainder(int first, UnsymmetricBand& band) {
+  if (!fresh_) return;
   find_stiffness();
   for (const Active& active : active_) {
-    const double lagged = lag_.force[active.point];
-    if (lagged <= 0.0) continue;
+    if (active.force <= 0.0) continue;
     const Rubbing& rubbing = rubbing_[static_cast<std::size_t>(active.point)];
     const Point& point = points_[static_cast<std::size_t>(active.point)];
     const Vec3& n = active.wall.gradient;
-    const double slope = n.norm();
     const Vec3 per_force = (options_.friction * rubbing.slope) * rubbing.toward;
-    const Vec3 change = (-active.stiffness * slope) * n;  // of the normal force, over the motion
+    const Vec3 change = (-active.stiffness * n.norm()) * n;  // of the normal force, over the motion
     const std::array<double, 2> weight = {1.0 - point.part, point.part};
     for (int p = 0; p < 2; ++p) {
-      const int i = point.edge + p - first;
-      if (weight[p] == 0.0 || i < 0) continue;
-      gradient.segment<3>(3 * i) += (weight[p] * (active.force * slope - lagged)) * per_force;
       for (int q = 0; q < 2; ++q) {
-        const int j = point.edge + q - first;
-        if (weight[q] == 0.0 || j < 0) continue;
+        const int i = point.edge + p - first, j = point.edge + q - first;
+        const double scale = weight[p] * weight[q];
+        if (scale == 0.0 || i < 0 || j < 0) continue;
         UnsymmetricBand::Block& block = band.at(i, j);
-        for (int c = 0; c < 3; ++c) {
-          block.col(c).head<3>() += (weight[p] * weight[q] * change[c]) * per_force;
-        }
+        for (int c = 0; c < 3; ++c) block.col(c).head<3>() += (scale * change[c]) * per_force;
       }
     }
   }

@@ -152,10 +152,8 @@ class WallContact {
   /// slides to.
   void add_remainder(const Motion& motion, Eigen::VectorXd& product);
   /// On a wall that does not yield that is friction's dependence on normal forces alone, and lies
-  /// within an unsymmetric band: adds it there, and to `gradient` how friction will change as the
-  /// lag comes to be the state's own. A Newton step with both is one for positions and lag
-  /// together.
-  void add_remainder(int first, UnsymmetricBand& band, Eigen::VectorXd& gradient);
+  /// within the band: adds it to an unsymmetric one, of the nodes from `first` on.
+  void add_remainder(int first, UnsymmetricBand& band);
   bool remainder_is_banded() const { return !yielding_ && options_.friction > 0.0; }
   bool has_remainder() const { return !active_.empty() && (yielding_ || options_.friction > 0.0); }
 

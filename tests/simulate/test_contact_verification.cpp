@@ -11,6 +11,7 @@
 #include <array>
 #include <cmath>
 #include <functional>
+#include <random>
 #include <vector>
 
 #include "simulate/scene.h"
@@ -719,6 +720,77 @@ TEST(YieldingWall, HeldFeetAreRefreshedOnlyWhereTheyAreFarOff) {
   // What counts is how far the points went, not their places on the wall, here 0.5 mm.
   EXPECT_NEAR(change(0.0, 0.2, true), 0.0, 1e-12);
   EXPECT_GT(std::abs(change(0.0, 0.2, false)), 1e-6);
+}
+
+// ---------------------------------------------------------------- a wall that does not yield
+
+TEST(Friction, ChangesWithTheNormalForceInTheUnsymmetricBandAsElsewhere) {
+  const VesselModel vessel(shapes::bend_tube(1.5, 20.0, 0.5 * kPi, 0.0, 0.0, 0.8));
+  ContactOptions options;
+  options.friction = 0.3;
+  // A wire along the bend that presses outward, and went on by half of what friction needs.
+  const auto along_the_bend = [](double along) {
+    return [=](double s) {
+      const double at = 0.15 + (s + along) / 20.0, radius = 20.54;
+      return Vec3(20.0 - radius * std::cos(at), 0.0, radius * std::sin(at));
+    };
+  };
+  Bench bench(uniform_wire(20.0, 1.0, 50.0), 10, vessel, options, along_the_bend(0.0));
+  const Bench further(uniform_wire(20.0, 1.0, 50.0), 10, vessel, options, along_the_bend(0.01));
+  const int n = bench.rod.nodes();
+  bench.contact.begin(further.state.x);
+  bench.contact.refresh(true);
+
+  const Eigen::VectorXd motion = Eigen::VectorXd::LinSpaced(3 * n, -1.0, 2.0);
+  Eigen::VectorXd remainder = Eigen::VectorXd::Zero(3 * n);
+  bench.contact.add_remainder({0, n, 3, motion}, remainder);
+  EXPECT_GT(remainder.norm(), 1e-3);
+
+  BlockBand<3> zero;
+  zero.reset(n);
+  UnsymmetricBand band;
+  band.take(zero);
+  bench.contact.add_remainder(0, band);
+  Eigen::VectorXd product = Eigen::VectorXd::Zero(3 * n);
+  for (int i = 0; i < n; ++i) {
+    for (int j = std::max(0, i - 1); j <= std::min(n - 1, i + 1); ++j) {
+      product.segment<3>(3 * i) += band.at(i, j).topRows<3>() * motion.segment<3>(3 * j);
+    }
+  }
+  EXPECT_LT((product - remainder).norm(), 1e-12 * remainder.norm());
+}
+
+TEST(WallContact, FindsWhatTouchesAfterManyMotions) {
+  // Points far from the wall are not looked at until they could have come near. A wire that wanders
+  // about, now further and now less far out of its introducer, feels what a new one there feels.
+  const VesselModel vessel(shapes::straight_tube(3.0, 60.0, 0.8));
+  const Wire wire = uniform_wire(40.0, 0.4, 50.0);
+  ContactOptions options;
+  Bench bench(wire, 8, vessel, options, [](double s) { return Vec3(0.0, 0.0, 10.0 + s); });
+  std::mt19937_64 random(3);
+  std::uniform_real_distribution<double> side(-1.0, 1.0);
+  double touched = 0.0, missed = 0.0;
+  for (int round = 0; round < 300; ++round) {
+    const double out = 20.0 + 20.0 * side(random), shift = 2.0 * side(random);
+    const double stride = round % 3 == 0 ? 3.2 : round % 3 == 1 ? 0.5 : 0.02;
+    const Vec3 by(stride * side(random), stride * side(random), 0.0);
+    bench.contact.free_from(out);
+    bench.contact.begin(bench.state.x);
+    for (int i = 0; i < bench.rod.nodes(); ++i) {
+      Vec3 p = bench.state.x.col(i) + by * (0.5 + 0.5 * std::sin(i + shift));
+      p.head<2>() *= std::min(1.0, 2.7 / p.head<2>().norm());
+      bench.state.x.col(i) = p;
+    }
+    const double found = bench.contact.sample(bench.state.x).contact;
+    WallContact fresh(bench.rod, vessel, options);
+    fresh.start_at(bench.state.x);
+    fresh.free_from(out);
+    fresh.begin(bench.state.x);
+    EXPECT_EQ(found, fresh.energy().contact) << round;
+    (found > 0.0 ? touched : missed) += 1.0;
+  }
+  EXPECT_GT(touched, 50.0);
+  EXPECT_GT(missed, 20.0);
 }
 
 // ---------------------------------------------------------------- steps

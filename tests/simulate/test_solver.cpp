@@ -678,7 +678,66 @@ TEST(BlockBand, FindsThatAMatrixIsNotPositiveDefinite) {
   band.reset(2);
   band.own(0) = band.own(1) = Mat3::Identity();
   band.one(1) = 1.5 * Mat3::Identity();
+  UnsymmetricBand unsymmetric;
+  unsymmetric.take(band);
   EXPECT_FALSE(band.factor());
+  EXPECT_FALSE(unsymmetric.factor());
+}
+
+TEST(UnsymmetricBand, SolvesWhatADenseFactorisationSolves) {
+  for (const int n : {1, 2, 3, 9}) {
+    SCOPED_TRACE(n);
+    BlockBand<3> symmetric;
+    Eigen::MatrixXd dense;
+    fill_at_random(n, 0, symmetric, dense);
+    UnsymmetricBand band;
+    band.take(symmetric);
+    std::mt19937_64 random(7);
+    for (int i = 0; i < n; ++i) {
+      for (int j = std::max(0, i - 1); j <= std::min(n - 1, i + 1); ++j) {
+        const Mat3 more = Mat3::NullaryExpr([&] { return uniform(random); });
+        band.at(i, j).topRows<3>() += more;
+        dense.block<3, 3>(3 * i, 3 * j) += more;
+      }
+    }
+    const Eigen::VectorXd b = Eigen::VectorXd::LinSpaced(3 * n, -1.0, 1.0);
+    Eigen::VectorXd x = b;
+    ASSERT_TRUE(band.factor());
+    band.solve(x);
+    EXPECT_LT((dense * x - b).norm(), 1e-12);
+  }
+}
+
+TEST(UnsymmetricBand, KeepsSoftDirectionsBesideStiffOnes) {
+  // A chain that is 1e8 times as stiff along its edges, which turn from one to the next, as across.
+  constexpr int kBlocks = 20;
+  constexpr double kStiff = 1e6, kSoft = 1e-2;
+  BlockBand<3> symmetric;
+  symmetric.reset(kBlocks);
+  Eigen::MatrixXd dense = Eigen::MatrixXd::Zero(3 * kBlocks, 3 * kBlocks);
+  for (int i = 0; i < kBlocks; ++i) {
+    const Vec3 t(std::cos(0.1 * i), std::sin(0.1 * i), 0.0);
+    const Mat3 K = kSoft * Mat3::Identity() + kStiff * t * t.transpose();
+    symmetric.own(i) += K;
+    dense.block<3, 3>(3 * i, 3 * i) += K;
+    if (i == 0) continue;
+    symmetric.own(i - 1) += K;
+    symmetric.one(i) -= K;
+    dense.block<3, 3>(3 * i - 3, 3 * i - 3) += K;
+    dense.block<3, 3>(3 * i, 3 * i - 3) -= K;
+    dense.block<3, 3>(3 * i - 3, 3 * i) -= K;
+  }
+  UnsymmetricBand band;
+  band.take(symmetric);
+  band.at(4, 5)(2, 0) += 1e-3;
+  dense(3 * 4 + 2, 3 * 5) += 1e-3;
+  const Eigen::VectorXd b = Eigen::VectorXd::LinSpaced(3 * kBlocks, -1.0, 1.0);
+  Eigen::VectorXd x = b;
+  ASSERT_TRUE(band.factor());
+  band.solve(x);
+  const Eigen::VectorXd known = dense.fullPivLu().solve(b);
+  EXPECT_GT(known.norm(), 1e4);
+  EXPECT_LT((x - known).norm(), 1e-6 * known.norm());
 }
 
 }  // namespace
