@@ -118,9 +118,10 @@ std::optional<Push> Insertion::move(double amount, double longest_part, const Pa
   const auto ran_out = [&](const NewtonResult& solve) {
     return !solve.converged && solve.iterations == newton_.max_iterations;
   };
+  save(before_move_);
+  const Snapshot* before = &before_move_;  // the part that is next
   double done = 0.0, cut = std::min(std::abs(amount), longest_part);
-  while (std::abs(amount - done) > 1e-9) {
-    save(before_cut_);
+  for (;;) {
     const double now = std::copysign(std::min(cut, std::abs(amount - done)), amount);
     NewtonResult solve = part(now);
     record.iterations += solve.iterations;
@@ -131,12 +132,15 @@ std::optional<Push> Insertion::move(double amount, double longest_part, const Pa
     if (solve.converged) {
       record.residual = solve.residual;
       totals_.stored_energy = solve.energy;
-      settle(depth_ - before_cut_.depth, hub_angle_ - before_cut_.hub_angle);
+      settle(depth_ - before->depth, hub_angle_ - before->hub_angle);
       done += now;
+      if (std::abs(amount - done) <= 1e-9) break;
+      save(before_part_);
+      before = &before_part_;
       continue;
     }
     if (!slipped_out_) slipped_out_ = left_through();
-    restore(before_cut_);
+    restore(*before);
     cut *= 0.5;
     if (cut < kSmallestCut * std::abs(amount)) return std::nullopt;
   }

@@ -92,8 +92,8 @@ class Insertion {
   /// Pushes the wire in by `distance`, or pulls it back by -`distance` [mm], in parts that friction
   /// can follow. A part that runs out of iterations is a jump: it is solved again from where it
   /// got, up to six times. One that has no equilibrium is cut smaller. Empty when even the smallest
-  /// cut has none; the wire is then somewhere on the way. Expects wire that is left to push, or in
-  /// the body.
+  /// cut has none; the wire is then somewhere on the way: see take_back(). Expects wire that is
+  /// left to push, or in the body.
   std::optional<Push> push(double distance);
 
   /// Turns the hub by `angle`, right-handed about the introducer's direction [rad], in the same
@@ -124,7 +124,9 @@ class Insertion {
   std::optional<Vec3> find_fold() const;
   Vec3 most_bent() const;
 
-  /// Takes the wire back to an earlier state; peak_forces() keep what they were.
+  /// Takes the wire back to before the last move, or to an earlier state; peak_forces() keep what
+  /// they were.
+  void take_back() { restore(before_move_); }
   struct Snapshot {
     RodState state;
     double depth = 0.0, hub_angle = 0.0;
@@ -166,7 +168,7 @@ class Insertion {
   Eigen::VectorXd full_bend_, full_rest_angle_;  // of the rod, all of it outside
   WallContact contact_;
   RodState state_, guess_;
-  Snapshot before_cut_;
+  Snapshot before_move_, before_part_;
   Problem problem_;
   NewtonOptions newton_;
   Statics statics_;

@@ -85,11 +85,10 @@ bool Trial::step(const Move& move) {
   const double most_back = std::max(0.0, depth - options_.step);
   const double distance = std::clamp(move.push, -most_back, insertion_.longest() - depth);
   if (move.turn == 0.0 && std::abs(distance) < 1e-9) return false;
-  insertion_.save(before_);
   const std::optional<Push> push =
       move.turn == 0.0 ? insertion_.push(distance) : insertion_.turn(move.turn);
   if (!push) {
-    insertion_.restore(before_);
+    insertion_.take_back();
     if (const std::optional<int> opening = insertion_.slipped_out()) {
       return end(Outcome::kLeftOpening,
                  "the wire springs out of the vessel through the opening at " + place_of(*opening) +
@@ -102,7 +101,7 @@ bool Trial::step(const Move& move) {
   // Inside the goal the wire goes on until the tip is nearest to its centre.
   const double to_goal = (push->tip - goal_.point).norm();
   if (best_distance_ <= goal_.radius && to_goal >= best_distance_) {
-    insertion_.restore(before_);
+    insertion_.take_back();
     return end(Outcome::kReached, reached_reason());
   }
   best_distance_ = to_goal;

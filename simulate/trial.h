@@ -91,7 +91,6 @@ class Trial {
   const VesselModel& vessel_;
   InsertionOptions options_;
   Insertion insertion_;
-  Insertion::Snapshot before_;
   TrialResult result_;
   double best_distance_;           // of the tip from the goal, in the last step          [mm]
   double since_shape_ = 0.0;       // way of the hand since a shape was recorded          [mm]
