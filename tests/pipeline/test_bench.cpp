@@ -161,7 +161,13 @@ TEST(Bench, EveryInsertionIsInBalanceAndTheSameOnTwoThreads) {
   std::map<std::string, int> rows;
   for (const Json& row : throughput.result.at("rows")) {
     SCOPED_TRACE(row.dump());
-    EXPECT_LE(row.at("residual_n"), 1e-6);
+    const bool tube = row.at("surface") == "s-tube";
+    EXPECT_TRUE(row.at("residual_tolerance_n") == 1e-6 ||
+                (tube && row.at("residual_tolerance_n") == 1e-4));
+    EXPECT_LE(row.at("residual_n"), row.at("residual_tolerance_n"));
+    if (tube)
+      EXPECT_LT(row.at("peak_contact_force_error_n"),
+                0.02 * row.at("peak_contact_force_n").get<double>());
     EXPECT_EQ(row.at("not_converged"), 0);
     EXPECT_GT(row.at("insertions_per_second_per_core"), 0.0);
     EXPECT_GT(row.at("inserted_mm"), 30.0);
@@ -170,7 +176,7 @@ TEST(Bench, EveryInsertionIsInBalanceAndTheSameOnTwoThreads) {
   }
   EXPECT_EQ(rows, (std::map<std::string, int>{{"arterial-tree rigid", 12},
                                               {"arterial-tree elastic", 12},
-                                              {"s-tube rigid", 4},
+                                              {"s-tube rigid", 8},
                                               {"paper-tube rigid", 1},
                                               {"paper-tube elastic", 1}}));
   expect_written(throughput, "throughput", "1/s/core");
