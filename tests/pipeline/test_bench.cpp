@@ -165,9 +165,8 @@ TEST(Bench, EveryInsertionIsInBalanceAndTheSameOnTwoThreads) {
     EXPECT_TRUE(row.at("residual_tolerance_n") == 1e-6 ||
                 (tube && row.at("residual_tolerance_n") == 1e-4));
     EXPECT_LE(row.at("residual_n"), row.at("residual_tolerance_n"));
-    if (tube)
-      EXPECT_LT(row.at("peak_contact_force_error_n"),
-                0.02 * row.at("peak_contact_force_n").get<double>());
+    const double peak = row.at("peak_contact_force_n");
+    EXPECT_LT(row.at("peak_contact_force_error_n"), tube ? 0.02 * peak : 0.1 * peak + 1e-3);
     EXPECT_EQ(row.at("not_converged"), 0);
     EXPECT_GT(row.at("insertions_per_second_per_core"), 0.0);
     EXPECT_GT(row.at("inserted_mm"), 30.0);
