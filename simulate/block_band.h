@@ -1,6 +1,6 @@
 #pragma once
 /// Symmetric block-pentadiagonal matrices: a wire is a chain, its Hessian couples a node with two
-/// neighbours on each side. Factored in place, linear in the number of nodes, nothing allocated.
+/// neighbours on each side. Factored linearly in the number of nodes, nothing allocated.
 /// Leading block rows may lack their last unknown: those of the part of a wire whose twist is no
 /// unknown (twist_chain.h).
 #include <Eigen/Core>
@@ -35,20 +35,23 @@ class BlockBand {
   Block& one(int i) { return rows_[static_cast<std::size_t>(i)].one; }  // (i, i-1)
   Block& two(int i) { return rows_[static_cast<std::size_t>(i)].two; }  // (i, i-2)
 
-  /// A = L D L', L with ones on its diagonal: no pivot waits for a root. Only the lower triangle of
-  /// own(i) is read. Returns false at the first pivot that is not positive: A is then not positive
-  /// definite, and its contents are lost.
-  bool factor() {
-    for (int i = 0; i < narrow_; ++i) {
-      if (!factor_row<D - 1>(i)) return false;
-    }
-    for (int i = narrow_; i < size_; ++i) {
-      if (!factor_row<D>(i)) return false;
+  /// Becomes the factors of A + shift I = L D L', L with ones on its diagonal: no pivot waits for a
+  /// root. Of A only the lower triangle of own(i) is read. Returns false at the first pivot that is
+  /// not positive: the matrix is then not positive definite.
+  bool factor(const BlockBand& matrix, double shift = 0.0) {
+    size_ = matrix.size_;
+    narrow_ = matrix.narrow_;
+    rows_.resize(std::max(rows_.size(), matrix.rows_.size()));
+    for (int i = 0; i < size_; ++i) {
+      Row& row = rows_[static_cast<std::size_t>(i)];
+      row = matrix.rows_[static_cast<std::size_t>(i)];
+      row.own.diagonal().array() += shift;
+      if (!(i < narrow_ ? factor_row<D - 1>(i) : factor_row<D>(i))) return false;
     }
     return true;
   }
 
-  /// Solves A x = b after factor(); b, of size() * D values, becomes x.
+  /// Solves A x = b with the factors; b, of size() * D values, becomes x.
   void solve(Eigen::Ref<Eigen::VectorXd> b) const {
     solve_lower<1>({b.data()});
     solve_upper(b);

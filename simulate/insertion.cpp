@@ -93,6 +93,11 @@ Insertion::Insertion(const Wire& wire, const Introducer& introducer, const Vesse
   full_rest_angle_ = rod_.rest_angle;
   const Vec3 start = introducer.point - rod_.tip_distance[0] * introducer.direction;
   state_ = straight_state(rod_, start, introducer.direction, introducer.roll);
+  if (!rod_.twisted) {  // nothing that turns about the wire, so nothing to copy in every push
+    state_.theta.resize(0);
+    state_.director.resize(3, 0);
+    state_.reference_twist.resize(0);
+  }
   first_curved_ = n;
   for (int i = n - 1; i >= 0; --i) {
     if (rod_.rest_angle[i] != 0.0) first_curved_ = i;
@@ -277,7 +282,7 @@ NewtonResult Insertion::spin(double angle) {
   guess_ = state_;
   hub_angle_ += angle;
   const int n = rod_.nodes(), root = std::max(problem_.first, first_curved_);
-  guess_.theta.tail(n - 1 - problem_.first).array() += angle;
+  if (rod_.twisted) guess_.theta.tail(n - 1 - problem_.first).array() += angle;
   if (root < n) {
     const Eigen::AngleAxisd turn(angle, edge(root - 1).normalized());
     for (int i = root + 1; i < n; ++i) {

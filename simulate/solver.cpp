@@ -532,11 +532,7 @@ NewtonResult Statics::solve_with(BlockBand<D>& hessian, BlockBand<D>& factored,
           }
         }
         step_ = -gradient_;
-        factored = hessian;
-        if (shift > 0.0) {
-          for (int k = 0; k < count; ++k) factored.own(k).diagonal().array() += shift;
-        }
-        return factored.factor() &&
+        return factored.factor(hessian, shift) &&
                coupled_.solve_first(chain, factored, chain.last - problem.first, step_);
       };
       while (!solve()) {

@@ -632,28 +632,30 @@ void fill_at_random(int n, int narrow, BlockBand<D>& band, Eigen::MatrixXd& dens
 
 TEST(BlockBand, SolvesWhatADenseFactorisationSolves) {
   const int n = 7;
-  BlockBand<3> band;
+  BlockBand<3> band, factors;
   Eigen::MatrixXd dense;
   fill_at_random(n, 0, band, dense);
-  Eigen::VectorXd b = Eigen::VectorXd::LinSpaced(3 * n, -1.0, 1.0), x = b;
-  ASSERT_TRUE(band.factor());
-  band.solve(x);
-  EXPECT_LT((dense * x - b).norm(), 1e-12);
+  for (const double shift : {0.0, 2.0}) {
+    Eigen::VectorXd b = Eigen::VectorXd::LinSpaced(3 * n, -1.0, 1.0), x = b;
+    ASSERT_TRUE(factors.factor(band, shift));
+    factors.solve(x);
+    EXPECT_LT((dense * x + shift * x - b).norm(), 1e-12) << shift;
+  }
 }
 
 TEST(BlockBand, LeavesOutTheLastUnknownOfNarrowRowsAndSolvesByHalves) {
   const int n = 9;
   for (const int narrow : {1, 2, 3, 6, 9}) {
     SCOPED_TRACE(narrow);
-    BlockBand<4> band;
+    BlockBand<4> matrix, band;
     Eigen::MatrixXd dense;
-    fill_at_random(n, narrow, band, dense);
+    fill_at_random(n, narrow, matrix, dense);
     Eigen::MatrixXd b = Eigen::MatrixXd::NullaryExpr(4 * n, 3, [](Eigen::Index i, Eigen::Index k) {
       return std::sin(1.0 + static_cast<double>(i * (k + 1)));
     });
     for (int i = 0; i < narrow; ++i) b.row(4 * i + 3).setZero();
     Eigen::MatrixXd x = b;
-    ASSERT_TRUE(band.factor());
+    ASSERT_TRUE(band.factor(matrix));
     band.solve_lower<2>({x.col(0).data(), x.col(1).data()});
     band.solve_lower<1>({x.col(2).data()});
     const Eigen::MatrixXd half = x;
@@ -674,13 +676,14 @@ TEST(BlockBand, LeavesOutTheLastUnknownOfNarrowRowsAndSolvesByHalves) {
 }
 
 TEST(BlockBand, FindsThatAMatrixIsNotPositiveDefinite) {
-  BlockBand<3> band;
+  BlockBand<3> band, factors;
   band.reset(2);
   band.own(0) = band.own(1) = Mat3::Identity();
   band.one(1) = 1.5 * Mat3::Identity();
   UnsymmetricBand unsymmetric;
   unsymmetric.take(band);
-  EXPECT_FALSE(band.factor());
+  EXPECT_FALSE(factors.factor(band));
+  EXPECT_TRUE(factors.factor(band, 1.0));
   EXPECT_FALSE(unsymmetric.factor());
 }
 
