@@ -161,7 +161,7 @@ std::vector<Stage> stages_of(const Case& given) {
        .parameters = {"/wall/thickness_mm", "/wall/young_modulus_kpa", "/wall/poisson_ratio"},
        .make = make_wall});
   Stage trials{.name = "trials",
-               .version = 19,
+               .version = 20,
                .after = {"surface", "centerline"},
                .parameters = {"/access", "/target", "/wires", "/tip_roll_deg", "/friction",
                               "/wall/model", "/insertion"},
@@ -173,7 +173,7 @@ std::vector<Stage> stages_of(const Case& given) {
   stages.push_back(trials);
   Stage manoeuvres = trials;
   manoeuvres.name = "manoeuvres";
-  manoeuvres.version = 14;
+  manoeuvres.version = 15;
   manoeuvres.after.push_back("trials");
   read_too(manoeuvres, {"/manoeuvres"});
   if (given.manoeuvres == Manoeuvring::kWhenNeeded) {
@@ -186,7 +186,7 @@ std::vector<Stage> stages_of(const Case& given) {
   manoeuvres.make = make_manoeuvres;
   stages.push_back(manoeuvres);
   Stage report{.name = "report",
-               .version = 13,
+               .version = 14,
                .reads_input = true,
                .after = {},
                .parameters = {""},

@@ -18,9 +18,8 @@ class BlockBand {
   /// n block rows of zeros, of which the first `narrow` lack their last unknown: it has the
   /// identity's row and column, and must stay 0 in vectors. Memory only ever grows.
   void reset(int n, int narrow = 0) {
-    size_ = n;
+    resize(n);
     narrow_ = narrow;
-    if (static_cast<int>(rows_.size()) < n) rows_.resize(static_cast<std::size_t>(n));
     for (int i = 0; i < n; ++i) {
       Row& row = rows_[static_cast<std::size_t>(i)];
       row.own.setZero();
@@ -28,6 +27,12 @@ class BlockBand {
       row.two.setZero();
       if (i < narrow) row.own(D - 1, D - 1) = 1.0;
     }
+  }
+  /// n block rows of anything, none of them narrow.
+  void resize(int n) {
+    size_ = n;
+    narrow_ = 0;
+    if (static_cast<int>(rows_.size()) < n) rows_.resize(static_cast<std::size_t>(n));
   }
   int size() const { return size_; }
 
@@ -278,7 +283,10 @@ class UnsymmetricBand {
 
   template <class Square>
   static void copy(const Square& from, Block& to) {
-    for (int c = 0; c < 3; ++c) to.col(c) << from(0, c), from(1, c), from(2, c), 0.0;
+    for (int c = 0; c < 3; ++c) {
+      for (int r = 0; r < 3; ++r) to(r, c) = from(r, c);
+      to(3, c) = 0.0;
+    }
   }
 
   /// c <- c - a b, by columns.

@@ -23,13 +23,13 @@ namespace {
 
 constexpr double kTipRegion = 2.0;  // wire that counts as tip for its force            [mm]
 constexpr double kFoldTurn = 150.0 * kRadPerDeg;  // turning beyond the rest shape's that is one
-constexpr double kFoldLead = 10.0;      // ... with the bow so far ahead of the tip            [mm]
-constexpr double kFoldLength = 60.0;    // ... within so much wire                [mm]
-constexpr double kDriftInto = 0.5;      // a wire's drift may lead this much deeper into the wall
-                                        // than the wire did [mm]
-constexpr double kSnap = 2.0;           // way off the path per push that is a jump, not to go on
-constexpr double kKeptDrift = 0.8;      // of the last push's way off the path, in the next
-constexpr double kBent = 16.0;          // wire that a guess bends to keep its tip off the wall [mm]
+constexpr double kFoldLead = 10.0;    // ... with the bow so far ahead of the tip            [mm]
+constexpr double kFoldLength = 60.0;  // ... within so much wire                [mm]
+constexpr double kDriftInto = 0.5;    // a wire's drift may lead this much deeper into the wall
+                                      // than the wire did [mm]
+constexpr double kSnap = 2.0;         // way off the path per push that is a jump, not to go on
+constexpr double kDriftLasts = 5.0;   // push that a wire's drift falls to 1/e in               [mm]
+constexpr double kBent = 16.0;        // wire that a guess bends to keep its tip off the wall [mm]
 constexpr double kSmallestPart = 0.05;  // of a node's share of wire that bends at the exit
 constexpr double kLongestPart = 2.0;  // of a push: friction turns with the path               [mm]
 constexpr double kLongestTurn = 15.0 * kRadPerDeg;  // of the hub in one go
@@ -196,6 +196,7 @@ NewtonResult Insertion::advance(double distance) {
   // most of what they came off that path in the last push, per length of it, unless that leads
   // through the wall. The tip has no wire ahead, or another shape: see below.
   const int n = rod_.nodes();
+  const double drift = distance * std::exp(-std::abs(distance) / kDriftLasts);
   problem_.first = n;
   ahead_ = 0;
   int tip = std::min(n, first_curved_ + 1);
@@ -210,7 +211,7 @@ NewtonResult Insertion::advance(double distance) {
       problem_.first = std::min(problem_.first, i);
       if (i >= tip) break;
       path_.col(i) = ahead_of(i, distance);
-      const Vec3 way = (kKeptDrift * distance) * drift_.col(i);
+      const Vec3 way = drift * drift_.col(i);
       guess_ahead_.col(i) = path_.col(i) + way;
       through = through || (way.norm() > kDriftInto &&
                             vessel_.lumen.distance(guess_ahead_.col(i)) < -kDriftInto - deepest_);
@@ -223,14 +224,16 @@ NewtonResult Insertion::advance(double distance) {
   for (int i = problem_.first; i < n; ++i) {
     const Vec3 before = state_.x.col(i) - state_.x.col(i - 1);
     Vec3 edge = guess_ahead_.col(i) - guess_ahead_.col(i - 1);
-    if (i >= tip) edge = before + (kKeptDrift * distance) * (moved_.col(i) - moved_.col(i - 1));
-    guess_.x.col(i) = guess_.x.col(i - 1) + (before.norm() / edge.norm()) * edge;
+    if (i >= tip) edge = before + drift * (moved_.col(i) - moved_.col(i - 1));
+    guess_.x.col(i) =
+        guess_.x.col(i - 1) + std::sqrt(before.squaredNorm() / edge.squaredNorm()) * edge;
   }
   bend_off_wall(tip);
   const NewtonResult result = settle_guess(distance);  // swaps the state of before into guess_
   if (result.converged) {
-    moved_ = (state_.x - guess_.x) / distance;
-    drift_.leftCols(tip) = (state_.x - path_).leftCols(tip) / distance;
+    const double per_length = 1.0 / distance;
+    moved_ = per_length * (state_.x - guess_.x);
+    drift_.leftCols(tip) = per_length * (state_.x - path_).leftCols(tip);
     drift_.rightCols(n - tip).colwise() = drift_.col(tip - 1).eval();
     double off = std::sqrt(drift_.colwise().squaredNorm().maxCoeff());
     for (int i = tip; i < n; ++i) {

@@ -21,11 +21,17 @@ Energy assemble(const Problem& problem, const RodState& state, Sink& sink,
   const Rod& rod = *problem.rod;
   const int n = rod.nodes();
   Energy energy;
-  for (int i = std::max(0, problem.first - 1); i <= std::min(n - 2, problem.last - 1); ++i) {
-    energy.stretch += add_stretch(problem, state, i, sink);
-  }
-  for (int i = std::max(1, problem.first - 1); i <= std::min(n - 2, problem.last); ++i) {
-    energy.bend += add_bend(problem, state, i, sink);
+  if constexpr (requires { sink.add_wire(rod, state); }) {
+    const WirePass::Energy wire = sink.add_wire(rod, state);
+    energy.stretch = wire.stretch;
+    energy.bend = wire.bend;
+  } else {
+    for (int i = std::max(0, problem.first - 1); i <= std::min(n - 2, problem.last - 1); ++i) {
+      energy.stretch += add_stretch(problem, state, i, sink);
+    }
+    for (int i = std::max(1, problem.first - 1); i <= std::min(n - 2, problem.last); ++i) {
+      energy.bend += add_bend(problem, state, i, sink);
+    }
   }
   if (problem.first == 0 && problem.proximal.tangent) {
     energy.bend +=
@@ -146,6 +152,7 @@ template <int D>
 struct FreeSink {
   static constexpr bool kHessian = false;
   int first, last;
+  WirePass& pass;
   Eigen::VectorXd& g;
 
   bool is_free(int i) const { return i >= first && i < last; }
@@ -155,6 +162,9 @@ struct FreeSink {
   void gradient(int i, const Vec3& v) { add_to(g, i, v); }
   void gradient_theta(int e, double v) {
     if (D == 4 && is_free(e)) g[D * (e - first) + 3] += v;
+  }
+  WirePass::Energy add_wire(const Rod& rod, const RodState& state) {
+    return pass.add_gradient<D>(rod, first, last, state.x, g);
   }
 };
 
@@ -166,6 +176,11 @@ struct BandSink : FreeSink<D> {
   using FreeSink<D>::is_free;
   BlockBand<D>& H;
 
+  WirePass::Energy add_wire(const Rod& rod, const RodState& state) {
+    const WirePass::Energy energy = FreeSink<D>::add_wire(rod, state);
+    this->pass.set_hessian(H);
+    return energy;
+  }
   typename BlockBand<D>::Block& block(int i, int j) {  // i >= j
     return i == j ? H.own(i - first) : i == j + 1 ? H.one(i - first) : H.two(i - first);
   }
@@ -332,6 +347,7 @@ double largest_turning_step(const Problem& problem, const Eigen::VectorXd& step)
 template <int D>
 void turn_edges(const Problem& problem, const RodState& state, const Eigen::VectorXd& step,
                 double s, RodState& trial) {
+  constexpr double kTangent = 1e-7;  // up to here the root is its tangent, to 1e-15
   const Rod& rod = *problem.rod;
   const int n = rod.nodes();
   const auto move = [&](int i) -> Vec3 {
@@ -342,10 +358,15 @@ void turn_edges(const Problem& problem, const RodState& state, const Eigen::Vect
   trial.x.col(start) = state.x.col(start) + move(start);
   for (int i = start; i < end; ++i) {
     const Vec3 e = state.x.col(i + 1) - state.x.col(i), p = move(i + 1) - move(i);
-    const double smallest = 0.25 * rod.rest_length[i] * rod.rest_length[i];
-    const double squared_length = std::max(smallest, e.squaredNorm() + 2.0 * e.dot(p));
     const Vec3 turned = e + p;
-    trial.x.col(i + 1) = trial.x.col(i) + std::sqrt(squared_length / turned.squaredNorm()) * turned;
+    // The length that it gets is sqrt(|turned|^2 - |p|^2).
+    const double change = p.squaredNorm() * rod.per_length[i] * rod.per_length[i];
+    double part = 1.0 - 0.5 * change;
+    if (change > kTangent) {
+      const double smallest = 0.25 * rod.rest_length[i] * rod.rest_length[i];
+      part = std::sqrt(std::max(smallest, e.squaredNorm() + 2.0 * e.dot(p)) / turned.squaredNorm());
+    }
+    trial.x.col(i + 1) = trial.x.col(i) + part * turned;
   }
   const bool held = problem.last < n || problem.distal.hold_along || problem.distal.hold_across;
   if (held) {
@@ -393,7 +414,6 @@ NewtonResult Statics::solve_with(BlockBand<D>& hessian, BlockBand<D>& factored,
   // anew. Mostly the wire is then in equilibrium; and where it is not, but the residual fell to
   // a small part of itself, the factor of before does for one more step.
   constexpr double kNearlyThere = 0.01;  // [N]
-  bool old_hessian = false;
   double last_residual = 0.0;  // before the last step                                       [N]
   WallContact* contact = problem.contact;
   const bool twisted = D == 4;
@@ -409,27 +429,40 @@ NewtonResult Statics::solve_with(BlockBand<D>& hessian, BlockBand<D>& factored,
                       !problem.distal.hold_across && contact != nullptr &&
                       contact->remainder_is_banded();
   bool unsymmetric = false;  // the last factor
+  bool old_hessian = false;
 
   // Gradient and, unless the old one does, Hessian of the wire, and of contact as it was sampled
   // last; energy of the wire.
-  const auto add_all = [&](const RodState& where, auto& sink) {
+  const auto add_wire = [&](const RodState& where, auto& sink) {
     gradient_.setZero();
     double sum = assemble(problem, where, sink, chain).total();
     if (chain.exists()) {
       coupled_.psi.setZero(D * count);
       sum += add_chain(chain, *problem.rod, where, sink, coupled_.psi, gradient_);
     }
-    if (contact != nullptr) contact->add(sink);
-    project<D>(problem, gradient_);
     return sum;
   };
+  const auto add_contact = [&](auto& sink) {
+    if (contact != nullptr) contact->add(sink);
+    project<D>(problem, gradient_);
+  };
+  FreeSink<D> gradient_sink{problem.first, problem.last, pass_, gradient_};
   const auto differentiate = [&](const RodState& where) {
-    FreeSink<D> gradient{problem.first, problem.last, gradient_};
-    if (old_hessian) return add_all(where, gradient);
-    hessian.reset(count, chain.edges());
-    BandSink<D> both{gradient, hessian};
-    const double sum = add_all(where, both);
-    apply_supports<D>(problem, hessian);
+    double sum;
+    if (old_hessian) {
+      sum = add_wire(where, gradient_sink);
+      add_contact(gradient_sink);
+    } else {
+      if constexpr (D == 3) {
+        hessian.resize(count);  // the wire's blocks are set, all of each
+      } else {
+        hessian.reset(count, chain.edges());
+      }
+      BandSink<D> both{gradient_sink, hessian};
+      sum = add_wire(where, both);
+      add_contact(both);
+      apply_supports<D>(problem, hessian);
+    }
     return sum;
   };
   const auto largest_force = [&] {
@@ -452,7 +485,7 @@ NewtonResult Statics::solve_with(BlockBand<D>& hessian, BlockBand<D>& factored,
   const Rod& rod = *problem.rod;
   const double shortest = rod.rest_length.minCoeff();
   result.rounding_floor = 8.0 * kEpsilon * extent *
-                          (rod.stretch.cwiseQuotient(rod.rest_length).maxCoeff() +
+                          (rod.stretch.cwiseProduct(rod.per_length).maxCoeff() +
                            4.0 * rod.largest_bend() / (shortest * shortest));
   double shift = 0.0;                                            // of the Hessian's diagonal
   double last_halved = std::numeric_limits<double>::infinity();  // see below                [N]
@@ -557,6 +590,8 @@ NewtonResult Statics::solve_with(BlockBand<D>& hessian, BlockBand<D>& factored,
     const double rounding = 1e-13 * (1.0 + std::abs(energy));
     bool accepted = false;
     double trial_wire_energy = 0.0;
+    // Where a whole step makes a new Hessian needless, the gradient is found with the energy.
+    const bool keep_hessian = contact != nullptr && shift == 0.0 && result.residual <= kNearlyThere;
     const auto try_trial = [&](double length) {
       if constexpr (D == 4) {
         for (int k = chain.edges(); k < count && problem.first + k < n - 1; ++k) {
@@ -570,8 +605,12 @@ NewtonResult Statics::solve_with(BlockBand<D>& hessian, BlockBand<D>& factored,
       if (contact == nullptr) {
         trial_energy = trial_wire_energy = differentiate(trial_);
       } else {
-        EnergySink sink;
-        trial_wire_energy = assemble(problem, trial_, sink, chain).total() + chain.energy(trial_);
+        if (keep_hessian) {
+          trial_wire_energy = add_wire(trial_, gradient_sink);
+        } else {
+          EnergySink sink;
+          trial_wire_energy = assemble(problem, trial_, sink, chain).total() + chain.energy(trial_);
+        }
         trial_energy = trial_wire_energy + contact->sample(trial_.x).total();
       }
       accepted = trial_energy <= energy + 1e-4 * length * slope + rounding;
@@ -637,9 +676,13 @@ NewtonResult Statics::solve_with(BlockBand<D>& hessian, BlockBand<D>& factored,
     wire_energy = trial_wire_energy;
     if (contact != nullptr && !refreshed) {
       if (result.iterations < eager_until) contact->refresh(false);
-      old_hessian = shift == 0.0 && length == 0.0 && result.residual <= kNearlyThere;
+      old_hessian = keep_hessian && length == 0.0;
       last_residual = result.residual;
-      differentiate(state);
+      if (old_hessian) {
+        add_contact(gradient_sink);
+      } else {
+        differentiate(state);
+      }
     }
   }
 }

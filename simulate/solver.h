@@ -9,6 +9,7 @@
 #include "simulate/rod.h"
 #include "simulate/twist_chain.h"
 #include "simulate/wall_contact.h"
+#include "simulate/wire_pass.h"
 
 namespace wireplan::simulate {
 
@@ -83,7 +84,6 @@ class Statics {
   /// Moves `state` to equilibrium, starting from where it is. On failure `state` is the last
   /// iterate.
   NewtonResult solve(const Problem& problem, RodState& state, const NewtonOptions& options);
-
   /// Energy at the state and, in `gradient` (3, n), its derivative with respect to all nodes, held
   /// ones included: minus the gradient is the force of the rod and its loads on a node [N].
   static Energy evaluate(const Problem& problem, const RodState& state,
@@ -103,6 +103,7 @@ class Statics {
   template <int D>
   double refine_step(const Problem& problem, const BlockBand<D>& factored, double slope);
 
+  WirePass pass_;
   BlockBand<3> hessian3_, factored3_;
   BlockBand<4> hessian4_, factored4_;
   UnsymmetricBand unsymmetric_;

@@ -188,6 +188,7 @@ class WallContact {
   Vec3 anchor_of(Eigen::Index k) const;
   double reach() const;  // of contact, from the wire's axis                              [mm]
   void find_active(const Eigen::Matrix3Xd& x);
+  WallSample look_at(std::size_t k, const Vec3& position, double near);
   double least_distance(Eigen::Index k, const Vec3& position) const;
   void find_forces();
   void find_rubbing();
@@ -233,6 +234,7 @@ class WallContact {
   Eigen::VectorXd asleep_until_;     // [mm]
   Eigen::Matrix3Xd known_position_;  // [mm]
   Eigen::VectorXd known_distance_;   // [mm]
+  std::vector<WallSample> known_;    // there, of the points that touched
   std::vector<char> touched_;        // when the wall was last looked at
   std::vector<Rubbing> rubbing_;     // of the points in lag_.points, in the state sampled last
 

@@ -6,9 +6,11 @@
 #include <limits>
 #include <optional>
 #include <random>
+#include <string>
 #include <utility>
 
 #include "simulate/dynamics.h"
+#include "simulate/elements.h"
 #include "simulate/scene.h"
 #include "simulate/solver.h"
 #include "tests/shapes.h"
@@ -604,6 +606,82 @@ TEST(AbsentTerms, NothingOfThemIsRead) {
     poison.put_in(spoiled);
     Eigen::Matrix3Xd forces(3, spoiled.rod.nodes());
     EXPECT_TRUE(std::isnan(Statics::evaluate(spoiled.problem, spoiled.state, forces).total()));
+  }
+}
+
+/// Gradient and dense Hessian over the x of all nodes, element by element.
+struct ElementSink {
+  static constexpr bool kHessian = true;
+  Eigen::VectorXd g;
+  Eigen::MatrixXd H;
+
+  explicit ElementSink(int n)
+      : g(Eigen::VectorXd::Zero(3 * n)), H(Eigen::MatrixXd::Zero(3 * n, 3 * n)) {}
+  void gradient(int i, const Vec3& v) { g.segment<3>(3 * i) += v; }
+  void hessian_scaled_identity(int i, int j, double v) {
+    H.block<3, 3>(3 * i, 3 * j) += v * Mat3::Identity();
+    if (i != j) H.block<3, 3>(3 * j, 3 * i) += v * Mat3::Identity();
+  }
+  void hessian_of_edge(int i, const Mat3& v) {
+    for (const int a : {i, i + 1}) {
+      for (const int b : {i, i + 1}) H.block<3, 3>(3 * a, 3 * b) += a == b ? v : Mat3(-v);
+    }
+  }
+};
+
+TEST(WirePass, SumsWhatTheElementsAreOneByOne) {
+  // A wire of unequal elements with a curved tip, anyhow; all of it free, or not its ends.
+  const Wire wire = {.name = "",
+                     .radius = 0.4,
+                     .sections = {{.length = 9.0, .bending_stiffness = 4.0, .rest_curvature = 0.1},
+                                  {.length = 30.0, .bending_stiffness = 80.0}}};
+  std::mt19937_64 random(8);
+  Eigen::VectorXd edges(12);
+  for (double& edge : edges) edge = 2.0 + uniform(random);
+  const Rod rod = build_rod(wire, edges);
+  ASSERT_TRUE(rod.twisted);
+  const int n = rod.nodes();
+  RodState state = straight_state(rod, Vec3::Zero(), Vec3::UnitZ(), 0.0);
+  for (double& x : state.x.reshaped()) x += 0.3 * uniform(random);
+  Problem problem;
+  problem.rod = &rod;
+  WirePass pass;
+  for (const auto& [first, last] :
+       {std::pair{0, n}, {1, n}, {2, n}, {7, n}, {0, n - 1}, {3, 6}, {n - 1, n}, {0, 1}, {5, 6}}) {
+    SCOPED_TRACE(std::to_string(first) + " to " + std::to_string(last));
+    problem.first = first;
+    problem.last = last;
+    ElementSink sum(n);
+    double stretch = 0.0, bend = 0.0;
+    for (int i = std::max(0, first - 1); i <= std::min(n - 2, last - 1); ++i) {
+      stretch += add_stretch(problem, state, i, sum);
+    }
+    for (int i = std::max(1, first - 1); i <= std::min(n - 2, last); ++i) {
+      bend += add_bend(problem, state, i, sum);
+    }
+    const int count = last - first;
+    Eigen::VectorXd gradient = Eigen::VectorXd::Ones(4 * count);  // it adds to what is there
+    const WirePass::Energy energy = pass.add_gradient<4>(rod, first, last, state.x, gradient);
+    BlockBand<4> band;
+    band.reset(count);
+    pass.set_hessian(band);
+
+    EXPECT_NEAR(energy.stretch, stretch, 1e-12 * stretch);
+    EXPECT_NEAR(energy.bend, bend, 1e-12 * bend);
+    const double force = sum.g.norm(), stiffness = sum.H.norm();
+    EXPECT_GT(force, 1.0);
+    for (int k = 0; k < count; ++k) {
+      const int i = first + k;
+      EXPECT_LT((gradient.segment<3>(4 * k) - Vec3::Ones() - sum.g.segment<3>(3 * i)).norm(),
+                1e-12 * force);
+      EXPECT_EQ(gradient[4 * k + 3], 1.0);
+      for (int j = 0; j <= std::min(2, k); ++j) {
+        const auto& block = j == 0 ? band.own(k) : j == 1 ? band.one(k) : band.two(k);
+        const Mat3 found = block.topLeftCorner<3, 3>();
+        EXPECT_LT((found - sum.H.block<3, 3>(3 * i, 3 * (i - j))).norm(), 1e-12 * stiffness);
+        EXPECT_EQ(block.row(3).norm() + block.col(3).norm(), 0.0);
+      }
+    }
   }
 }
 
