@@ -425,7 +425,7 @@ struct Care {
     return format("%g N, points %g mm apart", residual_tolerance, contact_spacing);
   }
 };
-const std::vector<Care> kCares = {{1e-6, 1.0}, {1e-4, 3.0}};
+const std::vector<Care> kCares = {{1e-6, 1.0}, {1e-3, 6.0}};
 
 /// The largest distance between two of the tips.
 Json compare_pushes(double EI, bool fine_tip, const std::vector<TrialResult>& ends) {
