@@ -586,6 +586,7 @@ NewtonResult Statics::solve_with(BlockBand<D>& hessian, BlockBand<D>& factored,
     if (contact != nullptr) contact->expect_after(motion());
 
     // 2. Full step, edges turned rather than lengthened; most steps end here.
+    constexpr double kTooShort = 0.75;  // fall of the energy, of what the slope says
     // Rounding may hide the fall of the energy close to the minimum.
     const double rounding = 1e-13 * (1.0 + std::abs(energy));
     bool accepted = false;
@@ -619,8 +620,32 @@ NewtonResult Statics::solve_with(BlockBand<D>& hessian, BlockBand<D>& factored,
       }
       return trial_energy;
     };
-    turn_edges<D>(problem, state, step_, std::min(1.0, cap), trial_);
-    try_trial(std::min(1.0, cap));
+    double part = std::min(1.0, cap);
+    const auto go = [&] {
+      turn_edges<D>(problem, state, step_, part, trial_);
+      return try_trial(part);
+    };
+    double lowest = go();
+    // Where the energy falls nearly as fast all along the step as at its start, as it does while a
+    // wire jumps, the Hessian's shift or what it folds made the step too short.
+    const auto may_go_as_far_again = [&] {
+      direction_ = part * step_;
+      return 2.0 * part <= cap &&
+             contact->largest_safe_part({problem.first, problem.last, D, direction_}, looks) >= 1.0;
+    };
+    while (accepted && contact != nullptr &&
+           energy - lowest > std::max(-kTooShort * part * slope, 10.0 * rounding) &&
+           may_go_as_far_again()) {
+      part *= 2.0;
+      const double further = go();
+      if (accepted && further < lowest) {
+        lowest = further;
+        continue;
+      }
+      part *= 0.5;
+      go();
+      break;
+    }
     // What friction and yielding lag has no energy: a full step may be a good one all the same. The
     // residual of each such step is no more than half of the last one's, so that none goes round.
     bool refreshed = false;

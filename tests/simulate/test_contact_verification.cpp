@@ -827,9 +827,33 @@ TEST(Newton, GivesUpSoonWhereTheEnergyJumps) {
   EXPECT_LT(result.iterations, 60);
 }
 
-TEST(SafeStep, IsNeverLengthened) {
+TEST(Newton, LengthensStepsOfAWireThatJumps) {
+  // A strut in a wide tube, all but straight, under a load far past the one at which it buckles: it
+  // goes from the saddle to the wall and along that. With whole steps at most the five loads take
+  // 74 to 86 iterations each, 400 in all; steps that are lengthened take 47 to 57, 260 in all.
+  constexpr double kRadius = 12.0, kLength = 40.0, kStiffness = 50.0;
+  const VesselModel vessel(shapes::straight_tube(kRadius, 60.0, 1.5), {.band = 4.0});
+  int iterations = 0;
+  for (const double factor : {18.0, 19.0, 20.0, 21.0, 22.0}) {
+    Bench bench(uniform_wire(kLength, 0.5, kStiffness), 40, vessel, {},
+                [](double s) { return Vec3(1e-4 * std::sin(kPi * s / kLength), 0.0, 10.0 + s); });
+    bench.problem.proximal = pinned();
+    bench.problem.distal = held_across(Vec3::UnitZ());
+    Eigen::Matrix3Xd load = Eigen::Matrix3Xd::Zero(3, bench.rod.nodes());
+    load(2, bench.rod.nodes() - 1) = -factor * kPi * kPi * kStiffness / (kLength * kLength);
+    bench.problem.load = &load;
+    SCOPED_TRACE(factor);
+    const NewtonResult result = bench.statics.solve(bench.problem, bench.state, {});
+    EXPECT_TRUE(result.converged);
+    EXPECT_LE(bench.state.x.topRows<2>().colwise().norm().maxCoeff(), kRadius - 0.5 + 0.1);
+    iterations += result.iterations;
+  }
+  EXPECT_LT(iterations, 330);
+}
+
+TEST(SafeStep, IsLengthenedNoFurtherThanItLooks) {
   // A load pulls a wire out of an open end, where nothing holds it: the lowest energy along a step
-  // is infinitely far on, but how far it is safe was looked at for the step alone.
+  // is infinitely far on.
   const Surface surface = shapes::straight_tube(2.0, 40.0, 0.6);
   const VesselModel vessel(surface, {.band = 2.0, .openings = find_openings(surface)});
   Bench bench(uniform_wire(30.0, 0.5, 50.0), 30, vessel, {},
@@ -839,13 +863,14 @@ TEST(SafeStep, IsNeverLengthened) {
   Eigen::Matrix3Xd load = Eigen::Matrix3Xd::Zero(3, bench.rod.nodes());
   load(2, bench.rod.nodes() - 1) = 0.01;
   bench.problem.load = &load;
-  constexpr int kIterations = 60;
+  constexpr int kIterations = 4;
   const NewtonResult result =
       bench.statics.solve(bench.problem, bench.state, {.max_iterations = kIterations});
   EXPECT_FALSE(result.converged);
   const double way = bench.state.x(2, bench.rod.nodes() - 1) - 42.0;
   EXPECT_GT(way, 5.0);
-  EXPECT_LT(way, kIterations * (vessel.lumen.band() + 0.25));
+  // A last doubling goes as far as one look, from where the steps before it led.
+  EXPECT_LT(way, kIterations * 2.0 * (vessel.lumen.band() + 0.25));
 }
 
 TEST(SafeStep, SlidesAlongTheWallButNotThroughIt) {
