@@ -629,9 +629,9 @@ NewtonResult Statics::solve_with(BlockBand<D>& hessian, BlockBand<D>& factored,
     // Where the energy falls nearly as fast all along the step as at its start, as it does while a
     // wire jumps, the Hessian's shift or what it folds made the step too short.
     const auto may_go_as_far_again = [&] {
+      if (2.0 * part > cap) return false;
       direction_ = part * step_;
-      return 2.0 * part <= cap &&
-             contact->largest_safe_part({problem.first, problem.last, D, direction_}, looks) >= 1.0;
+      return contact->largest_safe_part({problem.first, problem.last, D, direction_}, looks) >= 1.0;
     };
     while (accepted && contact != nullptr &&
            energy - lowest > std::max(-kTooShort * part * slope, 10.0 * rounding) &&
