@@ -3,7 +3,7 @@
 #include <string>
 #include <vector>
 
-#include "simulate/trial.h"
+#include "simulate/insertion/trial.h"
 
 namespace wireplan::plan {
 

@@ -1,5 +1,5 @@
 // Case files: any bytes are a case or an Error, and a case's parameters read back as the same case.
-#include "pipeline/case_file.h"
+#include "pipeline/files/case_file.h"
 #include "tests/fuzz/fuzz.h"
 
 using namespace wireplan;

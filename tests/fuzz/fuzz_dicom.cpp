@@ -1,7 +1,7 @@
 // DICOM: the halves of the input are the two slices of a folder. They are looked through here too:
 // what happens in the process that reads them is not seen by the fuzzer.
-#include "preprocess/dicom_check.h"
-#include "preprocess/image.h"
+#include "preprocess/volume/dicom_check.h"
+#include "preprocess/volume/image.h"
 #include "tests/fuzz/fuzz.h"
 
 using namespace wireplan;

@@ -3,8 +3,8 @@
 // each.
 #include <array>
 
-#include "preprocess/surface.h"
-#include "preprocess/surface_repair.h"
+#include "preprocess/surface/surface.h"
+#include "preprocess/surface/surface_repair.h"
 #include "tests/fuzz/fuzz.h"
 
 using namespace wireplan;

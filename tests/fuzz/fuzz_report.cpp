@@ -1,5 +1,5 @@
 // Reports that a user hands in: any bytes are a report that can be told in a line, or an Error.
-#include "pipeline/report.h"
+#include "pipeline/report/report.h"
 #include "tests/fuzz/fuzz.h"
 
 using namespace wireplan;

@@ -1,5 +1,5 @@
 // Scene files: any bytes are a scene or an Error.
-#include "pipeline/scene_file.h"
+#include "pipeline/files/scene_file.h"
 #include "tests/fuzz/fuzz.h"
 
 using namespace wireplan;

@@ -1,7 +1,7 @@
 // Surfaces as they are read: the first byte chooses the format, the rest is the file.
 #include <array>
 
-#include "preprocess/surface.h"
+#include "preprocess/surface/surface.h"
 #include "tests/fuzz/fuzz.h"
 
 using namespace wireplan;

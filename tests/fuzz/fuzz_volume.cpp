@@ -1,7 +1,7 @@
 // Volumes in one file: the first byte chooses the format, the rest is the file, header and voxels.
 #include <array>
 
-#include "preprocess/image.h"
+#include "preprocess/volume/image.h"
 #include "tests/fuzz/fuzz.h"
 
 using namespace wireplan;

@@ -5,9 +5,9 @@
 #include <iostream>
 #include <random>
 
-#include "pipeline/disk.h"
-#include "pipeline/page.h"
-#include "pipeline/report.h"
+#include "pipeline/files/disk.h"
+#include "pipeline/report/page.h"
+#include "pipeline/report/report.h"
 #include "tests/shapes.h"
 
 namespace wireplan::pipeline {

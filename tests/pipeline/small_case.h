@@ -14,7 +14,7 @@
 #include <sstream>
 #include <string>
 
-#include "pipeline/json_reader.h"
+#include "pipeline/files/json_reader.h"
 #include "tests/shapes.h"
 
 namespace wireplan::pipeline {

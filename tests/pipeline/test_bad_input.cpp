@@ -2,7 +2,7 @@
 // expected, and where there is one the remedy.
 #include <gtest/gtest.h>
 
-#include "pipeline/case_file.h"
+#include "pipeline/files/case_file.h"
 #include "tests/pipeline/small_case.h"
 
 namespace wireplan::pipeline {

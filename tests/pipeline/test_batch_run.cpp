@@ -2,7 +2,7 @@
 // held.
 #include <gtest/gtest.h>
 
-#include "pipeline/batch_run.h"
+#include "pipeline/commands/batch_run.h"
 #include "tests/pipeline/program.h"
 
 namespace wireplan::pipeline {

@@ -5,11 +5,11 @@
 #include <cstdlib>
 #include <map>
 
-#include "pipeline/bench.h"
-#include "pipeline/bench_report.h"
-#include "pipeline/bench_walls.h"
-#include "preprocess/surface.h"
-#include "preprocess/surface_repair.h"
+#include "pipeline/bench/bench.h"
+#include "pipeline/bench/bench_report.h"
+#include "pipeline/bench/bench_walls.h"
+#include "preprocess/surface/surface.h"
+#include "preprocess/surface/surface_repair.h"
 #include "tests/pipeline/small_case.h"
 
 namespace wireplan::pipeline {

@@ -1,8 +1,8 @@
 // `wireplan cache`: what it lists, finds damaged and takes out, and what it leaves alone.
 #include <gtest/gtest.h>
 
-#include "pipeline/cache.h"
-#include "pipeline/hash.h"
+#include "pipeline/store/cache.h"
+#include "pipeline/store/hash.h"
 #include "tests/pipeline/program.h"
 
 namespace wireplan::pipeline {

@@ -13,9 +13,9 @@
 #include <set>
 #include <string>
 
-#include "pipeline/case_file.h"
-#include "pipeline/catalogue.h"
-#include "pipeline/scene_file.h"
+#include "pipeline/files/case_file.h"
+#include "pipeline/files/catalogue.h"
+#include "pipeline/files/scene_file.h"
 #include "tests/pipeline/small_case.h"
 
 namespace wireplan::pipeline {

@@ -5,7 +5,7 @@
 #include <chrono>
 #include <functional>
 
-#include "pipeline/catalogue.h"
+#include "pipeline/files/catalogue.h"
 #include "tests/dicom.h"
 #include "tests/pipeline/program.h"
 

@@ -1,7 +1,7 @@
 // `wireplan compare` on reports made by hand: only what it reads.
 #include <gtest/gtest.h>
 
-#include "pipeline/compare.h"
+#include "pipeline/report/compare.h"
 #include "tests/pipeline/small_case.h"
 
 namespace wireplan::pipeline {

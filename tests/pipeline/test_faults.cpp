@@ -13,9 +13,9 @@
 #include <random>
 #include <thread>
 
-#include "pipeline/cache.h"
-#include "pipeline/hash.h"
-#include "pipeline/stages.h"
+#include "pipeline/stages/stages.h"
+#include "pipeline/store/cache.h"
+#include "pipeline/store/hash.h"
 #include "tests/pipeline/program.h"
 
 namespace wireplan::pipeline {

@@ -4,10 +4,10 @@
 #include <cstring>
 #include <set>
 
-#include "pipeline/case_file.h"
-#include "pipeline/page.h"
-#include "pipeline/report.h"
-#include "pipeline/stages.h"
+#include "pipeline/files/case_file.h"
+#include "pipeline/report/page.h"
+#include "pipeline/report/report.h"
+#include "pipeline/stages/stages.h"
 #include "tests/pipeline/small_case.h"
 
 namespace wireplan::pipeline {

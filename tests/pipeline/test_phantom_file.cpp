@@ -4,9 +4,9 @@
 #include <cmath>
 #include <fstream>
 
-#include "pipeline/json_reader.h"
-#include "pipeline/phantom_file.h"
-#include "preprocess/vessel_io.h"
+#include "pipeline/files/json_reader.h"
+#include "pipeline/files/phantom_file.h"
+#include "preprocess/files/vessel_io.h"
 
 namespace wireplan::pipeline {
 namespace {

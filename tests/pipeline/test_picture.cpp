@@ -6,7 +6,7 @@
 #include <iterator>
 #include <string>
 
-#include "pipeline/picture.h"
+#include "pipeline/report/picture.h"
 
 namespace wireplan::pipeline {
 namespace {

@@ -3,11 +3,11 @@
 
 #include <cstdlib>
 
-#include "pipeline/case_file.h"
-#include "pipeline/picture.h"
-#include "pipeline/render.h"
-#include "pipeline/report.h"
-#include "pipeline/stages.h"
+#include "pipeline/files/case_file.h"
+#include "pipeline/report/picture.h"
+#include "pipeline/report/render.h"
+#include "pipeline/report/report.h"
+#include "pipeline/stages/stages.h"
 #include "tests/pipeline/small_case.h"
 
 namespace wireplan::pipeline {

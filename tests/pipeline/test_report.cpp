@@ -3,11 +3,11 @@
 
 #include <cstdlib>
 
-#include "pipeline/case_file.h"
-#include "pipeline/report.h"
-#include "pipeline/stages.h"
-#include "pipeline/trial_file.h"
-#include "preprocess/vessel_io.h"
+#include "pipeline/files/case_file.h"
+#include "pipeline/files/trial_file.h"
+#include "pipeline/report/report.h"
+#include "pipeline/stages/stages.h"
+#include "preprocess/files/vessel_io.h"
 #include "tests/pipeline/small_case.h"
 
 namespace wireplan::pipeline {

@@ -2,7 +2,7 @@
 // it is told, and what the program writes keeps to them.
 #include <gtest/gtest.h>
 
-#include "pipeline/report.h"
+#include "pipeline/report/report.h"
 #include "tests/pipeline/program.h"
 
 namespace wireplan::pipeline {

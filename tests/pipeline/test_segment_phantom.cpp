@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "preprocess/segment.h"
+#include "preprocess/segment/segment.h"
 #include "tests/pipeline/upper_abdomen.h"
 
 #ifdef WIREPLAN_IMAGING

@@ -3,8 +3,8 @@
 #include <fcntl.h>
 #include <gtest/gtest.h>
 
-#include "pipeline/case_file.h"
-#include "pipeline/shards.h"
+#include "pipeline/files/case_file.h"
+#include "pipeline/stages/shards.h"
 #include "tests/pipeline/program.h"
 
 namespace wireplan::pipeline {

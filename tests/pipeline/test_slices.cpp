@@ -3,7 +3,7 @@
 
 #include <Eigen/Geometry>
 
-#include "pipeline/slices.h"
+#include "pipeline/report/slices.h"
 #include "tests/shapes.h"
 
 namespace wireplan::pipeline {

@@ -4,10 +4,10 @@
 #include <fstream>
 #include <map>
 
-#include "pipeline/case_file.h"
-#include "pipeline/hash.h"
-#include "pipeline/stages.h"
-#include "pipeline/store.h"
+#include "pipeline/files/case_file.h"
+#include "pipeline/stages/stages.h"
+#include "pipeline/store/hash.h"
+#include "pipeline/store/store.h"
 #include "tests/pipeline/small_case.h"
 
 namespace wireplan::pipeline {

@@ -4,9 +4,9 @@
 #include <cmath>
 #include <numeric>
 
-#include "preprocess/centerline.h"
-#include "preprocess/segment.h"
-#include "preprocess/surface.h"
+#include "preprocess/centerline/centerline.h"
+#include "preprocess/segment/segment.h"
+#include "preprocess/surface/surface.h"
 #include "tests/pipeline/upper_abdomen.h"
 
 #ifdef WIREPLAN_IMAGING

@@ -4,12 +4,12 @@
 #include <Eigen/Geometry>
 #include <sstream>
 
-#include "pipeline/case_file.h"
-#include "pipeline/report.h"
-#include "pipeline/stages.h"
-#include "pipeline/viewer_files.h"
-#include "preprocess/image.h"
-#include "preprocess/vessel_io.h"
+#include "pipeline/files/case_file.h"
+#include "pipeline/files/viewer_files.h"
+#include "pipeline/report/report.h"
+#include "pipeline/stages/stages.h"
+#include "preprocess/files/vessel_io.h"
+#include "preprocess/volume/image.h"
 #include "tests/pipeline/small_case.h"
 
 namespace wireplan::pipeline {

@@ -2,7 +2,7 @@
 /// A part of the bundled phantom, small enough for tests.
 #include <filesystem>
 
-#include "pipeline/phantom_file.h"
+#include "pipeline/files/phantom_file.h"
 
 namespace wireplan::pipeline {
 

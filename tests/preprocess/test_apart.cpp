@@ -11,8 +11,8 @@
 #include <stdexcept>
 #include <vector>
 
-#include "preprocess/apart.h"
 #include "preprocess/base.h"
+#include "preprocess/volume/apart.h"
 #include "tests/messages.h"
 
 namespace wireplan::preprocess {

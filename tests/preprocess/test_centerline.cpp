@@ -14,9 +14,9 @@
 #include <string>
 #include <vector>
 
-#include "preprocess/centerline.h"
-#include "preprocess/surface.h"
-#include "preprocess/surface_repair.h"
+#include "preprocess/centerline/centerline.h"
+#include "preprocess/surface/surface.h"
+#include "preprocess/surface/surface_repair.h"
 #include "tests/shapes.h"
 
 namespace wireplan::preprocess {

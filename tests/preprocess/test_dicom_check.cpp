@@ -6,7 +6,7 @@
 #include <iterator>
 #include <string>
 
-#include "preprocess/dicom_check.h"
+#include "preprocess/volume/dicom_check.h"
 
 namespace wireplan::preprocess {
 namespace {

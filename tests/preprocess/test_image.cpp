@@ -12,8 +12,8 @@
 #include "gdcmImageChangeTransferSyntax.h"
 #include "gdcmImageReader.h"
 #include "gdcmImageWriter.h"
-#include "preprocess/dicom_check.h"
-#include "preprocess/image.h"
+#include "preprocess/volume/dicom_check.h"
+#include "preprocess/volume/image.h"
 #include "tests/dicom.h"
 
 namespace wireplan::preprocess {

@@ -3,8 +3,8 @@
 #include <Eigen/Geometry>
 #include <random>
 
-#include "preprocess/nearest_wall.h"
-#include "preprocess/surface.h"
+#include "preprocess/centerline/nearest_wall.h"
+#include "preprocess/surface/surface.h"
 #include "tests/shapes.h"
 
 namespace wireplan::preprocess {

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <numeric>
 
-#include "preprocess/phantom.h"
+#include "preprocess/volume/phantom.h"
 
 namespace wireplan::preprocess {
 namespace {

@@ -8,7 +8,7 @@
 #include <random>
 #include <string>
 
-#include "preprocess/segment.h"
+#include "preprocess/segment/segment.h"
 
 namespace wireplan::preprocess {
 namespace {

@@ -9,10 +9,10 @@
 #include <random>
 #include <sstream>
 
-#include "preprocess/phantom.h"
-#include "preprocess/surface.h"
-#include "preprocess/surface_repair.h"
-#include "preprocess/vessel_io.h"
+#include "preprocess/files/vessel_io.h"
+#include "preprocess/surface/surface.h"
+#include "preprocess/surface/surface_repair.h"
+#include "preprocess/volume/phantom.h"
 #include "tests/messages.h"
 #include "tests/shapes.h"
 

@@ -7,8 +7,8 @@
 #include <set>
 #include <vector>
 
-#include "preprocess/surface.h"
-#include "preprocess/surface_repair.h"
+#include "preprocess/surface/surface.h"
+#include "preprocess/surface/surface_repair.h"
 #include "tests/messages.h"
 #include "tests/shapes.h"
 

@@ -5,7 +5,7 @@
 #include <random>
 #include <sstream>
 
-#include "preprocess/vessel_io.h"
+#include "preprocess/files/vessel_io.h"
 #include "tests/messages.h"
 #include "tests/shapes.h"
 

@@ -3,8 +3,8 @@
 #include <Eigen/Geometry>
 #include <cmath>
 
-#include "preprocess/surface.h"
-#include "preprocess/wall.h"
+#include "preprocess/surface/surface.h"
+#include "preprocess/wall/wall.h"
 #include "tests/shapes.h"
 
 namespace wireplan::preprocess {

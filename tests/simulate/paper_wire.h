@@ -1,7 +1,7 @@
 #pragma once
 /// The wire of the paper's experiments, of 40 mm: k_b = 100 N/m and k_s = 1e10 N/m^3 at 20 elements
 /// of 2 mm, 0.2 g each.
-#include "simulate/rod.h"
+#include "simulate/wire/rod.h"
 
 namespace wireplan::simulate {
 

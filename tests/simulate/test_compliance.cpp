@@ -14,8 +14,8 @@
 #include <utility>
 #include <vector>
 
-#include "simulate/compliance.h"
-#include "simulate/locator.h"
+#include "simulate/wall/compliance.h"
+#include "simulate/wall/locator.h"
 #include "tests/shapes.h"
 
 namespace wireplan::simulate {

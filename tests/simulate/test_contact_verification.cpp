@@ -14,11 +14,13 @@
 #include <random>
 #include <vector>
 
-#include "simulate/scene.h"
+#include "simulate/insertion/scene.h"
 #include "tests/shapes.h"
 
 namespace wireplan::simulate {
 namespace {
+
+using preprocess::find_openings;
 
 // ---------------------------------------------------------------- wires in vessels
 

@@ -6,9 +6,9 @@
 #include <cmath>
 #include <limits>
 
-#include "simulate/dynamics.h"
-#include "simulate/quartic.h"
-#include "simulate/scene.h"
+#include "simulate/equilibrium/dynamics.h"
+#include "simulate/insertion/scene.h"
+#include "simulate/wire/quartic.h"
 #include "tests/simulate/paper_wire.h"
 
 namespace wireplan::simulate {

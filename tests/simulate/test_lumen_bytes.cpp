@@ -3,11 +3,13 @@
 
 #include <random>
 
-#include "simulate/contact.h"
+#include "simulate/wall/lumen.h"
 #include "tests/shapes.h"
 
 namespace wireplan::simulate {
 namespace {
+
+using preprocess::find_openings;
 
 Lumen tube_with_open_ends() {
   const Surface tube = shapes::straight_tube(4.0, 36.0, 1.5);

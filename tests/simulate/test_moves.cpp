@@ -4,7 +4,7 @@
 #include <cmath>
 #include <vector>
 
-#include "simulate/trial.h"
+#include "simulate/insertion/trial.h"
 #include "tests/shapes.h"
 
 namespace wireplan::simulate {

@@ -4,12 +4,16 @@
 #include <cmath>
 #include <vector>
 
-#include "simulate/contact.h"
-#include "simulate/openings.h"
+#include "preprocess/surface/openings.h"
+#include "simulate/wall/lumen.h"
 #include "tests/shapes.h"
 
 namespace wireplan::simulate {
 namespace {
+
+using preprocess::Opening;
+using preprocess::find_openings;
+using preprocess::left_through;
 
 /// Straight tube along z whose radius at each row is `radius_at(z)`.
 template <class RadiusAt>

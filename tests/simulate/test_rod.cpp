@@ -3,7 +3,7 @@
 #include <Eigen/Geometry>
 #include <cmath>
 
-#include "simulate/rod.h"
+#include "simulate/wire/rod.h"
 
 namespace wireplan::simulate {
 namespace {

@@ -9,10 +9,10 @@
 #include <string>
 #include <utility>
 
-#include "simulate/dynamics.h"
-#include "simulate/elements.h"
-#include "simulate/scene.h"
-#include "simulate/solver.h"
+#include "simulate/equilibrium/dynamics.h"
+#include "simulate/equilibrium/elements.h"
+#include "simulate/equilibrium/solver.h"
+#include "simulate/insertion/scene.h"
 #include "tests/shapes.h"
 #include "tests/simulate/paper_wire.h"
 

@@ -6,11 +6,14 @@
 #include <string>
 #include <vector>
 
-#include "simulate/trial.h"
+#include "simulate/insertion/trial.h"
 #include "tests/shapes.h"
 
 namespace wireplan::simulate {
 namespace {
+
+using preprocess::Opening;
+using preprocess::find_openings;
 
 Wire straight_wire(double EI) {
   return {.name = "straight",

@@ -11,7 +11,7 @@
 #include <functional>
 #include <vector>
 
-#include "simulate/solver.h"
+#include "simulate/equilibrium/solver.h"
 #include "tests/simulate/analytic.h"
 
 // Calls of malloc, which operator new and Eigen go through, are counted while a test asks for it.

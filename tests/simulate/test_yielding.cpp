@@ -4,8 +4,8 @@
 #include <random>
 #include <vector>
 
-#include "simulate/compliance.h"
-#include "simulate/yielding.h"
+#include "simulate/contact/yielding.h"
+#include "simulate/wall/compliance.h"
 #include "tests/shapes.h"
 
 namespace wireplan::simulate {

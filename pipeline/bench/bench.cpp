@@ -1,0 +1,124 @@
+#include "pipeline/bench/bench.h"
+
+#include <algorithm>
+#include <ctime>
+#include <iostream>
+#include <sstream>
+
+#include "pipeline/bench/bench_report.h"
+#include "pipeline/commands/commands.h"
+#include "pipeline/files/disk.h"
+#include "pipeline/files/text.h"
+#include "pipeline/report/report.h"
+#include "preprocess/files/vessel_io.h"
+
+namespace wireplan::pipeline {
+namespace {
+
+/// A value as it stands in the CSV: numbers with the digits of the JSON, null as nothing.
+std::string csv_value(const Json& value) {
+  if (value.is_null()) return "";
+  if (!value.is_string()) return value.dump();
+  const auto text = value.get<std::string>();
+  if (text.find_first_of(",\"\n") == std::string::npos) return text;
+  std::string quoted = "\"";
+  for (const char c : text) quoted += c == '"' ? std::string("\"\"") : std::string(1, c);
+  return quoted + "\"";
+}
+
+void write_csv(const std::vector<Json>& rows, const std::filesystem::path& path) {
+  std::ostringstream file;
+  const auto write_line = [&file](const Json& row, const auto& text_of) {
+    const char* separator = "";
+    for (const auto& [key, value] : row.items()) {
+      file << separator << text_of(key, value);
+      separator = ",";
+    }
+    file << "\n";
+  };
+  write_line(rows.front(), [](const std::string& key, const Json&) { return key; });
+  for (const Json& row : rows) {
+    write_line(row, [](const std::string&, const Json& value) { return csv_value(value); });
+  }
+  write_whole(file.str(), path);
+}
+
+std::string cell_text(const Json& value) {
+  if (value.is_null()) return "-";
+  if (value.is_string()) return value.get<std::string>();
+  if (value.is_number_float()) return format("%.4g", value.get<double>());
+  return value.dump();
+}
+
+}  // namespace
+
+std::string table_text(const std::vector<Json>& rows) {
+  if (rows.empty()) return "";
+  std::vector<std::vector<std::string>> lines(1);
+  for (const auto& [key, value] : rows.front().items()) lines.front().push_back(key);
+  for (const Json& row : rows) {
+    lines.emplace_back();
+    for (const auto& [key, value] : row.items()) lines.back().push_back(cell_text(value));
+  }
+  return format_table(lines);
+}
+
+double thread_milliseconds() {
+  timespec now{};
+  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
+  return 1e3 * static_cast<double>(now.tv_sec) + 1e-6 * static_cast<double>(now.tv_nsec);
+}
+
+double median(std::vector<double> values) {
+  expects(!values.empty());
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+#ifndef WIREPLAN_IMAGING  // else bench_preprocess.cpp
+BenchReport bench_preprocess(const BenchOptions&) {
+  throw Error(
+      "bench: preprocess needs images, and this wireplan is built without them; configure with "
+      "-DWIREPLAN_IMAGING=ON");
+}
+#endif
+
+int run_bench(const std::string& name, const std::filesystem::path& folder,
+              const BenchOptions& options) {
+  const auto make_report = name == "accuracy"     ? bench_accuracy
+                           : name == "stability"  ? bench_stability
+                           : name == "throughput" ? bench_throughput
+                           : name == "preprocess" ? bench_preprocess
+                                                  : nullptr;
+  if (make_report == nullptr) {
+    throw Error("bench: NAME is '" + name +
+                "', expected accuracy, stability, throughput or preprocess");
+  }
+  if (make_report != bench_throughput && !options.case_path.empty()) {
+    throw Error("bench: --case is '" + options.case_path +
+                "', expected none: only throughput takes a case");
+  }
+  std::filesystem::create_directories(folder);
+  const BenchReport report = make_report(options);
+
+  Json file;
+  file["schema"] = kBenchSchema;
+  file["name"] = name;
+  file["size"] = options.quick ? "quick" : "full";
+  file["program"] = build_info();
+  file["description"] = report.description;
+  file["results"] = report.results;
+  file["rows"] = report.rows;
+  write_json(file, folder / (name + ".json"));
+  write_csv(report.rows, folder / (name + ".csv"));
+  write_png(report.plot, folder / (name + ".png"));
+  for (const BenchSurface& vessel : report.surfaces) {
+    preprocess::write_surface(vessel.surface, folder / (vessel.name + ".vtp"));
+  }
+  std::cout << report.text << "\n"
+            << "files: " << (folder / name).string() << ".json, .csv, .png\n";
+  return kDone;
+}
+
+}  // namespace wireplan::pipeline

@@ -1,0 +1,43 @@
+#pragma once
+/// What a bench hands to run_bench, which prints and writes it. For use in this folder.
+#include <string>
+#include <vector>
+
+#include "pipeline/bench/bench.h"
+#include "pipeline/files/json_reader.h"
+#include "pipeline/report/canvas.h"
+#include "preprocess/vessel.h"
+
+namespace wireplan::pipeline {
+
+inline constexpr const char* kBenchSchema = "wireplan.bench/1";
+
+/// A vessel that was benched, written to NAME.vtp.
+struct BenchSurface {
+  std::string name;
+  Surface surface;
+};
+
+struct BenchReport {
+  Json description;        // scenes, methods, what the columns mean: the same on every machine
+  std::vector<Json> rows;  // plain objects with the same keys in the same order
+  Json results;            // what the rows come to
+  std::string text;        // for standard output
+  Picture plot;
+  std::vector<BenchSurface> surfaces = {};
+};
+
+BenchReport bench_accuracy(const BenchOptions& options);
+BenchReport bench_stability(const BenchOptions& options);
+BenchReport bench_throughput(const BenchOptions& options);
+BenchReport bench_preprocess(const BenchOptions& options);
+
+/// Rows as a table for people: columns aligned, numbers with 4 digits.
+std::string table_text(const std::vector<Json>& rows);
+
+/// CPU time of this thread [ms].
+double thread_milliseconds();
+
+double median(std::vector<double> values);
+
+}  // namespace wireplan::pipeline

@@ -1,0 +1,67 @@
+#include "pipeline/commands/check.h"
+
+#include "preprocess/surface/surface.h"
+#include "preprocess/surface/surface_repair.h"
+#include "preprocess/volume/image.h"
+
+namespace wireplan::pipeline {
+namespace {
+
+#ifdef WIREPLAN_IMAGING
+// Within the cell of some voxel.
+bool contains(const preprocess::Grid& grid, const Vec3& point) {
+  const Vec3 ijk = grid.ijk_from_lps(point);
+  const Eigen::Array3d size(grid.size[0], grid.size[1], grid.size[2]);
+  return (ijk.array() >= -0.5).all() && (ijk.array() < size - 0.5).all();
+}
+
+void check_volume(const Case& given, Problems& problems) {
+  const preprocess::Grid grid = preprocess::read_image(given.volume->path).grid;
+  const auto expect_inside = [&](const std::string& key, const Vec3& point) {
+    if (!contains(grid, point)) {
+      problems.add(key, to_json(point).dump(), "a point inside the volume",
+                   "points are in mm, patient LPS; given in RAS?");
+    }
+  };
+  expect_inside("access.point_mm", given.study.access);
+  expect_inside("target.point_mm", given.study.goal.point);
+  for (std::size_t k = 0; k < given.segmentation.seeds.size(); ++k) {
+    expect_inside("segmentation.seeds_mm[" + std::to_string(k) + "]", given.segmentation.seeds[k]);
+  }
+}
+#else
+void check_volume(const Case& given, Problems& problems) {
+  problems.add("volume.path", given.volume->given, "a surface: this wireplan has no imaging",
+               "configure with -DWIREPLAN_IMAGING=ON");
+}
+#endif
+
+std::vector<std::string> check_surface_file(const Case& given, Problems& problems) {
+  const SurfaceInput& input = *given.surface_input;
+  const preprocess::RepairedSurface repaired =
+      preprocess::read_surface(input.path, input.unit, input.frame);
+  const Surface& surface = repaired.surface;
+  preprocess::require_sound(preprocess::check_surface(surface), input.path.string());
+  const auto expect_inside = [&](const std::string& key, const Vec3& point) {
+    if (!preprocess::locate_point(surface, point).inside) {
+      problems.add(key, to_json(point).dump(), "a point inside the surface",
+                   "wrong surface.unit or surface.frame?");
+    }
+  };
+  expect_inside("access.point_mm", given.study.access);
+  expect_inside("target.point_mm", given.study.goal.point);
+  return preprocess::tell_mends(repaired.mends);
+}
+
+}  // namespace
+
+std::vector<std::string> check_input(const Case& given) {
+  Problems problems(given.file.string());
+  std::vector<std::string> mended;
+  if (given.volume) check_volume(given, problems);
+  if (given.surface_input) mended = check_surface_file(given, problems);
+  problems.throw_if_any();
+  return mended;
+}
+
+}  // namespace wireplan::pipeline

@@ -1,0 +1,199 @@
+#include "pipeline/commands/scene_run.h"
+
+#include <map>
+#include <memory>
+
+#include "pipeline/files/text.h"
+#include "pipeline/files/trial_file.h"
+#include "pipeline/report/picture.h"
+#include "pipeline/report/report.h"
+#include "plan/batch.h"
+#include "preprocess/files/vessel_io.h"
+#include "preprocess/surface/surface.h"
+#include "preprocess/surface/surface_repair.h"
+#include "preprocess/wall/wall.h"
+
+namespace wireplan::pipeline {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// A scene's vessel, read, checked and ready for a wire.
+struct LoadedVessel {
+  Surface surface;
+  Wall wall;                        // of a rigid vessel too: forces are shown on it
+  std::vector<std::string> mended;  // of the file, in sentences
+  std::unique_ptr<const simulate::VesselModel> model;
+};
+
+LoadedVessel load_vessel(const SceneVessel& given) {
+  LoadedVessel vessel;
+  const SurfaceInput& file = given.surface;
+  preprocess::RepairedSurface repaired = preprocess::read_surface(file.path, file.unit, file.frame);
+  vessel.surface = std::move(repaired.surface);
+  vessel.mended = preprocess::tell_mends(repaired.mends);
+  preprocess::require_sound(preprocess::check_surface(vessel.surface), file.path.string());
+  vessel.wall = preprocess::extrude_wall(vessel.surface, given.wall.extrusion).wall;
+  const simulate::LumenOptions options = simulate::follow(vessel.surface);
+  vessel.model = given.wall.elastic
+                     ? std::make_unique<simulate::VesselModel>(vessel.surface, vessel.wall, options)
+                     : std::make_unique<simulate::VesselModel>(vessel.surface, options);
+  return vessel;
+}
+
+/// What the result tells of the vessel.
+Json vessel_json(const SceneVessel& given, const LoadedVessel& vessel) {
+  const simulate::Lumen& lumen = vessel.model->lumen;
+  Json json = {{"triangles", vessel.surface.triangles.cols()},
+               {"wall_model", given.wall.elastic ? "elastic" : "rigid"}};
+  if (given.wall.elastic) {
+    json["wall_young_modulus_kpa"] = clean(vessel.wall.young_modulus / kMpaPerKpa);
+    json["wall_stiffness_kpa_per_mm"] =
+        clean(wall_normal_stiffness(vessel.wall.young_modulus, vessel.wall.poisson_ratio,
+                                    given.wall.extrusion.thickness_mm) /
+              kMpaPerKpa);
+  } else {
+    json["wall_stiffness_kpa_per_mm"] = nullptr;
+    json["wall_stiffness_kpa_per_mm_reason"] = "the wall is rigid";
+  }
+  json["friction"] = given.friction;
+  json["lumen_grid_mm"] = lumen.grid_spacing();
+  json["lumen_max_deviation_mm"] = lumen.max_deviation();
+  json["lumen_mean_deviation_mm"] = lumen.mean_deviation();
+  json["openings"] = openings_json(lumen.openings());
+  return json;
+}
+
+Json warnings_json(const SceneVessel& given, const LoadedVessel& vessel) {
+  Json warnings = Json::array();
+  for (const std::string& line : vessel.mended) warnings.push_back("surface: " + line);
+  if (given.friction == 0.0) {
+    warnings.push_back("frictionless (friction is 0): push forces are lower bounds");
+  }
+  if (!given.wall.elastic) warnings.push_back("rigid wall: contact forces are upper bounds");
+  return warnings;
+}
+
+/// The result with what the vessel adds to it.
+void write_result(Json result, const SceneFile& scene, const LoadedVessel* vessel,
+                  const fs::path& folder) {
+  if (vessel) {
+    result["vessel"] = vessel_json(*scene.vessel, *vessel);
+    result["warnings"] = warnings_json(*scene.vessel, *vessel);
+  }
+  write_json(result, folder / "result.json");
+}
+
+/// Each triangle of the wall with the force that it took.
+void write_forces(const LoadedVessel& vessel, const std::vector<simulate::TriangleForce>& peaks,
+                  const fs::path& folder) {
+  std::vector<double> force(static_cast<std::size_t>(vessel.surface.triangles.cols()), 0.0);
+  for (const simulate::TriangleForce& peak : peaks) {
+    force.at(static_cast<std::size_t>(peak.triangle)) = peak.force;
+  }
+  preprocess::write_wall(vessel.surface, vessel.wall, folder / "forces.vtu",
+                         {{"peak_force_n", force}});
+}
+
+/// Nothing is drawn of a wire that has no place.
+void write_wire_picture(const LoadedVessel* vessel, const PictureWire& wire,
+                        const PictureMarks& marks, const fs::path& folder) {
+  const bool drawable = wire.nodes.cols() >= 2 && wire.nodes.allFinite();
+  if (!drawable && !vessel) return;
+  const std::vector<PictureWire> wires = drawable ? std::vector{wire} : std::vector<PictureWire>{};
+  write_picture(vessel ? vessel->surface : Surface(), wires, marks, folder / "wire.png");
+}
+
+/// Sum of the contacts on each triangle that has one, ascending.
+std::vector<simulate::TriangleForce> sum_by_triangle(
+    const std::vector<simulate::WireContact>& contacts) {
+  std::map<int, double> force;
+  for (const simulate::WireContact& contact : contacts) {
+    if (contact.triangle >= 0) force[contact.triangle] += contact.normal_force.norm();
+  }
+  std::vector<simulate::TriangleForce> sums;
+  for (const auto& [triangle, sum] : force) sums.push_back({triangle, sum});
+  return sums;
+}
+
+SceneAnswer run_bench_scene(const SceneFile& file, const LoadedVessel* vessel,
+                            const fs::path& folder) {
+  simulate::Scene scene = *file.bench;
+  if (vessel) scene.vessel = vessel->model.get();
+  const simulate::SceneResult result = simulate::run_scene(scene);
+
+  std::vector<simulate::WireContact> contacts;
+  if (vessel) {
+    for (const simulate::Touch& touch : result.contacts) {
+      contacts.push_back(simulate::contact_of(touch, scene.wire.radius, vessel->model->locator));
+    }
+    write_forces(*vessel, sum_by_triangle(contacts), folder);
+  }
+  write_result(result_json(result, contacts), file, vessel, folder);
+  preprocess::write_polyline(result.nodes, {}, folder / "wire.vtp");
+  write_wire_picture(vessel,
+                     {.name = scene.wire.name + ": " + outcome_name(result.outcome),
+                      .nodes = result.nodes,
+                      .contact_force = {},
+                      .radius = scene.wire.radius},
+                     {.title = file.name}, folder);
+
+  const Vec3 tip = result.nodes.col(result.nodes.cols() - 1);
+  return {result.outcome == simulate::SceneOutcome::kConverged,
+          std::string(outcome_name(result.outcome)) +
+              format(": tip (%.4f, %.4f, %.4f) mm, residual %.2g N, %d iterations", tip.x(),
+                     tip.y(), tip.z(), result.residual, result.iterations)};
+}
+
+SceneAnswer run_insertion_scene(const SceneFile& file, const LoadedVessel& vessel,
+                                const fs::path& folder) {
+  const InsertionScene& scene = *file.insertion;
+  const double start = plan::thread_cpu_seconds();
+  simulate::TrialResult result =
+      simulate::run_trial(scene.wire, scene.introducer, scene.goal, *vessel.model, scene.options);
+  const double seconds = plan::thread_cpu_seconds() - start;
+  if (!scene.has_target && result.outcome == simulate::Outcome::kMissed) {
+    result.reason = "all of the wire went in; the scene has no target";
+  }
+
+  write_result(result_json(result, scene.options.record_every, seconds), file, &vessel, folder);
+  write_forces(vessel, result.peak_forces, folder);
+  preprocess::write_polyline(result.nodes, {}, folder / "wire.vtp");
+  write_shapes(result, "shapes", folder);
+  PictureWire wire{.name = scene.wire.name + ": " + outcome_name(result.outcome),
+                   .nodes = result.nodes,
+                   .contact_force = {},
+                   .radius = scene.wire.radius};
+  if (!result.shapes.empty() && result.shapes.back().nodes.cols() == result.nodes.cols()) {
+    wire.contact_force = result.shapes.back().contact_force;
+  }
+  PictureMarks marks{.title = file.name, .access = scene.introducer.point};
+  if (scene.has_target) {
+    marks.target = scene.goal.point;
+    marks.target_radius = scene.goal.radius;
+  }
+  write_wire_picture(&vessel, wire, marks, folder);
+
+  std::string line = outcome_name(result.outcome);
+  if (!result.pushes.empty()) {
+    const simulate::Push& last = result.pushes.back();
+    line += format(": %.1f mm in, tip (%.4f, %.4f, %.4f) mm, residual %.2g N", last.insertion,
+                   last.tip.x(), last.tip.y(), last.tip.z(), last.residual);
+  }
+  if (!result.reason.empty()) line += "; " + result.reason;
+  return {result.outcome != simulate::Outcome::kNotConverged &&
+              result.outcome != simulate::Outcome::kFailed,
+          line};
+}
+
+}  // namespace
+
+SceneAnswer run_scene_file(const SceneFile& scene, const fs::path& folder) {
+  std::optional<LoadedVessel> vessel;
+  if (scene.vessel) vessel = load_vessel(*scene.vessel);
+  fs::create_directories(folder);
+  return scene.bench ? run_bench_scene(scene, vessel ? &*vessel : nullptr, folder)
+                     : run_insertion_scene(scene, *vessel, folder);
+}
+
+}  // namespace wireplan::pipeline

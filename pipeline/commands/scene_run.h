@@ -1,0 +1,20 @@
+#pragma once
+/// `wireplan simulate`: runs a scene and writes what a user reads and looks at.
+#include <filesystem>
+#include <string>
+
+#include "pipeline/files/scene_file.h"
+
+namespace wireplan::pipeline {
+
+struct SceneAnswer {
+  bool solved = false;  // an equilibrium was found, whatever became of the wire
+  std::string line;     // what came out, in one line
+};
+
+/// Writes into `folder`: result.json, wire.vtp and wire.png; of an insertion also the shapes on the
+/// way, shapes.pvd; in a vessel also forces.vtu, the wall with the force that each triangle took
+/// (`peak_force_n`). Throws Error where the vessel is not sound or a file cannot be written.
+SceneAnswer run_scene_file(const SceneFile& scene, const std::filesystem::path& folder);
+
+}  // namespace wireplan::pipeline

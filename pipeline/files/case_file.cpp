@@ -1,0 +1,540 @@
+#include "pipeline/files/case_file.h"
+
+#include <algorithm>
+#include <array>
+#include <cctype>
+#include <cstdlib>
+#include <limits>
+#include <set>
+#include <string_view>
+#include <system_error>
+#include <utility>
+
+#include "pipeline/files/catalogue.h"
+
+namespace wireplan::pipeline {
+namespace {
+
+constexpr const char* kSchema = "wireplan.case/1";
+constexpr std::string_view kDataVariable = "${WIREPLAN_DATA}";
+constexpr double kFriction = 0.04;  // of a hydrophilic wire, references A3
+
+std::filesystem::path find_case_file(const std::filesystem::path& path) {
+  if (!std::filesystem::is_directory(path)) return path;
+  const std::filesystem::path file = path / "case.json";
+  if (!std::filesystem::exists(file)) {
+    throw Error(path.string() +
+                ": this folder has no case.json (give a case file or a folder that has one)");
+  }
+  return file;
+}
+
+/// Sets the value at a dotted path, making the objects on the way.
+void apply_override(Json& root, const std::string& text) {
+  const std::size_t equals = text.find('=');
+  if (equals == 0 || equals == std::string::npos) {
+    throw Error("--set " + text + ": expected key=value, such as wall.thickness_mm=2");
+  }
+
+  // The value: JSON, and else text.
+  const std::string value_text = text.substr(equals + 1);
+  Json value = Json::parse(value_text, nullptr, false);
+  if (value.is_discarded()) value = value_text;
+
+  // Down the path.
+  const std::string key = text.substr(0, equals);
+  Json* place = &root;
+  for (std::size_t begin = 0; begin <= key.size();) {
+    const std::size_t end = std::min(key.find('.', begin), key.size());
+    if (!place->is_object() && !place->is_null()) {
+      throw Error("--set " + text + ": " + key.substr(0, begin - 1) +
+                  " is no object in the case file, so nothing can be set in it (set it whole)");
+    }
+    place = &(*place)[key.substr(begin, end - begin)];
+    begin = end + 1;
+  }
+  *place = std::move(value);
+}
+
+std::string default_name(const std::filesystem::path& file) {
+  const std::filesystem::path absolute = std::filesystem::absolute(file).lexically_normal();
+  return file.filename() == "case.json" ? absolute.parent_path().filename().string()
+                                        : file.stem().string();
+}
+
+/// The case's name becomes that of folders, so it holds no path.
+std::string read_name(JsonReader& root, const std::filesystem::path& file) {
+  const std::string name = root.text("name", default_name(file));
+  const bool plain =
+      !name.empty() && name.front() != '.' && std::all_of(name.begin(), name.end(), [](char c) {
+        return std::isalnum(static_cast<unsigned char>(c)) != 0 ||
+               std::string_view("-_. ").find(c) != std::string_view::npos;
+      });
+  if (!plain) {
+    root.problems().add("name", "\"" + name + "\"",
+                        "letters, digits, spaces, '-', '_' and '.', not starting with '.'",
+                        "folders are named after the case");
+  }
+  return name;
+}
+
+void expect_exists(JsonReader& reader, const std::string& key, const std::string& given,
+                   const std::filesystem::path& path, const std::string& expected) {
+  std::error_code unreachable;  // a folder on the way may not be searched: told as absent
+  if (given.empty() || std::filesystem::exists(path, unreachable)) return;
+  std::string remedy = "relative paths count from the file that gives them";
+  if (given.find(kDataVariable) != std::string::npos) {
+    const bool is_set = std::getenv("WIREPLAN_DATA") != nullptr;
+    remedy = is_set ? "the environment variable WIREPLAN_DATA names the data folder"
+                    : "the environment variable WIREPLAN_DATA is not set, so the data folder is "
+                      "../shared/data beside the checkout";
+  } else if (given.find("${") != std::string::npos) {
+    remedy = "${WIREPLAN_DATA} is the only variable of a path";
+  }
+  reader.problems().add(reader.path_of(key), "\"" + given + "\"", expected + " at " + path.string(),
+                        remedy);
+}
+
+VolumeInput read_volume(JsonReader reader, const std::filesystem::path& folder) {
+  VolumeInput volume;
+  volume.given = reader.text("path", std::nullopt);
+  volume.path = resolve_path(volume.given, folder);
+  expect_exists(reader, "path", volume.given, volume.path, "an image file or a DICOM folder");
+  reader.finish();
+  return volume;
+}
+
+/// The entry of the pipeline: a volume, or a surface that has a path.
+void read_inputs(JsonReader& root, Case& input) {
+  const std::filesystem::path folder = input.file.parent_path();
+  JsonReader surface = root.object("surface", false);
+  input.surface.edge_length_mm = surface.number("edge_length_mm", input.surface.edge_length_mm,
+                                                {.min = 0.1, .max = 10.0}, "given in m?");
+  const bool has_volume = root.has("volume");
+  bool has_surface = false;
+  for (const char* key : {"path", "unit", "frame"}) has_surface |= surface.has(key);
+  if (has_volume && has_surface) {
+    root.problems().add("surface.path", "given beside volume", "one of the two",
+                        "a case enters either at a volume or at a surface");
+  } else if (!has_volume && !has_surface) {
+    root.problems().add("volume", "missing", "volume.path or surface.path",
+                        "a case enters either at a volume or at a surface");
+  }
+  if (has_volume) {
+    input.volume = read_volume(root.object("volume", true), folder);
+  } else if (has_surface) {
+    input.surface_input = read_surface_input(surface, folder);
+  }
+  surface.finish();
+}
+
+void read_segmentation(JsonReader& root, Case& input) {
+  if (!input.volume) {
+    if (root.has("segmentation") && input.surface_input) {
+      root.problems().add("segmentation", "given with a surface as input", "none",
+                          "only a volume is segmented; delete it");
+    }
+    return;
+  }
+  const std::size_t problems_before = root.problems().count();
+  JsonReader reader = root.object("segmentation", false);
+  const Range band{.min = -1100.0, .max = 65535.0}, length{.min = 0.0, .max = 5.0};
+  const auto given = [&](const std::string& key, Range range) {
+    return reader.has(key) ? std::optional<double>(reader.number(key, std::nullopt, range))
+                           : std::nullopt;
+  };
+  SegmentationInput& segmentation = input.segmentation;
+  segmentation.lower_hu = given("lower_hu", band);
+  segmentation.upper_hu = given("upper_hu", band);
+  if (segmentation.lower_hu.has_value() != segmentation.upper_hu.has_value()) {
+    root.problems().add(segmentation.lower_hu ? "segmentation.upper_hu" : "segmentation.lower_hu",
+                        "missing",
+                        "both ends of the band, or none: then it is chosen from the volume");
+  } else if (segmentation.lower_hu && root.problems().count() == problems_before &&
+             *segmentation.lower_hu >= *segmentation.upper_hu) {
+    root.problems().add("segmentation.lower_hu", Json(*segmentation.lower_hu).dump(),
+                        "less than segmentation.upper_hu, " + Json(*segmentation.upper_hu).dump());
+  }
+  segmentation.seeds = reader.points("seeds_mm", false);
+  segmentation.smoothing_mm = given("smoothing_mm", length);
+  segmentation.neck_opening_mm = given("neck_opening_mm", length);
+  reader.finish();
+}
+
+std::vector<double> read_angles(JsonReader& reader, const std::string& key,
+                                const std::vector<double>& fallback_deg, Range range_deg) {
+  std::vector<double> angles = reader.numbers(key, fallback_deg, range_deg);
+  for (double& angle : angles) angle *= kRadPerDeg;
+  return angles;
+}
+
+void read_access_and_target(JsonReader& root, plan::Study& study) {
+  const std::size_t problems_before = root.problems().count();
+  const Range turn{.min = -360.0, .max = 360.0};
+  JsonReader access = root.object("access", true);
+  study.access = access.point("point_mm", std::nullopt);
+  study.inclinations =
+      read_angles(access, "inclination_deg", {0.0, 15.0, 30.0}, {.min = 0.0, .max = 80.0});
+  study.azimuths = read_angles(access, "azimuth_deg", {0.0, 90.0, 180.0, 270.0}, turn);
+  access.finish();
+
+  JsonReader target = root.object("target", true);
+  study.goal.point = target.point("point_mm", std::nullopt);
+  study.goal.radius =
+      target.number("radius_mm", study.goal.radius, {.min = 0.1, .max = 50.0}, "given in m?");
+  target.finish();
+  study.rolls = read_angles(root, "tip_roll_deg", {0.0, 90.0, 180.0, 270.0}, turn);
+  if (root.problems().count() == problems_before &&
+      (study.goal.point - study.access).norm() <= study.goal.radius) {
+    root.problems().add("target.point_mm", to_json(study.goal.point).dump(),
+                        "a point further than target.radius_mm from access.point_mm",
+                        "a wire would be there before it is pushed");
+  }
+}
+
+constexpr std::array kManoeuvrings = {std::pair("never", Manoeuvring::kNever),
+                                      std::pair("when_needed", Manoeuvring::kWhenNeeded),
+                                      std::pair("always", Manoeuvring::kAlways)};
+
+Manoeuvring read_manoeuvring(JsonReader& root) {
+  const std::string name =
+      root.choice("manoeuvres", "when_needed", {"never", "when_needed", "always"});
+  for (const auto& [known, value] : kManoeuvrings) {
+    if (name == known) return value;
+  }
+  return Manoeuvring::kWhenNeeded;  // a problem was noted
+}
+
+const char* manoeuvring_name(Manoeuvring value) {
+  for (const auto& [name, known] : kManoeuvrings) {
+    if (value == known) return name;
+  }
+  throw LogicError("a Manoeuvring without a name");
+}
+
+/// The wire under a name of the catalogue; a wire without sections where there is none.
+simulate::Wire find_catalogue_wire(const std::string& name, const std::string& key,
+                                   const std::vector<CatalogueWire>& known, Problems& problems) {
+  std::vector<std::string> names;
+  std::string list;
+  for (const CatalogueWire& entry : known) {
+    if (entry.wire.name == name) return entry.wire;
+    names.push_back(entry.wire.name);
+    list += (list.empty() ? "" : ", ") + entry.wire.name;
+  }
+  const std::string nearest = nearest_name(name, names);
+  problems.add(key, "\"" + name + "\"", "a wire of the catalogue: " + list,
+               nearest.empty() ? "a wire of your own is an object {\"name\", \"diameter_mm\", "
+                                 "\"sections\"}"
+                               : "did you mean \"" + nearest + "\"?");
+  return {.name = name, .radius = 0.0, .sections = {}};
+}
+
+std::vector<simulate::Wire> read_wires(JsonReader& root) {
+  const std::string expected = "a list of catalogue names and wires, at least one";
+  Problems& problems = root.problems();
+  if (!root.has("wires")) {
+    problems.add("wires", "missing", expected, "`wireplan wires` lists the catalogue");
+    return {};
+  }
+  const Json& list = root.raw("wires");
+  if (!list.is_array() || list.empty()) {
+    problems.add("wires", list.dump(), expected, "`wireplan wires` lists the catalogue");
+    return {};
+  }
+  const std::vector<CatalogueWire> known = catalogue();
+  std::vector<simulate::Wire> wires;
+  std::set<std::string> names;
+  for (std::size_t i = 0; i < list.size(); ++i) {
+    const std::string key = "wires[" + std::to_string(i) + "]";
+    if (list[i].is_string()) {
+      wires.push_back(find_catalogue_wire(list[i].get<std::string>(), key, known, problems));
+    } else {
+      JsonReader reader(list[i], key, problems);
+      wires.push_back(read_wire(reader).wire);
+    }
+    if (!wires.back().name.empty() && !names.insert(wires.back().name).second) {
+      problems.add(key, "\"" + wires.back().name + "\" again", "a name of its own",
+                   "the report tells wires by name");
+    }
+  }
+  return wires;
+}
+
+void read_insertion(JsonReader& root, plan::Study& study) {
+  const std::size_t problems_before = root.problems().count();
+  JsonReader reader = root.object("insertion", false);
+  simulate::InsertionOptions& insertion = study.insertion;
+  insertion.length = reader.number("length_mm", 0.0, {.min = 0.0, .max = 3000.0}, "given in m?");
+  insertion.step = reader.number("step_mm", insertion.step, {.min = 0.01, .max = 20.0});
+  insertion.element_length =
+      reader.number("element_length_mm", insertion.element_length, {.min = 0.05, .max = 20.0});
+  insertion.contact_spacing =
+      reader.number("contact_spacing_mm", insertion.contact_spacing, {.min = 0.05, .max = 20.0});
+  insertion.residual_tolerance = reader.number("residual_tolerance_n", insertion.residual_tolerance,
+                                               {.min = 1e-12, .max = 1e-2});
+  insertion.max_iterations = reader.integer("max_iterations", insertion.max_iterations, 1, 100000);
+  insertion.record_every =
+      reader.number("record_every_mm", insertion.record_every, {.min = 0.1, .max = 1000.0});
+  reader.finish();
+
+  if (insertion.length > 0.0 && insertion.length < 1.0) {
+    root.problems().add("insertion.length_mm", Json(insertion.length).dump(), "0 or at least 1",
+                        "given in m?");
+  }
+  if (root.problems().count() > problems_before) return;
+  for (const simulate::Wire& wire : study.wires) {
+    if (wire.sections.empty() || wire.length() >= insertion.length) continue;
+    root.problems().add("insertion.length_mm", Json(insertion.length).dump(),
+                        "at most the length of every wire; \"" + wire.name + "\" has " +
+                            Json(clean(wire.length())).dump() + " mm",
+                        "push in less, or lengthen the wire's last section");
+  }
+}
+
+void read_limits(JsonReader& root, plan::Limits& limit) {
+  const std::size_t problems_before = root.problems().count();
+  JsonReader limits = root.object("limits", false);
+  const Range force{.min = 0.0, .max = 100.0, .open_min = true};
+  limit.tip_force_warn =
+      limits.number("tip_force_warn_n", limit.tip_force_warn, force, "given in mN or gf?");
+  limit.tip_force_fail =
+      limits.number("tip_force_fail_n", limit.tip_force_fail, force, "given in mN or gf?");
+  limit.penetration_fail = limits.number("penetration_fail_mm", limit.penetration_fail,
+                                         {.min = 0.0, .max = 5.0, .open_min = true});
+  limit.off_path_fail = limits.number("off_path_fail_mm", limit.off_path_fail,
+                                      {.min = 0.0, .max = 1000.0, .open_min = true});
+  limits.finish();
+  if (root.problems().count() == problems_before && limit.tip_force_warn > limit.tip_force_fail) {
+    root.problems().add("limits.tip_force_warn_n", Json(limit.tip_force_warn).dump(),
+                        "at most limits.tip_force_fail_n, " + Json(limit.tip_force_fail).dump());
+  }
+}
+
+void read_weights(JsonReader& root, plan::Weights& weight) {
+  JsonReader ranking = root.object("ranking", false);
+  JsonReader weights = ranking.object("weights", false);
+  const Range share{.min = 0.0, .max = 1000.0};
+  weight.reach = weights.number("reach", weight.reach, share);
+  weight.peak_force = weights.number("peak_force", weight.peak_force, share);
+  weight.mean_force = weights.number("mean_force", weight.mean_force, share);
+  weight.margin = weights.number("margin", weight.margin, share);
+  weights.finish();
+  ranking.finish();
+  if (weight.reach + weight.peak_force + weight.mean_force + weight.margin <= 0.0) {
+    root.problems().add("ranking.weights", "0 in all", "at least one weight above 0");
+  }
+}
+
+/// Two factors, the lower first.
+void read_factors(JsonReader& reader, const std::string& key, double& low, double& high) {
+  const std::size_t problems_before = reader.problems().count();
+  const std::vector<double> factors =
+      reader.numbers(key, std::vector<double>{low, high}, {.min = 0.01, .max = 100.0});
+  if (reader.problems().count() > problems_before) return;
+  if (factors.size() != 2 || factors[0] > factors[1]) {
+    reader.problems().add(reader.path_of(key), Json(factors).dump(),
+                          "two factors, the smaller one first", "[1, 1] leaves the value alone");
+    return;
+  }
+  low = factors[0];
+  high = factors[1];
+}
+
+void read_robustness(JsonReader& root, Case& input) {
+  JsonReader reader = root.object("robustness", false);
+  plan::RobustnessOptions& options = input.robustness;
+  options.repeats = reader.integer("repeats", options.repeats, 0, 100000);
+  options.plans = reader.integer("plans", options.plans, 1, 1000);
+  options.seed = static_cast<std::uint64_t>(
+      reader.integer("seed", static_cast<int>(options.seed), 0, std::numeric_limits<int>::max()));
+  plan::Unknowns& unknowns = options.unknowns;
+  read_factors(reader, "friction_factor", unknowns.friction_low, unknowns.friction_high);
+  read_factors(reader, "wall_factor", unknowns.wall_low, unknowns.wall_high);
+  unknowns.angle =
+      reader.number("angle_deg", clean(unknowns.angle / kRadPerDeg), {.min = 0.0, .max = 45.0}) *
+      kRadPerDeg;
+  unknowns.entry =
+      reader.number("entry_mm", unknowns.entry, {.min = 0.0, .max = 50.0}, "given in m?");
+  unknowns.lumen = reader.number("lumen_mm", 0.0, {.min = 0.0, .max = 10.0}, "0 chooses it");
+  reader.finish();
+}
+
+Json robustness_json(const Case& input) {
+  const plan::RobustnessOptions& options = input.robustness;
+  const plan::Unknowns& unknowns = options.unknowns;
+  return {{"repeats", options.repeats},
+          {"plans", options.plans},
+          {"seed", options.seed},
+          {"friction_factor", {unknowns.friction_low, unknowns.friction_high}},
+          {"wall_factor", {unknowns.wall_low, unknowns.wall_high}},
+          {"angle_deg", clean(unknowns.angle / kRadPerDeg)},
+          {"entry_mm", unknowns.entry},
+          {"lumen_mm", unknowns.lumen}};
+}
+
+Json degrees(const std::vector<double>& angles) {
+  Json list = Json::array();
+  for (const double angle : angles) list.push_back(clean(angle / kRadPerDeg));
+  return list;
+}
+
+Json input_json(const Case& input) {
+  Json json;
+  if (input.volume) {
+    const SegmentationInput& segmentation = input.segmentation;
+    Json seeds = Json::array();
+    for (const Vec3& seed : segmentation.seeds) seeds.push_back(to_json(seed));
+    json["volume"] = {{"path", input.volume->given}};
+    const auto value = [](const std::optional<double>& given) {
+      return given ? Json(*given) : Json(nullptr);
+    };
+    json["segmentation"] = {{"lower_hu", value(segmentation.lower_hu)},
+                            {"upper_hu", value(segmentation.upper_hu)},
+                            {"seeds_mm", seeds},
+                            {"smoothing_mm", value(segmentation.smoothing_mm)},
+                            {"neck_opening_mm", value(segmentation.neck_opening_mm)}};
+  }
+  if (input.surface_input) {
+    json["surface"] = {{"path", input.surface_input->given},
+                       {"unit", input.surface_input->unit},
+                       {"frame", input.surface_input->frame}};
+  }
+  json["surface"]["edge_length_mm"] = input.surface.edge_length_mm;
+  return json;
+}
+
+}  // namespace
+
+std::filesystem::path resolve_path(const std::string& given, const std::filesystem::path& folder) {
+  std::string text = given;
+  const std::size_t variable = text.find(kDataVariable);
+  if (variable != std::string::npos) {
+    const char* set = std::getenv("WIREPLAN_DATA");
+    const std::filesystem::path data =
+        set != nullptr
+            ? std::filesystem::absolute(set)
+            : std::filesystem::path(WIREPLAN_SOURCE_DIR).parent_path() / "shared" / "data";
+    text.replace(variable, kDataVariable.size(), data.string());
+  }
+  return (folder / text).lexically_normal();
+}
+
+SurfaceInput read_surface_input(JsonReader& reader, const std::filesystem::path& folder) {
+  SurfaceInput surface;
+  surface.given = reader.text("path", std::nullopt);
+  surface.path = resolve_path(surface.given, folder);
+  expect_exists(reader, "path", surface.given, surface.path, "a surface file");
+
+  std::string extension = surface.path.extension().string();
+  std::transform(extension.begin(), extension.end(), extension.begin(),
+                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  const std::set<std::string> known = {".stl", ".ply", ".obj", ".vtp"};
+  if (!surface.given.empty() && known.count(extension) == 0) {
+    reader.problems().add(reader.path_of("path"), "\"" + surface.given + "\"",
+                          "a name that ends in .stl, .ply, .obj or .vtp");
+  }
+
+  // An STL, PLY or OBJ carries neither.
+  const bool is_vtp = extension == ".vtp";
+  using Fallback = std::optional<std::string>;
+  surface.unit = reader.choice("unit", is_vtp ? Fallback("mm") : std::nullopt, {"mm", "cm", "m"});
+  surface.frame = reader.choice("frame", is_vtp ? Fallback("LPS") : std::nullopt, {"LPS", "RAS"});
+  return surface;
+}
+
+void refuse(JsonReader& reader, const std::string& key, const std::string& what) {
+  if (!reader.has(key)) return;
+  reader.problems().add(reader.path_of(key), "given", "no such key yet",
+                        what + " not in this version; delete the key");
+}
+
+WallInput read_wall(JsonReader& reader, const std::string& model) {
+  WallInput wall;
+  wall.elastic = reader.choice("model", model, {"elastic", "rigid"}) == "elastic";
+  preprocess::WallOptions& extrusion = wall.extrusion;
+  extrusion.thickness_mm = reader.number("thickness_mm", extrusion.thickness_mm,
+                                         {.min = 0.1, .max = 10.0}, "given in m?");
+  extrusion.young_modulus = reader.number("young_modulus_kpa", 0.0, {.min = 0.0, .max = 1e5},
+                                          "given in Pa? 0 chooses it") *
+                            kMpaPerKpa;
+  extrusion.poisson_ratio =
+      reader.number("poisson_ratio", extrusion.poisson_ratio, {.min = 0.0, .max = 0.49});
+  return wall;
+}
+
+double read_friction(JsonReader& reader, double fallback) {
+  return reader.number("friction", fallback, {.min = 0.0, .max = 1.0},
+                       "Coulomb's coefficient: 0.04 hydrophilic, 0.12 PTFE, 0.25 bare");
+}
+
+Case read_case(const std::filesystem::path& path, const std::vector<std::string>& overrides) {
+  Case input;
+  input.file = find_case_file(path);
+  Json file = read_json(input.file, kSchema);
+  for (const std::string& override_text : overrides) apply_override(file, override_text);
+
+  Problems problems(input.file.string());
+  JsonReader root(file, "", problems);
+  root.text("schema", std::nullopt);
+  input.name = read_name(root, input.file);
+  read_access_and_target(root, input.study);
+  read_inputs(root, input);
+  read_segmentation(root, input);
+  JsonReader wall = root.object("wall", false);
+  input.wall = read_wall(wall, "elastic");
+  wall.finish();
+  input.study.wires = read_wires(root);
+  read_insertion(root, input.study);
+  read_limits(root, input.limits);
+  read_weights(root, input.weights);
+  input.manoeuvres = read_manoeuvring(root);
+  input.study.insertion.friction = read_friction(root, kFriction);
+  read_robustness(root, input);
+  JsonReader search = root.object("search", false);
+  input.exhaustive = search.boolean("exhaustive", false);
+  search.finish();
+  root.finish();
+  problems.throw_if_any();
+  return input;
+}
+
+Json case_parameters(const Case& input) {
+  const plan::Study& study = input.study;
+  Json json = {{"schema", kSchema}, {"name", input.name}};
+  json.update(input_json(input));
+  json["wall"] = {{"model", input.wall.elastic ? "elastic" : "rigid"},
+                  {"thickness_mm", input.wall.extrusion.thickness_mm},
+                  {"young_modulus_kpa", clean(input.wall.extrusion.young_modulus / kMpaPerKpa)},
+                  {"poisson_ratio", input.wall.extrusion.poisson_ratio}};
+  json["access"] = {{"point_mm", to_json(study.access)},
+                    {"inclination_deg", degrees(study.inclinations)},
+                    {"azimuth_deg", degrees(study.azimuths)}};
+  json["target"] = {{"point_mm", to_json(study.goal.point)}, {"radius_mm", study.goal.radius}};
+  json["wires"] = Json::array();
+  for (const simulate::Wire& wire : study.wires) json["wires"].push_back(wire_json(wire));
+  json["tip_roll_deg"] = degrees(study.rolls);
+  json["manoeuvres"] = manoeuvring_name(input.manoeuvres);
+  json["friction"] = study.insertion.friction;
+  json["insertion"] = {{"length_mm", study.insertion.length},
+                       {"step_mm", study.insertion.step},
+                       {"element_length_mm", study.insertion.element_length},
+                       {"contact_spacing_mm", study.insertion.contact_spacing},
+                       {"residual_tolerance_n", study.insertion.residual_tolerance},
+                       {"max_iterations", study.insertion.max_iterations},
+                       {"record_every_mm", study.insertion.record_every}};
+  json["limits"] = {{"tip_force_warn_n", input.limits.tip_force_warn},
+                    {"tip_force_fail_n", input.limits.tip_force_fail},
+                    {"penetration_fail_mm", input.limits.penetration_fail},
+                    {"off_path_fail_mm", input.limits.off_path_fail}};
+  json["search"] = {{"exhaustive", input.exhaustive}};
+  json["robustness"] = robustness_json(input);
+  json["ranking"] = {{"weights",
+                      {{"reach", input.weights.reach},
+                       {"peak_force", input.weights.peak_force},
+                       {"mean_force", input.weights.mean_force},
+                       {"margin", input.weights.margin}}}};
+  return json;
+}
+
+}  // namespace wireplan::pipeline

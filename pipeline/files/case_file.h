@@ -1,0 +1,94 @@
+#pragma once
+/// case.json -> typed structs in internal units (design section 4). Every wrong key or value is
+/// collected before one Error tells them all, each with file, key, value, expectation and remedy.
+/// The keys, their ranges and defaults are also in schemas/case.schema.json, for editors.
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "pipeline/files/json_reader.h"
+#include "plan/candidates.h"
+#include "plan/ranking.h"
+#include "plan/robustness.h"
+#include "preprocess/surface/surface.h"
+#include "preprocess/wall/wall.h"
+
+namespace wireplan::pipeline {
+
+/// An input has its path twice: resolved, and as the case file gives it, which names no folder of
+/// this machine and so may stand in a report.
+struct VolumeInput {
+  std::filesystem::path path;
+  std::string given;
+};
+
+struct SurfaceInput {
+  std::filesystem::path path;
+  std::string given;
+  std::string unit;   // "mm", "cm", "m"
+  std::string frame;  // "LPS", "RAS"
+};
+
+/// Mirrors preprocess::SegmentOptions, which exists only where imaging is built.
+struct SegmentationInput {
+  std::optional<double> lower_hu, upper_hu;  // both or none: chosen from the volume
+  std::vector<Vec3> seeds;                   // besides the access point; may be empty     [mm]
+  std::optional<double> smoothing_mm, neck_opening_mm;  // chosen with the band, else 0
+};
+
+/// The vessel's wall. A rigid one has the other values too: the wall's files are made of them.
+struct WallInput {
+  bool elastic = true;
+  preprocess::WallOptions extrusion;  // young_modulus 0: chosen by the wall stage
+};
+
+/// When scripts of pushes, pulls and turns are searched.
+/// When needed: no straight push reaches, or none that does holds under disturbances.
+enum class Manoeuvring { kNever, kWhenNeeded, kAlways };
+
+struct Case {
+  std::filesystem::path file;  // the case file itself
+  std::string name;
+  std::optional<VolumeInput> volume;  // exactly one of volume and surface_input is given
+  std::optional<SurfaceInput> surface_input;
+  SegmentationInput segmentation;  // of a volume
+  preprocess::SurfaceOptions surface;
+  WallInput wall;
+  /// Its tangent is found later, from the centerline. insertion.length 0: chosen from the path's
+  /// length by the trials stage, 1.25 times it and 20 mm more.
+  plan::Study study;
+  Manoeuvring manoeuvres = Manoeuvring::kWhenNeeded;
+  plan::Limits limits;
+  plan::Weights weights;
+  /// unknowns.lumen 0: chosen by the report stage, half a voxel of a volume, 0.25 mm of a surface.
+  plan::RobustnessOptions robustness;
+  bool exhaustive = false;  // all candidates are run in full, none is only scouted
+};
+
+/// Reads CASE (a file, or a folder with a case.json), applies `overrides` ("wall.thickness_mm=2":
+/// the value is JSON, and else text), defaults and units. Throws Error with all problems at once.
+Case read_case(const std::filesystem::path& path, const std::vector<std::string>& overrides = {});
+
+/// Every parameter after defaults, under the keys of the case file; catalogue wires written out.
+Json case_parameters(const Case& input);
+
+/// A path of a case or scene file: ${WIREPLAN_DATA} is the environment's, and else ../shared/data
+/// beside the checkout; what is relative counts from `folder`.
+std::filesystem::path resolve_path(const std::string& given, const std::filesystem::path& folder);
+
+/// Reads {"path", "unit", "frame"} and checks that the file is there; unit and frame may be left
+/// out for VTP alone, which is ours and in mm LPS. Leaves other keys to the caller.
+SurfaceInput read_surface_input(JsonReader& reader, const std::filesystem::path& folder);
+
+/// Adds a problem where the key is given: a part of the design that this version does not have.
+void refuse(JsonReader& reader, const std::string& key, const std::string& what);
+
+/// Reads {"model", "thickness_mm", "young_modulus_kpa", "poisson_ratio"} of the wall; `model` is
+/// "elastic" or "rigid" and stands where the file gives none.
+WallInput read_wall(JsonReader& reader, const std::string& model);
+
+/// Reads a coefficient of friction between wire and wall.
+double read_friction(JsonReader& reader, double fallback);
+
+}  // namespace wireplan::pipeline

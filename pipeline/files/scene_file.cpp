@@ -1,0 +1,654 @@
+#include "pipeline/files/scene_file.h"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+
+namespace wireplan::pipeline {
+namespace {
+
+constexpr const char* kSceneSchema = "wireplan.scene/1";
+constexpr const char* kResultSchema = "wireplan.result/1";
+constexpr Range kAboveZero{.min = 0.0, .open_min = true};
+constexpr Range kFromZero{.min = 0.0};
+
+// ---- reading ----------------------------------------------------------------------------------
+
+/// A stiffness given as such or as the paper's coefficient, whose value depends on the edge length.
+struct StiffnessKeys {
+  const char* value;
+  const char* coefficient;
+};
+constexpr StiffnessKeys kBend{"bending_stiffness_n_mm2", "bend_coefficient_n_per_m"};
+constexpr StiffnessKeys kStretch{"axial_stiffness_n", "stretch_coefficient_n_per_m3"};
+
+/// Tells where both forms are given, or a required one in neither; true if there is one to read.
+bool check_one_form(JsonReader& reader, const StiffnessKeys& keys, bool required) {
+  const bool has_value = reader.has(keys.value), has_coefficient = reader.has(keys.coefficient);
+  if (has_value && has_coefficient) {
+    reader.problems().add(reader.path_of(keys.coefficient), "given twice",
+                          std::string("one of it and ") + keys.value);
+  } else if (required && !has_value && !has_coefficient) {
+    reader.problems().add(reader.path_of(keys.value), "missing",
+                          std::string("a number above 0, or ") + keys.coefficient);
+  }
+  return has_value != has_coefficient;
+}
+
+/// The section, with the paper's coefficients left to convert once the wire's length is known.
+struct SectionInput {
+  simulate::Section section;
+  double radius = 0.0;               // [mm]
+  double bend_coefficient = 0.0;     // k_b; 0 where EI is given                          [N/m]
+  double stretch_coefficient = 0.0;  // k_s; 0 where EA is given                          [N/m^3]
+  double element_length = 0.0;       // 0: as the wire's number of elements gives         [mm]
+};
+
+/// A strip has no stiffnesses of a round rod to fall back on.
+void check_strip(JsonReader& reader, const SectionInput& input) {
+  const auto refuse_default = [&](const char* key, double value) {
+    if (value > 0.0) return;
+    reader.problems().add(reader.path_of(key), reader.has(key) ? "0" : "missing",
+                          "a number above 0",
+                          "with bending_stiffness_2_n_mm2 the wire is a strip, and there is no "
+                          "solid round rod to take it from");
+  };
+  refuse_default(kStretch.value, input.section.axial_stiffness + input.stretch_coefficient);
+  refuse_default("twist_stiffness_n_mm2", input.section.twist_stiffness);
+}
+
+SectionInput read_section(JsonReader& reader) {
+  SectionInput input;
+  simulate::Section& section = input.section;
+  section.length = reader.number("length_mm", std::nullopt, kAboveZero);
+  if (check_one_form(reader, kBend, true)) {
+    const bool raw = reader.has(kBend.coefficient);
+    (raw ? input.bend_coefficient : section.bending_stiffness) =
+        reader.number(raw ? kBend.coefficient : kBend.value, std::nullopt, kAboveZero);
+  }
+  if (check_one_form(reader, kStretch, false)) {
+    const bool raw = reader.has(kStretch.coefficient);
+    (raw ? input.stretch_coefficient : section.axial_stiffness) =
+        reader.number(raw ? kStretch.coefficient : kStretch.value, std::nullopt, kFromZero);
+  }
+  section.twist_stiffness = reader.number("twist_stiffness_n_mm2", 0.0, kFromZero);
+  if (reader.has("bending_stiffness_2_n_mm2")) {
+    section.bending_stiffness_2 =
+        reader.number("bending_stiffness_2_n_mm2", std::nullopt, kAboveZero);
+    check_strip(reader, input);
+  }
+  section.mass_per_length = reader.number("mass_kg_per_m", 0.0, kFromZero) * kTonnePerMmFromKgPerM;
+  section.rest_curvature =
+      reader.number("rest_curvature_per_mm", 0.0, {.min = 0.0, .max = 2.0}, "given in 1/m?");
+  if (reader.has("element_length_mm")) {
+    input.element_length = reader.number("element_length_mm", std::nullopt, kAboveZero);
+  }
+  input.radius =
+      reader.number("radius_mm", std::nullopt, {.min = 0.001, .max = 10.0}, "given in m?");
+  reader.finish();
+  return input;
+}
+
+/// Of the file, or of the folder where the file is scene.json.
+std::string scene_name(const std::filesystem::path& file) {
+  const std::filesystem::path absolute = std::filesystem::absolute(file).lexically_normal();
+  return file.filename() == "scene.json" ? absolute.parent_path().filename().string()
+                                         : file.stem().string();
+}
+
+constexpr int kMaxElements = 20000;
+
+/// How finely each section is cut. What has no length of its own is as long as `elements` say.
+void read_elements(JsonReader& reader, const std::vector<SectionInput>& sections,
+                   simulate::Scene& scene) {
+  const auto has_length = [](const SectionInput& input) { return input.element_length > 0.0; };
+  const bool all = !sections.empty() && std::all_of(sections.begin(), sections.end(), has_length);
+  if (!all) {
+    scene.elements = reader.integer("elements", std::nullopt, 2, kMaxElements);
+  } else if (reader.has("elements")) {
+    reader.problems().add(reader.path_of("elements"), "given", "no such key",
+                          "every section has an element_length_mm");
+  }
+  if (std::none_of(sections.begin(), sections.end(), has_length)) return;
+  double count = 0.0;
+  for (std::size_t k = 0; k < sections.size(); ++k) {
+    scene.element_length.push_back(sections[k].element_length);
+    count += sections[k].section.length / simulate::edge_length(scene, k);
+  }
+  if (!(count > 1.5 && count < kMaxElements + 0.5)) {
+    reader.problems().add(reader.path_of("sections"), "of " + Json(count).dump() + " elements",
+                          "2 to " + std::to_string(kMaxElements), "change element_length_mm");
+  }
+}
+
+/// The wire and how it is cut and twisted, in an otherwise empty scene.
+simulate::Scene read_wire_of_scene(JsonReader& root) {
+  JsonReader reader = root.object("wire", true);
+  simulate::Scene scene;
+  scene.wire.name = reader.text("name", "wire");
+  const std::string twist = reader.choice("twist", "auto", {"auto", "coupled", "decoupled"});
+  scene.twist = twist == "coupled"     ? simulate::Twist::kCoupled
+                : twist == "decoupled" ? simulate::Twist::kDecoupled
+                                       : simulate::Twist::kAuto;
+  std::vector<SectionInput> sections;
+  for (JsonReader& section : reader.objects("sections", true)) {
+    sections.push_back(read_section(section));
+    scene.wire.sections.push_back(sections.back().section);
+  }
+  read_elements(reader, sections, scene);
+  reader.finish();
+
+  // One wire has one radius here.
+  for (const SectionInput& section : sections) {
+    if (section.radius == sections.front().radius) continue;
+    reader.problems().add("wire.sections", "of several radius_mm", "the same in each",
+                          "a changing radius is not in this version");
+    break;
+  }
+  if (!sections.empty()) scene.wire.radius = sections.front().radius;
+
+  // The paper's coefficients are those of edges of one length.
+  for (std::size_t k = 0; k < sections.size(); ++k) {
+    simulate::Section& section = scene.wire.sections[k];
+    const double l = simulate::edge_length(scene, k);
+    if (sections[k].bend_coefficient > 0.0) {
+      section.bending_stiffness = bending_stiffness_from_paper(sections[k].bend_coefficient, l);
+    }
+    if (sections[k].stretch_coefficient > 0.0) {
+      section.axial_stiffness = axial_stiffness_from_paper(sections[k].stretch_coefficient, l);
+    }
+  }
+  if (scene.twist == simulate::Twist::kDecoupled &&
+      !(scene.wire.straight() && scene.wire.round())) {
+    root.problems().add("wire.twist", "\"decoupled\"", "\"coupled\" or \"auto\"",
+                        "a wire with rest_curvature_per_mm or bending_stiffness_2_n_mm2 bends and "
+                        "twists together");
+  }
+  return scene;
+}
+
+simulate::Support read_support(JsonReader& reader) {
+  using simulate::SupportKind;
+  simulate::Support support;
+  support.at = reader.choice("at", std::nullopt, {"proximal", "distal"}) == "proximal"
+                   ? simulate::WireEnd::kProximal
+                   : simulate::WireEnd::kDistal;
+  const std::string kind = reader.choice("kind", std::nullopt, {"clamped", "pinned", "guided"});
+  support.kind = kind == "clamped"  ? SupportKind::kClamped
+                 : kind == "pinned" ? SupportKind::kPinned
+                                    : SupportKind::kGuided;
+  support.point = reader.point("point_mm", std::nullopt);
+  support.direction = reader.direction("direction", Vec3(Vec3::UnitX()));
+  support.roll = reader.number("roll_deg", 0.0, {.min = -36000.0, .max = 36000.0}) * kRadPerDeg;
+  reader.finish();
+  return support;
+}
+
+/// The supports must hold the wire against rigid motion, or it has no equilibrium.
+void check_supports(const std::vector<simulate::Support>& supports, Problems& problems) {
+  using simulate::SupportKind;
+  int proximal = 0, clamped = 0, pinned = 0;
+  for (const simulate::Support& support : supports) {
+    proximal += support.at == simulate::WireEnd::kProximal;
+    clamped += support.kind == SupportKind::kClamped;
+    pinned += support.kind == SupportKind::kPinned;
+  }
+  const int count = static_cast<int>(supports.size());
+  if (count > 2 || (count == 2 && proximal != 1)) {
+    problems.add("supports", "several at one end", "one at an end");
+  } else if (proximal != 1) {
+    problems.add("supports", "without one at the proximal end", "one there",
+                 "the wire starts straight from it");
+  } else if (clamped == 0 && !(count == 2 && pinned > 0)) {
+    problems.add("supports", "not enough to hold the wire",
+                 "one clamped end, or a pinned end and a support at the other");
+  }
+}
+
+simulate::Loads read_loads(JsonReader& root) {
+  JsonReader reader = root.object("loads", false);
+  simulate::Loads loads;
+  loads.gravity = reader.point("gravity_m_per_s2", Vec3(Vec3::Zero())) * kMmPerM;
+  loads.tip_force = reader.point("tip_force_n", Vec3(Vec3::Zero()));
+  loads.tip_moment = reader.point("tip_moment_n_mm", Vec3(Vec3::Zero()));
+  loads.tip_torque = reader.number("tip_torque_n_mm", 0.0, {});
+  reader.finish();
+  return loads;
+}
+
+simulate::SolverOptions read_solver(JsonReader& root) {
+  using simulate::Method;
+  JsonReader reader = root.object("solver", false);
+  simulate::SolverOptions options;
+  const std::string method = reader.choice(
+      "method", "newton", {"newton", "conjugate_gradient", "explicit", "semi_implicit"});
+  options.method = method == "conjugate_gradient" ? Method::kConjugateGradient
+                   : method == "explicit"         ? Method::kExplicitEuler
+                   : method == "semi_implicit"    ? Method::kSemiImplicitEuler
+                                                  : Method::kNewton;
+  options.residual_tolerance =
+      reader.number("residual_tolerance_n", options.residual_tolerance, {.min = 1e-14, .max = 1.0});
+  options.max_iterations = reader.integer("max_iterations", options.max_iterations, 1, 10000000);
+  options.load_steps = reader.integer("load_steps", options.load_steps, 1, 100000);
+  options.time_step = reader.number("time_step_s", options.time_step, kAboveZero);
+  options.duration = reader.number("duration_s", options.duration, kAboveZero);
+  options.damping = reader.number("damping_per_s", options.damping, kFromZero);
+
+  // Keys of other methods.
+  const auto refuse_key = [&](const char* key, const std::string& why) {
+    if (!reader.has(key)) return;
+    reader.problems().add(reader.path_of(key), "given", "no such key with this method", why);
+  };
+  if (options.method == Method::kNewton) {
+    const std::string why = "newton takes no time steps; choose another solver.method";
+    refuse_key("time_step_s", why);
+    refuse_key("duration_s", why);
+    refuse_key("damping_per_s", why);
+  } else if (options.load_steps != 1) {
+    refuse_key("load_steps", "loads act in full from the first time step");
+  }
+  if (options.method == Method::kConjugateGradient) {
+    refuse_key("damping_per_s", "its viscosity is the time step");
+  }
+  if (options.method != Method::kNewton && options.duration > 1e9 * options.time_step) {
+    reader.problems().add(reader.path_of("duration_s"), Json(options.duration).dump(),
+                          "at most 1e9 time steps, " + Json(1e9 * options.time_step).dump() + " s");
+  }
+  reader.finish();
+  return options;
+}
+
+/// Loads that the wire, its supports and its twist can carry.
+void check_loads(const simulate::Scene& scene, Problems& problems) {
+  const auto massless = [](const simulate::Section& s) { return s.mass_per_length == 0.0; };
+  const std::vector<simulate::Section>& sections = scene.wire.sections;
+  if (!scene.loads.gravity.isZero(0.0) && std::all_of(sections.begin(), sections.end(), massless)) {
+    problems.add("loads.gravity_m_per_s2", "not 0", "a wire with a mass",
+                 "give mass_kg_per_m in wire.sections");
+  }
+  const simulate::Support *proximal = nullptr, *distal = nullptr;
+  for (const simulate::Support& support : scene.supports) {
+    (support.at == simulate::WireEnd::kProximal ? proximal : distal) = &support;
+  }
+  const auto directed = [](const simulate::Support* support) {
+    return support != nullptr && support->kind != simulate::SupportKind::kPinned;
+  };
+  const Vec3& moment = scene.loads.tip_moment;
+  if (scene.wire.straight() && moment.cross(proximal->direction).norm() <= 1e-9 * moment.norm() &&
+      !moment.isZero(0.0)) {
+    problems.add("loads.tip_moment_n_mm", "along the wire", "an axis across it",
+                 "for torsion turn the roll_deg of a support, or give tip_torque_n_mm and "
+                 "\"twist\": \"decoupled\"");
+  }
+  const bool decoupled = scene.twist == simulate::Twist::kDecoupled;
+  if (scene.loads.tip_torque != 0.0 && !decoupled) {
+    problems.add("loads.tip_torque_n_mm", Json(scene.loads.tip_torque).dump(), "0",
+                 "it needs \"decoupled\" in wire.twist; or turn the roll_deg of a support");
+  } else if (scene.loads.tip_torque != 0.0 && directed(distal)) {
+    problems.add("loads.tip_torque_n_mm", Json(scene.loads.tip_torque).dump(), "0",
+                 "the distal support holds the roll already");
+  }
+  if (decoupled && !directed(proximal)) {
+    problems.add("wire.twist", "\"decoupled\"", "a clamped or guided proximal end",
+                 "a pinned one does not hold the roll that the chain starts from");
+  }
+
+  // A table that the ends lie on.
+  if (!scene.plane) return;
+  for (const simulate::Support& support : scene.supports) {
+    const bool out = std::abs(scene.plane->dot(support.point - proximal->point)) > 1e-6 ||
+                     (directed(&support) && std::abs(scene.plane->dot(support.direction)) > 1e-6);
+    if (!out) continue;
+    problems.add("plane_normal", to_json(*scene.plane).dump(), "a plane that the supports lie in",
+                 "give a normal square to their directions and to the line between their points");
+    break;
+  }
+}
+
+/// What methods other than Newton's cannot do.
+void check_method(const simulate::Scene& scene, Problems& problems) {
+  using simulate::Method;
+  const Method method = scene.solver.method;
+  if (method == Method::kNewton) return;
+  const std::string remedy = "with this solver.method; choose newton";
+  if (scene.twist == simulate::Twist::kCoupled) {
+    problems.add("wire.twist", "\"coupled\"", "\"auto\" or \"decoupled\"", remedy);
+  }
+  if (!scene.wire.straight()) {
+    problems.add("wire.sections", "with rest_curvature_per_mm", "a wire straight at rest", remedy);
+  }
+  if (!scene.wire.round()) {
+    problems.add("wire.sections", "with bending_stiffness_2_n_mm2", "a wire as stiff all ways",
+                 remedy);
+  }
+  if (!scene.loads.tip_moment.isZero(0.0)) {
+    problems.add("loads.tip_moment_n_mm", to_json(scene.loads.tip_moment).dump(), "[0, 0, 0]",
+                 remedy);
+  }
+  if (scene.plane) problems.add("plane_normal", "given", "no such key", remedy);
+  if (method == Method::kConjugateGradient) return;
+  for (std::size_t k = 0; k < scene.wire.sections.size(); ++k) {
+    if (scene.wire.sections[k].mass_per_length > 0.0) continue;
+    problems.add("wire.sections[" + std::to_string(k) + "].mass_kg_per_m", "0", "a number above 0",
+                 "the Euler schemes move masses");
+  }
+}
+
+/// Where the wire lies in a vessel.
+void add_vessel(const SceneVessel& vessel, simulate::Scene& scene, Problems& problems) {
+  scene.contact.friction = vessel.friction;
+  scene.contact.spacing = vessel.contact_spacing;
+  if (scene.solver.method != simulate::Method::kNewton) {
+    problems.add("solver.method", "not \"newton\"", "\"newton\"",
+                 "the paper's own methods know no vessel in this version");
+  }
+  if (scene.twist == simulate::Twist::kDecoupled) {
+    problems.add("wire.twist", "\"decoupled\"", "\"coupled\" or \"auto\"",
+                 "beside a vessel the paper's chain is not in this version");
+  }
+}
+
+simulate::Scene read_bench(JsonReader& root, simulate::Scene scene,
+                           const std::optional<SceneVessel>& vessel) {
+  for (JsonReader& support : root.objects("supports", true)) {
+    scene.supports.push_back(read_support(support));
+  }
+  if (root.problems().empty()) check_supports(scene.supports, root.problems());
+  scene.loads = read_loads(root);
+  if (root.has("plane_normal")) scene.plane = root.direction("plane_normal", std::nullopt);
+  scene.solver = read_solver(root);
+  if (vessel) add_vessel(*vessel, scene, root.problems());
+  if (root.problems().empty()) {
+    check_loads(scene, root.problems());
+    check_method(scene, root.problems());
+  }
+  return scene;
+}
+
+SceneVessel read_vessel(JsonReader& root, const std::filesystem::path& folder) {
+  SceneVessel vessel;
+  JsonReader reader = root.object("vessel", true);
+  JsonReader surface = reader.object("surface", true);
+  vessel.surface = read_surface_input(surface, folder);
+  surface.finish();
+  JsonReader wall = reader.object("wall", false);
+  vessel.wall = read_wall(wall, "rigid");
+  wall.finish();
+  vessel.friction = read_friction(reader, vessel.friction);
+  vessel.contact_spacing =
+      reader.number("contact_spacing_mm", vessel.contact_spacing, {.min = 0.01, .max = 20.0});
+  reader.finish();
+  return vessel;
+}
+
+/// The target of a scene, which need not have one.
+simulate::Goal read_goal(JsonReader& root, const simulate::Introducer& introducer) {
+  constexpr double kFarAway = 1e6;  // [mm]
+  simulate::Goal goal{.point = introducer.point - kFarAway * introducer.direction, .radius = 1.0};
+  if (!root.has("target")) return goal;
+  JsonReader target = root.object("target", true);
+  goal.point = target.point("point_mm", std::nullopt);
+  goal.radius = target.number("radius_mm", simulate::Goal().radius, kAboveZero);
+  target.finish();
+  return goal;
+}
+
+InsertionScene read_insertion_scene(JsonReader& root, const simulate::Scene& wire,
+                                    const SceneVessel& vessel) {
+  InsertionScene scene;
+  scene.wire = wire.wire;
+  if (wire.twist != simulate::Twist::kAuto) {
+    root.problems().add("wire.twist", "given", "\"auto\"",
+                        "in a vessel the twist of curved wires is coupled, and that of straight "
+                        "ones has no effect");
+  }
+  refuse(root, "supports", "supports beside the introducer are");
+  refuse(root, "plane_normal", "tables in a vessel are");
+  const simulate::Loads loads = read_loads(root);
+  if (!loads.gravity.isZero(0.0) || !loads.tip_force.isZero(0.0) || !loads.tip_moment.isZero(0.0) ||
+      loads.tip_torque != 0.0) {
+    root.problems().add("loads", root.raw("loads").dump(), "none but 0",
+                        "loads on a wire in a vessel are not in this version");
+  }
+
+  // The introducer and the push.
+  JsonReader insertion = root.object("insertion", true);
+  scene.introducer.point = insertion.point("point_mm", std::nullopt);
+  scene.introducer.direction = insertion.direction("direction", std::nullopt);
+  scene.introducer.roll =
+      insertion.number("roll_deg", 0.0, {.min = -360.0, .max = 360.0}) * kRadPerDeg;
+  scene.options.length = insertion.number("length_mm", std::nullopt, kAboveZero);
+  scene.options.step = insertion.number("step_mm", scene.options.step, kAboveZero);
+  insertion.finish();
+  if (root.problems().empty() && scene.options.length > scene.wire.length()) {
+    root.problems().add("insertion.length_mm", Json(scene.options.length).dump(),
+                        "at most the wire's length, " + Json(scene.wire.length()).dump());
+  }
+
+  // How finely.
+  const simulate::SolverOptions solver = read_solver(root);
+  if (solver.method != simulate::Method::kNewton) {
+    root.problems().add("solver.method", "not \"newton\"", "\"newton\"",
+                        "the paper's own methods work on the bench alone in this version");
+  }
+  scene.options.element_length = wire.wire.length() / wire.elements;
+  scene.options.section_element_length = wire.element_length;
+  scene.options.contact_spacing = vessel.contact_spacing;
+  scene.options.friction = vessel.friction;
+  scene.options.residual_tolerance = solver.residual_tolerance;
+  scene.options.max_iterations = solver.max_iterations;
+  scene.has_target = root.has("target");
+  scene.goal = read_goal(root, scene.introducer);
+  return scene;
+}
+
+// ---- writing ----------------------------------------------------------------------------------
+
+constexpr const char* kNotFinite = "the solver left no finite number here";
+
+/// Adds the value, or null and the reason where it is not finite.
+void put(Json& object, const std::string& key, double value, const char* reason = kNotFinite) {
+  object[key] = std::isfinite(value) ? Json(value) : Json();
+  if (!std::isfinite(value)) object[key + "_reason"] = reason;
+}
+
+/// The same for angles; `reason` tells why there are none.
+void put_angles(Json& object, const std::string& key, const Eigen::VectorXd& angles,
+                const char* reason) {
+  const bool given = angles.size() > 0 && angles.allFinite();
+  object[key] = given ? Json(std::vector<double>(angles.begin(), angles.end())) : Json();
+  if (!given) object[key + "_reason"] = angles.size() == 0 ? reason : kNotFinite;
+}
+
+template <typename Matrix>
+void put_points(Json& object, const std::string& key, const Matrix& points) {
+  object[key] = points.allFinite() ? to_json(points) : Json();
+  if (!points.allFinite()) object[key + "_reason"] = kNotFinite;
+}
+
+Json energy_json(const simulate::SceneResult& result) {
+  Json json = Json::object();
+  put(json, "stretch", result.energy.stretch);
+  put(json, "bend", result.energy.bend);
+  put(json, "twist", result.energy.twist);
+  put(json, "gravity", result.gravity_energy);
+  put(json, "tip_force", result.energy.load - result.gravity_energy - result.moment_energy);
+  put(json, "tip_moment", result.moment_energy);
+  put(json, "contact", result.energy.contact);
+  put(json, "wall", result.energy.wall);
+  put(json, "total", result.energy.total());
+  return json;
+}
+
+Json reaction_json(const simulate::Reaction& reaction) {
+  Json json = {{"at", reaction.at == simulate::WireEnd::kProximal ? "proximal" : "distal"}};
+  put_points(json, "force_n", reaction.force);
+  put_points(json, "moment_n_mm", reaction.moment);
+  return json;
+}
+
+Json contact_json(const simulate::WireContact& contact) {
+  Json json = {{"node", contact.node}, {"part", contact.part}};
+  if (contact.triangle >= 0) {
+    json["triangle"] = contact.triangle;
+  } else {
+    json["triangle"] = nullptr;
+    json["triangle_reason"] = "none lies within reach of the point";
+  }
+  put_points(json, "point_mm", contact.point);
+  put_points(json, "normal_force_n", contact.normal_force);
+  put_points(json, "friction_force_n", contact.friction_force);
+  put(json, "penetration_mm", contact.penetration);
+  put(json, "wall_displacement_mm", contact.wall_displacement);
+  return json;
+}
+
+Json contacts_json(const std::vector<simulate::WireContact>& contacts) {
+  Json rows = Json::array();
+  for (const simulate::WireContact& contact : contacts) rows.push_back(contact_json(contact));
+  return rows;
+}
+
+/// Of an insertion: the sum alone is known.
+Json energy_json(const simulate::Push& push) {
+  Json json = Json::object();
+  for (const char* term : {"stretch", "bend", "twist", "contact", "wall"}) {
+    put(json, term, std::nan(""), "an insertion gives the sum of its terms alone");
+  }
+  put(json, "total", push.stored_energy);
+  return json;
+}
+
+void put_work(Json& json, const simulate::Push& push) {
+  put(json, "push_work_n_mm", push.push_work);
+  put(json, "stored_energy_n_mm", push.stored_energy);
+  put(json, "friction_work_n_mm", push.friction_work);
+  put(json, "energy_released_n_mm", push.push_work - push.stored_energy - push.friction_work);
+}
+
+/// One row per `every_mm` of insertion, and one for the last push.
+Json history_json(const std::vector<simulate::Push>& pushes, double every_mm) {
+  Json rows = Json::array();
+  double next = every_mm, peak = 0.0, peak_tip = 0.0, penetration = 0.0, displacement = 0.0;
+  for (std::size_t i = 0; i < pushes.size(); ++i) {
+    const simulate::Push& push = pushes[i];
+    peak = std::max(peak, push.peak_contact_force);
+    peak_tip = std::max(peak_tip, push.tip_force);
+    penetration = std::max(penetration, push.max_penetration);
+    displacement = std::max(displacement, push.wall_displacement);
+    if (push.insertion < next && i + 1 < pushes.size()) continue;
+    Json row;
+    put(row, "insertion_mm", push.insertion);
+    put(row, "push_force_n", push.push_force);
+    put_points(row, "tip_mm", push.tip);
+    put(row, "peak_tip_force_n", peak_tip);
+    put(row, "peak_contact_force_n", peak);
+    put(row, "total_contact_force_n", push.total_contact_force);
+    put(row, "friction_force_n", push.friction_force);
+    put(row, "max_penetration_mm", penetration);
+    put(row, "wall_displacement_mm", displacement);
+    put_work(row, push);
+    put(row, "residual_n", push.residual);
+    row["iterations"] = push.iterations;
+    rows.push_back(row);
+    peak = peak_tip = penetration = displacement = 0.0;
+    while (next <= push.insertion) next += every_mm;
+  }
+  return rows;
+}
+
+}  // namespace
+
+double axial_stiffness_from_paper(double stretch_coefficient, double edge_length) {
+  const double h = edge_length / kMmPerM;  // [m]
+  return 2.0 * stretch_coefficient * h * h * h;
+}
+
+double bending_stiffness_from_paper(double bend_coefficient, double edge_length) {
+  const double h = edge_length / kMmPerM;                   // [m]
+  return bend_coefficient * h * h * h * kMmPerM * kMmPerM;  // N m^2 -> N mm^2
+}
+
+SceneFile read_scene(const std::filesystem::path& path) {
+  SceneFile scene;
+  scene.file = path;
+  scene.name = scene_name(path);
+  const Json file = read_json(path, kSceneSchema);
+  Problems problems(path.string());
+  JsonReader root(file, "", problems);
+  root.text("schema", std::nullopt);
+  const simulate::Scene wire = read_wire_of_scene(root);
+  JsonReader output = root.object("output", false);
+  const double every = output.number("every_mm", simulate::InsertionOptions().record_every,
+                                     {.min = 0.001, .max = 1e4});
+  output.finish();
+
+  // An insertion has a vessel; a bench may have one.
+  const bool inserted = root.has("insertion");
+  if (inserted || root.has("vessel")) scene.vessel = read_vessel(root, path.parent_path());
+  if (inserted) {
+    scene.insertion = read_insertion_scene(root, wire, *scene.vessel);
+    scene.insertion->options.record_every = every;
+  } else {
+    scene.bench = read_bench(root, wire, scene.vessel);
+  }
+  root.finish();
+  problems.throw_if_any();
+  return scene;
+}
+
+Json result_json(const simulate::SceneResult& result,
+                 const std::vector<simulate::WireContact>& contacts) {
+  Json json = {{"schema", kResultSchema}, {"outcome", simulate::outcome_name(result.outcome)}};
+  if (!result.reason.empty()) json["reason"] = result.reason;
+  json["terms"] = result.terms;
+  put_points(json, "nodes_mm", result.nodes);
+  put_angles(json, "twist_rad", result.twist,
+             "the wire is straight at rest, so no twist was solved for");
+  put_angles(json, "roll_rad", result.roll, "only decoupled twist gives it");
+  json["energy_n_mm"] = energy_json(result);
+  put(json, "residual_n", result.residual);
+  json["iterations"] = result.iterations;
+  json["steps"] = result.steps;
+  put(json, "simulated_time_s", result.time);
+  put(json, "critical_time_step_s", result.critical_time_step,
+      "the method is stable at any time step");
+  put(json, "worst_energy_rise_n_mm", result.worst_energy_rise);
+  put(json, "cpu_time_s", result.cpu_time_s);
+  json["reactions"] = Json::array();
+  for (const simulate::Reaction& reaction : result.reactions) {
+    json["reactions"].push_back(reaction_json(reaction));
+  }
+  json["contacts"] = contacts_json(contacts);
+  put(json, "friction_work_n_mm", result.friction_work);
+  return json;
+}
+
+Json result_json(const simulate::TrialResult& result, double every_mm, double cpu_time_s) {
+  Json json = {{"schema", kResultSchema}, {"outcome", simulate::outcome_name(result.outcome)}};
+  if (!result.reason.empty()) json["reason"] = result.reason;
+  json["terms"] = result.terms;
+  put_points(json, "nodes_mm", result.nodes);
+  long iterations = 0;
+  double residual = 0.0, penetration = 0.0, displacement = 0.0;
+  for (const simulate::Push& push : result.pushes) {
+    iterations += push.iterations;
+    residual = std::max(residual, push.residual);
+    penetration = std::max(penetration, push.max_penetration);
+    displacement = std::max(displacement, push.wall_displacement);
+  }
+  const simulate::Push last = result.pushes.empty() ? simulate::Push() : result.pushes.back();
+  json["energy_n_mm"] = energy_json(last);
+  put_work(json, last);
+  put(json, "residual_n", residual);
+  json["iterations"] = iterations;
+  json["steps"] = result.pushes.size();
+  put(json, "cpu_time_s", cpu_time_s);
+  json["contacts"] = contacts_json(result.contacts);
+  put(json, "max_penetration_mm", penetration);
+  put(json, "max_wall_displacement_mm", displacement);
+  json["history"] = history_json(result.pushes, every_mm);
+  return json;
+}
+
+}  // namespace wireplan::pipeline

@@ -1,0 +1,59 @@
+#pragma once
+/// SCENE.json -> one wire on the laboratory bench, with or without a vessel round it, or one
+/// insertion into a vessel (design section 5), and its result.json. What the design has and this
+/// version not is refused by name.
+#include <filesystem>
+#include <optional>
+#include <string>
+
+#include "pipeline/files/case_file.h"
+#include "pipeline/files/json_reader.h"
+#include "simulate/insertion/scene.h"
+#include "simulate/insertion/trial.h"
+
+namespace wireplan::pipeline {
+
+/// The vessel of a scene; what the scene does not give of it is not there: rigid, without friction.
+struct SceneVessel {
+  SurfaceInput surface;
+  WallInput wall;
+  double friction = 0.0;
+  double contact_spacing = 1.0;  // [mm]
+};
+
+/// A wire pushed into a vessel: what run_trial asks for.
+struct InsertionScene {
+  simulate::Wire wire;
+  simulate::Introducer introducer;
+  simulate::Goal goal;  // where the scene gives none: one so far away that no tip reaches it
+  bool has_target = false;
+  simulate::InsertionOptions options;  // edges as long as the wire's elements
+};
+
+/// Exactly one of bench and insertion is there, the latter with a vessel.
+struct SceneFile {
+  std::filesystem::path file;
+  std::string name;  // of the file without its ending, of the folder if it is scene.json
+  std::optional<SceneVessel> vessel;
+  std::optional<simulate::Scene> bench;  // its vessel is not set
+  std::optional<InsertionScene> insertion;
+};
+
+/// Reads, checks and converts to internal units. Throws Error with all problems at once.
+SceneFile read_scene(const std::filesystem::path& path);
+
+/// EA [N] from the paper's k_s [N/m^3] and EI [N mm^2] from its k_b [N/m], for edges of
+/// `edge_length` h [mm]: k_s = EA / (2 h^3) and k_b = EI / h^3 with h in m.
+double axial_stiffness_from_paper(double stretch_coefficient, double edge_length);
+double bending_stiffness_from_paper(double bend_coefficient, double edge_length);
+
+/// result.json, "wireplan.result/1". A number that is not finite becomes null with the reason
+/// beside it, under "KEY_reason". `contacts` are those of a wire in a vessel.
+Json result_json(const simulate::SceneResult& result,
+                 const std::vector<simulate::WireContact>& contacts);
+
+/// The same for an insertion, which took `cpu_time_s`; `every_mm` spaces the rows of its history,
+/// whose forces are the largest since the row before.
+Json result_json(const simulate::TrialResult& result, double every_mm, double cpu_time_s);
+
+}  // namespace wireplan::pipeline

@@ -1,0 +1,238 @@
+#include "pipeline/files/trial_file.h"
+
+#include <array>
+#include <cmath>
+#include <fstream>
+#include <sstream>
+#include <utility>
+
+#include "pipeline/files/json_reader.h"
+#include "pipeline/files/text.h"
+#include "preprocess/files/vessel_io.h"
+
+namespace wireplan::pipeline {
+namespace {
+
+using simulate::Outcome;
+using simulate::Push;
+using simulate::TrialResult;
+using simulate::TriangleForce;
+using simulate::WireContact;
+
+constexpr const char* kSchema = "wireplan.trial/3";
+
+constexpr std::array kOutcomes = {
+    Outcome::kReached,     Outcome::kMissed,    Outcome::kStuck,        Outcome::kProlapsed,
+    Outcome::kLeftOpening, Outcome::kLeftLumen, Outcome::kNotConverged, Outcome::kFailed};
+
+// The numbers of a push, each a column of the file.
+constexpr std::array<std::pair<const char*, double Push::*>, 15> kColumns = {{
+    {"hub_angle_rad", &Push::hub_angle},
+    {"hub_torque_n_mm", &Push::hub_torque},
+    {"insertion_mm", &Push::insertion},
+    {"push_force_n", &Push::push_force},
+    {"tip_force_n", &Push::tip_force},
+    {"peak_contact_force_n", &Push::peak_contact_force},
+    {"total_contact_force_n", &Push::total_contact_force},
+    {"friction_force_n", &Push::friction_force},
+    {"max_penetration_mm", &Push::max_penetration},
+    {"wall_displacement_mm", &Push::wall_displacement},
+    {"peak_curvature_per_mm", &Push::peak_curvature},
+    {"push_work_n_mm", &Push::push_work},
+    {"stored_energy_n_mm", &Push::stored_energy},
+    {"friction_work_n_mm", &Push::friction_work},
+    {"residual_n", &Push::residual},
+}};
+
+// Its points, columns too.
+constexpr std::array<std::pair<const char*, Vec3 Push::*>, 2> kPointColumns = {{
+    {"tip_mm", &Push::tip},
+    {"wall_displacement_point_mm", &Push::wall_displacement_point},
+}};
+
+// A number of a trial that failed may not be finite: null, with the trial's reason beside it.
+double number(const Json& value) { return value.is_null() ? std::nan("") : value.get<double>(); }
+
+Vec3 point(const Json& row) { return {number(row.at(0)), number(row.at(1)), number(row.at(2))}; }
+
+Outcome outcome_of(const std::string& name) {
+  for (const Outcome outcome : kOutcomes) {
+    if (name == simulate::outcome_name(outcome)) return outcome;
+  }
+  throw Error("outcome is " + name + ", expected one that this program knows");
+}
+
+Json pushes_to_json(const std::vector<Push>& pushes) {
+  Json columns;
+  for (const auto& [name, member] : kColumns) {
+    Json column = Json::array();
+    for (const Push& push : pushes) column.push_back(push.*member);
+    columns[name] = std::move(column);
+  }
+  for (const auto& [name, member] : kPointColumns) {
+    Json column = Json::array();
+    for (const Push& push : pushes) column.push_back(to_json(push.*member));
+    columns[name] = std::move(column);
+  }
+  Json iterations = Json::array();
+  for (const Push& push : pushes) iterations.push_back(push.iterations);
+  columns["iterations"] = std::move(iterations);
+  return columns;
+}
+
+std::vector<Push> pushes_from_json(const Json& columns) {
+  std::vector<Push> pushes(columns.at("iterations").size());
+  for (std::size_t k = 0; k < pushes.size(); ++k) {
+    for (const auto& [name, member] : kColumns) pushes[k].*member = number(columns.at(name).at(k));
+    for (const auto& [name, member] : kPointColumns) {
+      pushes[k].*member = point(columns.at(name).at(k));
+    }
+    pushes[k].iterations = columns.at("iterations").at(k);
+  }
+  return pushes;
+}
+
+Json contacts_to_json(const std::vector<WireContact>& contacts) {
+  Json rows = Json::array();
+  for (const WireContact& contact : contacts) {
+    rows.push_back({{"node", contact.node},
+                    {"part", contact.part},
+                    {"triangle", contact.triangle},
+                    {"point_mm", to_json(contact.point)},
+                    {"normal_force_n", to_json(contact.normal_force)},
+                    {"friction_force_n", to_json(contact.friction_force)},
+                    {"penetration_mm", contact.penetration},
+                    {"wall_displacement_mm", contact.wall_displacement}});
+  }
+  return rows;
+}
+
+std::vector<WireContact> contacts_from_json(const Json& rows) {
+  std::vector<WireContact> contacts;
+  for (const Json& row : rows) {
+    contacts.push_back({.node = row.at("node"),
+                        .part = number(row.at("part")),
+                        .triangle = row.at("triangle"),
+                        .point = point(row.at("point_mm")),
+                        .normal_force = point(row.at("normal_force_n")),
+                        .friction_force = point(row.at("friction_force_n")),
+                        .penetration = number(row.at("penetration_mm")),
+                        .wall_displacement = number(row.at("wall_displacement_mm"))});
+  }
+  return contacts;
+}
+
+// Two columns: triangles of surface.vtp and their forces.
+Json peaks_to_json(const std::vector<TriangleForce>& peaks) {
+  Json triangles = Json::array(), forces = Json::array();
+  for (const TriangleForce& peak : peaks) {
+    triangles.push_back(peak.triangle);
+    forces.push_back(peak.force);
+  }
+  return {{"triangle", std::move(triangles)}, {"force_n", std::move(forces)}};
+}
+
+std::vector<TriangleForce> peaks_from_json(const Json& columns) {
+  std::vector<TriangleForce> peaks(columns.at("triangle").size());
+  for (std::size_t k = 0; k < peaks.size(); ++k) {
+    peaks[k] = {columns.at("triangle").at(k), number(columns.at("force_n").at(k))};
+  }
+  return peaks;
+}
+
+// One key of the root per line: compact, and still to be read and compared by eye.
+std::string to_lines(const Json& object) {
+  std::ostringstream stream;
+  const char* separator = "{";
+  for (const auto& [key, value] : object.items()) {
+    stream << separator << "\n" << Json(key) << ": " << value;
+    separator = ",";
+  }
+  stream << "\n}\n";
+  return stream.str();
+}
+
+}  // namespace
+
+std::string trial_file_name(int id) { return format("trials/%04d.json", id); }
+
+std::string trial_text(const plan::Study& study, const plan::Candidate& candidate,
+                       const TrialResult& trial) {
+  Json file;
+  file["schema"] = kSchema;
+  file["wire"] = study.wires[static_cast<std::size_t>(candidate.wire)].name;
+  file["inclination_deg"] = clean(candidate.inclination / kRadPerDeg);
+  file["azimuth_deg"] = clean(candidate.azimuth / kRadPerDeg);
+  file["roll_deg"] = clean(candidate.roll / kRadPerDeg);
+  if (!candidate.moves.empty()) file["moves"] = moves_json(candidate.moves);
+  file["outcome"] = simulate::outcome_name(trial.outcome);
+  file["reason"] = trial.reason;
+  file["terms"] = trial.terms;
+  file["pushes"] = pushes_to_json(trial.pushes);
+  file["nodes_mm"] = to_json(trial.nodes);
+  file["contacts"] = contacts_to_json(trial.contacts);
+  file["peak_forces"] = peaks_to_json(trial.peak_forces);
+  return to_lines(file);
+}
+
+Json moves_json(const std::vector<simulate::Move>& moves) {
+  Json list = Json::array();
+  for (const simulate::Move& move : moves) {
+    if (move.turn != 0.0) {
+      list.push_back({{"turn_deg", clean(move.turn / kRadPerDeg)}});
+    } else {
+      list.push_back({{"push_mm", clean(move.push)}});
+    }
+  }
+  return list;
+}
+
+std::vector<simulate::Move> moves_of(const Json& list) {
+  std::vector<simulate::Move> moves;
+  for (const Json& move : list) {
+    moves.push_back(
+        {.push = move.value("push_mm", 0.0), .turn = move.value("turn_deg", 0.0) * kRadPerDeg});
+  }
+  return moves;
+}
+
+std::optional<TrialResult> find_trial(const std::filesystem::path& path) {
+  std::ifstream stream(path, std::ios::binary);
+  const Json file = Json::parse(stream, nullptr, /*allow_exceptions=*/false);
+  if (!file.is_object() || file.value("schema", "") != kSchema) return {};
+  TrialResult trial;
+  trial.outcome = outcome_of(file.at("outcome"));
+  trial.reason = file.at("reason");
+  trial.terms = file.at("terms").get<std::vector<std::string>>();
+  trial.pushes = pushes_from_json(file.at("pushes"));
+  const Json& nodes = file.at("nodes_mm");
+  trial.nodes.resize(3, static_cast<Eigen::Index>(nodes.size()));
+  for (std::size_t k = 0; k < nodes.size(); ++k) {
+    trial.nodes.col(static_cast<Eigen::Index>(k)) = point(nodes[k]);
+  }
+  trial.contacts = contacts_from_json(file.at("contacts"));
+  trial.peak_forces = peaks_from_json(file.at("peak_forces"));
+  return trial;
+}
+
+TrialResult read_trial_file(const std::filesystem::path& path) {
+  std::optional<TrialResult> trial = find_trial(path);
+  expects(trial.has_value());
+  return std::move(*trial);
+}
+
+void write_shapes(const TrialResult& trial, const std::string& name,
+                  const std::filesystem::path& folder) {
+  std::filesystem::create_directories(folder / name);
+  std::vector<std::filesystem::path> files;
+  std::vector<double> insertions;
+  for (const simulate::Shape& shape : trial.shapes) {
+    const std::vector<double> force(shape.contact_force.begin(), shape.contact_force.end());
+    files.push_back(folder / name / (std::to_string(files.size()) + ".vtp"));
+    insertions.push_back(shape.insertion);
+    preprocess::write_polyline(shape.nodes, {{"contact_force_n", force}}, files.back());
+  }
+  preprocess::write_time_series(files, insertions, folder / (name + ".pvd"));
+}
+
+}  // namespace wireplan::pipeline

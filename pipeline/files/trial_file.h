@@ -1,0 +1,36 @@
+#pragma once
+/// One trial <-> trials/NNNN.json: what was tried, how it ended, every push as columns, the final
+/// shape, its contacts and the largest force on each triangle. The shapes on the way are not kept:
+/// a trial is deterministic and is repeated for the few plans whose pictures are wanted.
+#include <filesystem>
+#include <optional>
+#include <string>
+
+#include "pipeline/files/json_reader.h"
+#include "plan/candidates.h"
+
+namespace wireplan::pipeline {
+
+/// "trials/0007.json"
+std::string trial_file_name(int id);
+
+/// The text of the file. It does not hold the trial's number, so that a trial is the same file in
+/// every case that tries it.
+std::string trial_text(const plan::Study& study, const plan::Candidate& candidate,
+                       const simulate::TrialResult& trial);
+
+/// Reads such a file, bit for bit but for `shapes`, which is empty. Nothing where the
+/// file is absent or cut.
+std::optional<simulate::TrialResult> find_trial(const std::filesystem::path& path);
+simulate::TrialResult read_trial_file(const std::filesystem::path& path);  // expects it to be whole
+
+/// [{"push_mm": 40.0}, {"turn_deg": 90.0}], negative pushes pull; and back.
+Json moves_json(const std::vector<simulate::Move>& moves);
+std::vector<simulate::Move> moves_of(const Json& list);
+
+/// The shapes on the way as FOLDER/NAME/K.vtp, with the contact force at each node, and
+/// FOLDER/NAME.pvd, a time series over the insertion [mm] that ParaView plays.
+void write_shapes(const simulate::TrialResult& trial, const std::string& name,
+                  const std::filesystem::path& folder);
+
+}  // namespace wireplan::pipeline

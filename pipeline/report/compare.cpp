@@ -1,0 +1,169 @@
+#include "pipeline/report/compare.h"
+
+#include <algorithm>
+#include <tuple>
+
+#include "pipeline/files/json_reader.h"
+#include "pipeline/files/text.h"
+#include "pipeline/report/report.h"
+
+namespace wireplan::pipeline {
+namespace {
+
+constexpr std::size_t kPlansListed = 10;
+
+std::string number(const Json& value, const char* pattern) {
+  return value.is_null() ? "-" : format(pattern, value.get<double>());
+}
+
+const Json& parameter(const Json& report, const char* pointer) {
+  return report.at("provenance").at("parameters").at(Json::json_pointer(pointer));
+}
+
+/// Whether a value of the case is the same in all reports.
+bool agree(const std::vector<Json>& reports, const char* pointer) {
+  return std::all_of(reports.begin(), reports.end(), [&](const Json& report) {
+    return parameter(report, pointer) == parameter(reports.front(), pointer);
+  });
+}
+
+bool same_patient(const std::vector<Json>& reports) {
+  const bool one_input = std::all_of(reports.begin(), reports.end(), [&](const Json& report) {
+    return report.at("provenance").at("inputs") == reports.front().at("provenance").at("inputs");
+  });
+  return one_input && agree(reports, "/access/point_mm") && agree(reports, "/target/point_mm");
+}
+
+std::string describe_way(const Json& plan) {
+  return plan.at("wire").get<std::string>() +
+         format(", %g/%g/%g deg", plan.at("inclination_deg").get<double>(),
+                plan.at("azimuth_deg").get<double>(), plan.at("roll_deg").get<double>());
+}
+
+std::vector<std::string> plan_cells(const Json& report, const Json& plan) {
+  const Json& trial = report.at("trials").at(plan.at("trial").get<std::size_t>());
+  return {describe_way(plan),
+          number(plan.at("score"), "%.3f"),
+          number(plan.at("score_error"), "%.3f"),
+          number(plan.at("mean_score"), "%.3f"),
+          number(plan.at("success_rate"), "%.2f"),
+          number(trial.at("peak_contact_force_n"), "%.3f")};
+}
+
+const std::vector<std::string> kPlanHeads = {
+    "inclination/azimuth/roll", "score", "+-", "mean score", "success", "force N"};
+
+std::string list_reports(const std::vector<Json>& reports) {
+  std::vector<std::vector<std::string>> rows = {{"", "case", "plans/trials"}};
+  rows.front().insert(rows.front().end(), kPlanHeads.begin(), kPlanHeads.end());
+  rows.front()[3] = "best plan, " + rows.front()[3];
+  for (std::size_t k = 0; k < reports.size(); ++k) {
+    const Json& ranking = reports[k].at("ranking");
+    std::vector<std::string> row = {
+        format("%zu", k + 1), reports[k].at("name"),
+        format("%zu/%zu", ranking.size(), reports[k].at("trials").size())};
+    if (ranking.empty()) {
+      row.insert(row.end(), {"none reaches", "-", "-", "-", "-", "-"});
+    } else {
+      const std::vector<std::string> cells = plan_cells(reports[k], ranking.front());
+      row.insert(row.end(), cells.begin(), cells.end());
+    }
+    rows.push_back(std::move(row));
+  }
+  return format_table(rows);
+}
+
+/// Wires in the order in which reports name them first.
+std::vector<std::string> list_wires(const std::vector<Json>& reports) {
+  std::vector<std::string> names;
+  for (const Json& report : reports) {
+    for (const Json& wire : report.at("wires")) {
+      const std::string name = wire.at("wire");
+      if (std::find(names.begin(), names.end(), name) == names.end()) names.push_back(name);
+    }
+  }
+  return names;
+}
+
+/// "6/36  0.271  0.12": reached of trials, score of the best plan, median force.
+std::string wire_cell(const Json& report, const std::string& name) {
+  for (const Json& wire : report.at("wires")) {
+    if (wire.at("wire") != name) continue;
+    std::string score = "-";
+    for (const Json& plan : report.at("ranking")) {
+      if (plan.at("trial") == wire.at("best_trial")) score = number(plan.at("score"), "%.3f");
+    }
+    return format("%d/%d  ", wire.at("reached").get<int>(), wire.at("trials").get<int>()) + score +
+           "  " + number(wire.at("median_peak_contact_force_n"), "%.3f");
+  }
+  return "not tried";
+}
+
+std::string list_wire_table(const std::vector<Json>& reports) {
+  std::vector<std::vector<std::string>> rows = {{"wire"}};
+  for (std::size_t k = 0; k < reports.size(); ++k) rows.front().push_back(format("%zu", k + 1));
+  for (const std::string& name : list_wires(reports)) {
+    std::vector<std::string> row = {name};
+    for (const Json& report : reports) row.push_back(wire_cell(report, name));
+    rows.push_back(std::move(row));
+  }
+  return format_table(rows);
+}
+
+std::string list_best_plans(const std::vector<Json>& reports) {
+  struct Place {
+    double score;  // that orders plans within a report
+    std::size_t report, rank;
+  };
+  std::vector<Place> places;
+  for (std::size_t k = 0; k < reports.size(); ++k) {
+    const Json& ranking = reports[k].at("ranking");
+    for (std::size_t r = 0; r < ranking.size(); ++r)
+      places.push_back({ranking[r].at("expected_score"), k, r});
+  }
+  std::sort(places.begin(), places.end(), [](const Place& a, const Place& b) {
+    return std::tie(a.score, a.report, a.rank) < std::tie(b.score, b.report, b.rank);
+  });
+  if (places.size() > kPlansListed) places.resize(kPlansListed);
+
+  std::vector<std::vector<std::string>> rows = {{"", "report"}};
+  rows.front().insert(rows.front().end(), kPlanHeads.begin(), kPlanHeads.end());
+  for (std::size_t k = 0; k < places.size(); ++k) {
+    const Json& report = reports[places[k].report];
+    std::vector<std::string> row = {format("%zu", k + 1), format("%zu", places[k].report + 1)};
+    const std::vector<std::string> cells = plan_cells(report, report.at("ranking")[places[k].rank]);
+    row.insert(row.end(), cells.begin(), cells.end());
+    rows.push_back(std::move(row));
+  }
+  return format_table(rows);
+}
+
+}  // namespace
+
+std::string compare_reports(const std::vector<std::filesystem::path>& files) {
+  expects(files.size() >= 2);
+  std::vector<Json> reports;
+  for (const std::filesystem::path& file : files) reports.push_back(read_json(file, kReportSchema));
+
+  const bool one_patient = same_patient(reports);
+  std::string text = list_reports(reports) +
+                     "\nWires: reached/trials, score of the best plan, median peak force in N\n" +
+                     list_wire_table(reports);
+  if (one_patient) {
+    text += "\nAll reports are of one patient, access and target. Their best plans:\n" +
+            list_best_plans(reports);
+  } else {
+    text += "\nThe reports are of different vessels, accesses or targets.\n";
+  }
+  for (const char* pointer : {"/limits", "/ranking/weights", "/target/radius_mm"}) {
+    if (agree(reports, pointer)) continue;
+    text += std::string("Scores are not comparable: ") + (pointer + 1) + " differs.\n";
+  }
+  for (const char* pointer : {"/robustness", "/friction", "/wall"}) {
+    if (agree(reports, pointer)) continue;
+    text += std::string("Mind that ") + (pointer + 1) + " differs.\n";
+  }
+  return text;
+}
+
+}  // namespace wireplan::pipeline

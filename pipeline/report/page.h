@@ -1,0 +1,68 @@
+#pragma once
+/// report.html: the report as one file for any browser, without network. The template (scripts,
+/// styles, libraries) is made of page/ when wireplan is built; here it is filled with the report
+/// and with what only the page shows: shapes, histories, forces on the wall, slices of the volume.
+/// Outside the one block of timing the page is the same, byte for byte, for the same inputs and
+/// build.
+#include <Eigen/Core>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "pipeline/files/json_reader.h"
+#include "pipeline/report/slices.h"
+#include "preprocess/vessel.h"
+#include "simulate/insertion/trial.h"
+
+namespace wireplan::pipeline {
+
+/// The best so many plans can be played on the page, and the closest attempt of each wire that has
+/// none among them; of other trials it has the final shape.
+inline constexpr std::size_t kPlansPlayed = 20;
+
+/// What the page shows of every trial. Points and forces stand in it with single precision or less.
+struct PageTrial {
+  Vec3 direction = Vec3::UnitZ();    // of the introducer, into the vessel
+  Eigen::Matrix3Xf nodes;            // final shape                                         [mm]
+  Eigen::Matrix<float, 5, -1> push;  // insertion [mm]; push, tip, largest contact and total contact
+                                     // force [N], after each push
+};
+PageTrial page_trial(const simulate::TrialResult& trial, const Vec3& direction);
+
+/// The insertion of one trial, to be played.
+struct PageInsertion {
+  int trial = 0;
+  std::vector<simulate::Shape> shapes;
+  std::vector<simulate::TriangleForce> peak_forces;
+};
+
+struct PageInput {
+  Surface surface;
+  std::vector<double> peak_force;  // of any trial, per triangle                               [N]
+  Centerline path;
+  Vec3 access = Vec3::Zero(), target = Vec3::Zero();  //                                      [mm]
+  double target_radius = 0.0;                         //                                      [mm]
+  std::vector<double> wire_radius;  // in the order of the report's wires                     [mm]
+  std::vector<PageTrial> trials;    // in the order of the report's trials
+  std::vector<PageInsertion> insertions;
+  std::optional<Slices> slices;  // none where the case starts from a surface
+  std::string picture_png;       // the vessel, for browsers without 3D
+};
+
+/// Why this program cannot make pages; empty where it can.
+std::string page_missing();
+
+/// SHA-256 of the template, for keys: another template makes another page.
+std::string page_template_sha256();
+
+/// The page of a report (report.h). Expects page_missing() to be empty.
+std::string build_page(const Json& report, const PageInput& input);
+
+/// A JSON text that can stand inside a script element of HTML: <, >, & and all that is not ASCII
+/// escaped, so that no name ends the element or the script.
+std::string embed_json(const Json& value);
+
+/// Bytes as base64 (RFC 4648, with padding).
+std::string base64(const void* bytes, std::size_t count);
+
+}  // namespace wireplan::pipeline

@@ -1,0 +1,52 @@
+#pragma once
+/// report.json (design section 6): what a run found, as plain JSON with a fixed order of keys.
+/// Outside "timing" it is the same, byte for byte, for the same inputs and build.
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "pipeline/files/json_reader.h"
+#include "plan/ranking.h"
+#include "plan/refine.h"
+#include "preprocess/surface/openings.h"
+
+namespace wireplan::pipeline {
+
+inline constexpr const char* kReportSchema = "wireplan.report/1";
+
+/// The best so many plans are written as files for viewers too.
+inline constexpr std::size_t kPlansShown = 5;
+
+struct ReportInput {
+  std::string name;                      // of the case
+  std::string input_name, input_sha256;  // of the volume or surface: no folder names
+  Json parameters;                       // of the case, after defaults
+  std::vector<std::string> stages;       // that were run or found, in order
+  Json figures;                          // per stage name, what its figures.json holds
+  plan::Study study;                     // as the trials used it
+  std::vector<plan::Candidate> candidates;
+  std::vector<simulate::TrialResult> trials;  // outcome, reason and terms; the rest may be empty
+  std::vector<plan::Metrics> metrics;
+  std::vector<std::string> levels;  // per trial: "scout" or "probe", on a rigid wall, or "full"
+  bool is_scouted(std::size_t trial) const { return levels[trial] != "full"; }
+  plan::Ranking ranking;
+  std::vector<plan::Refinement> refinements;
+  Json robustness;  // of repeats.h
+  Json timing;      // all that differs between equal runs
+};
+
+Json build_report(const ReportInput& input);
+
+/// The vessel's openings as reports and results tell them.
+Json openings_json(const std::vector<preprocess::Opening>& openings);
+
+/// Version, revision, compiler, build type and library versions of this program.
+Json build_info();
+
+/// Reads a report and sees that it has what describe_best tells. Throws Error where it has not.
+Json read_report(const std::filesystem::path& path);
+
+/// The best plan of a report in one line, or why there is none.
+std::string describe_best(const Json& report);
+
+}  // namespace wireplan::pipeline

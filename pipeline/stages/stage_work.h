@@ -1,0 +1,121 @@
+#pragma once
+/// What each stage does with its inputs. The order of the stages, their keys and the cache are in
+/// stages.h.
+#include <filesystem>
+#include <functional>
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "pipeline/files/case_file.h"
+#include "pipeline/files/json_reader.h"
+#include "pipeline/store/store.h"
+#include "preprocess/surface/openings.h"
+#include "preprocess/volume/image.h"
+#include "simulate/wall/vessel_model.h"
+
+namespace wireplan::pipeline {
+
+/// Work was stopped by the user; what was finished is kept.
+class Interrupted : public std::exception {
+ public:
+  const char* what() const noexcept override { return "interrupted; what was finished is kept"; }
+};
+
+/// How a stage speaks to whom started it; each may be empty.
+struct WorkOptions {
+  int threads = 0;                                    // of the trials; 0: all cores
+  std::function<void(int done, int total)> progress;  // trials; from any thread, one at a time
+  std::function<bool()> cancelled;                    // from any thread
+};
+
+/// The artifacts made so far and what was read from them, each once and only when a stage asks.
+class Workspace {
+ public:
+  Workspace(Case given, WorkOptions options, Store store);
+
+  const Case& given() const { return given_; }
+  const WorkOptions& options() const { return options_; }
+  const Store& store() const { return store_; }
+
+  void add(const Artifact& artifact) { artifacts_[artifact.stage] = artifact; }
+  bool has(const std::string& stage) const { return artifacts_.count(stage) != 0; }
+  /// Expects the stage to be done.
+  const Artifact& artifact(const std::string& stage) const;
+  Json figures(const std::string& stage) const;  // its figures.json
+
+  const preprocess::Image& image();
+  void drop_image() { image_.reset(); }
+  const Surface& surface();
+  const Centerline& path();  // access to target
+  const Wall& wall();
+  /// The vessel as the trials feel it: with the wall only where it yields.
+  const simulate::VesselModel& model();
+  /// The same with a wall that does not yield. Both are one object: the use of either ends before
+  /// the other is asked for.
+  const simulate::VesselModel& rigid_model();
+  /// Makes the field of the vessel a piece in the store, unless another process did: for shards, so
+  /// that one of them computes it. rigid_model() takes it from there.
+  void share_field();
+  /// The case's study with what the centerline tells: the tangent at the access, and the insertion
+  /// length where the case leaves it open.
+  const plan::Study& study();
+
+  std::filesystem::path input;  // the volume or surface that the case names
+  std::string input_sha256;
+  std::string input_stamp;  // before it was hashed
+  Json parameters;          // of the case after defaults, without folder names
+  std::string key_text;     // of the stage under way
+
+ private:
+  Case given_;
+  WorkOptions options_;
+  Store store_;
+  std::map<std::string, Artifact> artifacts_;
+  std::optional<preprocess::Image> image_;
+  std::optional<Surface> surface_;
+  std::optional<Centerline> path_;
+  std::optional<Wall> wall_;
+  std::optional<plan::Study> study_;
+  std::unique_ptr<simulate::VesselModel> model_;
+  std::unique_ptr<const simulate::WallCompliance> compliance_aside_;  // while it is the rigid one
+
+  std::string field_key_text() const;
+  bool find_field();  // whether the store has it; model_ then
+};
+
+/// The start of a stage's figures.json, and its end.
+Json figures_of(const std::string& stage);
+void write_figures(const Json& figures, const std::filesystem::path& folder);
+
+/// Each fills `folder` with the artifact of its stage. All but the report write figures.json,
+/// numbers for the report with a list of warnings.
+void make_volume(Workspace& work, const std::filesystem::path& folder);
+void make_segment(Workspace& work, const std::filesystem::path& folder);
+void make_surface(Workspace& work, const std::filesystem::path& folder);
+void make_centerline(Workspace& work, const std::filesystem::path& folder);
+void make_wall(Workspace& work, const std::filesystem::path& folder);
+void make_trials(Workspace& work, const std::filesystem::path& folder);
+void make_manoeuvres(Workspace& work, const std::filesystem::path& folder);
+void make_report(Workspace& work, const std::filesystem::path& folder);
+
+/// One of several processes' part of a case's trials. They are run in rounds: the scouts of all
+/// candidates (all in full where none are scouted), then probes and full runs that the rounds
+/// before name.
+struct Share {
+  int shard = 1, shards = 1;  // part `shard` of `shards`, from 1
+  int round = 1;
+};
+struct ShareOutcome {
+  std::string level;            // "scout", "probe" or "full"
+  int round_trials = 0;         // 0: there is no such round
+  int own_trials = 0, run = 0;  // of these in the part; run this time
+};
+
+/// Puts the trials of that part into the store, each a piece, for make_trials() to find; runs those
+/// that are missing. Expects `work` to be ready for make_trials(). Throws `Error` where a round
+/// before is not complete, and Interrupted.
+ShareOutcome run_share(Workspace& work, const Share& share);
+
+}  // namespace wireplan::pipeline

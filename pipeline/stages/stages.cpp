@@ -1,0 +1,266 @@
+#include "pipeline/stages/stages.h"
+
+#include <algorithm>
+#include <chrono>
+#include <initializer_list>
+#include <utility>
+
+#include "pipeline/report/report.h"
+#include "pipeline/store/hash.h"
+#include "plan/search.h"
+
+namespace wireplan::pipeline {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr const char* kNotMade = "to be made";  // in the place of contents not yet known
+
+double seconds_since(std::chrono::steady_clock::time_point start) {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+}
+
+// One line per value: objects and lists of objects are walked, lists of numbers stay whole.
+void add_parameter(const std::string& name, const Json& value, std::vector<KeyLine>& lines) {
+  const bool objects = value.is_array() && !value.empty() && value.front().is_object();
+  if (value.is_object()) {
+    for (const auto& [key, part] : value.items()) {
+      add_parameter(name.empty() ? key : name + "." + key, part, lines);
+    }
+  } else if (objects) {
+    for (std::size_t k = 0; k < value.size(); ++k) {
+      add_parameter(name + "[" + std::to_string(k) + "]", value[k], lines);
+    }
+  } else {
+    lines.push_back({"parameter " + name, value.dump()});
+  }
+}
+
+// "/wall/thickness_mm" -> "wall.thickness_mm"
+std::string dotted(const std::string& pointer) {
+  std::string name = pointer.substr(pointer.empty() ? 0 : 1);
+  std::replace(name.begin(), name.end(), '/', '.');
+  return name;
+}
+
+std::string stage_key_text(const Stage& stage, const Workspace& work) {
+  std::vector<KeyLine> lines = {{"stage", stage.name}, {"version", std::to_string(stage.version)}};
+  if (stage.reads_input) lines.push_back({"input file", work.input_sha256});
+  for (const std::string& earlier : stage.after) {
+    lines.push_back(
+        {"input " + earlier, work.has(earlier) ? work.artifact(earlier).contents() : kNotMade});
+  }
+  for (const std::string& pointer : stage.parameters) {
+    add_parameter(dotted(pointer), work.parameters.at(Json::json_pointer(pointer)), lines);
+  }
+  if (stage.names_program) lines.push_back({"program", build_info().dump()});
+  return key_text(lines);
+}
+
+// What changed since the stage last ran for this case.
+std::vector<std::string> why_it_runs(const Store& store, const Case& given, const Stage& stage,
+                                     const std::string& key_text, bool forced) {
+  if (forced) return {"it is forced"};
+  const std::string before = store.last_key_text(given.file, stage.name);
+  if (before.empty()) return {"it has no earlier result for this case"};
+  std::vector<std::string> reasons = describe_difference(before, key_text);
+  if (reasons.empty()) reasons = {"its result is gone from the cache or damaged"};
+  return reasons;
+}
+
+bool contains(const std::vector<std::string>& names, const std::string& name) {
+  return std::find(names.begin(), names.end(), name) != names.end();
+}
+
+void require_known(const std::vector<Stage>& stages, const std::string& name) {
+  std::string list;
+  for (const Stage& stage : stages) {
+    if (stage.name == name) return;
+    list += (list.empty() ? "" : ", ") + stage.name;
+  }
+  throw Error("stage \"" + name + "\": this case has none of that name, expected one of " + list);
+}
+
+// What a stage says of the world is told with the case and the stage, and where to look.
+std::string in_context(const Workspace& work, const std::string& stage, const std::string& what) {
+  std::string text = work.given().file.string() + ": stage " + stage + ": " + what;
+  if (work.has("surface")) {
+    text += " (the surface: " + (work.artifact("surface").folder / "surface.vtp").string() + ")";
+  }
+  return text;
+}
+
+// Calls what acts for the stage, whose key text it finds in the workspace.
+template <typename Act>
+auto act_for(const Stage& stage, const std::string& key_text, Workspace& work, const Act& act) {
+  work.key_text = key_text;
+  try {
+    return act();
+  } catch (const DiskError& error) {
+    throw DiskError(in_context(work, stage.name, error.what()));
+  } catch (const Error& error) {
+    throw Error(in_context(work, stage.name, error.what()));
+  }
+}
+
+Artifact make_artifact(const Stage& stage, const Store& store, const std::string& key_text,
+                       Workspace& work) {
+  const auto make = [&](const fs::path& folder) {
+    stage.make(work, folder);
+    if (stage.reads_input && input_stamp(work.input) != work.input_stamp) {
+      throw Error(work.input.string() + ": changed while it was read; run again");
+    }
+  };
+  return act_for(stage, key_text, work, [&] { return store.commit(stage.name, key_text, make); });
+}
+
+/// Adds parameters that the stage does not read yet.
+void read_too(Stage& stage, std::initializer_list<const char*> pointers) {
+  for (const char* pointer : pointers) {
+    const auto& known = stage.parameters;
+    if (std::find(known.begin(), known.end(), pointer) == known.end()) {
+      stage.parameters.emplace_back(pointer);
+    }
+  }
+}
+
+}  // namespace
+
+std::vector<Stage> stages_of(const Case& given) {
+  const bool from_volume = given.volume.has_value();
+  std::vector<Stage> stages;
+  if (from_volume) {
+    stages.push_back({.name = "volume", .reads_input = true, .make = make_volume});
+    stages.push_back({.name = "segment",
+                      .version = 2,
+                      .reads_input = true,
+                      .parameters = {"/segmentation", "/access/point_mm", "/target/point_mm"},
+                      .make = make_segment});
+    stages.push_back({.name = "surface",
+                      .version = 5,
+                      .reads_input = true,
+                      .after = {"segment"},
+                      .parameters = {"/surface/edge_length_mm"},
+                      .make = make_surface});
+  } else {
+    stages.push_back({.name = "surface",
+                      .version = 4,
+                      .reads_input = true,
+                      .parameters = {"/surface/unit", "/surface/frame", "/surface/edge_length_mm"},
+                      .make = make_surface});
+  }
+  stages.push_back({.name = "centerline",
+                    .version = 3,
+                    .after = {"surface"},
+                    .parameters = {"/access/point_mm", "/target/point_mm"},
+                    .make = make_centerline});
+  stages.push_back(
+      {.name = "wall",
+       .version = 2,
+       .after = {"surface"},
+       .parameters = {"/wall/thickness_mm", "/wall/young_modulus_kpa", "/wall/poisson_ratio"},
+       .make = make_wall});
+  Stage trials{.name = "trials",
+               .version = 21,
+               .after = {"surface", "centerline"},
+               .parameters = {"/access", "/target", "/wires", "/tip_roll_deg", "/friction",
+                              "/wall/model", "/insertion"},
+               .make = make_trials};
+  if (given.wall.elastic) trials.after.push_back("wall");  // a rigid one does not act
+  if (plan::needs_search(given.study, given.exhaustive)) {
+    read_too(trials, {"/search", "/limits", "/ranking"});
+  }
+  stages.push_back(trials);
+  Stage manoeuvres = trials;
+  manoeuvres.name = "manoeuvres";
+  manoeuvres.version = 16;
+  manoeuvres.after.push_back("trials");
+  read_too(manoeuvres, {"/manoeuvres"});
+  if (given.manoeuvres == Manoeuvring::kWhenNeeded) {
+    // Plans are tried under disturbances; the voxels tell how well the lumen is known.
+    if (from_volume) manoeuvres.after.push_back("volume");
+    read_too(manoeuvres, {"/limits", "/ranking", "/robustness/seed", "/robustness/friction_factor",
+                          "/robustness/wall_factor", "/robustness/angle_deg",
+                          "/robustness/entry_mm", "/robustness/lumen_mm"});
+  }
+  manoeuvres.make = make_manoeuvres;
+  stages.push_back(manoeuvres);
+  Stage report{.name = "report",
+               .version = 15,
+               .reads_input = true,
+               .after = {},
+               .parameters = {""},
+               .names_program = true,
+               .make = make_report};
+  for (const Stage& stage : stages) report.after.push_back(stage.name);
+  stages.push_back(report);
+  return stages;
+}
+
+Json used_parameters(const Case& given) {
+  Json parameters = case_parameters(given);
+  const auto name_only = [](const fs::path& path) { return path.filename().string(); };
+  if (given.volume) parameters["volume"]["path"] = name_only(given.volume->path);
+  if (given.surface_input) parameters["surface"]["path"] = name_only(given.surface_input->path);
+  return parameters;
+}
+
+RunResult run_stages(const Case& given, const RunOptions& options) {
+  return run_stages(given, options, stages_of(given));
+}
+
+RunResult run_stages(const Case& given, const RunOptions& options,
+                     const std::vector<Stage>& stages) {
+  if (!options.to.empty()) require_known(stages, options.to);
+  for (const std::string& name : options.force) require_known(stages, name);
+
+  const Store store(options.cache);
+  RunResult result{.stages = {}, .artifacts = {}, .use = store.use()};
+  Workspace work(given, options.work, store);
+  work.parameters = used_parameters(given);
+  work.input_stamp = input_stamp(work.input);
+  work.input_sha256 = hash_input(work.input);
+  for (const Stage& stage : stages) {
+    if (options.work.cancelled && options.work.cancelled()) throw Interrupted();
+
+    // Look it up.
+    const auto start = std::chrono::steady_clock::now();
+    const std::string text = stage_key_text(stage, work);
+    const bool forced = contains(options.force, stage.name);
+    std::optional<Artifact> artifact;
+    if (!forced) artifact = store.find(stage.name, text);
+    StageOutcome outcome{.stage = stage.name};
+    if (!artifact && options.instead && stage.name == options.to) {
+      act_for(stage, text, work, [&] { options.instead(work); });
+      break;
+    }
+
+    // Run it, unless another process just did; or in a dry run say so.
+    if (!artifact && !options.dry_run) {
+      const std::optional<FileLock> lock = store.lock(stage.name, text, options.work.cancelled);
+      if (!lock) throw Interrupted();
+      if (forced) store.forget(stage.name, text);
+      artifact = store.find(stage.name, text);
+      if (!artifact) {
+        outcome = {stage.name, StageState::kMade, 0.0,
+                   why_it_runs(store, given, stage, text, forced)};
+        artifact = make_artifact(stage, store, text, work);
+      }
+    } else if (!artifact) {
+      outcome = {stage.name, StageState::kWouldRun, 0.0,
+                 why_it_runs(store, given, stage, text, forced)};
+    }
+    if (artifact) {
+      if (!options.dry_run) store.remember(given.file, *artifact);
+      work.add(*artifact);
+      result.artifacts.push_back(*artifact);
+    }
+    outcome.seconds = seconds_since(start);
+    result.stages.push_back(outcome);
+    if (options.on_stage) options.on_stage(outcome);
+    if (stage.name == options.to) break;
+  }
+  return result;
+}
+
+}  // namespace wireplan::pipeline

@@ -1,0 +1,726 @@
+#include "preprocess/centerline/centerline.h"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdio>
+#include <functional>
+#include <limits>
+#include <memory>
+#include <queue>
+#include <utility>
+#include <vector>
+
+#include "preprocess/centerline/nearest_wall.h"
+#include "preprocess/surface/surface.h"
+
+namespace wireplan::preprocess {
+namespace {
+
+using Points = std::vector<Vec3>;
+
+// The search grid starts with about this many nodes in the lumen, within these spacings [mm], and
+// is halved where the lumen is too thin for it. That of the tree, which is not, starts finer.
+constexpr double kNodesWanted = 20e3, kTreeNodesWanted = 80e3;
+constexpr double kCoarsestGrid = 1.0, kFirstGrid = 0.25, kFinestGrid = 0.12;
+constexpr std::size_t kMostNodes = 3'000'000;  // bounds memory (0.25 GB) and time (about 10 s)
+constexpr double kInfinite = std::numeric_limits<double>::infinity();
+constexpr std::size_t kFewPoints = 5;  // fewer have no direction
+constexpr int kRounds = 2;             // of moving to the ridge and smoothing
+// Smoothing along the line, as part of the inscribed radius. It shortens the radius r of a bend by
+// sigma^2/(2r): in a bend as sharp as r = 3 R, by 0.24 % of R.
+constexpr double kSmoothing = 0.12;
+
+// ---------------------------------------------------------------------------------- the wall
+
+/// From a point near the wall straight away from it, as far as the distance grows and at most to
+/// `depth`: there the ball is large enough to meet the grid.
+Vec3 leave_wall(const NearestWall& wall, Vec3 point, double depth) {
+  Nearest here = wall.find(point);
+  while (here.distance < depth) {
+    const Vec3 next = point + 0.5 * (point - here.foot);
+    const Nearest there = wall.find(next, here);
+    if (there.distance < 1.2 * here.distance) break;  // free growth is by 1.5: near the ridge
+    point = next;
+    here = there;
+  }
+  return point;
+}
+
+// -------------------------------------------------------------------------------- the search
+
+struct Node {
+  Vec3 point = Vec3::Zero();
+  Eigen::Vector3i ijk = Eigen::Vector3i::Zero();  // of a grid point; not used by the two ends
+  Nearest wall;
+  double cost = kInfinite;  // from the start
+  int parent = -1;
+  bool settled = false;
+  bool allowed = true;  // may the path pass here?
+};
+
+/// Cost of a path per length, for inscribed radius r [mm]. The route is the shortest one that is
+/// passable: as length, but twice as dear where r is 1 mm. The line that follows the route is drawn
+/// to the middle.
+enum class Cost { kRoute, kMiddle };
+
+double cost_per_mm(Cost cost, double r) {
+  const double narrow = 1.0 / (r * r);
+  return cost == Cost::kRoute ? 1.0 + narrow : narrow;
+}
+
+/// Cheapest paths on a grid whose points are made, and their wall distance computed, when first
+/// touched. Two points are joined when their inscribed balls overlap: then no wall is between them,
+/// and so all that is reached lies in the same lumen as the start, without any inside test.
+class GridSearch {
+ public:
+  GridSearch(const NearestWall& wall, const Surface& surface, double spacing, const Vec3& start,
+             const Vec3& goal)
+      : wall_(wall), spacing_(spacing) {
+    origin_ = surface.vertices.rowwise().minCoeff();
+    const Vec3 extent = surface.vertices.rowwise().maxCoeff() - origin_;
+    size_ = (extent / spacing).array().ceil().cast<int>() + 1;
+    bricks_ = (size_.array() + kBrick - 1) / kBrick;
+    slots_.resize(static_cast<std::size_t>(bricks_.x()) * static_cast<std::size_t>(bricks_.y()) *
+                  static_cast<std::size_t>(bricks_.z()));
+    nodes_.push_back({.point = start, .wall = wall_.find(start)});
+    nodes_.push_back({.point = goal, .wall = wall_.find(goal)});
+  }
+
+  /// True when the goal was reached. A* with the straight way to the goal as bound, which the route
+  /// cannot undercut; for the middle there is no such bound.
+  bool run(Cost kind) {
+    kind_ = kind;
+    for (Node& n : nodes_) {
+      n.cost = kInfinite;
+      n.parent = -1;
+      n.settled = false;
+    }
+    queue_ = {};
+    nodes_[kStart].cost = 0.0;
+    queue_.emplace(0.0, kStart);
+    while (!queue_.empty() && nodes_.size() < kMostNodes) {
+      const int here = queue_.top().second;
+      queue_.pop();
+      if (here == kGoal) return true;
+      if (node(here).settled) continue;
+      nodes_[static_cast<std::size_t>(here)].settled = true;
+      relax(here, kGoal);
+      if (here == kStart) {
+        visit_block(here, (node(here).point - origin_) / spacing_);
+      } else {
+        visit_neighbours(here);
+      }
+    }
+    return false;
+  }
+
+  /// Cheapest ways from the start to all that is connected to it.
+  void run_everywhere(Cost kind) {
+    nodes_[kGoal].allowed = false;
+    run(kind);
+  }
+
+  // The nodes by number, for a look at all of them; 0 is the start, 1 the goal.
+  std::size_t count() const { return nodes_.size(); }
+  const Node& at(std::size_t i) const { return nodes_[i]; }
+  double spacing() const { return spacing_; }
+
+  /// Numbers of the grid's nodes that are made within `reach` of a point.
+  std::vector<int> nodes_near(const Vec3& point, double reach) const {
+    std::vector<int> near;
+    const Vec3 place = (point - origin_) / spacing_;
+    const Eigen::Vector3i low = (place.array() - reach / spacing_).ceil().cast<int>().max(0);
+    const Eigen::Vector3i high =
+        (place.array() + reach / spacing_).floor().cast<int>().min(size_.array() - 1);
+    for (int k = low.z(); k <= high.z(); ++k) {
+      for (int j = low.y(); j <= high.y(); ++j) {
+        for (int i = low.x(); i <= high.x(); ++i) {
+          const int n = made({i, j, k});
+          if (n != kUntouched && (node(n).point - point).norm() <= reach) near.push_back(n);
+        }
+      }
+    }
+    return near;
+  }
+
+  /// From now on paths stay in the vessel round `route`: within 1.5 radii of its middle.
+  void stay_near(const Points& route);
+
+  /// From the goal back to the start.
+  Points path() const {
+    Points points;
+    for (int i = kGoal; i >= 0; i = node(i).parent) points.push_back(node(i).point);
+    return points;
+  }
+
+  /// The place reached nearest to `point`.
+  Vec3 nearest_reached(const Vec3& point) const {
+    double least = kInfinite;
+    Vec3 best = nodes_.front().point;
+    for (const Node& n : nodes_) {
+      const double squared_distance = (n.point - point).squaredNorm();
+      if (!std::isfinite(n.cost) || squared_distance >= least) continue;
+      least = squared_distance;
+      best = n.point;
+    }
+    return best;
+  }
+
+ private:
+  static constexpr int kBrick = 8, kStart = 0, kGoal = 1;
+  static constexpr int kUntouched = -1;
+  // Two balls on either side of a flat wall touch to the last bit: more than that is asked for.
+  static constexpr double kOverlap = 1.0 + 1e-6;
+  using Brick = std::array<int, kBrick * kBrick * kBrick>;
+
+  const Node& node(int i) const { return nodes_[static_cast<std::size_t>(i)]; }
+
+  void visit_neighbours(int here) {
+    const Eigen::Vector3i center = node(here).ijk;
+    for (int k = -1; k <= 1; ++k) {
+      for (int j = -1; j <= 1; ++j) {
+        for (int i = -1; i <= 1; ++i) {
+          if (i != 0 || j != 0 || k != 0) visit(here, center + Eigen::Vector3i(i, j, k));
+        }
+      }
+    }
+  }
+
+  /// The 4 x 4 x 4 grid points round a place that is itself not on the grid.
+  void visit_block(int here, const Vec3& place) {
+    const Eigen::Vector3i corner = place.array().floor().cast<int>() - 1;
+    for (int k = 0; k < 4; ++k) {
+      for (int j = 0; j < 4; ++j) {
+        for (int i = 0; i < 4; ++i) visit(here, corner + Eigen::Vector3i(i, j, k));
+      }
+    }
+  }
+
+  void visit(int here, const Eigen::Vector3i& ijk) {
+    if ((ijk.array() < 0).any() || (ijk.array() >= size_.array()).any()) return;
+    int& there = slot(ijk);
+    if (there == kUntouched) {
+      there = static_cast<int>(nodes_.size());
+      const Vec3 point = origin_ + spacing_ * ijk.cast<double>();
+      nodes_.push_back({.point = point, .ijk = ijk, .wall = wall_.find(point, node(here).wall)});
+    }
+    relax(here, there);
+  }
+
+  void relax(int here, int there) {
+    const Node& a = node(here);
+    Node& b = nodes_[static_cast<std::size_t>(there)];
+    const double length = (a.point - b.point).norm();
+    const double r_a = a.wall.distance, r_b = b.wall.distance;
+    if (!b.allowed || r_a + r_b < kOverlap * length) return;  // the wall may be between them
+    const double cost = a.cost + 0.5 * length * (cost_per_mm(kind_, r_a) + cost_per_mm(kind_, r_b));
+    if (cost >= b.cost) return;
+    b.cost = cost;
+    b.parent = here;
+    const double bound = kind_ == Cost::kRoute ? (b.point - node(kGoal).point).norm() : 0.0;
+    queue_.emplace(cost + bound, there);
+  }
+
+  /// Index into nodes_ of a grid point, or kUntouched.
+  int made(const Eigen::Vector3i& ijk) const {
+    const Eigen::Vector3i brick = ijk / kBrick, in = ijk - kBrick * brick;
+    const std::unique_ptr<Brick>& entries = slots_[brick_number(brick)];
+    return entries
+               ? (*entries)[static_cast<std::size_t>(in.x() + kBrick * (in.y() + kBrick * in.z()))]
+               : kUntouched;
+  }
+
+  std::size_t brick_number(const Eigen::Vector3i& brick) const {
+    return static_cast<std::size_t>(brick.x()) +
+           static_cast<std::size_t>(bricks_.x()) *
+               (static_cast<std::size_t>(brick.y()) +
+                static_cast<std::size_t>(bricks_.y()) * static_cast<std::size_t>(brick.z()));
+  }
+
+  /// Index into nodes_ of a grid point, in bricks that exist where the search has been.
+  int& slot(const Eigen::Vector3i& ijk) {
+    const Eigen::Vector3i brick = ijk / kBrick, in = ijk - kBrick * brick;
+    const std::size_t b = brick_number(brick);
+    if (!slots_[b]) {
+      slots_[b] = std::make_unique<Brick>();
+      slots_[b]->fill(kUntouched);
+    }
+    return (*slots_[b])[static_cast<std::size_t>(in.x() + kBrick * (in.y() + kBrick * in.z()))];
+  }
+
+  // Cheapest first; of equal costs the point that was touched first, so that ties are settled.
+  using Entry = std::pair<double, int>;
+
+  const NearestWall& wall_;
+  double spacing_;
+  Cost kind_ = Cost::kRoute;
+  Vec3 origin_;
+  Eigen::Vector3i size_, bricks_;
+  std::vector<std::unique_ptr<Brick>> slots_;
+  std::vector<Node> nodes_;
+  std::priority_queue<Entry, std::vector<Entry>, std::greater<>> queue_;
+};
+
+void GridSearch::stay_near(const Points& route) {
+  // Balls in the middle of the vessel: the route itself may run along the wall.
+  std::vector<std::pair<Vec3, double>> balls;  // centre, squared radius
+  for (const Vec3& p : route) {
+    const Vec3 center = leave_wall(wall_, p, kInfinite);
+    balls.emplace_back(center, std::pow(1.5 * wall_.find(center).distance, 2));
+  }
+  const auto covered = [&](const Vec3& p) {
+    return std::any_of(balls.begin(), balls.end(), [&](const auto& ball) {
+      return (p - ball.first).squaredNorm() <= ball.second;
+    });
+  };
+  for (Node& n : nodes_) n.allowed = covered(n.point);
+  for (const int end : {kStart, kGoal}) nodes_[static_cast<std::size_t>(end)].allowed = true;
+}
+
+std::string text(const Vec3& p) {
+  std::array<char, 96> buffer{};
+  std::snprintf(buffer.data(), buffer.size(), "(%.1f, %.1f, %.1f)", p.x(), p.y(), p.z());
+  return buffer.data();
+}
+
+std::string text(double value) {
+  std::array<char, 32> buffer{};
+  std::snprintf(buffer.data(), buffer.size(), "%.3g", value);
+  return buffer.data();
+}
+
+void require_inside(const Surface& surface, const std::string& name, const Vec3& point) {
+  constexpr double kOnTheWall = 1e-6;  // mm
+  const InsideAnswer answer = locate_point(surface, point);
+  if (answer.inside && answer.distance > kOnTheWall) return;
+  throw Error(name + " " + text(point) + " mm lies outside the vessel surface, " +
+              text(answer.distance) +
+              " mm from the wall; expected a point in the lumen. Move it inward, or check that "
+              "point and surface share one frame (LPS, mm)");
+}
+
+struct RawPath {
+  Points points;         // access to target, inside the lumen all the way
+  double spacing = 0.0;  // of the grid it was found on
+};
+
+/// Searches from the target, which mostly lies in the thinner vessel: then most of the wide one is
+/// never visited.
+RawPath search_path(const NearestWall& wall, const Surface& surface, const Vec3& access,
+                    const Vec3& target, double first_spacing) {
+  const auto search_on = [&](double spacing, const Vec3& from, const Vec3& to) {
+    const double depth = 2.0 * spacing;  // there every ball meets the grid
+    return GridSearch(wall, surface, spacing, leave_wall(wall, from, depth),
+                      leave_wall(wall, to, depth));
+  };
+  double spacing = first_spacing;
+  for (;; spacing *= 0.5) {
+    GridSearch search = search_on(spacing, target, access);
+    if (search.run(Cost::kRoute)) {
+      search.stay_near(search.path());
+      expects(search.run(Cost::kMiddle));  // the route itself is such a path
+      return {.points = search.path(), .spacing = spacing};
+    }
+    if (0.5 * spacing < kFinestGrid) break;
+  }
+
+  // Not connected: the user sees how far one comes from the access, on the first grid.
+  GridSearch search = search_on(first_spacing, access, target);
+  search.run(Cost::kRoute);
+  const Vec3 reached = search.nearest_reached(target);
+  throw Error("target " + text(target) + " mm is not connected to access " + text(access) +
+              " mm inside the vessel surface (finest search grid " + text(spacing) +
+              " mm): the nearest place reached, " + text(reached) + " mm, is " +
+              text((target - reached).norm()) +
+              " mm from the target. Check the segmentation band (segmentation.lower_hu, "
+              "upper_hu), which may cut the vessel there, and the target point");
+}
+
+// ---------------------------------------------------------------------------------- the ridge
+
+std::vector<double> arc_length(const Points& line) {
+  std::vector<double> s(line.size(), 0.0);
+  for (std::size_t i = 1; i < line.size(); ++i) s[i] = s[i - 1] + (line[i] - line[i - 1]).norm();
+  return s;
+}
+
+/// Equally spaced points from end to end, about `sample` apart, at least two.
+Points resample(const Points& line, double sample) {
+  const std::vector<double> s = arc_length(line);
+  const int intervals = std::max(1, static_cast<int>(std::lround(s.back() / sample)));
+  Points points;
+  std::size_t i = 1;
+  for (int k = 0; k <= intervals; ++k) {
+    const double at = s.back() * k / intervals;
+    while (i + 1 < s.size() && s[i] < at) ++i;
+    const double length = s[i] - s[i - 1];
+    const double f = length > 0.0 ? std::clamp((at - s[i - 1]) / length, 0.0, 1.0) : 0.0;
+    points.push_back((1.0 - f) * line[i - 1] + f * line[i]);
+  }
+  return points;
+}
+
+/// Width of a Gaussian along the line: sigma = max(least, part of the inscribed radius).
+struct Smoothing {
+  double least = 0.0;  // [mm]
+  double part = 0.0;
+};
+
+/// Gaussian smoothing of points that are `sample` apart. The window is symmetric and shrinks toward
+/// the ends, which stay. A point that would leave its inscribed ball, and so perhaps the lumen,
+/// stays as well.
+Points smooth(const NearestWall& wall, const Points& line, double sample,
+              const Smoothing& smoothing) {
+  const int n = static_cast<int>(line.size());
+  const auto at = [&](int i) -> const Vec3& { return line[static_cast<std::size_t>(i)]; };
+  Points result = line;
+  Nearest near = wall.find(line.front());
+  for (int i = 1; i + 1 < n; ++i) {
+    near = wall.find(at(i), near);
+    const double sigma = std::max(smoothing.least, smoothing.part * near.distance) / sample;
+    const int half = std::min({static_cast<int>(std::ceil(3.0 * sigma)), i, n - 1 - i});
+    Vec3 sum = at(i);
+    double weights = 1.0;
+    for (int k = 1; k <= half; ++k) {
+      const double weight = std::exp(-0.5 * k * k / (sigma * sigma));
+      sum += weight * (at(i - k) + at(i + k));
+      weights += 2.0 * weight;
+    }
+    const Vec3 moved = sum / weights;
+    if ((moved - at(i)).norm() < 0.9 * near.distance) result[static_cast<std::size_t>(i)] = moved;
+  }
+  return result;
+}
+
+/// Steps of a climb, the first as a part of the inscribed radius. The first climb reaches 1.25
+/// radii, later ones mend what smoothing moved.
+struct Climb {
+  double first_step = 0.25;
+  int steps = 25;
+};
+constexpr Climb kFirstClimb{}, kLaterClimb{.first_step = 0.08, .steps = 16};
+
+/// Ascends the wall distance in the plane through `point` across `tangent`, by steps along the
+/// gradient that shrink geometrically (it jumps at the ridge, so its length tells nothing). Never
+/// leaves the ball that is known to be free. `near` is a hint and is updated.
+Vec3 climb(const NearestWall& wall, Vec3 point, const Vec3& tangent, Nearest& near,
+           const Climb& how = kFirstClimb) {
+  constexpr double kDecay = 0.8;
+  near = wall.find(point, near);
+  Nearest here = near;
+  Vec3 best = point;
+  double step = how.first_step * here.distance;
+  for (int i = 0; i < how.steps && here.distance > 0.0; ++i, step *= kDecay) {
+    const Vec3 gradient = (point - here.foot) / here.distance;
+    const Vec3 across = gradient - gradient.dot(tangent) * tangent;
+    point += std::min(step, 0.9 * here.distance) * across;
+    here = wall.find(point, here);
+    if (here.distance <= near.distance) continue;
+    near = here;
+    best = point;
+  }
+  return best;
+}
+
+/// Direction of the line at point i, over some points on both sides.
+Vec3 tangent_at(const Points& line, std::size_t i) {
+  constexpr std::size_t kSpan = 3;
+  const std::size_t from = i < kSpan ? 0 : i - kSpan, to = std::min(line.size() - 1, i + kSpan);
+  return (line[to] - line[from]).normalized();
+}
+
+Points move_to_ridge(const NearestWall& wall, const Points& line, const Climb& how) {
+  Points moved;
+  Nearest near = wall.find(line.front());
+  for (std::size_t i = 0; i < line.size(); ++i) {
+    moved.push_back(climb(wall, line[i], tangent_at(line, i), near, how));
+  }
+  return moved;
+}
+
+/// Without its two ends, where the path still climbs from access and target to the ridge: what is
+/// within one inscribed radius of an end. A path too short for that is kept.
+Points without_ends(const NearestWall& wall, const Points& line) {
+  const std::vector<double> s = arc_length(line);
+  std::size_t first = 0, last = line.size() - 1;
+  while (first < last && s[first] < wall.find(line[first]).distance) ++first;
+  while (first < last && s.back() - s[last] < wall.find(line[last]).distance) --last;
+  if (last - first < 4) return line;
+  return {line.begin() + static_cast<std::ptrdiff_t>(first),
+          line.begin() + static_cast<std::ptrdiff_t>(last) + 1};
+}
+
+/// Without its last 1.5 radii: the way to the farthest place of an end, mostly a cap's corner,
+/// leaves the middle where the cap is as near as the side. A line too short for that is kept.
+Points without_tip(const NearestWall& wall, const Points& line) {
+  constexpr double kRadii = 1.5;
+  const std::vector<double> s = arc_length(line);
+  std::size_t last = line.size() - 1;
+  while (last > 0 && s.back() - s[last] < kRadii * wall.find(line[last]).distance) --last;
+  last = std::max(last, std::min(kFewPoints, line.size()) - 2);
+  return {line.begin(), line.begin() + static_cast<std::ptrdiff_t>(last) + 1};
+}
+
+/// Continues the line along the ridge beyond its last point until it has passed `end`, or the wall
+/// is ahead. Where the nearest wall is a cap ahead, the distance says nothing about the middle, and
+/// the line goes straight on.
+void extend(const NearestWall& wall, Points& line, const Vec3& end, double sample) {
+  constexpr std::size_t kSpan = 8;    // points whose chord is the direction
+  constexpr double kCapAhead = -0.5;  // slope of the distance along the line, -1 before a flat cap
+  Nearest near = wall.find(line.back());
+  const int most_steps = 10 + static_cast<int>(2.0 * (end - line.back()).norm() / sample);
+  for (int i = 0; i < most_steps; ++i) {
+    const std::size_t back = line.size() - 1 - std::min(kSpan, line.size() - 1);
+    const Vec3 tangent = (line.back() - line[back]).normalized();
+    if ((end - line.back()).dot(tangent) <= 0.0 || near.distance <= sample) return;
+    const Vec3 next = line.back() + sample * tangent;
+    near = wall.find(next, near);
+    const bool cap_ahead = (next - near.foot).dot(tangent) < kCapAhead * near.distance;
+    line.push_back(cap_ahead ? next : climb(wall, next, tangent, near));
+  }
+}
+
+/// The same straight on to the wall ahead: for an end that lies in a corner of a cap, to which the
+/// ridge would lead.
+void extend_straight(const NearestWall& wall, Points& line, const Vec3& end, double sample) {
+  constexpr double kSpan = 3.0, kAtWall = 0.2;  // radii whose chord is the direction; of wall ahead
+  const double radius = wall.find(line.back()).distance, at_wall = kAtWall * radius;
+  const auto span = static_cast<std::size_t>(std::max(2.0, std::round(kSpan * radius / sample)));
+  const std::size_t back = line.size() - 1 - std::min(span, line.size() - 1);
+  const Vec3 tangent = (line.back() - line[back]).normalized();
+  const double step = std::min(sample, at_wall);
+  while ((end - line.back()).dot(tangent) > 0.0) {
+    const Vec3 next = line.back() + step * tangent;
+    if (wall.find(next).distance < at_wall) break;
+    line.push_back(next);
+  }
+}
+
+/// Ends the line at its place nearest to `end`, which is sought no farther back than it can be when
+/// the line ends abreast of it: one that comes by `end` earlier, in another vessel, is not cut
+/// there.
+void cut_after(Points& line, const Vec3& end, double sample) {
+  const double reach = 2.0 * (line.back() - end).norm() + sample;
+  std::size_t best = line.size() - 1;
+  Vec3 foot = line.back();
+  double walked = 0.0;
+  for (std::size_t i = line.size() - 1; i > 0 && walked < reach; --i) {
+    const Vec3 a = line[i - 1], edge = line[i] - a;
+    const double length = edge.norm();
+    if (length == 0.0) continue;
+    walked += length;
+    const Vec3 q = a + std::clamp((end - a).dot(edge) / (length * length), 0.0, 1.0) * edge;
+    if ((q - end).norm() < (foot - end).norm()) {
+      best = i;
+      foot = q;
+    }
+  }
+  line.resize(best);
+  line.push_back(foot);
+}
+
+/// Arc length and inscribed radius of a line.
+Centerline measured(const NearestWall& wall, const Points& line) {
+  const auto n = static_cast<Eigen::Index>(line.size());
+  const std::vector<double> s = arc_length(line);
+  Centerline result{.points = Eigen::Matrix3Xd(3, n),
+                    .radius = Eigen::VectorXd(n),
+                    .arc_length = Eigen::Map<const Eigen::VectorXd>(s.data(), n)};
+  Nearest near = wall.find(line.front());
+  for (Eigen::Index i = 0; i < n; ++i) {
+    result.points.col(i) = line[static_cast<std::size_t>(i)];
+    near = wall.find(result.points.col(i), near);
+    result.radius(i) = near.distance;
+  }
+  return result;
+}
+
+double first_spacing(const Surface& surface, double nodes_wanted,
+                     const CenterlineOptions& options) {
+  return options.grid_mm > 0.0
+             ? options.grid_mm
+             : std::clamp(std::cbrt(std::abs(signed_volume(surface)) / nodes_wanted), kFirstGrid,
+                          kCoarsestGrid);
+}
+
+// ---------------------------------------------------------------------------------- the tree
+
+/// A way through the grid from the tree to an end, as numbers of nodes.
+struct Twig {
+  std::vector<int> nodes;  // the first one is in the tree already, but for the first twig
+  int parent = -1;         // twig of that node
+};
+
+/// The ends of the lumen and the ways there, the farthest first.
+std::vector<Twig> find_twigs(GridSearch& search) {
+  constexpr double kCovered = 1.5;  // radii round a line that belong to it
+  search.run_everywhere(Cost::kRoute);
+  std::vector<std::pair<double, int>> farthest_first;
+  for (std::size_t i = 2; i < search.count(); ++i) {
+    const Node& n = search.at(i);
+    if (std::isfinite(n.cost) && n.wall.distance > 0.5 * search.spacing()) {
+      farthest_first.emplace_back(-n.cost, static_cast<int>(i));
+    }
+  }
+  std::sort(farthest_first.begin(), farthest_first.end());
+  search.run_everywhere(Cost::kMiddle);
+
+  std::vector<Twig> twigs;
+  std::vector<char> covered(search.count(), 0);
+  std::vector<int> owner(search.count(), -1);  // twig that passes a node
+  for (const auto& [cost, end] : farthest_first) {
+    if (covered[static_cast<std::size_t>(end)] != 0) continue;
+    Twig twig;
+    int at = end;
+    for (; at >= 0 && owner[static_cast<std::size_t>(at)] < 0;
+         at = search.at(static_cast<std::size_t>(at)).parent) {
+      twig.nodes.push_back(at);
+    }
+    if (at >= 0) {
+      twig.parent = owner[static_cast<std::size_t>(at)];
+      twig.nodes.push_back(at);
+    }
+    std::reverse(twig.nodes.begin(), twig.nodes.end());
+
+    // What it covers is no end again; whether it is long enough to be a vessel is another question.
+    double length = 0.0;
+    for (std::size_t k = 0; k < twig.nodes.size(); ++k) {
+      const Node& n = search.at(static_cast<std::size_t>(twig.nodes[k]));
+      if (k > 0) {
+        length += (n.point - search.at(static_cast<std::size_t>(twig.nodes[k - 1])).point).norm();
+      }
+      const double reach = kCovered * n.wall.distance + 2.0 * search.spacing();
+      for (const int near : search.nodes_near(n.point, reach)) {
+        covered[static_cast<std::size_t>(near)] = 1;
+      }
+    }
+    const double from = search.at(static_cast<std::size_t>(twig.nodes.front())).wall.distance;
+    std::vector<double> radii;
+    for (const int n : twig.nodes)
+      radii.push_back(search.at(static_cast<std::size_t>(n)).wall.distance);
+    std::nth_element(radii.begin(), radii.begin() + static_cast<std::ptrdiff_t>(radii.size() / 2),
+                     radii.end());
+    const double widest = radii[radii.size() / 2];
+    if (twig.parent >= 0 && length < from + widest + 2.0 * search.spacing()) continue;
+    const int number = static_cast<int>(twigs.size());
+    for (std::size_t k = twig.parent >= 0 ? 1 : 0; k < twig.nodes.size(); ++k) {
+      owner[static_cast<std::size_t>(twig.nodes[k])] = number;
+    }
+    twigs.push_back(std::move(twig));
+  }
+  return twigs;
+}
+
+/// Point of a line nearest to another: its index.
+Eigen::Index nearest_index(const Centerline& line, const Vec3& p) {
+  Eigen::Index best = 0;
+  (line.points.colwise() - p).colwise().squaredNorm().minCoeff(&best);
+  return best;
+}
+
+}  // namespace
+
+std::vector<Branch> find_tree(const Surface& surface, const Vec3& root,
+                              const CenterlineOptions& options) {
+  expects(options.sample_mm > 0.0 && options.grid_mm >= 0.0);
+  require_inside(surface, "access", root);
+  const NearestWall wall(surface);
+  const double spacing = first_spacing(surface, kTreeNodesWanted, options),
+               sample = options.sample_mm;
+  const Vec3 start = leave_wall(wall, root, 2.0 * spacing);
+  GridSearch search(wall, surface, spacing, start, start);
+
+  std::vector<Branch> branches;
+  std::vector<int> branch_of;  // of each twig; its parent's where it is none itself
+  for (const Twig& twig : find_twigs(search)) {
+    const int parent = twig.parent < 0 ? -1 : branch_of[static_cast<std::size_t>(twig.parent)];
+    Points line;
+    for (const int n : twig.nodes) line.push_back(search.at(static_cast<std::size_t>(n)).point);
+    const Vec3 end = line.back();
+    line = smooth(wall, resample(line, sample), sample, {.least = 2.0 * spacing});
+    line = without_tip(wall, without_ends(wall, line));
+    if (parent >= 0 && line.size() < kFewPoints) {  // a corner of its parent's end
+      branch_of.push_back(parent);
+      continue;
+    }
+
+    // To the ridge; within the parent's ball the ridge is the parent's, so the line starts at it.
+    for (int round = 0; round < kRounds; ++round) {
+      line =
+          resample(smooth(wall, move_to_ridge(wall, line, round == 0 ? kFirstClimb : kLaterClimb),
+                          sample, {.least = sample, .part = kSmoothing}),
+                   sample);
+    }
+    extend_straight(wall, line, end, sample);
+    Branch branch{.line = {}, .parent = parent};
+    if (parent >= 0) {
+      const Centerline& from = branches[static_cast<std::size_t>(parent)].line;
+      const Eigen::Index at = nearest_index(from, line.front());
+      branch.parent_arc = from.arc_length(at);
+      if ((line.front() - from.points.col(at)).norm() > 1e-9) {
+        line.insert(line.begin(), from.points.col(at));
+      }
+    } else {
+      std::reverse(line.begin(), line.end());
+      extend(wall, line, root, sample);
+      cut_after(line, root, sample);
+      std::reverse(line.begin(), line.end());
+    }
+    branch.line = measured(
+        wall, smooth(wall, resample(line, sample), sample, {.least = sample, .part = kSmoothing}));
+    branch_of.push_back(static_cast<int>(branches.size()));
+    branches.push_back(std::move(branch));
+  }
+  return branches;
+}
+
+Centerline find_centerline(const Surface& surface, const Vec3& access, const Vec3& target,
+                           const CenterlineOptions& options) {
+  expects(options.sample_mm > 0.0 && options.grid_mm >= 0.0);
+  require_inside(surface, "access", access);
+  require_inside(surface, "target", target);
+  const NearestWall wall(surface);
+
+  // Cheapest path on the grid, rid of its steps.
+  const RawPath raw =
+      search_path(wall, surface, access, target, first_spacing(surface, kNodesWanted, options));
+  const double sample = options.sample_mm;
+  Points line = smooth(wall, resample(raw.points, sample), sample, {.least = 2.0 * raw.spacing});
+
+  // To the ridge, in the planes across the line.
+  line = without_ends(wall, line);
+  for (int round = 0; round < kRounds; ++round) {
+    line = resample(smooth(wall, move_to_ridge(wall, line, round == 0 ? kFirstClimb : kLaterClimb),
+                           sample, {.least = sample, .part = kSmoothing}),
+                    sample);
+  }
+
+  // Both ends: along the ridge to the places nearest to target and access.
+  for (const Vec3& end : {target, access}) {
+    extend(wall, line, end, sample);
+    cut_after(line, end, sample);
+    std::reverse(line.begin(), line.end());
+  }
+  if (arc_length(line).back() < sample) {
+    throw Error("target " + text(target) + " mm and access " + text(access) +
+                " mm lie at the same place along the vessel; expected at least " + text(sample) +
+                " mm between them. Check the target point");
+  }
+  line = smooth(wall, resample(line, sample), sample, {.least = sample, .part = kSmoothing});
+
+  return measured(wall, line);
+}
+
+Vec3 start_tangent(const Centerline& line, double span) {
+  expects(line.points.cols() >= 2 && span > 0.0);
+  Eigen::Index i = 1;
+  while (i + 1 < line.points.cols() && line.arc_length(i) < span) ++i;
+  const double length = line.arc_length(i) - line.arc_length(i - 1);
+  const double f = std::min(1.0, (span - line.arc_length(i - 1)) / length);
+  const Vec3 end = (1.0 - f) * line.points.col(i - 1) + f * line.points.col(i);
+  return (end - line.points.col(0)).normalized();
+}
+
+}  // namespace wireplan::preprocess

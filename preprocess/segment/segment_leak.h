@@ -1,0 +1,50 @@
+#pragma once
+/// Leaks: what a mask holds besides the vessel that the seeds lie in.
+#include <cstddef>
+#include <vector>
+
+#include "preprocess/volume/voxels.h"
+
+namespace wireplan::preprocess {
+
+/// A part of the mask that was cut off.
+struct Leak {
+  Vec3 place = Vec3::Zero();    // where it was cut from the vessel                          [mm]
+  double neck_radius_mm = 0.0;  // of the contact: inscribed radius there                    [mm]
+  double radius_mm = 0.0;       // largest inscribed radius behind it                        [mm]
+  double volume_mm3 = 0.0;
+  double mean_hu = 0.0;          //                                                           [HU]
+  double bright_fraction = 0.0;  // of its boundary that lies against values above the band: bone
+};
+
+/// The way from the first seed to the others through the middle of the vessel.
+struct Route {
+  std::vector<Vec3> points;          // from the first seed to the last, smoothed          [mm]
+  double length_mm = 0.0;            // of these
+  double narrowest_radius_mm = 0.0;  // least inscribed radius on all ways
+  Vec3 narrowest = Vec3::Zero();     // where                                                [mm]
+};
+
+struct LeakSearch {
+  Route route;
+  std::vector<Leak> leaks;  // largest first
+};
+
+/// Cuts from `labels` (1 inside) what cannot be the artery of the seeds. Arteries taper: seen from
+/// the ways between the seeds, no branch grows wider than what it was entered through. Each voxel
+/// is compared with the widest way that leads to it from there (the largest least inscribed radius
+/// on the way); where its own inscribed radius is more than twice that and a millimetre, the way
+/// has passed a neck into a vein, an organ, the heart or a bone. The cut lies in the neck: both
+/// sides flood the mask from wide to narrow until they meet. Ways between seeds are trusted, so a
+/// seed beyond a real neck (a stenosis before an aneurysm) keeps what lies there.
+/// `seeds` are labelled voxels, `values` [HU] those of the grid, `upper` the end of the band. Seeds
+/// that no way joins each start their own vessel.
+LeakSearch cut_leaks(const Grid& grid, const std::vector<float>& values, double upper,
+                     const std::vector<std::size_t>& seeds, Labels& labels);
+
+/// Share of the boundary faces of the mask behind which, one or two voxels on, the values [HU] lie
+/// above `upper`: about 1 inside a bone's shell, small in an artery with plaque.
+double bright_boundary(const Grid& grid, const std::vector<float>& values, double upper,
+                       const Labels& labels);
+
+}  // namespace wireplan::preprocess

@@ -1,0 +1,97 @@
+#pragma once
+/// Mask or surface file -> closed, oriented, checked triangles.
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "preprocess/surface/surface_fit.h"
+#include "preprocess/vessel.h"
+#include "preprocess/volume/image.h"
+
+namespace wireplan::preprocess {
+
+struct SurfaceOptions {
+  double edge_length_mm = 1.0;  // of the remesh; shorter where a vessel is thin         [mm]
+};
+
+/// What a surface is, as measured. A sound surface: one piece, closed, manifold, normals outward,
+/// no degenerate triangle, no self-intersection; handles (Euler number 2 - 2g) are reported, not
+/// refused.
+struct SurfaceCheck {
+  int vertices = 0, triangles = 0, pieces = 0;  // vertices that a triangle uses
+  int open_edges = 0;                           // of one triangle
+  int non_manifold_edges = 0;                   // of three or more
+  int misoriented_edges = 0;                    // of two whose normals disagree
+  int non_manifold_vertices = 0;                // where sheets touch in a point
+  int degenerate_triangles = 0;                 // without area
+  int euler_number = 0;
+  int self_intersections =
+      0;  // pairs of triangles; not looked for where the surface is not manifold
+  // The first of each that is not sound.                                                 [mm]
+  Vec3 open_at = Vec3::Zero(), non_manifold_at = Vec3::Zero(), misoriented_at = Vec3::Zero(),
+       touching_at = Vec3::Zero(), degenerate_at = Vec3::Zero(), cut_at = Vec3::Zero();
+  bool outward = false;
+  double volume_mm3 = 0.0, area_mm2 = 0.0;
+  double min_angle_deg = 0.0, mean_edge_mm = 0.0, max_edge_mm = 0.0;
+};
+
+/// Isosurface of the mask at 1/2, smoothed with a volume-keeping windowed sinc, remeshed to the
+/// edge length, largest piece (cavities inside it are filled). Where the mask meets the border of
+/// its grid the surface is capped there. Sound but for handles; throws `Error` for an empty mask or
+/// where no sound surface is found.
+Surface surface_from_mask(const Mask& mask, const SurfaceOptions& options);
+
+/// The same, then fitted to the image before the remesh: its edge lies where the grey value passes
+/// half way between lumen and surroundings, not where the mask's stairs are. Image and mask share
+/// one grid. Fills `statistics` where it is not null.
+Surface surface_from_image(const Image& image, const Mask& mask, const SurfaceOptions& options,
+                           FitStatistics* statistics = nullptr);
+
+/// Reads the triangles of an STL, PLY, OBJ or VTP file as they stand there, but for points merged
+/// that are equal to 1e-7 of the size, and polygons cut into triangles. `unit` is "mm", "cm" or
+/// "m"; `frame` is "LPS" or "RAS" (x, y flipped). Throws `Error` where the file is missing or no
+/// surface.
+Surface read_triangles(const std::filesystem::path& path, const std::string& unit,
+                       const std::string& frame);
+
+/// Remeshes isotropically to the edge length, or to half of the local inscribed radius where that
+/// is less, so that thin branches and their caps keep their shape. Checks for self-intersections
+/// the remesh brought in and retries finer where they are (prototypes B). A surface that already
+/// has such edges (mean within 10 %, none over twice as long) is left as it is. Expects a sound
+/// surface; throws `Error` where none of the tries gives one.
+Surface remesh(const Surface& surface, double edge_length_mm);
+
+SurfaceCheck check_surface(const Surface& surface);
+
+/// Triangles that cut another one, ascending. Expects a manifold, oriented surface.
+std::vector<int> find_self_intersections(const Surface& surface);
+
+bool is_sound(const SurfaceCheck& check);
+
+/// Throws `Error`, naming `origin` (a file or stage), every failed check and a remedy, unless
+/// sound.
+void require_sound(const SurfaceCheck& check, const std::string& origin);
+
+/// Volume enclosed [mm^3], negative where the normals point inward.
+double signed_volume(const Surface& surface);
+
+/// A piece of a surface (connected through edges), outward, without unused vertices.
+struct Piece {
+  Surface surface;
+  bool turned = false;  // it faced inward, and was turned as a whole
+};
+
+/// The one of the largest volume first. Of an open piece the volume is that up to its first vertex.
+std::vector<Piece> pieces_of(const Surface& surface);
+
+/// The first of these.
+Surface largest_piece(const Surface& surface);
+
+/// True where the point [mm] lies inside the closed surface, and its distance to it [mm].
+struct InsideAnswer {
+  bool inside = false;
+  double distance = 0.0;
+};
+InsideAnswer locate_point(const Surface& surface, const Vec3& point);
+
+}  // namespace wireplan::preprocess

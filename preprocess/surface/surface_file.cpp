@@ -1,0 +1,381 @@
+#include <vtkCellArray.h>
+#include <vtkPointLocator.h>
+#include <vtkSTLReader.h>
+#include <vtkTriangleFilter.h>
+#include <vtkXMLPolyDataReader.h>
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cctype>
+#include <cmath>
+#include <cstdint>
+#include <fstream>
+#include <optional>
+#include <sstream>
+#include <vector>
+
+#include "preprocess/surface/surface.h"
+#include "preprocess/surface/vtk_mesh.h"
+
+namespace wireplan::preprocess {
+namespace {
+
+constexpr double kFarthest = 1e9;  // no vessel has such coordinates, in whatever unit
+
+template <typename Reader>
+vtkSmartPointer<vtkPolyData> read_with(const std::filesystem::path& path) {
+  const VtkErrors errors;
+  vtkNew<Reader> reader;
+  reader->SetFileName(path.c_str());
+  reader->Update();
+  if (errors.any()) {
+    throw Error(path.string() + ": cannot be read as a surface (" + errors.text() +
+                "); expected STL, PLY, OBJ or VTP as the file's ending says");
+  }
+  return reader->GetOutput();
+}
+
+/// VTK takes room for as many triangles as the header of a binary STL promises, whatever the file
+/// holds. It takes for binary what has 5 % of other bytes than text in its first 256.
+void require_whole_stl(const std::filesystem::path& path) {
+  constexpr std::size_t kHead = 84, kTriangle = 50;
+  std::ifstream stream(path, std::ios::binary);
+  std::array<char, 256> head{};
+  stream.read(head.data(), head.size());
+  const auto length = static_cast<std::size_t>(stream.gcount());
+  const auto text = std::count_if(head.begin(), head.begin() + length, [](char c) {
+    const auto byte = static_cast<unsigned char>(c);
+    return (byte >= 0x20 && byte <= 0x7F) || c == '\n' || c == '\r' || c == '\t';
+  });
+  if (20 * (length - static_cast<std::size_t>(text)) < length) return;
+  std::uint32_t triangles = 0;
+  for (std::size_t k = 4; k-- > 0;) {
+    triangles = triangles << 8U | static_cast<unsigned char>(head[kHead - 4 + k]);
+  }
+  const std::uintmax_t bytes = std::filesystem::file_size(path);
+  if (length >= kHead && kHead + kTriangle * std::uintmax_t{triangles} <= bytes) return;
+  throw Error(path.string() + ": a binary STL of " + std::to_string(bytes) + " bytes, expected " +
+              std::to_string(kHead + kTriangle * std::uintmax_t{triangles}) + " for the " +
+              std::to_string(triangles) +
+              " triangles of its header; copy or export the surface again");
+}
+
+// ---- PLY by hand: VTK's reader ends the program where a file is cut short ---------------------
+
+enum class PlyFormat { kAscii, kLittleEndian, kBigEndian };
+enum class PlyType { kInt8, kUint8, kInt16, kUint16, kInt32, kUint32, kFloat, kDouble };
+
+struct PlyProperty {
+  std::string name;
+  PlyType type = PlyType::kFloat;
+  std::optional<PlyType> count_type;  // of a list
+};
+
+struct PlyElement {
+  std::string name;
+  std::size_t count = 0;
+  std::vector<PlyProperty> properties;
+};
+
+[[noreturn]] void refuse_ply(const std::filesystem::path& path, const std::string& why) {
+  throw Error(path.string() + ": cannot be read as a surface (" + why +
+              "); expected a PLY file with vertices x, y, z and faces");
+}
+
+PlyType ply_type(const std::string& name, const std::filesystem::path& path) {
+  constexpr std::array<std::array<const char*, 2>, 8> kNames = {{{"char", "int8"},
+                                                                 {"uchar", "uint8"},
+                                                                 {"short", "int16"},
+                                                                 {"ushort", "uint16"},
+                                                                 {"int", "int32"},
+                                                                 {"uint", "uint32"},
+                                                                 {"float", "float32"},
+                                                                 {"double", "float64"}}};
+  for (std::size_t k = 0; k < kNames.size(); ++k) {
+    if (name == kNames[k][0] || name == kNames[k][1]) return static_cast<PlyType>(k);
+  }
+  refuse_ply(path, "unknown type \"" + name + "\" in its header");
+}
+
+/// The values of a PLY file one after another, as doubles, which hold all of its types exactly.
+class PlyStream {
+ public:
+  explicit PlyStream(const std::filesystem::path& path)
+      : path_(path), in_(path, std::ios::binary) {}
+
+  std::vector<PlyElement> read_header() {
+    std::vector<PlyElement> elements;
+    std::string line, word, type;
+    if (!std::getline(in_, line) || line.substr(0, 3) != "ply") refuse("no PLY header");
+    while (std::getline(in_, line)) {
+      std::istringstream words(line);
+      words >> word;
+      if (word == "end_header") return elements;
+      if (word == "format") {
+        words >> type;
+        format_ = type == "ascii"               ? PlyFormat::kAscii
+                  : type == "binary_big_endian" ? PlyFormat::kBigEndian
+                                                : PlyFormat::kLittleEndian;
+      } else if (word == "element") {
+        PlyElement element;
+        if (!(words >> element.name >> element.count)) refuse("bad header line \"" + line + "\"");
+        elements.push_back(element);
+      } else if (word == "property") {
+        PlyProperty property;
+        words >> type;
+        if (type == "list") {
+          words >> type;
+          property.count_type = ply_type(type, path_);
+          words >> type;
+        }
+        property.type = ply_type(type, path_);
+        if (!(words >> property.name) || elements.empty())
+          refuse("bad header line \"" + line + "\"");
+        elements.back().properties.push_back(property);
+      }
+    }
+    refuse("its header has no end");
+  }
+
+  /// One value, or all of a list.
+  std::vector<double> read(const PlyProperty& property) {
+    const double count = property.count_type ? read_one(*property.count_type) : 1.0;
+    std::vector<double> values;
+    for (int k = 0; k < count; ++k) values.push_back(read_one(property.type));
+    return values;
+  }
+
+ private:
+  [[noreturn]] void refuse(const std::string& why) const { refuse_ply(path_, why); }
+
+  double read_one(PlyType type) {
+    double value = 0.0;
+    if (format_ == PlyFormat::kAscii) {
+      if (!(in_ >> value)) refuse("it ends early or holds something else than numbers");
+      return value;
+    }
+    switch (type) {
+      case PlyType::kInt8:
+        return read_bytes<std::int8_t>();
+      case PlyType::kUint8:
+        return read_bytes<std::uint8_t>();
+      case PlyType::kInt16:
+        return read_bytes<std::int16_t>();
+      case PlyType::kUint16:
+        return read_bytes<std::uint16_t>();
+      case PlyType::kInt32:
+        return read_bytes<std::int32_t>();
+      case PlyType::kUint32:
+        return read_bytes<std::uint32_t>();
+      case PlyType::kFloat:
+        return static_cast<double>(read_bytes<float>());
+      case PlyType::kDouble:
+        break;
+    }
+    return read_bytes<double>();
+  }
+
+  template <typename T>
+  T read_bytes() {
+    std::array<char, sizeof(T)> bytes;
+    if (!in_.read(bytes.data(), sizeof(T))) refuse("it ends early");
+    const bool native_little = std::endian::native == std::endian::little;
+    if ((format_ == PlyFormat::kLittleEndian) != native_little) {
+      std::reverse(bytes.begin(), bytes.end());
+    }
+    return std::bit_cast<T>(bytes);
+  }
+
+  std::filesystem::path path_;
+  std::ifstream in_;
+  PlyFormat format_ = PlyFormat::kAscii;
+};
+
+vtkSmartPointer<vtkPolyData> read_ply(const std::filesystem::path& path) {
+  PlyStream stream(path);
+  vtkNew<vtkPoints> points;
+  points->SetDataTypeToDouble();
+  vtkNew<vtkCellArray> polygons;
+  for (const PlyElement& element : stream.read_header()) {
+    if (element.properties.empty()) continue;
+    for (std::size_t k = 0; k < element.count; ++k) {
+      Vec3 point = Vec3::Zero();
+      for (const PlyProperty& property : element.properties) {
+        const std::vector<double> values = stream.read(property);
+        if (property.count_type && property.name.starts_with("vertex_ind")) {
+          polygons->InsertNextCell(static_cast<int>(values.size()));
+          for (const double value : values) polygons->InsertCellPoint(std::llround(value));
+        } else if (!property.count_type && property.name.size() == 1) {
+          const std::size_t axis = std::string("xyz").find(property.name);
+          if (axis < 3) point(static_cast<Eigen::Index>(axis)) = values[0];
+        }
+      }
+      if (element.name == "vertex") points->InsertNextPoint(point.data());
+    }
+  }
+  vtkNew<vtkPolyData> result;
+  result->SetPoints(points);
+  result->SetPolys(polygons);
+  return result;
+}
+
+// ---- OBJ by hand: VTK's reader ends the program where a face's numbers break off ---------------
+
+/// "3", "3/1", "3//2" or "3/1/2", counted from 1, or from the last vertex so far at -1.
+vtkIdType obj_vertex(const std::string& word, vtkIdType vertices) {
+  char* end = nullptr;
+  const long long number = std::strtoll(word.c_str(), &end, 10);
+  if (end == word.c_str() || (*end != '\0' && *end != '/')) return -1;
+  return number < 0 ? vertices + number : number - 1;
+}
+
+/// Vertices and faces; what else the file holds is for looks.
+vtkSmartPointer<vtkPolyData> read_obj(const std::filesystem::path& path) {
+  vtkNew<vtkPoints> points;
+  points->SetDataTypeToDouble();
+  vtkNew<vtkCellArray> polygons;
+  std::ifstream stream(path);
+  int number = 0;
+  const auto require = [&](bool sound) {
+    if (sound) return;
+    throw Error(path.string() + ": cannot be read as a surface (line " + std::to_string(number) +
+                "); expected an OBJ file with vertices \"v x y z\" and faces \"f 1 2 3\"");
+  };
+  for (std::string line, more; std::getline(stream, line);) {
+    ++number;
+    for (; !line.empty() && line.back() == '\\' && std::getline(stream, more); ++number) {
+      line.back() = ' ';
+      line += more;
+    }
+    std::istringstream words(line);
+    std::string kind;
+    words >> kind;
+    if (kind == "v") {
+      Vec3 p;
+      require(static_cast<bool>(words >> p.x() >> p.y() >> p.z()));
+      points->InsertNextPoint(p.data());
+    } else if (kind == "f") {
+      std::vector<vtkIdType> face;
+      for (std::string word; words >> word;) {
+        face.push_back(obj_vertex(word, points->GetNumberOfPoints()));
+        require(face.back() >= 0);
+      }
+      require(face.size() >= 3);
+      polygons->InsertNextCell(static_cast<vtkIdType>(face.size()), face.data());
+    }
+  }
+  vtkNew<vtkPolyData> result;
+  result->SetPoints(points);
+  result->SetPolys(polygons);
+  return result;
+}
+
+// ---- Any format ------------------------------------------------------------------------------
+
+/// Readers hand on vertex numbers as they stand in the file; VTK's filters rely on them.
+void require_valid_indices(vtkPolyData* data, const std::filesystem::path& path) {
+  vtkIdType count = 0;
+  const vtkIdType* ids = nullptr;
+  for (vtkCellArray* cells : {data->GetPolys(), data->GetStrips()}) {
+    for (cells->InitTraversal(); cells->GetNextCell(count, ids);) {
+      for (vtkIdType k = 0; k < count; ++k) {
+        if (ids[k] >= 0 && ids[k] < data->GetNumberOfPoints()) continue;
+        throw Error(path.string() + ": a face names vertex " + std::to_string(ids[k]) +
+                    ", but there are " + std::to_string(data->GetNumberOfPoints()) +
+                    " (counted from 0); expected faces of vertices in the file");
+      }
+    }
+  }
+}
+
+vtkSmartPointer<vtkPolyData> read_any(const std::filesystem::path& path) {
+  if (!std::filesystem::is_regular_file(path)) {
+    throw Error(path.string() + ": no such file; expected a surface (STL, PLY, OBJ or VTP)");
+  }
+  std::string ending = path.extension().string();
+  std::transform(ending.begin(), ending.end(), ending.begin(),
+                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  if (ending == ".stl") {
+    require_whole_stl(path);
+    return read_with<vtkSTLReader>(path);
+  }
+  if (ending == ".ply") return read_ply(path);
+  if (ending == ".obj") return read_obj(path);
+  if (ending == ".vtp") return read_with<vtkXMLPolyDataReader>(path);
+  throw Error(path.string() + ": the ending \"" + ending +
+              "\" is not known; expected .stl, .ply, .obj or .vtp");
+}
+
+/// Polygons and strips cut into triangles; lines and lone points are left out.
+vtkSmartPointer<vtkPolyData> triangles_of(vtkPolyData* input) {
+  vtkNew<vtkTriangleFilter> triangles;
+  triangles->SetInputData(input);
+  triangles->PassVertsOff();
+  triangles->PassLinesOff();
+  triangles->Update();
+  return triangles->GetOutput();
+}
+
+/// Points nearer to each other than the last digits of single precision made one.
+Surface merged(const Surface& surface) {
+  constexpr double kTolerance = 1e-7;  // of the size
+  const Vec3 low = surface.vertices.rowwise().minCoeff(),
+             high = surface.vertices.rowwise().maxCoeff();
+  vtkNew<vtkPoints> points;
+  points->SetDataTypeToDouble();
+  vtkNew<vtkPointLocator> locator;
+  locator->SetTolerance(kTolerance * (high - low).maxCoeff());
+  const std::array<double, 6> bounds = {low.x(), high.x(), low.y(), high.y(), low.z(), high.z()};
+  locator->InitPointInsertion(points, bounds.data(), surface.vertices.cols());
+  std::vector<int> number;
+  for (const auto& p : surface.vertices.colwise()) {
+    vtkIdType id = 0;
+    locator->InsertUniquePoint(p.data(), id);
+    number.push_back(static_cast<int>(id));
+  }
+  Surface result{.vertices = Eigen::Matrix3Xd(3, points->GetNumberOfPoints()),
+                 .triangles = surface.triangles};
+  for (vtkIdType k = 0; k < points->GetNumberOfPoints(); ++k) {
+    points->GetPoint(k, result.vertices.col(k).data());
+  }
+  for (int& v : result.triangles.reshaped()) v = number[static_cast<std::size_t>(v)];
+  return result;
+}
+
+double mm_per(const std::string& unit, const std::string& place) {
+  if (unit == "mm") return 1.0;
+  if (unit == "cm") return 10.0;
+  if (unit == "m") return kMmPerM;
+  throw Error(place + ": unit \"" + unit + "\" is not known; expected mm, cm or m");
+}
+
+Vec3 lps_signs(const std::string& frame, const std::string& place) {
+  if (frame == "LPS") return {1.0, 1.0, 1.0};
+  if (frame == "RAS") return {-1.0, -1.0, 1.0};
+  throw Error(place + ": frame \"" + frame + "\" is not known; expected LPS or RAS");
+}
+
+}  // namespace
+
+Surface read_triangles(const std::filesystem::path& path, const std::string& unit,
+                       const std::string& frame) {
+  const Vec3 scale = mm_per(unit, path.string()) * lps_signs(frame, path.string());
+  const vtkSmartPointer<vtkPolyData> data = read_any(path);
+  require_valid_indices(data, path);
+  Surface surface = surface_from(triangles_of(data));
+  if (surface.triangles.cols() == 0) {
+    throw Error(path.string() + ": holds no triangles; expected a surface (STL, PLY, OBJ or VTP)");
+  }
+  if (!surface.vertices.allFinite()) {
+    throw Error(path.string() + ": a coordinate is not a finite number; export the surface again");
+  }
+  if (surface.vertices.cwiseAbs().maxCoeff() > kFarthest) {
+    throw Error(path.string() + ": a coordinate is beyond " + std::to_string(long(kFarthest)) +
+                " " + unit + "; export the surface again");
+  }
+  surface.vertices = scale.asDiagonal() * surface.vertices;
+  return merged(surface);
+}
+
+}  // namespace wireplan::preprocess

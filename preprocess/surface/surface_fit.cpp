@@ -1,0 +1,246 @@
+#include "preprocess/surface/surface_fit.h"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <iterator>
+#include <limits>
+#include <optional>
+#include <vector>
+
+#include "preprocess/surface/vertex_graph.h"
+
+namespace wireplan::preprocess {
+namespace {
+
+// Distances along the normal, in units: voxels (geometric mean of the spacing) at first, then what
+// the edge is found to be blurred over, where that is more.
+constexpr double kReach = 1.2;           // the edge is sought this far on either side
+constexpr double kStep = 0.2;            // of the search
+constexpr double kInside = 1.5;          // the lumen's value is taken here, and a step deeper
+constexpr double kNearInside = 0.8;      // and here, the middle of a vessel thinner than that
+constexpr double kOutside = 1.2;         // the surroundings' value is the least up to here
+constexpr double kSmoothing = 2.0;       // shifts and the values outside are averaged over this far
+                                         // along the surface
+constexpr double kLevelSmoothing = 2.5;  // and the lumen's value over this
+// Over more of it in a noisy image: where the lumen's values stray from their average by more than
+// this part of the contrast (median), in proportion.
+constexpr double kQuiet = 0.03, kMostOfSmoothing = 1.5;
+constexpr double kUnitPerSigma = 1.7;  // of the blur ...
+constexpr double kMostUnit = 2.0;      // ... but at most so many voxels
+// A step less than this part of the usual one is no edge that a level could be put on.
+constexpr double kLeastContrast = 0.35;
+// How strongly a vertex without an edge is held where the mask has it, against one with an edge.
+constexpr double kHold = 0.15;
+constexpr int kRounds = 3;        // the first finds the unit
+constexpr double kDeep = 0.8413;  // part of a blurred step one sigma inside of it
+// Blur moves the half level of a disc by sigma^2/(2 r), but not by more than this part of sigma: in
+// one thinner than 3 sigma it lowers the lumen's value, and so the level, as well.
+constexpr double kMostMoved = 0.15;
+// The wall round a lumen of this contrast [HU] is soft tissue, at least so bright. An image in
+// other units has no such contrast, or lies above it.
+constexpr double kWallHu = 20.0, kLeastHu = 100.0;
+
+/// Values between voxels.
+class Interpolated {
+ public:
+  explicit Interpolated(const Image& image) : image_(image) {}
+
+  /// Trilinear; beyond the outermost centres their values go on.
+  double at(const Vec3& point) const {
+    const Vec3 p = image_.grid.ijk_from_lps(point);
+    std::array<int, 3> low{}, high{};
+    Vec3 f;
+    for (int a = 0; a < 3; ++a) {
+      const double x = std::clamp(p[a], 0.0, image_.grid.size[a] - 1.0);
+      low[a] = std::min(static_cast<int>(x), std::max(0, image_.grid.size[a] - 2));
+      high[a] = std::min(low[a] + 1, image_.grid.size[a] - 1);
+      f[a] = x - low[a];
+    }
+    const auto value = [&](int i, int j, int k) {
+      return static_cast<double>(image_.values[image_.grid.index(i, j, k)]);
+    };
+    const auto row = [&](int j, int k) {
+      return (1.0 - f[0]) * value(low[0], j, k) + f[0] * value(high[0], j, k);
+    };
+    const auto plane = [&](int k) {
+      return (1.0 - f[1]) * row(low[1], k) + f[1] * row(high[1], k);
+    };
+    return (1.0 - f[2]) * plane(low[2]) + f[2] * plane(high[2]);
+  }
+
+  /// Within a voxel of the outermost centres, where a cut vessel is capped.
+  bool at_border(const Vec3& point) const {
+    const Vec3 p = image_.grid.ijk_from_lps(point);
+    for (int a = 0; a < 3; ++a) {
+      if (p[a] < 1.0 || p[a] > image_.grid.size[a] - 2.0) return true;
+    }
+    return false;
+  }
+
+ private:
+  const Image& image_;
+};
+
+double median(std::vector<double> values) {
+  if (values.empty()) return 0.0;
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+/// Where the values along a normal pass the level nearest to 0 [in steps], rising or falling
+/// outward as asked.
+std::optional<double> crossing(const std::vector<double>& profile, double level, bool falling) {
+  std::optional<double> best;
+  const auto middle = static_cast<double>(profile.size() / 2);
+  for (std::size_t k = 0; k + 1 < profile.size(); ++k) {
+    const double a = profile[k] - level, b = profile[k + 1] - level;
+    if (falling ? !(a > 0.0 && b <= 0.0) : !(a < 0.0 && b >= 0.0)) continue;
+    const double at = static_cast<double>(k) + a / (a - b) - middle;
+    if (!best || std::abs(at) < std::abs(*best)) best = at;
+  }
+  return best;
+}
+
+/// From a crossing [in steps] inward to where the values have passed `level` [in steps].
+std::optional<double> way_inward(const std::vector<double>& profile, double from, double level,
+                                 bool falling) {
+  const auto middle = static_cast<double>(profile.size() / 2);
+  for (auto k = static_cast<int>(std::floor(from + middle)); k >= 0; --k) {
+    const double inner = profile[static_cast<std::size_t>(k)] - level;
+    const double outer = profile[static_cast<std::size_t>(k) + 1] - level;
+    if (falling ? inner < 0.0 : inner > 0.0) continue;
+    return from + middle - (static_cast<double>(k) + inner / (inner - outer));
+  }
+  return {};
+}
+
+/// How far blur with this sigma moves the edge inward at each vertex: sigma^2 times the mean
+/// curvature, to first order, as averaging over the surface moves the vertices themselves.
+Eigen::VectorXd moved_by_blur(const Surface& surface, const Neighbours& neighbours,
+                              const Eigen::Matrix3Xd& normals, double sigma, double edge) {
+  Eigen::VectorXd inward = Eigen::VectorXd::Zero(surface.vertices.cols());
+  // Spread along each of the surface's two directions by sigma.
+  const int passes = passes_for(std::sqrt(2.0) * sigma, edge);
+  for (int axis = 0; axis < 3; ++axis) {
+    Eigen::VectorXd place = surface.vertices.row(axis),
+                    weight = Eigen::VectorXd::Ones(place.size());
+    average(neighbours, passes, place, weight);
+    inward -= (place - surface.vertices.row(axis).transpose())
+                  .cwiseProduct(normals.row(axis).transpose());
+  }
+  return inward;
+}
+
+}  // namespace
+
+Surface fit_to_image(const Surface& surface, const Image& image, FitStatistics* statistics) {
+  expects(image.values.size() == image.grid.voxels() && surface.triangles.cols() > 0);
+  const Eigen::Index n = surface.vertices.cols();
+  const Interpolated grey(image);
+  const Neighbours neighbours = find_neighbours(surface);
+  const double voxel = std::cbrt(image.grid.spacing.prod()), edge = mean_edge(surface);
+  double unit = voxel;  // of distances along the normal                                  [mm]
+  const int half = static_cast<int>(std::lround(kReach / kStep));
+
+  std::vector<char> fixed(static_cast<std::size_t>(n));
+  for (Eigen::Index v = 0; v < n; ++v) fixed[v] = grey.at_border(surface.vertices.col(v)) ? 1 : 0;
+
+  Surface fitted = surface;
+  Eigen::VectorXd total = Eigen::VectorXd::Zero(n);
+  for (int round = 0; round < kRounds; ++round) {
+    const Eigen::Matrix3Xd normals = vertex_normals(fitted);
+
+    // What the lumen holds near each vertex, and what lies just outside.
+    Eigen::VectorXd lumen(n), outside(n), beyond(n), weight = Eigen::VectorXd::Ones(n);
+#pragma omp parallel for schedule(static)
+    for (Eigen::Index v = 0; v < n; ++v) {
+      const Vec3 p = fitted.vertices.col(v), out = unit * normals.col(v);
+      const double deep = 0.5 * (grey.at(p - kInside * out) + grey.at(p - (kInside + 0.5) * out));
+      lumen(v) = std::max(deep, grey.at(p - kNearInside * out));
+      beyond(v) = grey.at(p + kOutside * out);
+      outside(v) = beyond(v);
+      for (double way = kStep; way < kOutside; way += kStep) {
+        outside(v) = std::min(outside(v), grey.at(p + way * out));
+      }
+    }
+    const double usual_lumen = median({lumen.begin(), lumen.end()});
+    const double usual_outside = median({outside.begin(), outside.end()});
+    const double contrast = usual_lumen - usual_outside;
+    const Eigen::VectorXd as_read = lumen;
+    average(neighbours, passes_for(kLevelSmoothing * unit, edge), lumen, weight);
+    const Eigen::VectorXd off = (as_read - lumen).cwiseAbs();
+    const double noise = median({off.begin(), off.end()}) /
+                         std::max(std::abs(contrast), std::numeric_limits<double>::min());
+    const double reach = kSmoothing * std::clamp(noise / kQuiet, 1.0, kMostOfSmoothing);
+    weight.setOnes();
+    average(neighbours, passes_for(reach * unit, edge), outside, weight);
+    if (statistics) {
+      statistics->lumen_value = usual_lumen;
+      statistics->outside_value = usual_outside;
+    }
+
+    // The wall is soft tissue, though thin enough for the fat behind it to be what was read.
+    if (contrast > kLeastHu) outside = outside.cwiseMax(kWallHu);
+
+    // The edge along each normal.
+    Eigen::VectorXd shift = Eigen::VectorXd::Zero(n), certainty(n),
+                    width = Eigen::VectorXd::Zero(n);
+#pragma omp parallel
+    {
+      std::vector<double> profile(static_cast<std::size_t>(2 * half + 1));
+#pragma omp for schedule(static)
+      for (Eigen::Index v = 0; v < n; ++v) {
+        certainty(v) = kHold;
+        shift(v) = -total(v);
+        // Darker outside, if only between the lumen and a bone; else brighter, or no edge.
+        const double least = kLeastContrast * std::abs(contrast);
+        const bool falls = lumen(v) - outside(v) >= least;
+        if (!falls && beyond(v) - lumen(v) < least) continue;
+        const Vec3 p = fitted.vertices.col(v), out = kStep * unit * normals.col(v);
+        for (int k = -half; k <= half; ++k) {
+          profile[static_cast<std::size_t>(k + half)] = grey.at(p + k * out);
+        }
+        const double level = 0.5 * (lumen(v) + (falls ? outside(v) : beyond(v)));
+        const std::optional<double> at = crossing(profile, level, falls);
+        if (!at) continue;
+        shift(v) = *at * kStep * unit;
+        certainty(v) = 1.0;
+        const double deep = level + (2.0 * kDeep - 1.0) * (lumen(v) - level);
+        width(v) = way_inward(profile, *at, deep, falls).value_or(0.0) * kStep * unit;
+      }
+    }
+
+    // Blur moved it toward the middle of the vessel.
+    std::vector<double> widths;
+    std::copy_if(width.begin(), width.end(), std::back_inserter(widths),
+                 [](double w) { return w > 0.0; });
+    if (!widths.empty()) {
+      const double sigma = median(widths);
+      const Eigen::VectorXd inward = moved_by_blur(fitted, neighbours, normals, sigma, edge);
+      shift += (certainty.array() == 1.0).select(inward.cwiseMin(kMostMoved * sigma), 0.0).matrix();
+      unit = std::clamp(kUnitPerSigma * sigma, voxel, kMostUnit * voxel);
+    }
+    if (statistics) {
+      statistics->fitted_fraction =
+          static_cast<double>((certainty.array() == 1.0).count()) / static_cast<double>(n);
+    }
+
+    // Against noise and gaps: the average of the neighbourhood.
+    average(neighbours, passes_for(reach * unit, edge), shift, certainty);
+    for (Eigen::Index v = 0; v < n; ++v) {
+      if (fixed[v] != 0) continue;
+      const double most = kReach * unit;
+      const double move = std::clamp(total(v) + shift(v), -most, most) - total(v);
+      total(v) += move;
+      fitted.vertices.col(v) += move * normals.col(v);
+    }
+  }
+  if (statistics) statistics->mean_shift_mm = total.cwiseAbs().mean();
+  return fitted;
+}
+
+}  // namespace wireplan::preprocess

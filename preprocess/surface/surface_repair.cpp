@@ -1,0 +1,220 @@
+#include "preprocess/surface/surface_repair.h"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdio>
+#include <utility>
+
+#include "preprocess/surface/surface.h"
+#include "preprocess/surface/surface_mend.h"
+#include "preprocess/surface/triangle_sides.h"
+
+namespace wireplan::preprocess {
+namespace {
+
+// Of two closed pieces, one in the other, the inner one is the lumen if it holds this part of the
+// outer's volume: the two are the skins of a wall. A smaller one is a cavity or a crumb.
+constexpr double kInnerSkin = 0.2;
+// Pieces of less than this part of the largest's area are crumbs.
+constexpr double kCrumb = 0.05;
+// A vessel's area is more than this part of its length squared: 600 times that at 1 m and 0.1 mm.
+constexpr double kLeastArea = 1e-6;
+constexpr int kShortest = 1, kLongest = 5000;  // of what may be a vessel               [mm]
+
+Vec3 middle_of(const Surface& s) {
+  return 0.5 * (s.vertices.rowwise().minCoeff() + s.vertices.rowwise().maxCoeff());
+}
+
+double length_of(const Surface& s) {
+  return (s.vertices.rowwise().maxCoeff() - s.vertices.rowwise().minCoeff()).maxCoeff();
+}
+
+double area_of(const Surface& s) {
+  double area = 0.0;
+  for (const auto& t : s.triangles.colwise()) {
+    const Vec3 a = s.vertices.col(t(0)), b = s.vertices.col(t(1)), c = s.vertices.col(t(2));
+    area += 0.5 * (b - a).cross(c - a).norm();
+  }
+  return area;
+}
+
+Mend dropped_piece(const Surface& piece) {
+  return {.kind = MendKind::kPiece,
+          .count = static_cast<int>(piece.triangles.cols()),
+          .place = middle_of(piece),
+          .size = length_of(piece)};
+}
+
+Mend turned_piece(const Surface& piece) {
+  return {.kind = MendKind::kInward,
+          .count = static_cast<int>(piece.triangles.cols()),
+          .place = middle_of(piece)};
+}
+
+/// Whether a piece lies inside a closed surface, and how far from its wall in the median.
+InsideAnswer locate_piece(const Surface& piece, const Surface& closed) {
+  constexpr Eigen::Index kSamples = 20;
+  const Eigen::Index stride = std::max<Eigen::Index>(1, piece.vertices.cols() / kSamples);
+  int inside = 0;
+  std::vector<double> distances;
+  for (Eigen::Index v = 0; v < piece.vertices.cols(); v += stride) {
+    const InsideAnswer answer = locate_point(closed, piece.vertices.col(v));
+    inside += answer.inside ? 1 : 0;
+    distances.push_back(answer.distance);
+  }
+  const auto middle = distances.begin() + static_cast<std::ptrdiff_t>(distances.size() / 2);
+  std::nth_element(distances.begin(), middle, distances.end());
+  return {.inside = 10 * inside >= 9 * static_cast<int>(distances.size()), .distance = *middle};
+}
+
+void require_length(const Surface& s, const std::string& origin) {
+  const double length = length_of(s);
+  if (length >= kShortest && length <= kLongest) return;
+  throw Error(origin + ": the surface is " + number_text(length) +
+              " mm long in the unit stated, expected " + std::to_string(kShortest) + " to " +
+              std::to_string(kLongest) + " mm; correct the unit (mm, cm or m)");
+}
+
+void require_area(const Surface& s, const std::string& origin) {
+  if (area_of(s) > kLeastArea * std::pow(length_of(s), 2.0)) return;
+  throw Error(origin + ": the triangles near " + place_text(middle_of(s)) +
+              " mm enclose nothing, expected the wall of a vessel; export the surface again");
+}
+
+/// The vessel among closed or open pieces: the largest, closed; or a piece within it that is the
+/// inner skin of its wall.
+Surface choose_piece(const std::vector<Piece>& pieces, const std::string& origin,
+                     std::vector<Mend>& mends) {
+  const Surface& first = pieces.front().surface;
+  const double largest = area_of(first);
+  if (pieces.front().turned) mends.push_back(turned_piece(first));
+  require_area(first, origin);
+  Surface vessel = close_openings(first, origin, mends);
+  for (std::size_t k = 1; k < pieces.size(); ++k) {
+    const Surface& piece = pieces[k].surface;
+    const InsideAnswer there =
+        area_of(piece) < kCrumb * largest ? InsideAnswer{} : locate_piece(piece, vessel);
+    if (!there.inside) {
+      mends.push_back(dropped_piece(piece));
+      continue;
+    }
+    std::vector<Mend> of_piece;
+    Surface inner = largest_piece(close_openings(piece, origin, of_piece));
+    if (signed_volume(inner) < kInnerSkin * std::abs(signed_volume(vessel))) {
+      mends.push_back(dropped_piece(piece));
+      continue;
+    }
+    mends = std::move(of_piece);  // what was mended on the outer skin does not matter
+    mends.push_back({.kind = MendKind::kOuterSkin,
+                     .count = static_cast<int>(vessel.triangles.cols()),
+                     .place = middle_of(vessel),
+                     .size = there.distance});
+    vessel = std::move(inner);
+  }
+  return largest_piece(vessel);
+}
+
+struct Wording {
+  const char *name, *one, *many, *size;
+};
+
+/// In the order of MendKind.
+constexpr std::array<Wording, 12> kWordings = {{
+    {"duplicate triangles", "triangle that was there twice dropped",
+     "triangles that were there twice dropped", "wide"},
+    {"degenerate triangles", "triangle without area dropped", "triangles without area dropped",
+     "wide"},
+    {"turned triangles", "triangle turned whose normal disagreed with its neighbours'",
+     "triangles turned whose normals disagreed with their neighbours'", ""},
+    {"inward normals", "triangle turned outward, since its normal pointed into the vessel",
+     "triangles, all of them, turned outward, since their normals pointed into the vessel", ""},
+    {"hanging sheet", "sheet of triangles dropped that hung on the wall or divided the lumen",
+     "sheets of triangles dropped that hung on the wall or divided the lumen", "wide"},
+    {"contact", "vertex parted where the wall touched itself",
+     "vertices parted where the wall touched itself", "apart"},
+    {"tangle", "tangle of more than two sheets at an edge cut out",
+     "tangles of more than two sheets at an edge cut out", "wide"},
+    {"hole", "hole closed", "holes closed", "wide"},
+    {"open end", "open end capped", "open ends capped", "wide"},
+    {"other piece", "other piece dropped", "other pieces dropped", "long"},
+    {"outer skin",
+     "wall with two skins found: its inner skin is taken as the lumen, the outer one dropped",
+     "walls with two skins found: the inner skin is taken as the lumen, the outer ones dropped",
+     "thick"},
+    {"cutting triangles", "triangle made anew that cut another one",
+     "triangles made anew that cut each other", ""},
+}};
+
+/// Whether a mend's own count is how many there are of its kind; else it is one, of so many
+/// triangles or edges.
+bool counts_triangles(MendKind kind) {
+  return kind == MendKind::kDuplicate || kind == MendKind::kDegenerate ||
+         kind == MendKind::kTurned || kind == MendKind::kInward || kind == MendKind::kContact ||
+         kind == MendKind::kIntersection;
+}
+
+}  // namespace
+
+std::string place_text(const Vec3& p) {
+  std::array<char, 96> buffer{};
+  std::snprintf(buffer.data(), buffer.size(), "(%.1f, %.1f, %.1f)", p.x(), p.y(), p.z());
+  return buffer.data();
+}
+
+std::string number_text(double value) {
+  std::array<char, 32> buffer{};
+  std::snprintf(buffer.data(), buffer.size(), "%.3g", value);
+  return buffer.data();
+}
+
+std::string name_of(MendKind kind) { return kWordings.at(static_cast<std::size_t>(kind)).name; }
+
+std::vector<std::string> tell_mends(const std::vector<Mend>& mends) {
+  constexpr int kPlacesTold = 6;
+  std::vector<std::string> lines;
+  for (std::size_t k = 0; k < kWordings.size(); ++k) {
+    const Wording& wording = kWordings[k];
+    int count = 0, told = 0;
+    std::string places;
+    for (const Mend& mend : mends) {
+      if (mend.kind != static_cast<MendKind>(k)) continue;
+      count += counts_triangles(mend.kind) ? mend.count : 1;
+      if (++told > kPlacesTold) continue;
+      places += (told == 1 ? ": " : "; ");
+      if (mend.size > 0.0 && *wording.size != '\0') {
+        places += number_text(mend.size) + " mm " + wording.size + " ";
+      }
+      places += "at " + place_text(mend.place);
+    }
+    if (count == 0) continue;
+    lines.push_back(std::to_string(count) + " " + (count == 1 ? wording.one : wording.many) +
+                    places + " mm" + (told > kPlacesTold ? " and elsewhere" : ""));
+  }
+  return lines;
+}
+
+RepairedSurface read_surface(const std::filesystem::path& path, const std::string& unit,
+                             const std::string& frame) {
+  return repair_surface(read_triangles(path, unit, frame), path.string());
+}
+
+RepairedSurface repair_surface(const Surface& triangles, const std::string& origin) {
+  expects(triangles.triangles.cols() > 0);
+  require_length(triangles, origin);
+  RepairedSurface repaired;
+  std::vector<Mend>& mends = repaired.mends;
+  const Surface manifold = make_manifold(triangles, origin, mends);
+  Surface vessel = choose_piece(pieces_of(manifold), origin, mends);
+
+  // A wall with two skins that hang together: the inner one, closed again.
+  Surface skin = inner_skin(vessel, mends);
+  if (skin.triangles.cols() < vessel.triangles.cols()) {
+    vessel = choose_piece(pieces_of(skin), origin, mends);
+  }
+  repaired.surface = without_intersections(vessel, mends);
+  return repaired;
+}
+
+}  // namespace wireplan::preprocess

@@ -1,0 +1,304 @@
+#include "preprocess/volume/voxels.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdlib>
+#include <limits>
+
+namespace wireplan::preprocess {
+namespace {
+
+/// Weights of the discrete Gaussian of variance t [voxels^2] for 0, 1, ..., radius: e^-t I_n(t),
+/// whose variance is t also where a sampled Gaussian would miss it (Lindeberg 1990).
+std::vector<double> gaussian_weights(double t, int radius) {
+  std::vector<double> weights;
+  double sum = 0.0;
+  for (int n = 0; n <= radius; ++n) {
+    weights.push_back(std::exp(-t) * std::cyl_bessel_i(n, t));
+    sum += (n == 0 ? 1.0 : 2.0) * weights.back();
+  }
+  for (double& weight : weights) {
+    weight /= sum;
+  }
+  return weights;
+}
+
+std::vector<double> gaussian_weights(const Grid& grid, double sigma, int axis) {
+  const double spacing = grid.spacing[axis];
+  return gaussian_weights(std::pow(sigma / spacing, 2), smoothing_radius(sigma, spacing));
+}
+
+/// Weighted sum along one axis of the voxels up to weights.size() - 1 steps away.
+void convolve_along(const Grid& grid, int axis, const std::vector<double>& weights,
+                    std::vector<float>& values) {
+  const int nx = grid.size[0], last = grid.size[axis] - 1;
+  const int radius = static_cast<int>(weights.size()) - 1;
+  std::vector<float> result(values.size());
+  std::vector<float> padded(static_cast<std::size_t>(nx + 2 * radius));
+  std::vector<double> row(static_cast<std::size_t>(nx));
+  for (int k = 0; k < grid.size[2]; ++k) {
+    for (int j = 0; j < grid.size[1]; ++j) {
+      // a row of the result comes from whole rows: shifted ones along i, else neighbours
+      if (axis == 0) {
+        for (int i = -radius; i < nx + radius; ++i) {
+          padded[static_cast<std::size_t>(i + radius)] =
+              values[grid.index(std::clamp(i, 0, last), j, k)];
+        }
+      }
+      const auto source = [&](int n) -> const float* {
+        return axis == 0   ? padded.data() + radius + n
+               : axis == 1 ? values.data() + grid.index(0, std::clamp(j + n, 0, last), k)
+                           : values.data() + grid.index(0, j, std::clamp(k + n, 0, last));
+      };
+      std::fill(row.begin(), row.end(), 0.0);
+      for (int n = -radius; n <= radius; ++n) {
+        const float* from = source(n);
+        const double weight = weights[static_cast<std::size_t>(std::abs(n))];
+        for (std::size_t i = 0; i < row.size(); ++i) {
+          row[i] += weight * static_cast<double>(from[i]);
+        }
+      }
+      float* to = result.data() + grid.index(0, j, k);
+      std::transform(row.begin(), row.end(), to, [](double v) { return static_cast<float>(v); });
+    }
+  }
+  values.swap(result);
+}
+
+/// Lower envelope along one line: squared[n] becomes the least of squared[m] + (h (n - m))^2.
+class Envelope {
+ public:
+  void apply(std::vector<double>& squared, double h) {
+    apexes_.clear();
+    starts_.clear();
+    for (std::size_t n = 0; n < squared.size(); ++n) {
+      if (!std::isfinite(squared[n])) {
+        continue;
+      }
+      double start = -std::numeric_limits<double>::infinity();
+      while (!apexes_.empty()) {
+        // where this parabola falls below the last of the envelope
+        const double m = static_cast<double>(apexes_.back()), x = static_cast<double>(n);
+        start = ((squared[n] - squared[apexes_.back()]) / (h * h) + x * x - m * m) / (2 * (x - m));
+        if (start > starts_.back()) {
+          break;
+        }
+        apexes_.pop_back();
+        starts_.pop_back();
+        start = -std::numeric_limits<double>::infinity();
+      }
+      apexes_.push_back(n);
+      starts_.push_back(start);
+    }
+    if (apexes_.empty()) {
+      return;
+    }
+    result_.resize(squared.size());
+    std::size_t piece = 0;
+    for (std::size_t n = 0; n < squared.size(); ++n) {
+      while (piece + 1 < apexes_.size() && starts_[piece + 1] <= static_cast<double>(n)) {
+        ++piece;
+      }
+      const double way = h * (static_cast<double>(n) - static_cast<double>(apexes_[piece]));
+      result_[n] = squared[apexes_[piece]] + way * way;
+    }
+    squared.swap(result_);
+  }
+
+ private:
+  std::vector<std::size_t> apexes_;  // of the parabolas in the envelope
+  std::vector<double> starts_;       // from where on each of them is the lowest
+  std::vector<double> result_;
+};
+
+}  // namespace
+
+std::optional<Voxel> nearest_voxel(const Grid& grid, const Vec3& point) {
+  const Vec3 rounded = grid.ijk_from_lps(point).array().round();
+  Voxel voxel;
+  for (int axis = 0; axis < 3; ++axis) {
+    if (!(rounded[axis] >= 0.0 && rounded[axis] < grid.size[axis])) {
+      return std::nullopt;
+    }
+    voxel[axis] = static_cast<int>(rounded[axis]);
+  }
+  return voxel;
+}
+
+bool on_border(const Grid& grid, const Voxel& v) {
+  for (int axis = 0; axis < 3; ++axis) {
+    if (v[axis] == 0 || v[axis] == grid.size[axis] - 1) {
+      return true;
+    }
+  }
+  return false;
+}
+
+Box grown(Box box, const Voxel& margin, const Grid& grid) {
+  for (int axis = 0; axis < 3; ++axis) {
+    box.first[axis] = std::max(0, box.first[axis] - margin[axis]);
+    box.last[axis] = std::min(grid.size[axis] - 1, box.last[axis] + margin[axis]);
+  }
+  return box;
+}
+
+Box grown(const Box& box, double margin_mm, const Grid& grid) {
+  Voxel margin;
+  for (int axis = 0; axis < 3; ++axis) {
+    margin[axis] = static_cast<int>(std::ceil(margin_mm / grid.spacing[axis]));
+  }
+  return grown(box, margin, grid);
+}
+
+Box united(Box a, const Box& b) {
+  for (int axis = 0; axis < 3; ++axis) {
+    a.first[axis] = std::min(a.first[axis], b.first[axis]);
+    a.last[axis] = std::max(a.last[axis], b.last[axis]);
+  }
+  return a;
+}
+
+Box bounding_box(const Grid& grid, const Labels& labels, Box box) {
+  for (std::size_t n = 0; n < labels.size(); ++n) {
+    if (labels[n] != 0) {
+      const Voxel v = voxel_at(grid, n);
+      box = united(box, {v, v});
+    }
+  }
+  return box;
+}
+
+Grid cropped(const Grid& grid, const Box& box) {
+  Grid crop = grid;
+  for (int axis = 0; axis < 3; ++axis) {
+    crop.size[axis] = box.last[axis] - box.first[axis] + 1;
+  }
+  crop.origin = grid.lps_from_ijk(Vec3(box.first[0], box.first[1], box.first[2]));
+  return crop;
+}
+
+std::vector<std::size_t> voxels_in_ball(const Grid& grid, const Vec3& point, double radius) {
+  std::vector<std::size_t> found;
+  const std::optional<Voxel> center = nearest_voxel(grid, point);
+  if (!center) {
+    return found;
+  }
+  const Box box = grown({*center, *center}, radius, grid);
+  for_each_row(grid, box, [&](std::size_t start) {
+    for (int i = 0; i <= box.last[0] - box.first[0]; ++i) {
+      const std::size_t n = start + static_cast<std::size_t>(i);
+      if ((center_of(grid, n) - point).norm() <= radius) {
+        found.push_back(n);
+      }
+    }
+  });
+  return found;
+}
+
+std::vector<std::size_t> neighbourhood(const Grid& grid, const Voxel& v, int reach) {
+  const Box box = grown({v, v}, {reach, reach, reach}, grid);
+  std::vector<std::size_t> all;
+  for_each_row(grid, box, [&](std::size_t start) {
+    for (int i = 0; i <= box.last[0] - box.first[0]; ++i) {
+      all.push_back(start + static_cast<std::size_t>(i));
+    }
+  });
+  return all;
+}
+
+std::size_t count(const Labels& labels) {
+  return static_cast<std::size_t>(std::count(labels.begin(), labels.end(), 1));
+}
+
+void fill_cavities(const Grid& grid, Labels& labels, double largest) {
+  // what the border reaches is no cavity
+  std::vector<std::size_t> border;
+  for (int k = 0; k < grid.size[2]; ++k) {
+    for (int j = 0; j < grid.size[1]; ++j) {
+      const bool all = k == 0 || k == grid.size[2] - 1 || j == 0 || j == grid.size[1] - 1;
+      for (int i = 0; i < grid.size[0]; i += all ? 1 : std::max(1, grid.size[0] - 1)) {
+        if (labels[grid.index(i, j, k)] == 0) {
+          border.push_back(grid.index(i, j, k));
+        }
+      }
+    }
+  }
+  Labels seen = flood(grid, std::move(border), [&](std::size_t n) { return labels[n] == 0; });
+
+  // collect each cavity on its own
+  std::vector<std::size_t> cavity;
+  for (std::size_t n = 0; n < labels.size(); ++n) {
+    if (labels[n] != 0 || seen[n] != 0) {
+      continue;
+    }
+    cavity.assign(1, n);
+    seen[n] = 1;
+    for (std::size_t next = 0; next < cavity.size(); ++next) {
+      for_each_face_neighbour(grid, cavity[next], [&](std::size_t m) {
+        if (labels[m] == 0 && seen[m] == 0) {
+          seen[m] = 1;
+          cavity.push_back(m);
+        }
+      });
+    }
+    if (static_cast<double>(cavity.size()) <= largest) {
+      for (const std::size_t m : cavity) {
+        labels[m] = 1;
+      }
+    }
+  }
+}
+
+std::vector<float> distance_to(std::uint8_t label, const Grid& grid, const Labels& labels) {
+  std::vector<float> distance(labels.size());
+  std::transform(labels.begin(), labels.end(), distance.begin(), [&](std::uint8_t l) {
+    return l == label ? 0.0F : std::numeric_limits<float>::infinity();
+  });
+  Envelope envelope;
+  const std::array<std::size_t, 3> stride = {1, grid.index(0, 1, 0), grid.index(0, 0, 1)};
+  for (int axis = 0; axis < 3; ++axis) {
+    const int a = axis == 0 ? 1 : 0, b = axis == 2 ? 1 : 2;  // the other two axes
+    std::vector<double> line(static_cast<std::size_t>(grid.size[axis]));
+    for (int v = 0; v < grid.size[b]; ++v) {
+      for (int u = 0; u < grid.size[a]; ++u) {
+        float* first = distance.data() + static_cast<std::size_t>(u) * stride[a] +
+                       static_cast<std::size_t>(v) * stride[b];
+        for (std::size_t n = 0; n < line.size(); ++n) {
+          line[n] = static_cast<double>(first[n * stride[axis]]);
+        }
+        envelope.apply(line, grid.spacing[axis]);
+        for (std::size_t n = 0; n < line.size(); ++n) {
+          first[n * stride[axis]] = static_cast<float>(line[n]);
+        }
+      }
+    }
+  }
+  std::transform(distance.begin(), distance.end(), distance.begin(),
+                 [](float squared) { return std::sqrt(squared); });
+  return distance;
+}
+
+int smoothing_radius(double sigma, double spacing) {
+  return sigma > 0.0 ? 1 + static_cast<int>(std::ceil(4.0 * sigma / spacing)) : 0;
+}
+
+void smooth(const Grid& grid, double sigma, std::vector<float>& values) {
+  for (int axis = 0; axis < 3; ++axis) {
+    convolve_along(grid, axis, gaussian_weights(grid, sigma, axis), values);
+  }
+}
+
+double smoothed_noise(const Grid& grid, double sigma) {
+  double factor = 1.0;
+  for (int axis = 0; axis < 3; ++axis) {
+    const std::vector<double> weights = gaussian_weights(grid, sigma, axis);
+    double squares = weights[0] * weights[0];
+    for (std::size_t n = 1; n < weights.size(); ++n) {
+      squares += 2.0 * weights[n] * weights[n];
+    }
+    factor *= std::sqrt(squares);
+  }
+  return factor;
+}
+
+}  // namespace wireplan::preprocess

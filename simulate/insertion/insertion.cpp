@@ -1,0 +1,519 @@
+#include "simulate/insertion/insertion.h"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+
+namespace wireplan::simulate {
+
+WireContact contact_of(const Touch& touch, double wire_radius, const TriangleLocator& locator) {
+  const bool at_next = touch.part == 1.0;
+  const Vec3 point = touch.position - wire_radius * touch.normal;
+  return {.node = touch.edge + (at_next ? 1 : 0),
+          .part = at_next ? 0.0 : touch.part,
+          .triangle = locator.nearest(point).triangle,
+          .point = point,
+          .normal_force = touch.normal_force * touch.normal,
+          .friction_force = touch.friction,
+          .penetration = touch.penetration,
+          .wall_displacement = touch.wall_displacement};
+}
+
+namespace {
+
+constexpr double kTipRegion = 2.0;  // wire that counts as tip for its force            [mm]
+constexpr double kFoldTurn = 150.0 * kRadPerDeg;  // turning beyond the rest shape's that is one
+constexpr double kFoldLead = 10.0;    // ... with the bow so far ahead of the tip            [mm]
+constexpr double kFoldLength = 60.0;  // ... within so much wire                [mm]
+constexpr double kDriftInto = 0.5;    // a wire's drift may lead this much deeper into the wall
+                                      // than the wire did [mm]
+constexpr double kSnap = 2.0;         // way off the path per push that is a jump, not to go on
+constexpr double kDriftLasts = 5.0;   // push that a wire's drift falls to 1/e in               [mm]
+constexpr double kBent = 16.0;        // wire that a guess bends to keep its tip off the wall [mm]
+constexpr double kSmallestPart = 0.05;  // of a node's share of wire that bends at the exit
+constexpr double kLongestPart = 2.0;  // of a push: friction turns with the path               [mm]
+constexpr double kLongestTurn = 15.0 * kRadPerDeg;  // of the hub in one go
+constexpr double kSmallestCut = 1.0 / 16.0;         // of a push, when one does not converge
+constexpr int kFollowed = 6;                        // solves more of a wire that jumps
+
+/// Edges of the part of the wire that goes in, proximal to distal, and two more, so that the
+/// innermost free node bends against a straight introducer.
+Eigen::VectorXd layout(const Wire& wire, const InsertionOptions& options) {
+  std::vector<double> from_tip;
+  double sum = 0.0;
+  int beyond = 0;
+  const auto add = [&](double l) {
+    if (sum >= options.length - 1e-9) ++beyond;
+    sum += l;
+    from_tip.push_back(l);
+  };
+  const std::vector<double>& asked = options.section_element_length;
+  if (asked.empty()) {
+    const double h = options.element_length;
+    const int available = static_cast<int>(std::floor(wire.length() / h + 1e-9));
+    for (int i = 0; i < available && beyond < 2; ++i) add(h);
+  } else {
+    expects(asked.size() == wire.sections.size());
+    for (std::size_t k = 0; k < asked.size(); ++k) {
+      const double length = wire.sections[k].length;
+      const double most = asked[k] > 0.0 ? asked[k] : options.element_length;
+      const int count = std::max(1, static_cast<int>(std::ceil(length / most - 1e-9)));
+      for (int i = 0; i < count && beyond < 2; ++i) add(length / count);
+    }
+  }
+  expects(from_tip.size() >= 4);
+  std::reverse(from_tip.begin(), from_tip.end());
+  return Eigen::Map<const Eigen::VectorXd>(from_tip.data(),
+                                           static_cast<Eigen::Index>(from_tip.size()));
+}
+
+ContactOptions contact_options(const InsertionOptions& options) {
+  ContactOptions contact;
+  contact.spacing = options.contact_spacing;
+  contact.friction = options.friction;
+  return contact;
+}
+
+Vec3 force_on_wire(const Touch& touch) {
+  return touch.normal_force * touch.normal + touch.friction;
+}
+
+}  // namespace
+
+Insertion::Insertion(const Wire& wire, const Introducer& introducer, const VesselModel& vessel,
+                     const InsertionOptions& options)
+    : introducer_(introducer),
+      options_(options),
+      vessel_(vessel),
+      rod_(build_rod(wire, layout(wire, options))),
+      contact_(rod_, vessel, contact_options(options)) {
+  const int n = rod_.nodes();
+  longest_ = std::min(options.length, rod_.tip_distance[2]);
+  full_bend_ = rod_.bend;
+  full_rest_angle_ = rod_.rest_angle;
+  const Vec3 start = introducer.point - rod_.tip_distance[0] * introducer.direction;
+  state_ = straight_state(rod_, start, introducer.direction, introducer.roll);
+  if (!rod_.twisted) {  // nothing that turns about the wire, so nothing to copy in every push
+    state_.theta.resize(0);
+    state_.director.resize(3, 0);
+    state_.reference_twist.resize(0);
+  }
+  first_curved_ = n;
+  for (int i = n - 1; i >= 0; --i) {
+    if (rod_.rest_angle[i] != 0.0) first_curved_ = i;
+  }
+  problem_.rod = &rod_;
+  problem_.first = n;
+  problem_.last = n;
+  problem_.contact = &contact_;
+  newton_ = {.residual_tolerance = options.residual_tolerance,
+             .max_iterations = options.max_iterations};
+  contact_.start_at(state_.x);
+  forces_ = Eigen::Matrix3Xd::Zero(3, n);
+  guess_ahead_.resize(3, n);
+  path_.resize(3, n);
+  drift_ = moved_ = Eigen::Matrix3Xd::Zero(3, n);
+  mapped_.assign(static_cast<std::size_t>(contact_.memory().normal_force.size()), -1);
+}
+
+template <class Part>
+std::optional<Push> Insertion::move(double amount, double longest_part, const Part& part) {
+  Push record;
+  slipped_out_.reset();
+  const auto ran_out = [&](const NewtonResult& solve) {
+    return !solve.converged && solve.iterations == newton_.max_iterations;
+  };
+  save(before_move_);
+  const Snapshot* before = &before_move_;  // the part that is next
+  double done = 0.0, cut = std::min(std::abs(amount), longest_part);
+  for (;;) {
+    const double now = std::copysign(std::min(cut, std::abs(amount - done)), amount);
+    NewtonResult solve = part(now);
+    record.iterations += solve.iterations;
+    for (int k = 0; k < kFollowed && ran_out(solve); ++k) {
+      solve = follow_jump();
+      record.iterations += solve.iterations;
+    }
+    if (solve.converged) {
+      record.residual = solve.residual;
+      totals_.stored_energy = solve.energy;
+      settle(depth_ - before->depth, hub_angle_ - before->hub_angle);
+      done += now;
+      if (std::abs(amount - done) <= 1e-9) break;
+      save(before_part_);
+      before = &before_part_;
+      continue;
+    }
+    if (!slipped_out_) slipped_out_ = left_through();
+    restore(*before);
+    cut *= 0.5;
+    if (cut < kSmallestCut * std::abs(amount)) return std::nullopt;
+  }
+  measure(record);
+  return record;
+}
+
+std::optional<Push> Insertion::push(double distance) {
+  expects(distance != 0.0 && depth_ + distance > 0.0 && depth_ + distance <= longest_ + 1e-9);
+  return move(distance, kLongestPart, [&](double part) { return advance(part); });
+}
+
+std::optional<Push> Insertion::turn(double angle) {
+  expects(depth_ > 0.0);
+  return move(angle, kLongestTurn, [&](double part) { return spin(part); });
+}
+
+void Insertion::save(Snapshot& snapshot) const {
+  snapshot.state = state_;
+  snapshot.depth = depth_;
+  snapshot.hub_angle = hub_angle_;
+  snapshot.first = problem_.first;
+  snapshot.forces = forces_;
+  snapshot.memory = contact_.memory();
+  snapshot.totals = totals_;
+}
+
+void Insertion::restore(const Snapshot& snapshot) {
+  state_ = snapshot.state;
+  depth_ = snapshot.depth;
+  hub_angle_ = snapshot.hub_angle;
+  problem_.first = snapshot.first;
+  forces_ = snapshot.forces;
+  contact_.restore(snapshot.memory);
+  contact_.free_from(depth_);
+  totals_ = snapshot.totals;
+  forget_drift();
+  bend_at_the_exit();
+}
+
+/// Moves the introducer's part by `distance`, guesses the rest and finds its equilibrium.
+NewtonResult Insertion::advance(double distance) {
+  guess_ = state_;
+  depth_ += distance;
+  if (distance * last_distance_ < 0.0) forget_drift();
+  last_distance_ = distance;
+  // Nodes in the introducer lie on its axis; the others go where the wire ahead of them was, and
+  // most of what they came off that path in the last push, per length of it, unless that leads
+  // through the wall. The tip has no wire ahead, or another shape: see below.
+  const int n = rod_.nodes();
+  const double drift = distance * std::exp(-std::abs(distance) / kDriftLasts);
+  problem_.first = n;
+  ahead_ = 0;
+  int tip = std::min(n, first_curved_ + 1);
+  while (tip > 1 && rod_.tip_distance[tip - 1] < distance) --tip;
+  bool through = false;
+  for (int i = 0; i < n; ++i) {
+    const double behind = rod_.tip_distance[i] - depth_;
+    if (behind >= -1e-9) {
+      guess_.x.col(i) = introducer_.point - behind * introducer_.direction;
+      guess_ahead_.col(i) = path_.col(i) = guess_.x.col(i);
+    } else {
+      problem_.first = std::min(problem_.first, i);
+      if (i >= tip) break;
+      path_.col(i) = ahead_of(i, distance);
+      const Vec3 way = drift * drift_.col(i);
+      guess_ahead_.col(i) = path_.col(i) + way;
+      through = through || (way.norm() > kDriftInto &&
+                            vessel_.lumen.distance(guess_ahead_.col(i)) < -kDriftInto - deepest_);
+    }
+  }
+  if (through) guess_ahead_ = path_;
+  // Keep the edges' lengths of before: a guess that strains a stiff wire costs more than one that
+  // lies a little in the wall. The tip keeps its shape, and most of how it turned and changed in
+  // the last push.
+  for (int i = problem_.first; i < n; ++i) {
+    const Vec3 before = state_.x.col(i) - state_.x.col(i - 1);
+    Vec3 edge = guess_ahead_.col(i) - guess_ahead_.col(i - 1);
+    if (i >= tip) edge = before + drift * (moved_.col(i) - moved_.col(i - 1));
+    guess_.x.col(i) =
+        guess_.x.col(i - 1) + std::sqrt(before.squaredNorm() / edge.squaredNorm()) * edge;
+  }
+  bend_off_wall(tip);
+  const NewtonResult result = settle_guess(distance);  // swaps the state of before into guess_
+  if (result.converged) {
+    const double per_length = 1.0 / distance;
+    moved_ = per_length * (state_.x - guess_.x);
+    drift_.leftCols(tip) = per_length * (state_.x - path_).leftCols(tip);
+    drift_.rightCols(n - tip).colwise() = drift_.col(tip - 1).eval();
+    double off = std::sqrt(drift_.colwise().squaredNorm().maxCoeff());
+    for (int i = tip; i < n; ++i) {
+      off = std::max(off, (moved_.col(i) - moved_.col(tip - 1)).norm());
+    }
+    if (off > kSnap) forget_drift();
+  }
+  return result;
+}
+
+/// Bends the guess's last wire so that no node from `tip` on lies deeper in the wall than the wire
+/// did, or nearly so: a tip that was pushed out of the wall alone would leave a kink.
+void Insertion::bend_off_wall(int tip) {
+  constexpr int kRounds = 2;
+  const int n = rod_.nodes();
+  for (int round = 0; round < kRounds; ++round) {
+    double deep = 0.0, reach = 0.0;  // past the wall, of the deepest node; its tip distance
+    Vec3 inward = Vec3::Zero();
+    for (int i = std::max(tip, problem_.first); i < n; ++i) {
+      const WallSample wall = vessel_.lumen.sample(guess_.x.col(i));
+      const double here = rod_.radius - wall.distance - deepest_;
+      if (here <= deep) continue;
+      deep = here;
+      reach = rod_.tip_distance[i];
+      inward = wall.gradient;
+    }
+    if (deep == 0.0) return;
+    // By a parabola from so far behind that node on, past it by all; edges keep their lengths.
+    const double length = std::min(kBent, depth_ - reach);
+    const auto part = [&](int i) {
+      const double rest = std::clamp(1.0 - (rod_.tip_distance[i] - reach) / length, 0.0, 1.0);
+      return rest * rest;
+    };
+    int start = problem_.first;
+    while (part(start) == 0.0) ++start;
+    Vec3 before = guess_.x.col(start - 1);
+    for (int i = start; i < n; ++i) {
+      const Vec3 here = guess_.x.col(i), edge = here - before;
+      const Vec3 bent = edge + ((part(i) - part(i - 1)) * deep) * inward;
+      guess_.x.col(i) = guess_.x.col(i - 1) + (edge.norm() / bent.norm()) * bent;
+      before = here;
+    }
+  }
+}
+
+/// Turns the hub by `angle`, guesses that the whole wire spins with it, its curved tip about the
+/// edge that carries it, and finds its equilibrium.
+NewtonResult Insertion::spin(double angle) {
+  guess_ = state_;
+  hub_angle_ += angle;
+  const int n = rod_.nodes(), root = std::max(problem_.first, first_curved_);
+  if (rod_.twisted) guess_.theta.tail(n - 1 - problem_.first).array() += angle;
+  if (root < n) {
+    const Eigen::AngleAxisd turn(angle, edge(root - 1).normalized());
+    for (int i = root + 1; i < n; ++i) {
+      guess_.x.col(i) = state_.x.col(root) + turn * (state_.x.col(i) - state_.x.col(root));
+    }
+  }
+  forget_drift();
+  return settle_guess(0.0);
+}
+
+/// In the introducer the wire turns with the hub, without twist.
+void Insertion::turn_with_the_hub(RodState& state) const {
+  state.theta[0] = introducer_.roll + hub_angle_;  // this edge never leaves the introducer
+  for (int i = 1; i < std::min(problem_.first, rod_.nodes() - 1); ++i) {
+    state.theta[i] = state.theta[i - 1] - state.reference_twist[i];
+  }
+}
+
+/// Takes the guess, which is `distance` further in than the present state, and finds its
+/// equilibrium.
+NewtonResult Insertion::settle_guess(double distance) {
+  if (rod_.twisted) {
+    // Edges that stay in the introducer keep their directions, and with them their frames.
+    const int kept = distance >= 0.0 ? std::max(0, problem_.first - 1) : 0;
+    guess_.director.leftCols(kept) = state_.director.leftCols(kept);
+    guess_.reference_twist.head(kept) = state_.reference_twist.head(kept);
+    transport_frames(state_, guess_, kept, rod_.nodes() - 2);
+    turn_with_the_hub(guess_);
+  }
+  std::swap(state_, guess_);
+  bend_at_the_exit();
+  contact_.free_from(depth_);
+  contact_.predict(distance);
+  return statics_.solve(problem_, state_, newton_);
+}
+
+/// Goes on from where a solve ran out of iterations. That wire jumps, and its points slide by
+/// millimetres: friction that is held to where they were, and lagged with points that others took
+/// over from at the wall, may have no equilibrium. So anchors follow, and friction opposes the
+/// rest of the jump.
+NewtonResult Insertion::follow_jump() {
+  forget_drift();
+  totals_.friction_work += contact_.settle();
+  contact_.predict(0.0);
+  return statics_.solve(problem_, state_, newton_);
+}
+
+/// The introducer is straight: a node bends with that part alone of its share of the wire that is
+/// out of it. A node at the exit is then half a bend element, the second-order clamp of design 7.
+void Insertion::bend_at_the_exit() {
+  for (int i = exit_first_; i <= exit_last_; ++i) {
+    rod_.bend[i] = full_bend_[i];
+    rod_.rest_angle[i] = full_rest_angle_[i];
+  }
+  exit_first_ = std::max(1, problem_.first - 3);
+  exit_last_ = std::min(problem_.first + 1, rod_.nodes() - 2);
+  for (int i = exit_first_; i <= exit_last_; ++i) {
+    const double part = part_outside(i);
+    rod_.bend[i] = full_bend_[i] / std::max(kSmallestPart, part);
+    rod_.rest_angle[i] = full_rest_angle_[i] * part;
+  }
+}
+
+double Insertion::part_outside(int i) const {
+  const double out = depth_ - rod_.tip_distance[i] + 0.5 * rod_.rest_length[i];
+  return std::clamp(out / rod_.share[i], 0.0, 1.0);
+}
+
+/// Point of the present shape `distance` further along the wire than node i, which is that far from
+/// the tip at least. Called for rising i.
+Vec3 Insertion::ahead_of(int i, double distance) {
+  const double wanted = rod_.tip_distance[i] - distance;
+  while (ahead_ + 2 < rod_.nodes() && rod_.tip_distance[ahead_ + 1] > wanted) ++ahead_;
+  const double part = (rod_.tip_distance[ahead_] - wanted) / rod_.rest_length[ahead_];
+  return (1.0 - part) * state_.x.col(ahead_) + part * state_.x.col(ahead_ + 1);
+}
+
+/// The hand's force on the wire along the introducer. What it holds against is the wire, and the
+/// wall where it pushes on the edge at the exit; and as it lets out bent wire at the exit, this
+/// pushes outward by M^2/(2 EI), the configurational force of a sliding sleeve (Bigoni et al.,
+/// "Eshelby-like forces acting on elastic structures", Mech. Mater. 2015); so does twisted wire, by
+/// T^2/(2 GJ).
+double Insertion::push_force(const HeldEnd& held) const {
+  double force = held.force.dot(introducer_.direction);
+  for (const Touch& touch : touches_) {
+    if (touch.edge >= problem_.first) break;
+    force -= (1.0 - touch.part) * force_on_wire(touch).dot(introducer_.direction);
+  }
+  for (int i = std::max(1, problem_.first - 3); i + 1 < rod_.nodes(); ++i) {
+    if (part_outside(i) <= kSmallestPart) continue;
+    const double moment = rod_.bend[i] * (turn_at(i).norm() - rod_.rest_angle[i]);
+    const double EI = full_bend_[i] * rod_.share[i];
+    force -= moment * moment / (2.0 * EI) + moment * full_rest_angle_[i] / rod_.share[i];
+    if (rod_.twisted) force -= held.torque * held.torque / (2.0 * rod_.twist[i] * rod_.share[i]);
+    break;
+  }
+  return force;
+}
+
+Vec3 Insertion::turn_at(int i) const {
+  return edge(i) / rod_.rest_length[i] - edge(i - 1) / rod_.rest_length[i - 1];
+}
+
+/// After an equilibrium: what slipped, and the work of the push by `distance`.
+void Insertion::settle(double distance, double angle) {
+  touches_ = contact_.touches();
+  deepest_ = 0.0;
+  for (const Touch& touch : touches_) {
+    deepest_ = std::max(deepest_, touch.penetration + touch.wall_displacement);
+  }
+  const HeldEnd held = Statics::held_end(problem_, state_);
+  const double force = push_force(held);
+  totals_.push_work +=
+      0.5 * ((force + totals_.push_force) * distance + (held.torque + totals_.hub_torque) * angle);
+  totals_.push_force = force;
+  totals_.hub_torque = held.torque;
+  totals_.friction_work += contact_.settle();
+}
+
+/// Forces and shape of the present equilibrium.
+void Insertion::measure(Push& record) {
+  const int n = rod_.nodes();
+  record.insertion = depth_;
+  record.tip = tip();
+  record.hub_angle = hub_angle_;
+  record.push_force = totals_.push_force;
+  record.hub_torque = totals_.hub_torque;
+  record.push_work = totals_.push_work;
+  record.stored_energy = totals_.stored_energy;
+  record.friction_work = totals_.friction_work;
+
+  Vec3 group = Vec3::Zero(), at_tip = Vec3::Zero();
+  forces_.setZero();
+  triangle_forces_.clear();
+  int previous = -2;
+  for (const Touch& touch : touches_) {
+    const Vec3 force = force_on_wire(touch);
+    if (touch.point != previous + 1) group.setZero();
+    previous = touch.point;
+    group += force;
+    record.peak_contact_force = std::max(record.peak_contact_force, group.norm());
+    record.total_contact_force += touch.normal_force;
+    record.friction_force += touch.friction.norm();
+    record.max_penetration = std::max(record.max_penetration, touch.penetration);
+    if (touch.wall_displacement > record.wall_displacement) {
+      record.wall_displacement = touch.wall_displacement;
+      record.wall_displacement_point = touch.position - rod_.radius * touch.normal;
+    }
+    if (touch.tip_distance <= kTipRegion) at_tip += force;
+    forces_.col(touch.edge) += (1.0 - touch.part) * force;
+    forces_.col(touch.edge + 1) += touch.part * force;
+    if (!options_.map_forces) continue;
+    std::int32_t& triangle = mapped_[static_cast<std::size_t>(touch.point)];
+    triangle =
+        vessel_.locator.pierced(touch.position - rod_.radius * touch.normal, touch.normal, triangle)
+            .triangle;
+    if (triangle >= 0) triangle_forces_.emplace_back(triangle, touch.normal_force);
+  }
+  if (contact_.lost()) {
+    record.max_penetration = std::max(record.max_penetration, vessel_.lumen.band());
+  }
+  record.tip_force = at_tip.norm();
+  for (int i = std::max(1, problem_.first); i + 1 < n; ++i) {
+    record.peak_curvature = std::max(record.peak_curvature, turn_at(i).norm() / rod_.share[i]);
+  }
+  add_triangle_forces();
+}
+
+void Insertion::add_triangle_forces() {
+  std::sort(triangle_forces_.begin(), triangle_forces_.end());
+  for (std::size_t k = 0; k < triangle_forces_.size();) {
+    const int triangle = triangle_forces_[k].first;
+    double force = 0.0;
+    for (; k < triangle_forces_.size() && triangle_forces_[k].first == triangle; ++k) {
+      force += triangle_forces_[k].second;
+    }
+    double& peak = peak_forces_[triangle];
+    peak = std::max(peak, force);
+  }
+}
+
+std::vector<WireContact> Insertion::contacts() {
+  Eigen::Matrix3Xd unused(3, rod_.nodes());
+  Statics::evaluate(problem_, state_, unused);  // a restored state was not sampled last
+  std::vector<WireContact> list;
+  for (const Touch& touch : contact_.touches()) {
+    list.push_back(contact_of(touch, rod_.radius, vessel_.locator));
+    list.back().node -= problem_.first;
+  }
+  return list;
+}
+
+std::vector<TriangleForce> Insertion::peak_forces() const {
+  std::vector<TriangleForce> list;
+  for (const auto& [triangle, force] : peak_forces_) list.push_back({triangle, force});
+  return list;
+}
+
+std::optional<Vec3> Insertion::find_fold() const {
+  const int n = rod_.nodes();
+  for (int i = problem_.first; i + 1 < n; ++i) {
+    const Vec3 from = edge(i).normalized();
+    double rest = 0.0, length = 0.0;
+    Vec3 bow = state_.x.col(i);
+    for (int j = i + 1; j + 1 < n && length < kFoldLength; ++j) {
+      length += rod_.rest_length[j];
+      rest += std::abs(rod_.rest_angle[j]);
+      if (from.dot(state_.x.col(j) - bow) > 0.0) bow = state_.x.col(j);
+      const double turn = std::acos(std::clamp(from.dot(edge(j).normalized()), -1.0, 1.0));
+      const bool leads = from.dot(bow - tip()) > kFoldLead &&
+                         (bow - introducer_.point).norm() > (tip() - introducer_.point).norm();
+      if (turn - rest > kFoldTurn && leads) return bow;
+    }
+  }
+  return {};
+}
+
+std::optional<int> Insertion::left_through() const {
+  return preprocess::left_through(vessel_.lumen.openings(),
+                                  state_.x.rightCols(rod_.nodes() - problem_.first));
+}
+
+Vec3 Insertion::most_bent() const {
+  int most = std::min(problem_.first, rod_.nodes() - 2);
+  for (int i = most; i + 1 < rod_.nodes(); ++i) {
+    if (turn_at(i).norm() / rod_.share[i] > turn_at(most).norm() / rod_.share[most]) most = i;
+  }
+  return state_.x.col(most);
+}
+
+}  // namespace wireplan::simulate

@@ -1,0 +1,194 @@
+#pragma once
+/// A wire on its way into a vessel: what one push, pull or turn of the hand does to it.
+#include <map>
+#include <optional>
+#include <utility>
+#include <vector>
+
+#include "simulate/contact/wall_contact.h"
+#include "simulate/equilibrium/solver.h"
+#include "simulate/wall/vessel_model.h"
+#include "simulate/wire/rod.h"
+
+namespace wireplan::simulate {
+
+/// How finely and how far to push; the same for all trials of a study.
+struct InsertionOptions {
+  double length = 250.0;        // most wire to bring into the body                      [mm]
+  double step = 1.0;            // of one push                                           [mm]
+  double element_length = 1.0;  //                                                       [mm]
+  /// If not empty: of each section of the wire, tip first, shortened so that whole elements fill
+  /// it; 0: element_length [mm].
+  std::vector<double> section_element_length = {};
+  double contact_spacing = 1.0;      // see ContactOptions::spacing                      [mm]
+  double friction = 0.0;             // Coulomb's coefficient
+  double residual_tolerance = 1e-6;  // largest nodal force out of balance               [N]
+  int max_iterations = 50;           // Newton iterations per solve; see Insertion::push()
+  double record_every = 5.0;         // spacing of the stored shapes                     [mm]
+  bool map_forces = true;            // whether the wall's triangles remember their peak forces
+};
+
+/// The introducer: wire slides along its axis and is free beyond its point.
+struct Introducer {
+  Vec3 point = Vec3::Zero();       // where the wire becomes free, inside the lumen      [mm]
+  Vec3 direction = Vec3::UnitZ();  // unit, into the vessel
+  double roll = 0.0;               // of the hub, right-handed about the direction     [rad]
+};
+
+/// State after one step of a push, pull or turn, in equilibrium. Forces are those of the wall on
+/// the wire. A contact is a maximal run of neighbouring contact points that touch; its force is the
+/// norm of their sum.
+struct Push {
+  double insertion = 0.0;            // wire beyond the introducer's point               [mm]
+  double hub_angle = 0.0;            // turned since the start                          [rad]
+  double push_force = 0.0;           // axial force of the hand on the wire              [N]
+  double hub_torque = 0.0;           // of the hand, about the introducer's direction  [N mm]
+  Vec3 tip = Vec3::Zero();           //                                                  [mm]
+  double tip_force = 0.0;            // norm of the contact force on the last 2 mm       [N]
+  double peak_contact_force = 0.0;   // of the largest contact                           [N]
+  double total_contact_force = 0.0;  // sum of the normal forces of all points           [N]
+  double friction_force = 0.0;       // sum of the friction forces of all points         [N]
+  double max_penetration = 0.0;      // of the wire's surface past the (yielded) wall    [mm]
+  double wall_displacement = 0.0;    // largest of the wall under a contact              [mm]
+  Vec3 wall_displacement_point = Vec3::Zero();  // where                                 [mm]
+  double peak_curvature = 0.0;                  //                                       [1/mm]
+  double push_work = 0.0;      // of the hand since the start, its turning included ...  [N mm]
+  double stored_energy = 0.0;  // ... of wire, contact and wall now ...                  [N mm]
+  double friction_work = 0.0;  // ... and turned into heat since the start; what is left of the
+                               // work was released in jumps [N mm]
+  double residual = 0.0;       //                                                        [N]
+  int iterations = 0;          // Newton iterations of this step
+};
+
+/// Where the wire touches the wall in the final shape.
+struct WireContact {
+  int node = 0;                        // column of TrialResult::nodes, and how far ...
+  double part = 0.0;                   // ... from there to the next node, 0 to below 1
+  int triangle = -1;                   // of the surface; -1: none found there
+  Vec3 point = Vec3::Zero();           // on the wire's surface toward the wall          [mm]
+  Vec3 normal_force = Vec3::Zero();    // of the wall on the wire                        [N]
+  Vec3 friction_force = Vec3::Zero();  // of the wall on the wire, along the wall        [N]
+  double penetration = 0.0;            //                                                [mm]
+  double wall_displacement = 0.0;      // outward                                        [mm]
+};
+
+/// The same, with the triangle that the point is on; nodes counted from the rod's proximal end.
+WireContact contact_of(const Touch& touch, double wire_radius, const TriangleLocator& locator);
+
+/// Largest normal force that a triangle of the surface took at any time.
+struct TriangleForce {
+  int triangle = 0;
+  double force = 0.0;  //                                                                 [N]
+};
+
+/// The wire between two moves, always in equilibrium. Nodes in the introducer lie on its axis and
+/// turn with the hub; the others are free. Deterministic; shares the vessel read-only.
+class Insertion {
+ public:
+  /// Keeps a reference to the vessel. Expects a unit direction and positive lengths.
+  Insertion(const Wire& wire, const Introducer& introducer, const VesselModel& vessel,
+            const InsertionOptions& options);
+
+  /// Pushes the wire in by `distance`, or pulls it back by -`distance` [mm], in parts that friction
+  /// can follow. A part that runs out of iterations is a jump: it is solved again from where it
+  /// got, up to six times. One that has no equilibrium is cut smaller. Empty when even the smallest
+  /// cut has none; the wire is then somewhere on the way: see take_back(). Expects wire that is
+  /// left to push, or in the body.
+  std::optional<Push> push(double distance);
+
+  /// Turns the hub by `angle`, right-handed about the introducer's direction [rad], in the same
+  /// way. A straight round wire does not feel it.
+  std::optional<Push> turn(double angle);
+
+  /// The opening that the wire has left through, and the one that it was through when a part of the
+  /// last move found no equilibrium: it springs out further than the free space before an opening
+  /// goes.
+  std::optional<int> left_through() const;
+  std::optional<int> slipped_out() const { return slipped_out_; }
+
+  double longest() const { return longest_; }      // that can be brought into the body      [mm]
+  double depth() const { return depth_; }          // wire in the body                       [mm]
+  double hub_angle() const { return hub_angle_; }  // since the start               [rad]
+  const Rod& rod() const { return rod_; }
+  Vec3 tip() const { return state_.x.rightCols<1>(); }
+  int first_free() const { return problem_.first; }  // node
+  Eigen::Matrix3Xd free_nodes() const { return state_.x.rightCols(rod_.nodes() - problem_.first); }
+  /// (3, n) of the wall on the nodes, after the last move [N].
+  const Eigen::Matrix3Xd& forces() const { return forces_; }
+  /// Contacts of the present shape; nodes counted from the first free one.
+  std::vector<WireContact> contacts();
+  std::vector<TriangleForce> peak_forces() const;  // over all moves so far, if mapped
+
+  /// Where the wire has turned back on itself, within a short length and more than at rest, so that
+  /// its bow leads and its tip is behind.
+  std::optional<Vec3> find_fold() const;
+  Vec3 most_bent() const;
+
+  /// Takes the wire back to before the last move, or to an earlier state; peak_forces() keep what
+  /// they were.
+  void take_back() { restore(before_move_); }
+  struct Snapshot {
+    RodState state;
+    double depth = 0.0, hub_angle = 0.0;
+    int first = 0;
+    Eigen::Matrix3Xd forces;
+    WallContact::Memory memory;
+    Push totals;
+  };
+  void save(Snapshot& snapshot) const;
+  void restore(const Snapshot& snapshot);
+
+ private:
+  NewtonResult advance(double distance);
+  NewtonResult spin(double angle);
+  NewtonResult settle_guess(double distance);
+  NewtonResult follow_jump();
+  template <class Part>
+  std::optional<Push> move(double amount, double longest_part, const Part& part);
+  void turn_with_the_hub(RodState& state) const;
+  void bend_at_the_exit();
+  double part_outside(int i) const;
+  Vec3 ahead_of(int i, double distance);
+  void bend_off_wall(int tip);
+  void forget_drift() {
+    drift_.setZero();
+    moved_.setZero();
+  }
+  double push_force(const HeldEnd& held) const;
+  Vec3 edge(int i) const { return state_.x.col(i + 1) - state_.x.col(i); }
+  Vec3 turn_at(int i) const;
+  void settle(double distance, double angle);
+  void measure(Push& record);
+  void add_triangle_forces();
+
+  Introducer introducer_;
+  InsertionOptions options_;
+  const VesselModel& vessel_;
+  Rod rod_;
+  Eigen::VectorXd full_bend_, full_rest_angle_;  // of the rod, all of it outside
+  WallContact contact_;
+  RodState state_, guess_;
+  Snapshot before_move_, before_part_;
+  Problem problem_;
+  NewtonOptions newton_;
+  Statics statics_;
+  int first_curved_ = 0;  // first node with a rest angle; the number of nodes where there is none
+  int ahead_ = 0;         // see ahead_of()
+  int exit_first_ = 1, exit_last_ = 0;  // nodes that bend_at_the_exit() changed
+  double deepest_ = 0.0;  // the wire was past the resting wall                            [mm]
+  double depth_ = 0.0, longest_ = 0.0;
+  double hub_angle_ = 0.0;      // since the start                                           [rad]
+  double last_distance_ = 0.0;  // of the last push; negative: pulled                         [mm]
+  std::optional<int> slipped_out_;
+  Push totals_;             // forces of the hand, works and energy so far
+  Eigen::Matrix3Xd path_;   // where the wire ahead of each node was before the last push   [mm]
+  Eigen::Matrix3Xd drift_;  // off that path, per length of push
+  Eigen::Matrix3Xd moved_;  // each node in the last push, per length of it
+  Eigen::Matrix3Xd forces_, guess_ahead_;
+  std::vector<Touch> touches_;
+  std::vector<std::int32_t> mapped_;                     // triangle that each contact point was on
+  std::vector<std::pair<int, double>> triangle_forces_;  // of this push
+  std::map<int, double> peak_forces_;                    // of all pushes, by triangle
+};
+
+}  // namespace wireplan::simulate

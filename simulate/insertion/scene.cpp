@@ -1,0 +1,396 @@
+#include "simulate/insertion/scene.h"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <ctime>
+
+#include "simulate/equilibrium/dynamics.h"
+
+namespace wireplan::simulate {
+
+const char* outcome_name(SceneOutcome outcome) {
+  switch (outcome) {
+    case SceneOutcome::kConverged:
+      return "converged";
+    case SceneOutcome::kNotConverged:
+      return "not_converged";
+    case SceneOutcome::kUnstable:
+      return "unstable";
+  }
+  return "";
+}
+
+double edge_length(const Scene& scene, std::size_t section) {
+  const double equal = scene.wire.length() / scene.elements;
+  if (scene.element_length.empty()) return equal;
+  const double length = scene.wire.sections.at(section).length;
+  const double asked = scene.element_length.at(section);
+  // A whole number is not exceeded by its rounding.
+  return length / std::max(1.0, std::ceil(length / (asked > 0.0 ? asked : equal) - 1e-9));
+}
+
+Eigen::VectorXd edge_lengths(const Scene& scene) {
+  if (scene.element_length.empty()) {
+    return Eigen::VectorXd::Constant(scene.elements, edge_length(scene, 0));
+  }
+  std::vector<double> lengths;
+  for (std::size_t k = scene.wire.sections.size(); k-- > 0;) {
+    const double l = edge_length(scene, k);
+    lengths.insert(lengths.end(),
+                   static_cast<std::size_t>(std::lround(scene.wire.sections[k].length / l)), l);
+  }
+  return Eigen::Map<const Eigen::VectorXd>(lengths.data(),
+                                           static_cast<Eigen::Index>(lengths.size()));
+}
+
+namespace {
+
+/// CPU time of this thread [s].
+double thread_seconds() {
+  timespec now{};
+  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
+  return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
+}
+
+template <typename... Values>
+std::string format(const char* text, Values... values) {
+  char line[240];
+  std::snprintf(line, sizeof line, text, values...);
+  return line;
+}
+
+bool holds_direction(const Support* support) {
+  return support != nullptr && support->kind != SupportKind::kPinned;
+}
+
+EndSupport end_support(const Support& support) {
+  const bool directed = holds_direction(&support);
+  EndSupport end;
+  end.hold_along = support.kind != SupportKind::kGuided;
+  end.hold_across = true;
+  end.hold_roll = directed;
+  end.axis = support.direction;
+  if (directed) end.tangent = support.direction;
+  return end;
+}
+
+const Support* find_support(const Scene& scene, WireEnd end) {
+  for (const Support& support : scene.supports) {
+    if (support.at == end) return &support;
+  }
+  return nullptr;
+}
+
+// ---------------------------------------------------------------- the problem
+
+/// What is solved, and the memory that it refers to.
+struct Setup {
+  Rod rod;
+  RodState state;
+  Eigen::Matrix3Xd full_load, load;  // (3, n) at the end, and now                     [N]
+  Problem problem;
+  const Support* distal = nullptr;
+  Vec3 start_point = Vec3::Zero();     // of the distal node                              [mm]
+  double start_roll = 0.0;             // of the distal edge                              [rad]
+  double turned = 0.0;                 // so far, of the distal support's roll            [rad]
+  double part = 0.0;                   // of the loads, now
+  double moment_zero = 0.0;            // energy of the full tip moment at the start    [N mm]
+  std::optional<WallContact> contact;  // where there is a vessel
+};
+
+/// Energy of the tip moment: of the loads, what is not that of the nodal forces.
+double moment_energy(const Setup& s) {
+  Eigen::Matrix3Xd unused(3, s.state.x.cols());
+  const double loads = Statics::evaluate(s.problem, s.state, unused).load;
+  return s.problem.load == nullptr ? loads : loads + s.load.cwiseProduct(s.state.x).sum();
+}
+
+void set_up(const Scene& scene, Setup& s) {
+  const Support* proximal = find_support(scene, WireEnd::kProximal);
+  expects(proximal != nullptr);
+  s.distal = find_support(scene, WireEnd::kDistal);
+  s.rod = build_rod(scene.wire, edge_lengths(scene), scene.twist == Twist::kCoupled);
+  expects(!(s.rod.twisted && scene.twist == Twist::kDecoupled));
+  expects(scene.loads.tip_torque == 0.0 || scene.twist == Twist::kDecoupled);
+  const int n = s.rod.nodes();
+  s.state = rest_state(s.rod, proximal->point, proximal->direction, proximal->roll);
+  s.start_point = s.state.x.col(n - 1);
+  s.start_roll = s.state.theta[n - 2];
+  s.full_load = scene.loads.gravity * s.rod.mass.transpose();
+  s.full_load.col(n - 1) += scene.loads.tip_force;
+  s.load = s.full_load;
+  s.problem.rod = &s.rod;
+  s.problem.last = n;
+  s.problem.proximal = end_support(*proximal);
+  if (s.distal != nullptr) s.problem.distal = end_support(*s.distal);
+  if (!s.full_load.isZero(0.0)) s.problem.load = &s.load;
+  s.problem.plane = scene.plane;
+  if (scene.loads.tip_moment.isZero(0.0)) return;
+  s.problem.tip_moment =
+      TipMoment{.axis = scene.loads.tip_moment.normalized(), .size = scene.loads.tip_moment.norm()};
+  s.moment_zero = moment_energy(s);
+}
+
+std::vector<std::string> name_terms(const Scene& scene, const Rod& rod) {
+  std::vector<std::string> terms = {"stretch", "bend"};
+  if (rod.twisted) terms.push_back("twist");
+  if (!rod.strip.isZero(0.0)) terms.push_back("strip");
+  if (scene.twist == Twist::kDecoupled) terms.push_back("decoupled_twist");
+  if (!scene.loads.gravity.isZero(0.0) && !rod.mass.isZero(0.0)) terms.push_back("gravity");
+  if (!scene.loads.tip_force.isZero(0.0)) terms.push_back("tip_force");
+  if (!scene.loads.tip_moment.isZero(0.0)) terms.push_back("tip_moment");
+  if (scene.loads.tip_torque != 0.0) terms.push_back("tip_torque");
+  if (scene.plane) terms.push_back("plane");
+  if (scene.vessel != nullptr) {
+    terms.push_back("contact");
+    if (scene.contact.friction > 0.0) terms.push_back("friction");
+    if (scene.vessel->compliance != nullptr) terms.push_back("yielding_wall");
+  }
+  return terms;
+}
+
+/// Contact with the vessel, from the state in which the wire is.
+void add_vessel(const Scene& scene, Setup& s) {
+  s.contact.emplace(s.rod, *scene.vessel, scene.contact);
+  s.contact->start_at(s.state.x);
+  s.problem.contact = &*s.contact;
+}
+
+/// Loads and supports at a part of what they will be.
+void apply_part(const Scene& scene, double part, Setup& s) {
+  const int n = s.rod.nodes();
+  s.part = part;
+  s.load = part * s.full_load;
+  if (s.problem.tip_moment) s.problem.tip_moment->size = part * scene.loads.tip_moment.norm();
+  if (s.distal == nullptr) return;
+
+  // Every node follows the end in proportion, so that no edge is torn.
+  const RodState before = s.state;
+  Vec3 move = s.start_point + part * (s.distal->point - s.start_point) - s.state.x.col(n - 1);
+  if (s.distal->kind == SupportKind::kGuided && part > 1.0 / scene.solver.load_steps) {
+    move -= move.dot(s.distal->direction) * s.distal->direction;  // it is where it slid to
+  }
+  for (int i = 1; i < n; ++i) {
+    s.state.x.col(i) += (1.0 - s.rod.tip_distance[i] / s.rod.tip_distance[0]) * move;
+  }
+  if (!s.rod.twisted) return;
+  transport_frames(before, s.state, 0, n - 2);
+  if (!s.problem.distal.hold_roll) return;
+
+  // The turn of the end is spread over the edges as torsion spreads it.
+  const double target = part * (s.distal->roll - s.start_roll), turn = target - s.turned;
+  s.turned = target;
+  double compliance = 0.0, sum = 0.0;
+  for (int i = 1; i + 1 < n; ++i) compliance += 1.0 / s.rod.twist[i];
+  for (int i = 1; i + 1 < n; ++i) {
+    sum += 1.0 / s.rod.twist[i];
+    s.state.theta[i] += turn * sum / compliance;
+  }
+}
+
+// ---------------------------------------------------------------- the methods
+
+void run_newton(const Scene& scene, Setup& s, SceneResult& result) {
+  const SolverOptions& options = scene.solver;
+  expects(options.load_steps >= 1);
+  Statics statics;
+  NewtonResult solve;
+  for (int step = 1; step <= options.load_steps; ++step) {
+    apply_part(scene, static_cast<double>(step) / options.load_steps, s);
+    solve = statics.solve(s.problem, s.state,
+                          {.residual_tolerance = options.residual_tolerance,
+                           .max_iterations = options.max_iterations});
+    result.iterations += solve.iterations;
+    result.steps = step;
+    result.worst_energy_rise = std::max(result.worst_energy_rise, solve.worst_energy_rise);
+    if (!solve.converged) break;
+    if (s.contact) result.friction_work += s.contact->settle();
+  }
+  result.residual = solve.residual;
+  result.outcome = solve.converged ? SceneOutcome::kConverged : SceneOutcome::kNotConverged;
+  if (!solve.converged) {
+    result.reason =
+        format("residual %.3g N after %d iterations of load step %d of %d, asked for %.3g N",
+               solve.residual, solve.iterations, result.steps, options.load_steps,
+               options.residual_tolerance);
+  }
+}
+
+std::string why_unstable(const MotionResult& motion, Method method, double time_step) {
+  if (method == Method::kConjugateGradient) {
+    return format("a number was not finite after %ld iterations", motion.steps);
+  }
+  const std::string grew = format(
+      "the energy grew beyond 10 times what the loads can give within %ld time steps of %.3g s",
+      motion.steps, time_step);
+  if (motion.critical_time_step == 0.0) return grew + "; without damping no time step is stable";
+  return grew + format(" (largest stable one at the start: %.3g s)", motion.critical_time_step);
+}
+
+void run_motion(const Scene& scene, Setup& s, SceneResult& result) {
+  const SolverOptions& options = scene.solver;
+  expects(options.load_steps == 1 && options.duration < 2e9 * options.time_step);
+  apply_part(scene, 1.0, s);
+  const auto run = options.method == Method::kConjugateGradient ? run_conjugate_gradient
+                   : options.method == Method::kExplicitEuler   ? run_explicit_euler
+                                                                : run_semi_implicit_euler;
+  const MotionResult motion = run(s.problem, s.state,
+                                  {.time_step = options.time_step,
+                                   .duration = options.duration,
+                                   .residual_tolerance = options.residual_tolerance,
+                                   .damping = options.damping});
+  result.iterations = result.steps = static_cast<int>(motion.steps);
+  result.time = motion.time;
+  result.residual = motion.residual;
+  result.worst_energy_rise = motion.worst_energy_rise;
+  result.critical_time_step = motion.critical_time_step;
+  switch (motion.outcome) {
+    case MotionOutcome::kConverged:
+      result.outcome = SceneOutcome::kConverged;
+      break;
+    case MotionOutcome::kFinished:
+      result.outcome = SceneOutcome::kNotConverged;
+      result.reason = format("residual %.3g N after %.6g s, asked for %.3g N%s", motion.residual,
+                             motion.time, options.residual_tolerance,
+                             motion.residual <= options.residual_tolerance ? " at rest" : "");
+      break;
+    case MotionOutcome::kUnstable:
+      result.outcome = SceneOutcome::kUnstable;
+      result.reason = why_unstable(motion, options.method, options.time_step);
+      break;
+  }
+}
+
+// ---------------------------------------------------------------- what came out
+
+/// Torque of a support that holds the roll of an edge: the derivative of the energy by its theta.
+/// By fourth-order differences, exact for the twist and to 1e-9 for the rest bend.
+double roll_torque(const Problem& problem, const RodState& state, int edge) {
+  constexpr double kTurn = 0.01;  // [rad]
+  Eigen::Matrix3Xd unused(3, state.x.cols());
+  RodState turned = state;
+  const auto energy_after = [&](double turn) {
+    turned.theta[edge] = state.theta[edge] + turn;
+    return Statics::evaluate(problem, turned, unused).total();
+  };
+  return (8.0 * (energy_after(kTurn) - energy_after(-kTurn)) -
+          (energy_after(2.0 * kTurn) - energy_after(-2.0 * kTurn))) /
+         (12.0 * kTurn);
+}
+
+/// Force and moment of a support on its end of the wire. The derivative of the energy at the end
+/// node is the force. The moment is the couple that the clamp's half element, told by leaving it
+/// out, turns its edge with and, with directors, the torque of the rest about the edge.
+Reaction reaction_at(const Support& support, const Problem& problem, const RodState& state,
+                     const Eigen::Matrix3Xd& gradient) {
+  const Rod& rod = *problem.rod;
+  const bool proximal = support.at == WireEnd::kProximal;
+  Reaction reaction;
+  reaction.at = support.at;
+  reaction.force = gradient.col(proximal ? 0 : rod.nodes() - 1);
+  if (support.kind == SupportKind::kPinned) return reaction;
+  const int edge = proximal ? 0 : rod.nodes() - 2;
+  const Vec3 e = state.x.col(edge + 1) - state.x.col(edge);
+  Problem rest = problem;
+  (proximal ? rest.proximal : rest.distal).tangent.reset();
+  Eigen::Matrix3Xd rest_gradient(3, rod.nodes());
+  Statics::evaluate(rest, state, rest_gradient);
+  reaction.moment = e.cross(rest_gradient.col(edge + 1) - gradient.col(edge + 1));
+  if (rod.twisted) reaction.moment += roll_torque(rest, state, edge) * e.normalized();
+  return reaction;
+}
+
+/// Angle by which a unit torque twists the wire between a and b, counted from the tip: the integral
+/// of 1/GJ [1/(N mm)].
+double twist_compliance(const Wire& wire, double a, double b) {
+  double sum = 0.0, start = 0.0;
+  for (const Section& section : wire.sections) {
+    const double end = start + section.length;
+    const double GJ =
+        section.twist_stiffness > 0.0 ? section.twist_stiffness : section.bending_stiffness / 1.3;
+    sum += std::max(0.0, std::min(b, end) - std::max(a, start)) / GJ;
+    start = end;
+  }
+  return sum;
+}
+
+/// Paper Eq. (14)-(15): the torque is the same all along the wire, and the rolls of its nodes
+/// follow one by one from the hub's. The torque is that on the tip, or what turns a held distal
+/// end.
+void add_decoupled_twist(const Scene& scene, const Setup& s, SceneResult& result) {
+  const Support* proximal = find_support(scene, WireEnd::kProximal);
+  const bool held = holds_direction(s.distal);
+  expects(holds_direction(proximal) && !(held && scene.loads.tip_torque != 0.0));
+  const double length = scene.wire.length();
+  const double compliance = twist_compliance(scene.wire, 0.0, length);
+  const double torque =
+      held ? (s.distal->roll - proximal->roll) / compliance : scene.loads.tip_torque;
+  const int n = s.rod.nodes();
+  result.twist = result.roll = Eigen::VectorXd::Zero(n);
+  for (int i = 0; i < n; ++i) {
+    const double to_tip = s.rod.tip_distance[i];
+    result.roll[i] = proximal->roll + torque * twist_compliance(scene.wire, to_tip, length);
+    if (i > 0 && i + 1 < n) result.twist[i] = torque / s.rod.twist[i];
+  }
+  result.energy.twist = 0.5 * torque * torque * compliance;
+  const double work = scene.loads.tip_torque * (result.roll[n - 1] - result.roll[0]);
+  result.energy.load -= work;
+  result.moment_energy -= work;
+  for (Reaction& reaction : result.reactions) {
+    const bool at_hub = reaction.at == WireEnd::kProximal;
+    if (!at_hub && !held) continue;
+    const int edge = at_hub ? 0 : n - 2;
+    reaction.moment +=
+        (at_hub ? -torque : torque) * (s.state.x.col(edge + 1) - s.state.x.col(edge)).normalized();
+  }
+}
+
+void describe(const Scene& scene, Setup& s, SceneResult& result) {
+  const int n = s.rod.nodes();
+  result.nodes = s.state.x;
+  Eigen::Matrix3Xd gradient(3, n);
+  result.energy = Statics::evaluate(s.problem, s.state, gradient);
+  if (s.problem.load != nullptr) {
+    result.gravity_energy = -s.part * (scene.loads.gravity.transpose() * s.state.x).dot(s.rod.mass);
+  }
+  if (s.problem.tip_moment) {
+    // Angles count from where the wire started.
+    result.energy.load -= s.part * s.moment_zero;
+    result.moment_energy = moment_energy(s) - s.part * s.moment_zero;
+  }
+  for (const Support& support : scene.supports) {
+    result.reactions.push_back(reaction_at(support, s.problem, s.state, gradient));
+  }
+  if (s.rod.twisted) {
+    result.twist = Eigen::VectorXd::Zero(n);
+    for (int i = 1; i + 1 < n; ++i) {
+      result.twist[i] = s.state.theta[i] - s.state.theta[i - 1] + s.state.reference_twist[i];
+    }
+  }
+  if (scene.twist == Twist::kDecoupled) add_decoupled_twist(scene, s, result);
+  if (s.contact) result.contacts = s.contact->touches();
+}
+
+}  // namespace
+
+SceneResult run_scene(const Scene& scene) {
+  expects(scene.vessel == nullptr || scene.solver.method == Method::kNewton);
+  Setup setup;
+  set_up(scene, setup);
+  if (scene.vessel != nullptr) add_vessel(scene, setup);
+  SceneResult result;
+  result.terms = name_terms(scene, setup.rod);
+  const double begin = thread_seconds();
+  if (scene.solver.method == Method::kNewton) {
+    run_newton(scene, setup, result);
+  } else {
+    run_motion(scene, setup, result);
+  }
+  result.cpu_time_s = thread_seconds() - begin;
+  describe(scene, setup, result);
+  return result;
+}
+
+}  // namespace wireplan::simulate

@@ -1,0 +1,234 @@
+#include "simulate/insertion/trial.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <optional>
+#include <utility>
+
+namespace wireplan::simulate {
+
+const char* outcome_name(Outcome outcome) {
+  switch (outcome) {
+    case Outcome::kReached:
+      return "reached";
+    case Outcome::kMissed:
+      return "missed";
+    case Outcome::kStuck:
+      return "stuck";
+    case Outcome::kProlapsed:
+      return "prolapsed";
+    case Outcome::kLeftOpening:
+      return "left_opening";
+    case Outcome::kLeftLumen:
+      return "left_lumen";
+    case Outcome::kNotConverged:
+      return "not_converged";
+    case Outcome::kFailed:
+      return "failed";
+  }
+  return "failed";
+}
+
+namespace {
+
+constexpr double kStuckPush = 20.0;    // pushing so far ...                               [mm]
+constexpr double kStuckMove = 2.0;     // ... while the tip moves less than this is stuck  [mm]
+constexpr double kProlapseMove = 0.5;  // ... or by less than this part of it, with a fold
+constexpr double kOutside = 1.0;       // penetration that contact does not explain        [mm]
+
+constexpr double kTurnStep = 15.0 * kRadPerDeg;      // of the hub between two records
+constexpr double kTurnPerShape = 30.0 * kRadPerDeg;  // of the hub between two shapes
+
+std::string place(const Vec3& p) {
+  char text[80];
+  std::snprintf(text, sizeof text, "(%.1f, %.1f, %.1f) mm", p[0], p[1], p[2]);
+  return text;
+}
+
+std::string millimetres(double value) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%.1f mm", value);
+  return text;
+}
+
+}  // namespace
+
+Trial::Trial(const Wire& wire, const Introducer& introducer, const Goal& goal,
+             const VesselModel& vessel, const InsertionOptions& options)
+    : goal_(goal),
+      vessel_(vessel),
+      options_(options),
+      insertion_(wire, introducer, vessel, options),
+      best_distance_((insertion_.tip() - goal.point).norm()) {
+  result_.terms = {"stretch", "bend"};
+  if (insertion_.rod().twisted) result_.terms.push_back("twist");
+  result_.terms.push_back("contact");
+  if (options.friction > 0.0) result_.terms.push_back("friction");
+  if (vessel.compliance) result_.terms.push_back("yielding_wall");
+}
+
+void Trial::make(const Move& move) {
+  expects(move.push == 0.0 || move.turn == 0.0);
+  const double whole = std::abs(move.push) + std::abs(move.turn);
+  const double most = move.turn == 0.0 ? options_.step : kTurnStep;
+  for (double done = 0.0; whole - done > 1e-9; done += most) {
+    const double part = std::min(most, whole - done) / whole;
+    if (!step({part * move.push, part * move.turn})) return;
+  }
+}
+
+bool Trial::step(const Move& move) {
+  if (ended_) return false;
+  // Some wire stays in the body, so that there is something to find an equilibrium of.
+  const double depth = insertion_.depth();
+  const double most_back = std::max(0.0, depth - options_.step);
+  const double distance = std::clamp(move.push, -most_back, insertion_.longest() - depth);
+  if (move.turn == 0.0 && std::abs(distance) < 1e-9) return false;
+  const std::optional<Push> push =
+      move.turn == 0.0 ? insertion_.push(distance) : insertion_.turn(move.turn);
+  if (!push) {
+    insertion_.take_back();
+    if (const std::optional<int> opening = insertion_.slipped_out()) {
+      return end(Outcome::kLeftOpening,
+                 "the wire springs out of the vessel through the opening at " + place_of(*opening) +
+                     " after " + millimetres(depth) + " of insertion, from " +
+                     place(insertion_.tip()));
+    }
+    return end(Outcome::kNotConverged, "no equilibrium after " + millimetres(depth) +
+                                           " of insertion, tip at " + place(insertion_.tip()));
+  }
+  // Inside the goal the wire goes on until the tip is nearest to its centre.
+  const double to_goal = (push->tip - goal_.point).norm();
+  if (best_distance_ <= goal_.radius && to_goal >= best_distance_) {
+    insertion_.take_back();
+    return end(Outcome::kReached, reached_reason());
+  }
+  best_distance_ = to_goal;
+  result_.pushes.push_back(*push);
+  if (distance <= 0.0) pushing_since_ = result_.pushes.size();
+  since_shape_ += std::abs(distance) + std::abs(move.turn) / kTurnPerShape * options_.record_every;
+  if (!check_progress()) return false;
+  if (since_shape_ >= options_.record_every - 1e-9) record_shape();
+  return true;
+}
+
+std::string Trial::place_of(int opening) const {
+  return place(vessel_.lumen.openings()[static_cast<std::size_t>(opening)].center);
+}
+
+/// False where the last step ended the trial.
+bool Trial::check_progress() {
+  const Push& push = result_.pushes.back();
+  if (const std::optional<int> opening = insertion_.left_through()) {
+    return end(Outcome::kLeftOpening, "the wire left the vessel through the opening at " +
+                                          place_of(*opening) + " after " +
+                                          millimetres(push.insertion) + " of insertion");
+  }
+  if (push.max_penetration > kOutside) {
+    return end(Outcome::kLeftLumen, millimetres(push.max_penetration) + " through the wall after " +
+                                        millimetres(push.insertion) + " of insertion, tip at " +
+                                        place(push.tip));
+  }
+  const std::size_t back = static_cast<std::size_t>(std::ceil(kStuckPush / options_.step));
+  if (result_.pushes.size() - pushing_since_ <= back) return true;
+  const Push& then = result_.pushes[result_.pushes.size() - 1 - back];
+  const double went = push.insertion - then.insertion;
+  const double moved = (push.tip - then.tip).norm();
+  const std::optional<Vec3> fold =
+      moved < kProlapseMove * went ? insertion_.find_fold() : std::nullopt;
+  if (fold) {
+    return end(Outcome::kProlapsed, "the wire folds back at " + place(*fold) + " after " +
+                                        millimetres(push.insertion) +
+                                        " of insertion; its tip is behind at " + place(push.tip));
+  }
+  if (moved < kStuckMove) {
+    return end(Outcome::kStuck,
+               "the tip stays at " + place(push.tip) + " while " + millimetres(went) +
+                   " of wire went in; the wire bends most at " + place(insertion_.most_bent()));
+  }
+  return true;
+}
+
+void Trial::record_shape() {
+  since_shape_ = 0.0;
+  const int first = insertion_.first_free();
+  result_.shapes.push_back({.insertion = insertion_.depth(),
+                            .hub_angle = insertion_.hub_angle(),
+                            .nodes = insertion_.free_nodes(),
+                            .contact_force = insertion_.forces()
+                                                 .rightCols(insertion_.rod().nodes() - first)
+                                                 .colwise()
+                                                 .norm()
+                                                 .transpose()});
+}
+
+/// Keeps the final shape. Always false.
+bool Trial::end(Outcome outcome, const std::string& reason) {
+  ended_ = true;
+  result_.outcome = outcome;
+  result_.reason = reason;
+  result_.nodes = insertion_.free_nodes();
+  result_.contacts = insertion_.contacts();
+  result_.peak_forces = insertion_.peak_forces();
+  const bool recorded = !result_.shapes.empty() &&
+                        result_.shapes.back().insertion == insertion_.depth() &&
+                        result_.shapes.back().hub_angle == insertion_.hub_angle();
+  if (!recorded) record_shape();
+  return false;
+}
+
+std::string Trial::reached_reason() const {
+  return "tip " + millimetres(best_distance_) + " from the target after " +
+         millimetres(insertion_.depth()) + " of insertion";
+}
+
+TrialResult Trial::finish() {
+  if (!ended_ && best_distance_ <= goal_.radius) {
+    end(Outcome::kReached, reached_reason());
+  } else if (!ended_) {
+    const bool all = insertion_.longest() - insertion_.depth() < 1e-9;
+    end(Outcome::kMissed, (all ? "all " : "") + millimetres(insertion_.depth()) +
+                              " of wire went in, tip ended " + millimetres(best_distance_) +
+                              " from the target at " + place(insertion_.tip()));
+  }
+  return std::move(result_);
+}
+
+void Trial::save(Mark& mark) const {
+  expects(!ended_);
+  insertion_.save(mark.insertion);
+  mark.pushes = result_.pushes.size();
+  mark.shapes = result_.shapes.size();
+  mark.pushing_since = pushing_since_;
+  mark.best_distance = best_distance_;
+  mark.since_shape = since_shape_;
+}
+
+void Trial::restore(const Mark& mark) {
+  ended_ = false;
+  insertion_.restore(mark.insertion);
+  result_.pushes.resize(mark.pushes);
+  result_.shapes.resize(mark.shapes);
+  pushing_since_ = mark.pushing_since;
+  best_distance_ = mark.best_distance;
+  since_shape_ = mark.since_shape;
+}
+
+TrialResult run_trial(const Wire& wire, const Introducer& introducer, const Goal& goal,
+                      const VesselModel& vessel, const InsertionOptions& options,
+                      const std::vector<Move>& moves) {
+  // The moves may bring in more wire than stays there.
+  InsertionOptions with_moves = options;
+  double depth = 0.0;
+  for (const Move& move : moves) {
+    depth += move.push;
+    with_moves.length = std::max(with_moves.length, depth);
+  }
+  Trial trial(wire, introducer, goal, vessel, with_moves);
+  for (const Move& move : moves) trial.make(move);
+  trial.make({.push = options.length - trial.depth()});
+  return trial.finish();
+}
+
+}  // namespace wireplan::simulate

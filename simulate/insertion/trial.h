@@ -1,0 +1,107 @@
+#pragma once
+/// One insertion of one wire into one vessel and its outcome: run_trial(wire, introducer, goal,
+/// vessel, options, moves) -> TrialResult. Serial and deterministic; shares the vessel read-only
+/// with other trials.
+#include <string>
+#include <vector>
+
+#include "simulate/insertion/insertion.h"
+
+namespace wireplan::simulate {
+
+struct Goal {
+  Vec3 point = Vec3::Zero();  //                                                  [mm]
+  double radius = 4.0;        // the tip within this distance has reached it      [mm]
+};
+
+enum class Outcome {
+  kReached,       // the tip came within the goal's radius; ends where it was nearest
+  kMissed,        // all wire was pushed in, the goal not reached
+  kStuck,         // pushing no longer advances the tip
+  kProlapsed,     // the wire folded back on itself instead of advancing its tip
+  kLeftOpening,   // the tip left the vessel through an inlet or outlet
+  kLeftLumen,     // the wire went further through the wall than contact explains
+  kNotConverged,  // a push had no equilibrium to the tolerance, also when cut smaller
+  kFailed,        // our fault; the reason holds the message
+};
+const char* outcome_name(Outcome outcome);  // "reached", "missed", "stuck", ...
+
+/// A shape on the way, for pictures and time series.
+struct Shape {
+  double insertion = 0.0;         //                                                  [mm]
+  double hub_angle = 0.0;         //                                                 [rad]
+  Eigen::Matrix3Xd nodes;         // (3, k) beyond the introducer, proximal to distal [mm]
+  Eigen::VectorXd contact_force;  // (k) norm per node                                [N]
+};
+
+struct TrialResult {
+  Outcome outcome = Outcome::kFailed;
+  std::string reason;        // one sentence; with the place in mm where it failed
+  std::vector<Push> pushes;  // in the order in which they were made
+  Eigen::Matrix3Xd nodes;    // (3, k) final shape beyond the introducer, proximal to distal
+  std::vector<WireContact> contacts;       // of the final shape
+  std::vector<TriangleForce> peak_forces;  // over all pushes, ascending triangles; if mapped
+  std::vector<Shape> shapes;       // every `record_every` of the hand's way, and the final one
+  std::vector<std::string> terms;  // energy terms that the scene built: "stretch", "bend", ...
+};
+
+/// What the hand does: pushes the wire in, pulls it back, or turns the hub. One of both is 0.
+struct Move {
+  double push = 0.0;  // negative: pulls back                                            [mm]
+  double turn = 0.0;  // of the hub, right-handed about the introducer's direction      [rad]
+};
+
+/// An insertion step by step, to its outcome. Never throws for what the physics does.
+class Trial {
+ public:
+  /// Keeps a reference to the vessel. Expects a unit direction and positive lengths.
+  Trial(const Wire& wire, const Introducer& introducer, const Goal& goal, const VesselModel& vessel,
+        const InsertionOptions& options);
+
+  /// Makes a move, in steps of the options' length or 15 degrees, as far as there is wire to push
+  /// or to pull and the trial has not ended.
+  void make(const Move& move);
+  /// One such step. False where the trial has ended, or no wire is left for it.
+  bool step(const Move& move);
+  bool ended() const { return ended_; }
+
+  double depth() const { return insertion_.depth(); }
+  /// So far; its final shape and contacts are those of the end, which finish() brings about.
+  const TrialResult& result() const { return result_; }
+  /// Ends the trial as one that missed, unless it has ended, and hands out the result.
+  TrialResult finish();
+
+  /// Takes an unfinished trial back to where it was, but for its peak forces.
+  struct Mark {
+    Insertion::Snapshot insertion;
+    std::size_t pushes = 0, shapes = 0, pushing_since = 0;
+    double best_distance = 0.0, since_shape = 0.0;
+  };
+  void save(Mark& mark) const;
+  void restore(const Mark& mark);
+
+ private:
+  bool end(Outcome outcome, const std::string& reason);
+  bool check_progress();
+  std::string reached_reason() const;
+  std::string place_of(int opening) const;
+  void record_shape();
+
+  Goal goal_;
+  const VesselModel& vessel_;
+  InsertionOptions options_;
+  Insertion insertion_;
+  TrialResult result_;
+  double best_distance_;           // of the tip from the goal, in the last step          [mm]
+  double since_shape_ = 0.0;       // way of the hand since a shape was recorded          [mm]
+  std::size_t pushing_since_ = 0;  // all records from here on are pushes
+  bool ended_ = false;
+};
+
+/// Makes the moves, none for a straight push, then pushes the wire in until the tip reaches the
+/// goal, all wire is in, or a named failure.
+TrialResult run_trial(const Wire& wire, const Introducer& introducer, const Goal& goal,
+                      const VesselModel& vessel, const InsertionOptions& options,
+                      const std::vector<Move>& moves = {});
+
+}  // namespace wireplan::simulate

@@ -1,0 +1,136 @@
+#pragma once
+/// Where a wire is straight at rest and round, nothing but twist depends on the thetas of its
+/// edges, and in equilibrium all of it carries one torque. Those thetas are then no unknowns: the
+/// free part of the wire up to its first shaped node is one torsion spring. Part of solver.cpp.
+#include <Eigen/Core>
+#include <Eigen/LU>
+
+#include "simulate/wire/block_band.h"
+#include "simulate/wire/rod.h"
+
+namespace wireplan::simulate {
+
+/// W = k/2 psi^2, psi = theta of edge `last` - theta of edge first-1 + reference twist at the nodes
+/// from `first` to `last`, 1/k the sum of their 1/T. During a solve the directors of the edges
+/// first..last-1 follow those behind without twist and are not kept: the reference twist of all the
+/// nodes is that of node `last`.
+struct TwistChain {
+  int first = 0, last = -1;  // none where last <= first
+  double stiffness = 0.0;    // k                                                       [N mm]
+
+  bool exists() const { return last > first; }
+  bool has(int node) const { return exists() && node >= first && node <= last; }
+  int edges() const { return exists() ? last - first : 0; }  // whose thetas are no unknowns
+  double angle(const RodState& state) const {
+    return state.theta[last] - state.theta[first - 1] + state.reference_twist[last];
+  }
+  double energy(const RodState& state) const {
+    const double psi = exists() ? angle(state) : 0.0;
+    return 0.5 * stiffness * psi * psi;
+  }
+};
+
+/// The chain of a wire whose nodes are free from `first`, which is past an introducer, to its tip.
+inline TwistChain find_chain(const Rod& rod, int first) {
+  TwistChain chain;
+  chain.first = first;
+  chain.last = first - 1;
+  while (chain.last < rod.nodes() - 2 && rod.rest_angle[chain.last + 1] == 0.0 &&
+         rod.strip[chain.last + 1] == 0.0) {
+    ++chain.last;
+  }
+  if (!chain.exists()) return {};
+  double compliance = 0.0;
+  for (int i = chain.first; i <= chain.last; ++i) compliance += 1.0 / rod.twist[i];
+  chain.stiffness = 1.0 / compliance;
+  return chain;
+}
+
+/// Takes the reference twist of the chain's nodes together at its last one.
+inline void gather_chain(const TwistChain& chain, RodState& state) {
+  for (int i = chain.first; i < chain.last; ++i) {
+    state.reference_twist[chain.last] += state.reference_twist[i];
+    state.reference_twist[i] = 0.0;
+  }
+}
+
+/// Gives the chain's edges their directors and thetas: one torque all along.
+inline void spread_chain(const TwistChain& chain, const Rod& rod, RodState& state) {
+  if (!chain.exists()) return;
+  const double torque = chain.stiffness * chain.angle(state);
+  const auto tangent = [&](int e) -> Vec3 {
+    return (state.x.col(e + 1) - state.x.col(e)).normalized();
+  };
+  Vec3 before = tangent(chain.first - 1);
+  for (int e = chain.first; e < chain.last; ++e) {
+    const Vec3 t = tangent(e);
+    Vec3 d = parallel_transport(state.director.col(e - 1), before, t);
+    d -= d.dot(t) * t;
+    state.director.col(e) = d.normalized();
+    state.theta[e] = state.theta[e - 1] + torque / rod.twist[e];
+    before = t;
+  }
+}
+
+/// Solves with a banded matrix A = L D L' that has been factored and what add_chain() left out of
+/// it: H = A + k ((p + e)(p + e)' - e e'), e the last theta's unit vector, p psi's derivatives with
+/// the nodes (Sherman, Morrison and Woodbury). Between the halves of a solve with A, so that p + e
+/// and e need the first half alone.
+class CoupledChain {
+ public:
+  Eigen::VectorXd psi;  // p
+
+  /// v <- H^-1 v, A having been factored anew. `theta`: block row of the last theta. Returns false
+  /// where H is not positive definite.
+  template <int D>
+  bool solve_first(const TwistChain& chain, const BlockBand<D>& factored, int theta,
+                   Eigen::VectorXd& v) {
+    exists_ = chain.exists();
+    if (!exists_) {
+      factored.solve(v);
+      return true;
+    }
+    const Eigen::Index place = D * theta + D - 1;
+    together_ = psi;
+    together_[place] += 1.0;
+    theta_.setZero(psi.size());
+    theta_[place] = 1.0;
+    factored.template solve_lower<2>({v.data(), together_.data()});
+    factored.template solve_lower<1>({theta_.data()}, theta);
+    together_part_ = together_;
+    theta_part_ = theta_;
+    factored.divide_by_pivots(together_part_);
+    factored.divide_by_pivots(theta_part_);
+    const double mixed = together_.dot(theta_part_);
+    Eigen::Matrix2d inner;
+    inner << 1.0 / chain.stiffness + together_.dot(together_part_), mixed, mixed,
+        theta_.dot(theta_part_) - 1.0 / chain.stiffness;
+    inverse_ = inner.inverse();
+    correct(v);
+    factored.solve_upper(v);
+    // A is positive definite; H is if the inner matrix has an eigenvalue of either sign
+    // (Haynsworth).
+    return inner.determinant() < 0.0;
+  }
+  /// v <- H^-1 v with the same matrix again.
+  template <int D>
+  void solve(const BlockBand<D>& factored, Eigen::VectorXd& v) const {
+    factored.template solve_lower<1>({v.data()});
+    if (exists_) correct(v);
+    factored.solve_upper(v);
+  }
+
+ private:
+  void correct(Eigen::VectorXd& v) const {
+    const Eigen::Vector2d share =
+        inverse_ * Eigen::Vector2d(together_part_.dot(v), theta_part_.dot(v));
+    v -= share[0] * together_ + share[1] * theta_;
+  }
+
+  bool exists_ = false;
+  Eigen::VectorXd together_, theta_;            // L^-1 (p + e), L^-1 e
+  Eigen::VectorXd together_part_, theta_part_;  // D^-1 of those
+  Eigen::Matrix2d inverse_;
+};
+
+}  // namespace wireplan::simulate
