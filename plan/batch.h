@@ -1,5 +1,6 @@
 #pragma once
 /// Many trials, any thread count, the same answer.
+#include <exception>
 #include <functional>
 #include <string>
 #include <vector>
@@ -13,6 +14,12 @@ struct BatchOptions {
   int threads = 0;                                              // 0: all cores
   std::function<void(int done, int total)> progress = nullptr;  // `done` rises by one
   std::function<bool()> cancelled = nullptr;                    // asked before each trial
+};
+
+/// Work was stopped by the user; what was finished is kept.
+class Interrupted : public std::exception {
+ public:
+  const char* what() const noexcept override { return "interrupted; what was finished is kept"; }
 };
 
 struct BatchResult {

@@ -176,14 +176,6 @@ class Search {
 
 }  // namespace
 
-double find_progress(const simulate::TrialResult& trial, const Centerline& path) {
-  double progress = 0.0;
-  for (const simulate::Push& push : trial.pushes) {
-    progress = std::max(progress, find_progress(push.tip, path));
-  }
-  return progress;
-}
-
 std::vector<int> choose_starts(const Study& study, const std::vector<Candidate>& candidates,
                                const std::vector<double>& progress,
                                const std::vector<simulate::Outcome>& outcomes, int per_wire) {
@@ -230,9 +222,18 @@ Manoeuvres find_manoeuvres(const Study& study, const std::vector<Candidate>& sta
       Candidate candidate = starts[k];
       candidate.moves = branch.moves;
       all.found.push_back(std::move(candidate));
+      all.starts.push_back(static_cast<int>(k));
     }
   }
   return all;
+}
+
+std::vector<simulate::Move> as_written(std::vector<simulate::Move> moves) {
+  for (Move& move : moves) {
+    move.turn = clean(move.turn / kRadPerDeg) * kRadPerDeg;
+    move.push = move.turn != 0.0 ? 0.0 : clean(move.push);
+  }
+  return moves;
 }
 
 std::string describe_moves(const std::vector<simulate::Move>& moves, double insertion) {

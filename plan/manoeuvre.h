@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "plan/batch.h"
+#include "plan/metrics.h"
 #include "preprocess/vessel.h"
 
 namespace wireplan::plan {
@@ -15,11 +16,9 @@ std::vector<int> choose_starts(const Study& study, const std::vector<Candidate>&
                                const std::vector<double>& progress,
                                const std::vector<simulate::Outcome>& outcomes, int per_wire);
 
-/// How far along the path the tip came in any push while it was in the path's lumen [mm].
-double find_progress(const simulate::TrialResult& trial, const Centerline& path);
-
 struct Manoeuvres {
   std::vector<Candidate> found;  // with the moves that let a push reach the target; may be empty
+  std::vector<int> starts;       // of each, the start that it went on from
   long branches = 0;             // that were tried
 };
 
@@ -31,6 +30,9 @@ struct Manoeuvres {
 Manoeuvres find_manoeuvres(const Study& study, const std::vector<Candidate>& starts,
                            const Centerline& path, const simulate::VesselModel& vessel,
                            int most_turns, const BatchOptions& options);
+
+/// Moves as files hold them, in degrees and mm: a search finds what can be read again.
+std::vector<simulate::Move> as_written(std::vector<simulate::Move> moves);
 
 /// "push 112.0 mm, turn 90 deg clockwise, pull back 10.0 mm, then push on to 140.0 mm": as the hand
 /// does it, seen from the hub toward the patient; the last as deep as the trial went in [mm]. Empty

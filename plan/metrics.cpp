@@ -80,4 +80,22 @@ Metrics compute_metrics(const simulate::TrialResult& trial, const Study& study,
   return metrics;
 }
 
+double find_progress(const simulate::TrialResult& trial, const Centerline& path) {
+  double progress = 0.0;
+  for (const simulate::Push& push : trial.pushes) {
+    progress = std::max(progress, find_progress(push.tip, path));
+  }
+  return progress;
+}
+
+Measured measure(const simulate::TrialResult& trial, const Study& study, const Centerline& path) {
+  return {.outcome = trial.outcome,
+          .reason = trial.reason,
+          .terms = trial.terms,
+          .metrics = compute_metrics(trial, study, path),
+          .progress = find_progress(trial, path),
+          .last_tip = trial.pushes.empty() ? study.access : trial.pushes.back().tip,
+          .nodes = trial.nodes};
+}
+
 }  // namespace wireplan::plan

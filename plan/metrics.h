@@ -1,5 +1,9 @@
 #pragma once
 /// One trial -> the numbers that plans are compared by (references C1; design section 6).
+#include <array>
+#include <string>
+#include <vector>
+
 #include "plan/candidates.h"
 #include "preprocess/vessel.h"
 
@@ -41,6 +45,32 @@ struct Metrics {
   long iterations = 0;           // of all pushes together
 };
 
+/// The numbers of Metrics with their names in files, in the order of a report's trial.
+struct MetricField {
+  const char* name;
+  double Metrics::*value;
+  bool reported = true;
+};
+inline constexpr std::array kMetricFields = {
+    MetricField{"insertion_mm", &Metrics::insertion},
+    MetricField{"tip_to_target_mm", &Metrics::tip_to_target},
+    MetricField{"nearest_to_target_mm", &Metrics::nearest_to_target, false},
+    MetricField{"peak_tip_force_n", &Metrics::peak_tip_force},
+    MetricField{"peak_contact_force_n", &Metrics::peak_contact_force},
+    MetricField{"mean_contact_force_n", &Metrics::mean_contact_force},
+    MetricField{"force_impulse_n_mm", &Metrics::force_impulse},
+    MetricField{"peak_push_force_n", &Metrics::peak_push_force},
+    MetricField{"push_work_n_mm", &Metrics::push_work},
+    MetricField{"friction_work_n_mm", &Metrics::friction_work},
+    MetricField{"energy_released_n_mm", &Metrics::energy_released},
+    MetricField{"peak_wall_displacement_mm", &Metrics::peak_wall_displacement},
+    MetricField{"peak_curvature_per_mm", &Metrics::peak_curvature},
+    MetricField{"centerline_deviation_mm", &Metrics::centerline_deviation},
+    MetricField{"off_path_mm", &Metrics::off_path},
+    MetricField{"max_penetration_mm", &Metrics::max_penetration},
+    MetricField{"residual_n", &Metrics::residual},
+};
+
 /// All of the trial's numbers. Without a push the wire counts as lying at the access, free of
 /// force. The deviation is the mean over the nodes of the exact distance to the path's segments.
 /// Expects a path of at least one point.
@@ -52,5 +82,22 @@ Metrics compute_metrics(const simulate::TrialResult& trial, const Study& study,
 /// way of the wire, in and out, by the trapezoidal rule, from rest (no force at insertion 0); the
 /// mean is the impulse over that way.
 Metrics compute_push_metrics(const std::vector<simulate::Push>& pushes);
+
+/// What planning and judging keep of a trial.
+struct Measured {
+  simulate::Outcome outcome = simulate::Outcome::kFailed;
+  std::string reason = {};
+  std::vector<std::string> terms = {};
+  Metrics metrics = {};
+  double progress = 0.0;         // furthest place of the tip along the path, in its lumen   [mm]
+  Vec3 last_tip = Vec3::Zero();  // after the last push; the access without one              [mm]
+  Eigen::Matrix3Xd nodes = {};   // (3, k) final shape                                       [mm]
+  double cpu_seconds = 0.0;      // that it took; timing, so never twice the same            [s]
+};
+
+/// How far along the path the tip came in any push while it was in the path's lumen [mm].
+double find_progress(const simulate::TrialResult& trial, const Centerline& path);
+
+Measured measure(const simulate::TrialResult& trial, const Study& study, const Centerline& path);
 
 }  // namespace wireplan::plan

@@ -55,7 +55,7 @@ void expects_valid(const Limits& limits, const Weights& weights) {
 }
 
 /// `summary`, and behind a colon what the trial itself says of it.
-std::string with_reason(const std::string& summary, const simulate::TrialResult& trial) {
+std::string with_reason(const std::string& summary, const Measured& trial) {
   return trial.reason.empty() ? summary : summary + ": " + trial.reason;
 }
 
@@ -360,9 +360,9 @@ double compute_score_error(const Metrics& metrics, const NumericalError& error,
   return weighted_mean(change, weights);
 }
 
-std::string exclusion_reason(const simulate::TrialResult& trial, const Metrics& metrics,
-                             const Study& study, const Limits& limits) {
+std::string exclusion_reason(const Measured& trial, const Study& study, const Limits& limits) {
   using simulate::Outcome;
+  const Metrics& metrics = trial.metrics;
   const std::string place = "at " + one_decimal(metrics.insertion) + " mm of wire, tip " +
                             one_decimal(metrics.tip_to_target) + " mm from the target";
   switch (trial.outcome) {
@@ -390,10 +390,12 @@ std::string exclusion_reason(const simulate::TrialResult& trial, const Metrics& 
 }
 
 Ranking rank(const Study& study, const std::vector<Candidate>& candidates,
-             const std::vector<simulate::TrialResult>& trials, const std::vector<Metrics>& metrics,
-             const Limits& limits, const Weights& weights, const Findings& findings) {
+             const std::vector<Measured>& trials, const Limits& limits, const Weights& weights,
+             const Findings& findings) {
+  std::vector<Metrics> metrics;
+  for (const Measured& trial : trials) metrics.push_back(trial.metrics);
   const std::vector<std::optional<NumericalError>>& errors = findings.errors;
-  expects(trials.size() == candidates.size() && metrics.size() == candidates.size());
+  expects(trials.size() == candidates.size());
   expects(errors.empty() || errors.size() == candidates.size());
   expects(findings.scouted.empty() || findings.scouted.size() == candidates.size());
   expects_valid(limits, weights);
@@ -401,7 +403,7 @@ Ranking rank(const Study& study, const std::vector<Candidate>& candidates,
   // A trial is a plan or has a reason.
   Ranking ranking;
   for (int k = 0; k < std::ssize(candidates); ++k) {
-    std::string reason = exclusion_reason(trials[k], metrics[k], study, limits);
+    std::string reason = exclusion_reason(trials[k], study, limits);
     if (!findings.scouted.empty() && findings.scouted[k]) {
       reason = scouted_reason(compute_score(metrics[k], study.goal, limits, weights), reason);
     }

@@ -127,14 +127,13 @@ struct Findings {
 /// repeats that both have, widened by both errors, holds 0: then the unknowns decide which is
 /// better. Where one has no repeats, they are tied if their scores differ by no more than both
 /// errors and what the unknowns typically move repeated plans against each other, the median over
-/// their pairs. A trial that was only scouted is no plan. Of a trial only its outcome and reason
-/// are looked at. Expects one trial and one Metrics per candidate, and positive limits.
+/// their pairs. A trial that was only scouted is no plan. Expects one trial per candidate, and
+/// positive limits.
 Ranking rank(const Study& study, const std::vector<Candidate>& candidates,
-             const std::vector<simulate::TrialResult>& trials, const std::vector<Metrics>& metrics,
-             const Limits& limits, const Weights& weights, const Findings& findings = {});
+             const std::vector<Measured>& trials, const Limits& limits, const Weights& weights,
+             const Findings& findings = {});
 
 /// Why a trial is no plan, in a sentence; empty if it is one.
-std::string exclusion_reason(const simulate::TrialResult& trial, const Metrics& metrics,
-                             const Study& study, const Limits& limits);
+std::string exclusion_reason(const Measured& trial, const Study& study, const Limits& limits);
 
 }  // namespace wireplan::plan

@@ -17,20 +17,6 @@ std::string in_mm(double length) {
   return text;
 }
 
-/// The study of one run: elements and contact points `factor` times as far apart, and pushed to
-/// `insertion` whether or not the tip passes the goal on the way.
-Study coarsened(const Study& study, double factor, double insertion) {
-  Study changed = study;
-  changed.insertion.element_length *= factor;
-  for (double& length : changed.insertion.section_element_length) length *= factor;
-  changed.insertion.contact_spacing *= factor;
-  changed.insertion.length = insertion;
-  changed.insertion.record_every = insertion;  // no shapes on the way
-  changed.insertion.map_forces = false;
-  changed.goal.radius = 1e-9;  // no push ends that near, so none ends the trial
-  return changed;
-}
-
 /// Arc length of each node from the tip, nodes counted from the tip.
 std::vector<double> arc_from_tip(const Eigen::Matrix3Xd& nodes) {
   std::vector<double> arc{0.0};
@@ -42,8 +28,7 @@ std::vector<double> arc_from_tip(const Eigen::Matrix3Xd& nodes) {
 
 /// Why the run cannot be compared; empty if it came to the insertion.
 std::string why_incomplete(const RefinedRun& run, double insertion) {
-  const auto& pushes = run.trial.pushes;
-  const double reached = pushes.empty() ? 0.0 : pushes.back().insertion;
+  const double reached = run.trial.metrics.insertion;
   if (std::abs(reached - insertion) <= 1e-6 * insertion && run.trial.nodes.cols() > 0) return "";
   const std::string why =
       run.trial.reason.empty() ? outcome_name(run.trial.outcome) : run.trial.reason;
@@ -57,8 +42,7 @@ struct Change {
 };
 
 Change compare_runs(const RefinedRun& coarse, const RefinedRun& fine) {
-  const Metrics a = compute_push_metrics(coarse.trial.pushes);
-  const Metrics b = compute_push_metrics(fine.trial.pushes);
+  const Metrics &a = coarse.trial.metrics, &b = fine.trial.metrics;
   return {.position = shape_distance(coarse.trial.nodes, fine.trial.nodes),
           .tip = (coarse.trial.nodes.rightCols<1>() - fine.trial.nodes.rightCols<1>()).norm(),
           .peak_force = std::abs(a.peak_contact_force - b.peak_contact_force),
@@ -98,39 +82,16 @@ std::vector<int> choose_plans_to_refine(const Ranking& ranking,
   return next;
 }
 
-std::vector<Refinement> refine_plans(const Study& study, const std::vector<Candidate>& candidates,
-                                     const std::vector<Metrics>& metrics,
-                                     const std::vector<int>& trials,
-                                     const simulate::VesselModel& vessel,
-                                     const BatchOptions& batch) {
-  expects(metrics.size() == candidates.size());
-
-  // Plan by plan: 2h, h, h/2.
-  constexpr std::array kFactors = {2.0, 1.0, 0.5};
-  std::vector<RefinedRun> runs;
-  for (std::size_t k = 0; k < trials.size(); ++k) {
-    for (const double factor : kFactors) {
-      RefinedRun& run = runs.emplace_back();
-      run.element_length = factor * study.insertion.element_length;
-      run.trial.reason = "not run: cancelled";
-    }
-  }
-  const auto run_slot = [&](int slot) {
-    RefinedRun& run = runs[slot];
-    const int trial = trials[slot / 3];
-    const double start = thread_cpu_seconds();
-    run.trial = run_candidate(coarsened(study, kFactors[slot % 3], metrics[trial].insertion),
-                              candidates[trial], vessel);
-    run.cpu_seconds = thread_cpu_seconds() - start;
-  };
-  for_each_slot(static_cast<int>(runs.size()), run_slot, batch);
-
-  std::vector<Refinement> refinements;
-  for (std::size_t k = 0; k < trials.size(); ++k) {
-    refinements.push_back(estimate_error(trials[k], metrics[trials[k]].insertion,
-                                         {runs[3 * k], runs[3 * k + 1], runs[3 * k + 2]}));
-  }
-  return refinements;
+Study refined_study(const Study& study, double factor, double insertion) {
+  Study changed = study;
+  changed.insertion.element_length *= factor;
+  for (double& length : changed.insertion.section_element_length) length *= factor;
+  changed.insertion.contact_spacing *= factor;
+  changed.insertion.length = insertion;
+  changed.insertion.record_every = insertion;  // no shapes on the way
+  changed.insertion.map_forces = false;
+  changed.goal.radius = 1e-9;  // no push ends that near, so none ends the trial
+  return changed;
 }
 
 Refinement estimate_error(int trial, double insertion, const std::vector<RefinedRun>& runs) {
@@ -169,12 +130,12 @@ Refinement estimate_error(int trial, double insertion, const std::vector<Refined
   if (fine) position_errors[2] = of_shorter * fine->position;
   for (int k = 0; k < 3; ++k) {
     if (!complete[k]) continue;
-    const Metrics metrics = compute_push_metrics(runs[k].trial.pushes);
+    const Metrics& metrics = runs[k].trial.metrics;
     result.rows.push_back({.element_length = runs[k].element_length,
                            .position_error = position_errors[k],
                            .peak_force = metrics.peak_contact_force,
                            .iterations = metrics.iterations});
-    result.cpu_seconds.push_back(runs[k].cpu_seconds);
+    result.cpu_seconds.push_back(runs[k].trial.cpu_seconds);
   }
   return result;
 }

@@ -2,11 +2,11 @@
 /// How far the best plans may be from the truth: each is run again with elements twice and half as
 /// long, and contact points as far apart, which also gives the error against run time of the case
 /// at hand (design section 8).
+#include <array>
 #include <optional>
 #include <string>
 #include <vector>
 
-#include "plan/batch.h"
 #include "plan/ranking.h"
 
 namespace wireplan::plan {
@@ -36,9 +36,16 @@ struct Refinement {
 /// A plan run with one element length.
 struct RefinedRun {
   double element_length = 0.0;  //                                                          [mm]
-  simulate::TrialResult trial;
-  double cpu_seconds = 0.0;  //                                                             [s]
+  Measured trial;
 };
+
+/// Each plan is run with elements of so many times the study's.
+inline constexpr std::array kRefineFactors = {2.0, 1.0, 0.5};
+
+/// The study of one such run: elements and contact points `factor` times as far apart, and pushed
+/// to the insertion that the plan ended at, past the goal if need be, so that shapes of equal
+/// insertion are compared.
+Study refined_study(const Study& study, double factor, double insertion);
 
 /// The plans to refine next: of the first `options.plans` those that are not in `known` yet, and,
 /// where `options.most` allows, those tied with the first plan, whose error may change which is
@@ -47,15 +54,6 @@ struct RefinedRun {
 std::vector<int> choose_plans_to_refine(const Ranking& ranking,
                                         const std::vector<Refinement>& known,
                                         const RefineOptions& options);
-
-/// Runs plans with elements of 2h, h and h/2, h the study's. All three push to the insertion that
-/// the plan ended at, past the goal if need be, so that shapes of equal insertion are compared.
-/// Returns one Refinement for each of `trials`, in their order; the batch counts runs, three each.
-std::vector<Refinement> refine_plans(const Study& study, const std::vector<Candidate>& candidates,
-                                     const std::vector<Metrics>& metrics,
-                                     const std::vector<int>& trials,
-                                     const simulate::VesselModel& vessel,
-                                     const BatchOptions& batch);
 
 /// Richardson's estimate from three runs to the same `insertion`, with elements of 2h, h and h/2.
 /// With d the change from one run to the next finer one, the longer elements' error is

@@ -180,10 +180,11 @@ double largest_entry_shift(const Study& study, const simulate::VesselModel& vess
   return 0.5 * std::max(0.0, vessel.lumen.distance(study.access));
 }
 
-Repeat judge_repeat(const simulate::TrialResult& trial, const Metrics& metrics, const Study& study,
-                    const Limits& limits, const Weights& weights) {
+Repeat judge_repeat(const Measured& trial, const Study& study, const Limits& limits,
+                    const Weights& weights) {
+  const Metrics& metrics = trial.metrics;
   Repeat repeat;
-  repeat.reason = exclusion_reason(trial, metrics, study, limits);
+  repeat.reason = exclusion_reason(trial, study, limits);
   repeat.success = repeat.reason.empty();
   if (repeat.success) repeat.score = compute_score(metrics, study.goal, limits, weights).total;
   repeat.peak_contact_force = metrics.peak_contact_force;

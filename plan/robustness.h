@@ -66,8 +66,8 @@ double largest_lumen_offset(const Study& study);
 double largest_entry_shift(const Study& study, const simulate::VesselModel& vessel);
 
 /// What is kept of a repeat: how it ended and what it cost, by the rules of the ranking.
-Repeat judge_repeat(const simulate::TrialResult& trial, const Metrics& metrics, const Study& study,
-                    const Limits& limits, const Weights& weights);
+Repeat judge_repeat(const Measured& trial, const Study& study, const Limits& limits,
+                    const Weights& weights);
 
 /// The plans to repeat next: of the first `plans` and of the first of each wire, those that have
 /// fewer than `count` repeats. Trials, best first.

@@ -126,22 +126,23 @@ simulate::TrialResult run_scout(const Study& scout, const Candidate& candidate,
   });
 }
 
-Sighting look_at(const simulate::TrialResult& trial, const Metrics& metrics, const Study& study,
-                 const Limits& limits, const Weights& weights) {
+Sighting look_at(const Measured& trial, const Study& study, const Limits& limits,
+                 const Weights& weights) {
   using simulate::Outcome;
+  const Metrics& metrics = trial.metrics;
   Sighting sighting;
   sighting.reached = metrics.reached;
-  sighting.plan = exclusion_reason(trial, metrics, study, limits).empty();
+  sighting.plan = exclusion_reason(trial, study, limits).empty();
   sighting.unclear = trial.outcome == Outcome::kNotConverged || trial.outcome == Outcome::kFailed;
   if (metrics.reached) sighting.score = compute_score(metrics, study.goal, limits, weights).total;
   sighting.nearest = metrics.nearest_to_target;
   return sighting;
 }
 
-bool is_pinched(const simulate::TrialResult& trial, double wire_radius, const Centerline& path) {
+bool is_pinched(const Measured& trial, double wire_radius, const Centerline& path) {
   constexpr double kNear = 10.0;  // wire radii
   if (trial.outcome != simulate::Outcome::kStuck) return false;
-  const PathPlace tip = find_place(trial.pushes.back().tip, path);
+  const PathPlace tip = find_place(trial.last_tip, path);
   for (Eigen::Index k = 0; k < path.radius.size(); ++k) {
     const bool near = std::abs(path.arc_length[k] - tip.arc) <= kNear * wire_radius;
     if (near && path.radius[k] < 2.0 * wire_radius) return true;

@@ -37,13 +37,13 @@ struct Sighting {
   double nearest = 0.0;  // to the target                                                   [mm]
 };
 /// `pinched` is left to is_pinched().
-Sighting look_at(const simulate::TrialResult& trial, const Metrics& metrics, const Study& study,
-                 const Limits& limits, const Weights& weights);
+Sighting look_at(const Measured& trial, const Study& study, const Limits& limits,
+                 const Weights& weights);
 
 /// Whether a trial on a rigid wall was stuck in a stenosis that the wall, did it yield, might let
 /// it through: with the tip where the path, within ten wire radii, leaves less room on each side
 /// than the wire's radius.
-bool is_pinched(const simulate::TrialResult& trial, double wire_radius, const Centerline& path);
+bool is_pinched(const Measured& trial, double wire_radius, const Centerline& path);
 
 /// What is known of the candidates, one entry each: of all from their scouts; of some from probes,
 /// which are the study's own trials on a rigid wall, given up as scouts are, a fraction of the cost

@@ -43,6 +43,10 @@ inline void expects(bool condition, const char* file = __builtin_FILE(),
   }
 }
 
+/// The number to 12 digits: what a conversion of units adds is gone, 15 deg and
+/// not 15.000000000000002.
+double clean(double value);
+
 inline constexpr double kPi = std::numbers::pi;
 inline constexpr double kRadPerDeg = kPi / 180.0;
 inline constexpr double kMpaPerKpa = 1e-3;

@@ -143,7 +143,7 @@ void read_segmentation(JsonReader& root, Case& input) {
     return reader.has(key) ? std::optional<double>(reader.number(key, std::nullopt, range))
                            : std::nullopt;
   };
-  SegmentationInput& segmentation = input.segmentation;
+  preprocess::SegmentOptions& segmentation = input.segmentation;
   segmentation.lower_hu = given("lower_hu", band);
   segmentation.upper_hu = given("upper_hu", band);
   if (segmentation.lower_hu.has_value() != segmentation.upper_hu.has_value()) {
@@ -382,7 +382,7 @@ Json degrees(const std::vector<double>& angles) {
 Json input_json(const Case& input) {
   Json json;
   if (input.volume) {
-    const SegmentationInput& segmentation = input.segmentation;
+    const preprocess::SegmentOptions& segmentation = input.segmentation;
     Json seeds = Json::array();
     for (const Vec3& seed : segmentation.seeds) seeds.push_back(to_json(seed));
     json["volume"] = {{"path", input.volume->given}};

@@ -8,9 +8,8 @@
 #include <vector>
 
 #include "pipeline/files/json_reader.h"
-#include "plan/candidates.h"
-#include "plan/ranking.h"
-#include "plan/robustness.h"
+#include "plan/make_plan.h"
+#include "preprocess/segment/segment.h"
 #include "preprocess/surface/surface.h"
 #include "preprocess/wall/wall.h"
 
@@ -30,29 +29,20 @@ struct SurfaceInput {
   std::string frame;  // "LPS", "RAS"
 };
 
-/// Mirrors preprocess::SegmentOptions, which exists only where imaging is built.
-struct SegmentationInput {
-  std::optional<double> lower_hu, upper_hu;  // both or none: chosen from the volume
-  std::vector<Vec3> seeds;                   // besides the access point; may be empty     [mm]
-  std::optional<double> smoothing_mm, neck_opening_mm;  // chosen with the band, else 0
-};
-
 /// The vessel's wall. A rigid one has the other values too: the wall's files are made of them.
 struct WallInput {
   bool elastic = true;
   preprocess::WallOptions extrusion;  // young_modulus 0: chosen by the wall stage
 };
 
-/// When scripts of pushes, pulls and turns are searched.
-/// When needed: no straight push reaches, or none that does holds under disturbances.
-enum class Manoeuvring { kNever, kWhenNeeded, kAlways };
+using plan::Manoeuvring;
 
 struct Case {
   std::filesystem::path file;  // the case file itself
   std::string name;
   std::optional<VolumeInput> volume;  // exactly one of volume and surface_input is given
   std::optional<SurfaceInput> surface_input;
-  SegmentationInput segmentation;  // of a volume
+  preprocess::SegmentOptions segmentation;  // of a volume; seeds besides the access point
   preprocess::SurfaceOptions surface;
   WallInput wall;
   /// Its tangent is found later, from the centerline. insertion.length 0: chosen from the path's
@@ -61,7 +51,8 @@ struct Case {
   Manoeuvring manoeuvres = Manoeuvring::kWhenNeeded;
   plan::Limits limits;
   plan::Weights weights;
-  /// unknowns.lumen 0: chosen by the report stage, half a voxel of a volume, 0.25 mm of a surface.
+  /// unknowns.lumen 0: chosen by the stages that repeat, half a voxel of a volume, 0.25 mm of a
+  /// surface.
   plan::RobustnessOptions robustness;
   bool exhaustive = false;  // all candidates are run in full, none is only scouted
 };

@@ -256,13 +256,6 @@ void write_json(const Json& value, const std::filesystem::path& path) {
   write_whole(value.dump(2, ' ', false, Json::error_handler_t::replace) + "\n", path);
 }
 
-double clean(double value) {
-  std::ostringstream text;
-  text.precision(12);
-  text << value;
-  return std::stod(text.str());
-}
-
 Json to_json(const Vec3& v) { return Json::array({v.x(), v.y(), v.z()}); }
 
 Json to_json(const Eigen::Matrix3Xd& points) {

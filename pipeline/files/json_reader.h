@@ -28,9 +28,6 @@ Json parse_json(const std::string& text, const std::string& file, const std::str
 /// refuses.
 void write_json(const Json& value, const std::filesystem::path& path);
 
-/// The number without the last bits that converting a unit there and back leaves: 12 digits.
-double clean(double value);
-
 /// Vec3 as [x, y, z] and matrices (3, n) as n such rows.
 Json to_json(const Vec3& v);
 Json to_json(const Eigen::Matrix3Xd& points);

@@ -2,8 +2,11 @@
 
 #include <array>
 #include <cmath>
+#include <cstdint>
+#include <cstring>
 #include <fstream>
 #include <sstream>
+#include <string_view>
 #include <utility>
 
 #include "pipeline/files/json_reader.h"
@@ -20,6 +23,7 @@ using simulate::TriangleForce;
 using simulate::WireContact;
 
 constexpr const char* kSchema = "wireplan.trial/3";
+constexpr std::string_view kShapesMagic = "wireplan.shapes/1\n";
 
 constexpr std::array kOutcomes = {
     Outcome::kReached,     Outcome::kMissed,    Outcome::kStuck,        Outcome::kProlapsed,
@@ -54,13 +58,6 @@ constexpr std::array<std::pair<const char*, Vec3 Push::*>, 2> kPointColumns = {{
 double number(const Json& value) { return value.is_null() ? std::nan("") : value.get<double>(); }
 
 Vec3 point(const Json& row) { return {number(row.at(0)), number(row.at(1)), number(row.at(2))}; }
-
-Outcome outcome_of(const std::string& name) {
-  for (const Outcome outcome : kOutcomes) {
-    if (name == simulate::outcome_name(outcome)) return outcome;
-  }
-  throw Error("outcome is " + name + ", expected one that this program knows");
-}
 
 Json pushes_to_json(const std::vector<Push>& pushes) {
   Json columns;
@@ -153,6 +150,64 @@ std::string to_lines(const Json& object) {
 }
 
 }  // namespace
+
+simulate::Outcome outcome_of(const std::string& name) {
+  for (const Outcome outcome : kOutcomes) {
+    if (name == simulate::outcome_name(outcome)) return outcome;
+  }
+  throw Error("outcome is " + name + ", expected one that this program knows");
+}
+
+std::string shapes_to_bytes(const std::vector<simulate::Shape>& shapes) {
+  std::string bytes(kShapesMagic);
+  const auto add = [&](const void* data, std::size_t count) {
+    bytes.append(static_cast<const char*>(data), count);
+  };
+  const auto add_count = [&](Eigen::Index count) {
+    const auto fixed = static_cast<std::uint64_t>(count);
+    add(&fixed, sizeof fixed);
+  };
+  add_count(std::ssize(shapes));
+  for (const simulate::Shape& shape : shapes) {
+    expects(shape.contact_force.size() == shape.nodes.cols());
+    add_count(shape.nodes.cols());
+    add(&shape.insertion, sizeof(double));
+    add(&shape.hub_angle, sizeof(double));
+    add(shape.nodes.data(), sizeof(double) * static_cast<std::size_t>(shape.nodes.size()));
+    add(shape.contact_force.data(),
+        sizeof(double) * static_cast<std::size_t>(shape.contact_force.size()));
+  }
+  return bytes;
+}
+
+std::optional<std::vector<simulate::Shape>> shapes_from_bytes(const std::string& bytes) {
+  if (!bytes.starts_with(kShapesMagic)) return {};
+  std::size_t at = kShapesMagic.size();
+  const auto take = [&](void* data, std::size_t count) {
+    if (bytes.size() - at < count) return false;
+    std::memcpy(data, bytes.data() + at, count);
+    at += count;
+    return true;
+  };
+  std::uint64_t count = 0;
+  if (!take(&count, sizeof count)) return {};
+  std::vector<simulate::Shape> shapes;
+  for (std::uint64_t k = 0; k < count; ++k) {
+    simulate::Shape shape;
+    std::uint64_t nodes = 0;
+    if (!take(&nodes, sizeof nodes) || nodes > bytes.size() / sizeof(double)) return {};
+    shape.nodes.resize(3, static_cast<Eigen::Index>(nodes));
+    shape.contact_force.resize(static_cast<Eigen::Index>(nodes));
+    const bool whole = take(&shape.insertion, sizeof(double)) &&
+                       take(&shape.hub_angle, sizeof(double)) &&
+                       take(shape.nodes.data(), 3 * nodes * sizeof(double)) &&
+                       take(shape.contact_force.data(), nodes * sizeof(double));
+    if (!whole) return {};
+    shapes.push_back(std::move(shape));
+  }
+  if (at != bytes.size()) return {};
+  return shapes;
+}
 
 std::string trial_file_name(int id) { return format("trials/%04d.json", id); }
 

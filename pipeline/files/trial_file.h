@@ -24,6 +24,14 @@ std::string trial_text(const plan::Study& study, const plan::Candidate& candidat
 std::optional<simulate::TrialResult> find_trial(const std::filesystem::path& path);
 simulate::TrialResult read_trial_file(const std::filesystem::path& path);  // expects it to be whole
 
+/// The outcome of that name; throws Error where there is none.
+simulate::Outcome outcome_of(const std::string& name);
+
+/// A trial's shapes on the way as bytes, and back bit for bit; nothing where they are cut. In this
+/// machine's number formats.
+std::string shapes_to_bytes(const std::vector<simulate::Shape>& shapes);
+std::optional<std::vector<simulate::Shape>> shapes_from_bytes(const std::string& bytes);
+
 /// [{"push_mm": 40.0}, {"turn_deg": 90.0}], negative pushes pull; and back.
 Json moves_json(const std::vector<simulate::Move>& moves);
 std::vector<simulate::Move> moves_of(const Json& list);

@@ -16,10 +16,6 @@
 
 namespace wireplan::pipeline {
 
-/// The best so many plans can be played on the page, and the closest attempt of each wire that has
-/// none among them; of other trials it has the final shape.
-inline constexpr std::size_t kPlansPlayed = 20;
-
 /// What the page shows of every trial. Points and forces stand in it with single precision or less.
 struct PageTrial {
   Vec3 direction = Vec3::UnitZ();    // of the introducer, into the vessel

@@ -69,19 +69,20 @@ class Row {
 };
 
 void put_candidate(Row& row, const ReportInput& input, std::size_t trial) {
-  const plan::Candidate& candidate = input.candidates[trial];
+  const plan::Candidate& candidate = input.plan.candidates[trial];
   row.put("wire", input.study.wires[static_cast<std::size_t>(candidate.wire)].name);
   row.put("inclination_deg", clean(candidate.inclination / kRadPerDeg));
   row.put("azimuth_deg", clean(candidate.azimuth / kRadPerDeg));
   row.put("roll_deg", clean(candidate.roll / kRadPerDeg));
   row.put("moves", moves_json(candidate.moves));
-  row.put("script", plan::describe_moves(candidate.moves, input.metrics[trial].insertion));
+  row.put("script",
+          plan::describe_moves(candidate.moves, input.plan.trials[trial].metrics.insertion));
 }
 
 const plan::Refinement* find_refinement(const ReportInput& input, int trial) {
-  const auto found = std::find_if(input.refinements.begin(), input.refinements.end(),
+  const auto found = std::find_if(input.plan.refinements.begin(), input.plan.refinements.end(),
                                   [&](const plan::Refinement& r) { return r.trial == trial; });
-  return found == input.refinements.end() ? nullptr : &*found;
+  return found == input.plan.refinements.end() ? nullptr : &*found;
 }
 
 Json provenance_json(const ReportInput& input) {
@@ -92,16 +93,17 @@ Json provenance_json(const ReportInput& input) {
   if (!page_missing().empty()) {
     warnings.push_back("report: the page report.html was left out: " + page_missing());
   }
-  const auto flagged =
-      std::count_if(input.metrics.begin(), input.metrics.end(),
-                    [](const plan::Metrics& m) { return m.wall_motion.beyond_linear_theory(); });
+  const auto flagged = std::count_if(
+      input.plan.trials.begin(), input.plan.trials.end(),
+      [](const auto& trial) { return trial.metrics.wall_motion.beyond_linear_theory(); });
+  for (const std::string& warning : input.warnings) warnings.push_back(warning);
   if (flagged > 0) {
     warnings.push_back("trials: " + std::to_string(flagged) + " of " +
-                       std::to_string(input.metrics.size()) +
+                       std::to_string(input.plan.trials.size()) +
                        " moved the wall beyond linear theory: see wall_motion of each");
   }
   std::vector<std::string> terms;
-  for (const simulate::TrialResult& trial : input.trials) {
+  for (const plan::Measured& trial : input.plan.trials) {
     for (const std::string& term : trial.terms) {
       if (std::find(terms.begin(), terms.end(), term) == terms.end()) terms.push_back(term);
     }
@@ -190,33 +192,24 @@ void put_wall_motion(Row& row, const ReportInput& input, const plan::Metrics& m,
 }
 
 Json trial_json(const ReportInput& input, std::size_t k) {
-  const simulate::TrialResult& trial = input.trials[k];
-  const plan::Metrics& m = input.metrics[k];
+  const plan::Measured& trial = input.plan.trials[k];
+  const plan::Metrics& m = trial.metrics;
   const std::string ended = "the trial ended " + std::string(outcome_name(trial.outcome)) +
                             (trial.reason.empty() ? "" : ": " + trial.reason);
   Row row;
   row.put("id", k);
   put_candidate(row, input, k);
-  row.put("level", input.levels[k]);
+  row.put("level", plan::level_name(input.plan.levels[k]));
   row.put("outcome", outcome_name(trial.outcome));
   row.put("reason", trial.reason);
   row.put("reached", m.reached);
-  row.put_number("insertion_mm", m.insertion, ended);
-  row.put_number("tip_to_target_mm", m.tip_to_target, ended);
-  row.put_number("peak_tip_force_n", m.peak_tip_force, ended);
-  row.put_number("peak_contact_force_n", m.peak_contact_force, ended);
-  row.put_number("mean_contact_force_n", m.mean_contact_force, ended);
-  row.put_number("force_impulse_n_mm", m.force_impulse, ended);
-  row.put_number("peak_push_force_n", m.peak_push_force, ended);
-  row.put_number("push_work_n_mm", m.push_work, ended);
-  row.put_number("friction_work_n_mm", m.friction_work, ended);
-  row.put_number("energy_released_n_mm", m.energy_released, ended);
-  put_wall_motion(row, input, m, input.is_scouted(k), ended);
-  row.put_number("peak_curvature_per_mm", m.peak_curvature, ended);
-  row.put_number("centerline_deviation_mm", m.centerline_deviation, ended);
-  row.put_number("off_path_mm", m.off_path, ended);
-  row.put_number("max_penetration_mm", m.max_penetration, ended);
-  row.put_number("residual_n", m.residual, ended);
+  for (const plan::MetricField& field : plan::kMetricFields) {
+    if (field.value == &plan::Metrics::peak_wall_displacement) {
+      put_wall_motion(row, input, m, input.plan.levels[k] != plan::Level::kFull, ended);
+    } else if (field.reported) {
+      row.put_number(field.name, m.*field.value, ended);
+    }
+  }
   const plan::Refinement* refined = find_refinement(input, static_cast<int>(k));
   if (refined == nullptr) {
     row.put_optional("position_error_mm", {},
@@ -244,7 +237,7 @@ void put_repeats(Row& row, const ReportInput& input, int trial) {
 }
 
 Json ranked_json(const ReportInput& input, std::size_t k) {
-  const plan::RankedPlan& plan = input.ranking.plans[k];
+  const plan::RankedPlan& plan = input.judgement.ranking.plans[k];
   Row row;
   row.put("rank", k + 1);
   row.put("trial", plan.trial);
@@ -282,7 +275,7 @@ Json wire_summary_json(const ReportInput& input, const plan::WireSummary& summar
 
 Json numerics_json(const ReportInput& input) {
   Json rows = Json::array(), plans = Json::array();
-  for (const plan::Refinement& refinement : input.refinements) {
+  for (const plan::Refinement& refinement : input.plan.refinements) {
     for (const plan::NumericsRow& run : refinement.rows) {
       Row row;
       row.put("trial", refinement.trial);
@@ -335,11 +328,11 @@ Json artifacts_json(const ReportInput& input) {
   add("plans.png", "best plan of each wire, or its closest attempt");
   if (page_missing().empty()) add("report.html", "this report as a page for any browser");
   add("trials.csv", "every trial as a row of a table");
-  for (std::size_t k = 1; k <= std::min(kPlansShown, input.ranking.plans.size()); ++k) {
+  for (std::size_t k = 1; k <= std::min(kPlansShown, input.judgement.ranking.plans.size()); ++k) {
     add("trials/plan-" + std::to_string(k) + ".pvd",
         "insertion of a plan, by rank, as a time series");
   }
-  for (std::size_t k = 1; k <= input.ranking.plans.size(); ++k) {
+  for (std::size_t k = 1; k <= input.judgement.ranking.plans.size(); ++k) {
     add("trials/plan-" + std::to_string(k) + ".mrk.json",
         "wire, entry and target of a plan, by rank, for 3D Slicer");
   }
@@ -359,18 +352,17 @@ Json openings_json(const std::vector<preprocess::Opening>& openings) {
 }
 
 Json build_report(const ReportInput& input) {
-  expects(input.trials.size() == input.candidates.size() &&
-          input.metrics.size() == input.candidates.size());
+  expects(input.plan.trials.size() == input.plan.candidates.size());
   Json trials = Json::array(), ranking = Json::array(), excluded = Json::array();
-  for (std::size_t k = 0; k < input.trials.size(); ++k) trials.push_back(trial_json(input, k));
-  for (std::size_t k = 0; k < input.ranking.plans.size(); ++k) {
+  for (std::size_t k = 0; k < input.plan.trials.size(); ++k) trials.push_back(trial_json(input, k));
+  for (std::size_t k = 0; k < input.judgement.ranking.plans.size(); ++k) {
     ranking.push_back(ranked_json(input, k));
   }
-  for (const plan::ExcludedTrial& trial : input.ranking.excluded) {
+  for (const plan::ExcludedTrial& trial : input.judgement.ranking.excluded) {
     excluded.push_back({{"trial", trial.trial}, {"reason", trial.reason}});
   }
   Json wires = Json::array();
-  for (const plan::WireSummary& summary : input.ranking.wires) {
+  for (const plan::WireSummary& summary : input.judgement.ranking.wires) {
     wires.push_back(wire_summary_json(input, summary));
   }
 
@@ -386,7 +378,7 @@ Json build_report(const ReportInput& input) {
   report["ranking"] = std::move(ranking);
   report["excluded"] = std::move(excluded);
   report["wires"] = std::move(wires);
-  report["pareto"] = input.ranking.pareto;
+  report["pareto"] = input.judgement.ranking.pareto;
   report["robustness"] = input.robustness;
   report["numerics"] = numerics_json(input);
   report["trials"] = std::move(trials);

@@ -6,8 +6,7 @@
 #include <vector>
 
 #include "pipeline/files/json_reader.h"
-#include "plan/ranking.h"
-#include "plan/refine.h"
+#include "plan/judge.h"
 #include "preprocess/surface/openings.h"
 
 namespace wireplan::pipeline {
@@ -24,15 +23,11 @@ struct ReportInput {
   std::vector<std::string> stages;       // that were run or found, in order
   Json figures;                          // per stage name, what its figures.json holds
   plan::Study study;                     // as the trials used it
-  std::vector<plan::Candidate> candidates;
-  std::vector<simulate::TrialResult> trials;  // outcome, reason and terms; the rest may be empty
-  std::vector<plan::Metrics> metrics;
-  std::vector<std::string> levels;  // per trial: "scout" or "probe", on a rigid wall, or "full"
-  bool is_scouted(std::size_t trial) const { return levels[trial] != "full"; }
-  plan::Ranking ranking;
-  std::vector<plan::Refinement> refinements;
-  Json robustness;  // of repeats.h
-  Json timing;      // all that differs between equal runs
+  plan::Plan plan;                       // what was simulated, and ...
+  plan::Judgement judgement;             // ... what that is worth by the case's limits and weights
+  std::vector<std::string> warnings;     // besides those in the figures
+  Json robustness;                       // of repeats_json.h
+  Json timing;                           // all that differs between equal runs
 };
 
 Json build_report(const ReportInput& input);

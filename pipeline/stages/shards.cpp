@@ -43,10 +43,10 @@ std::string describe_share(const Share& share, const std::optional<ShareOutcome>
   if (!outcome) return "the trials of this case are all in the store, nothing to do";
   const std::string round = "round " + std::to_string(share.round);
   if (outcome->round_trials == 0) return round + ": there is none, the round before was the last";
-  return round + " (" + outcome->level + "), shard " + std::to_string(share.shard) + "/" +
-         std::to_string(share.shards) + ": " + std::to_string(outcome->own_trials) + " of " +
-         std::to_string(outcome->round_trials) + " trials, " + std::to_string(outcome->run) +
-         " run now";
+  return round + " (" + plan::level_name(outcome->level) + "), shard " +
+         std::to_string(share.shard) + "/" + std::to_string(share.shards) + ": " +
+         std::to_string(outcome->own_trials) + " of " + std::to_string(outcome->round_trials) +
+         " trials, " + std::to_string(outcome->run) + " run now";
 }
 
 FirstRound read_first_round(const Artifact& trials) {

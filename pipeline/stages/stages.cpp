@@ -90,10 +90,9 @@ std::string in_context(const Workspace& work, const std::string& stage, const st
   return text;
 }
 
-// Calls what acts for the stage, whose key text it finds in the workspace.
+// Calls what acts for the stage.
 template <typename Act>
-auto act_for(const Stage& stage, const std::string& key_text, Workspace& work, const Act& act) {
-  work.key_text = key_text;
+auto act_for(const Stage& stage, Workspace& work, const Act& act) {
   try {
     return act();
   } catch (const DiskError& error) {
@@ -111,7 +110,7 @@ Artifact make_artifact(const Stage& stage, const Store& store, const std::string
       throw Error(work.input.string() + ": changed while it was read; run again");
     }
   };
-  return act_for(stage, key_text, work, [&] { return store.commit(stage.name, key_text, make); });
+  return act_for(stage, work, [&] { return store.commit(stage.name, key_text, make); });
 }
 
 /// Adds parameters that the stage does not read yet.
@@ -161,32 +160,38 @@ std::vector<Stage> stages_of(const Case& given) {
        .parameters = {"/wall/thickness_mm", "/wall/young_modulus_kpa", "/wall/poisson_ratio"},
        .make = make_wall});
   Stage trials{.name = "trials",
-               .version = 21,
+               .version = 22,
                .after = {"surface", "centerline"},
                .parameters = {"/access", "/target", "/wires", "/tip_roll_deg", "/friction",
                               "/wall/model", "/insertion"},
                .make = make_trials};
   if (given.wall.elastic) trials.after.push_back("wall");  // a rigid one does not act
-  if (plan::needs_search(given.study, given.exhaustive)) {
-    read_too(trials, {"/search", "/limits", "/ranking"});
-  }
+  if (plan::needs_search(given.study, given.exhaustive)) read_too(trials, {"/search"});
   stages.push_back(trials);
   Stage manoeuvres = trials;
   manoeuvres.name = "manoeuvres";
-  manoeuvres.version = 16;
+  manoeuvres.version = 17;
   manoeuvres.after.push_back("trials");
   read_too(manoeuvres, {"/manoeuvres"});
   if (given.manoeuvres == Manoeuvring::kWhenNeeded) {
     // Plans are tried under disturbances; the voxels tell how well the lumen is known.
     if (from_volume) manoeuvres.after.push_back("volume");
-    read_too(manoeuvres, {"/limits", "/ranking", "/robustness/seed", "/robustness/friction_factor",
-                          "/robustness/wall_factor", "/robustness/angle_deg",
-                          "/robustness/entry_mm", "/robustness/lumen_mm"});
+    read_too(manoeuvres,
+             {"/robustness/seed", "/robustness/friction_factor", "/robustness/wall_factor",
+              "/robustness/angle_deg", "/robustness/entry_mm", "/robustness/lumen_mm"});
   }
   manoeuvres.make = make_manoeuvres;
   stages.push_back(manoeuvres);
+  Stage plans = trials;
+  plans.name = "plans";
+  plans.version = 1;
+  plans.after.insert(plans.after.end(), {"trials", "manoeuvres"});
+  if (from_volume) plans.after.push_back("volume");
+  read_too(plans, {"/manoeuvres", "/robustness"});
+  plans.make = make_plans;
+  stages.push_back(plans);
   Stage report{.name = "report",
-               .version = 15,
+               .version = 16,
                .reads_input = true,
                .after = {},
                .parameters = {""},
@@ -226,12 +231,13 @@ RunResult run_stages(const Case& given, const RunOptions& options,
     // Look it up.
     const auto start = std::chrono::steady_clock::now();
     const std::string text = stage_key_text(stage, work);
+    work.key_texts[stage.name] = text;
     const bool forced = contains(options.force, stage.name);
     std::optional<Artifact> artifact;
     if (!forced) artifact = store.find(stage.name, text);
     StageOutcome outcome{.stage = stage.name};
     if (!artifact && options.instead && stage.name == options.to) {
-      act_for(stage, text, work, [&] { options.instead(work); });
+      act_for(stage, work, [&] { options.instead(work); });
       break;
     }
 

@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "pipeline/stages/stage_work.h"
+#include "pipeline/stages/makers.h"
 
 namespace wireplan::pipeline {
 

@@ -424,7 +424,10 @@ void publish(const std::vector<Artifact>& artifacts, const fs::path& folder) {
   for (const Artifact& artifact : artifacts) {
     for (const ArtifactFile& file : artifact.files) {
       const fs::path from = artifact.folder / file.name, to = folder / file.name;
-      if (from.filename() == kFiguresFile || from.filename() == kTimingFile) continue;
+      if (from.filename() == kFiguresFile || from.filename() == kTimingFile ||
+          file.name.starts_with(std::string(kKeptFolder) + "/")) {
+        continue;
+      }
       names.push_back(file.name);
       if (!is_same(from, to, file)) place_file(from, to);
     }

@@ -39,6 +39,9 @@ inline constexpr const char* kTimingFile = "timing.json";
 /// times: the report has both.
 inline constexpr const char* kFiguresFile = "figures.json";
 
+/// What lies in a folder of this name is for later stages alone, as figures are.
+inline constexpr const char* kKeptFolder = "kept";
+
 struct ArtifactFile {
   std::string name;  // relative to the artifact's folder, with '/'
   std::uintmax_t bytes = 0;

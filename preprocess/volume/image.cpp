@@ -750,6 +750,8 @@ void write_nrrd(const Grid& grid, const void* voxels, itk::IOComponentEnum type,
 
 }  // namespace
 
+bool reads_volumes() { return true; }
+
 Image read_image(const fs::path& path) {
   std::error_code unknown;
   if (!fs::exists(path, unknown)) {

@@ -45,6 +45,10 @@ struct Mask {
   std::vector<std::uint8_t> labels;  // 1 inside the lumen, 0 elsewhere
 };
 
+/// Whether this build has the readers; without ITK the functions below throw `Error`
+/// (no_imaging.cpp).
+bool reads_volumes();
+
 /// Reads a folder of DICOM files (one series, sorted by position), .nii, .nii.gz, .nrrd, .nhdr,
 /// .mha or .mhd, with the header's direction, spacing, slope and intercept honoured. One value per
 /// voxel, one volume (4D with a single volume is fine). Throws `Error` for a missing file, one that

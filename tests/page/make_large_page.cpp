@@ -183,8 +183,9 @@ std::string make_page(const std::string& name) {
   report.stages = {"surface", "centerline", "wall", "trials"};
   report.figures = figures(surface);
   report.study = make_study();
-  report.candidates = plan::list_candidates(report.study);
-  report.levels.assign(report.candidates.size(), "full");
+  plan::Plan& plan = report.plan;
+  plan.candidates = plan::list_candidates(report.study);
+  plan.levels.assign(plan.candidates.size(), plan::Level::kFull);
 
   PageInput page;
   page.surface = surface;
@@ -193,19 +194,17 @@ std::string make_page(const std::string& name) {
   page.target = report.study.goal.point;
   page.target_radius = report.study.goal.radius;
   std::mt19937_64 random(1);
-  for (std::size_t id = 0; id < report.candidates.size(); ++id) {
-    simulate::TrialResult trial = make_trial(surface, random);
-    report.metrics.push_back(plan::compute_metrics(trial, report.study, path));
+  for (std::size_t id = 0; id < plan.candidates.size(); ++id) {
+    const simulate::TrialResult trial = make_trial(surface, random);
+    plan.trials.push_back(plan::measure(trial, report.study, path));
     page.trials.push_back(
-        page_trial(trial, plan::make_introducer(report.study, report.candidates[id]).direction));
+        page_trial(trial, plan::make_introducer(report.study, plan.candidates[id]).direction));
     if (id < kInsertions) {
       page.insertions.push_back({static_cast<int>(id), trial.shapes, trial.peak_forces});
     }
-    report.trials.push_back(std::move(trial));
   }
-  report.ranking =
-      plan::rank(report.study, report.candidates, report.trials, report.metrics, {}, {});
-  report.robustness = robustness(report.ranking);
+  report.judgement = plan::judge(report.study, plan, {}, {});
+  report.robustness = robustness(report.judgement.ranking);
   report.timing = {{"threads", 1}, {"stages", Json::array()}, {"numerics", Json::array()}};
   for (Eigen::Index k = 0; k < surface.triangles.cols(); ++k)
     page.peak_force.push_back(draw(random));
@@ -216,7 +215,7 @@ std::string make_page(const std::string& name) {
   }
   page.slices =
       cut_slices(make_volume(), surface, places, {.window_low = -200.0, .window_high = 500.0});
-  std::cerr << surface.triangles.cols() << " triangles, " << report.trials.size() << " trials, "
+  std::cerr << surface.triangles.cols() << " triangles, " << plan.trials.size() << " trials, "
             << page.insertions.size() << " insertions\n";
   return build_page(build_report(report), page);
 }

@@ -16,6 +16,7 @@
 #include "pipeline/stages/stages.h"
 #include "pipeline/store/cache.h"
 #include "pipeline/store/hash.h"
+#include "preprocess/volume/image.h"
 #include "tests/pipeline/program.h"
 
 namespace wireplan::pipeline {
@@ -50,13 +51,11 @@ class Faults : public testing::Test {
 
 TEST_F(Faults, AWriteThatFailsIsToldAndSpoilsNothing) {
   if (!can_preload()) GTEST_SKIP() << "a preloaded library comes before the sanitizer's";
-#ifdef WIREPLAN_IMAGING
-  if (long_tests()) {  // all stages
+  if (long_tests() && preprocess::reads_volumes()) {  // all stages
     write_two_tubes(folder_ / "ct.nrrd");
     const Json tube = read_json(folder_ / "case.json", "wireplan.case/1");
     write_json(volume_case(tube), folder_ / "case.json");
   }
-#endif
   const Answer whole = run_with("WIREPLAN_FAULT_COUNT='" + (folder_ / "count.txt").string() + "'");
   ASSERT_EQ(whole.code, 0) << whole.log;
   const long writes = std::stol(read_text(folder_ / "count.txt"));
@@ -142,7 +141,7 @@ TEST_F(Faults, AnArtifactThatVanishesBetweenStagesIsNamedAndMadeAgain) {
         << error.what();
   }
   options.on_stage = {};
-  EXPECT_EQ(run_stages(given, options).stages.size(), 6u);
+  EXPECT_EQ(run_stages(given, options).stages.size(), 7u);
 }
 
 TEST_F(Faults, AnInputThatVanishesIsNamed) {
@@ -302,19 +301,19 @@ std::map<fs::path, std::pair<ino_t, std::int64_t>> kept_trials(const fs::path& c
 std::vector<std::string> write_many_trials(const fs::path& folder) {
   Json file = read_json(folder / "case.json", "wireplan.case/1");
   file["access"]["azimuth_deg"] = {0, 45, 90, 135, 180, 225, 270, 315};
-  std::vector<std::string> stages = {"surface", "centerline", "wall",
-                                     "trials",  "manoeuvres", "report"};
-#ifdef WIREPLAN_IMAGING
-  if (long_tests()) {
-    const std::string abdomen = std::string(WIREPLAN_SOURCE_DIR) + "/cases/abdomen/";
-    EXPECT_EQ(run_program(folder, "phantom '" + abdomen + "phantom.json' -o phantom").code, 0);
-    file = read_json(abdomen + "case.json", "wireplan.case/1");
-  } else {
-    write_two_tubes(folder / "ct.nrrd");
-    file = volume_case(file);
+  std::vector<std::string> stages = {"surface",    "centerline", "wall",  "trials",
+                                     "manoeuvres", "plans",      "report"};
+  if (preprocess::reads_volumes()) {
+    if (long_tests()) {
+      const std::string abdomen = std::string(WIREPLAN_SOURCE_DIR) + "/cases/abdomen/";
+      EXPECT_EQ(run_program(folder, "phantom '" + abdomen + "phantom.json' -o phantom").code, 0);
+      file = read_json(abdomen + "case.json", "wireplan.case/1");
+    } else {
+      write_two_tubes(folder / "ct.nrrd");
+      file = volume_case(file);
+    }
+    stages.insert(stages.begin(), {"volume", "segment"});
   }
-  stages.insert(stages.begin(), {"volume", "segment"});
-#endif
   write_json(file, folder / "case.json");
   return stages;
 }
@@ -414,7 +413,8 @@ TEST_F(Faults, TwoProcessesOnOneCaseMakeEachStageOnce) {
       EXPECT_EQ(second.wait(), 0);
     }
     const std::string logs = read_text(folder_ / "a.txt") + read_text(folder_ / "b.txt");
-    for (const char* stage : {"surface", "centerline", "wall", "trials", "manoeuvres", "report"}) {
+    for (const char* stage :
+         {"surface", "centerline", "wall", "trials", "manoeuvres", "plans", "report"}) {
       std::string line = stage;
       line.resize(10, ' ');
       EXPECT_EQ(count(logs, line + "  made"), 1) << logs;

@@ -206,8 +206,8 @@ class StageKeys : public testing::Test {
   }
 
   TemporaryFolder folder_;
-  const std::vector<std::string> all_ = {"surface", "centerline", "wall",
-                                         "trials",  "manoeuvres", "report"};
+  const std::vector<std::string> all_ = {"surface",    "centerline", "wall",  "trials",
+                                         "manoeuvres", "plans",      "report"};
 };
 
 TEST_F(StageKeys, ASecondRunRunsNoStage) {
@@ -265,9 +265,9 @@ class RerunMatrix : public testing::Test {
 // What every case has, whatever it starts from.
 std::map<std::string, std::vector<std::string>> common_table() {
   using Names = std::vector<std::string>;
-  const Names report = {"report"}, trials = {"trials", "manoeuvres", "report"},
+  const Names report = {"report"}, trials = {"trials", "manoeuvres", "plans", "report"},
               wall = {"wall", "report"};
-  const Names ends = {"centerline", "trials", "manoeuvres", "report"};
+  const Names ends = {"centerline", "trials", "manoeuvres", "plans", "report"};
   std::map<std::string, Names> table = {{"/name", report},
                                         {"/surface/edge_length_mm", {"surface", "report"}},
                                         {"/wall/model", trials},
@@ -279,7 +279,7 @@ std::map<std::string, std::vector<std::string>> common_table() {
                                         {"/access/azimuth_deg/0", trials},
                                         {"/tip_roll_deg/0", trials},
                                         {"/friction", trials},
-                                        {"/manoeuvres", {"manoeuvres", "report"}},
+                                        {"/manoeuvres", {"manoeuvres", "plans", "report"}},
                                         {"/search/exhaustive", report}};
   for (const char* k : {"0", "1", "2"}) {
     table[std::string("/access/point_mm/") + k] = ends;
@@ -294,17 +294,19 @@ std::map<std::string, std::vector<std::string>> common_table() {
                           "residual_tolerance_n", "max_iterations", "record_every_mm"}) {
     table[std::string("/insertion/") + key] = trials;
   }
-  const Names manoeuvres = {"manoeuvres", "report"};  // for which plans are tried
+  // What judges, and simulates nothing.
   for (const char* key :
        {"limits/tip_force_warn_n", "limits/tip_force_fail_n", "limits/penetration_fail_mm",
         "limits/off_path_fail_mm", "ranking/weights/reach", "ranking/weights/peak_force",
-        "ranking/weights/mean_force", "ranking/weights/margin", "robustness/seed",
-        "robustness/friction_factor/0", "robustness/friction_factor/1", "robustness/wall_factor/0",
-        "robustness/wall_factor/1", "robustness/angle_deg", "robustness/entry_mm",
-        "robustness/lumen_mm"}) {
-    table[std::string("/") + key] = manoeuvres;
+        "ranking/weights/mean_force", "ranking/weights/margin"}) {
+    table[std::string("/") + key] = report;
   }
-  table["/robustness/repeats"] = table["/robustness/plans"] = report;
+  const Names tried = {"manoeuvres", "plans", "report"};  // under disturbances
+  for (const char* key : {"seed", "friction_factor/0", "friction_factor/1", "wall_factor/0",
+                          "wall_factor/1", "angle_deg", "entry_mm", "lumen_mm"}) {
+    table[std::string("/robustness/") + key] = tried;
+  }
+  table["/robustness/repeats"] = table["/robustness/plans"] = {"plans", "report"};
   return table;
 }
 
@@ -370,7 +372,7 @@ TEST_F(RerunMatrix, OfACaseThatStartsFromAVolume) {
 TEST_F(StageKeys, AChangeRerunsAlsoWhatReadsWhatItChanges) {
   run({});
   EXPECT_EQ(not_cached(run({"wall.thickness_mm=2"})),
-            (std::vector<std::string>{"wall", "trials", "manoeuvres", "report"}));
+            (std::vector<std::string>{"wall", "trials", "manoeuvres", "plans", "report"}));
 }
 
 TEST_F(StageKeys, TrialsInARigidVesselDoNotReadItsWall) {
@@ -391,7 +393,8 @@ TEST_F(StageKeys, AStageThatComesOutTheSameStopsTheCascade) {
 TEST_F(StageKeys, ADryRunSaysWhatWouldRunAndWhyAndRunsNothing) {
   run({});
   const RunResult dry = run({"wall.thickness_mm=2"}, /*dry=*/true);
-  EXPECT_EQ(not_cached(dry), (std::vector<std::string>{"wall", "trials", "manoeuvres", "report"}));
+  EXPECT_EQ(not_cached(dry),
+            (std::vector<std::string>{"wall", "trials", "manoeuvres", "plans", "report"}));
   EXPECT_EQ(dry.stages[2].reasons,
             std::vector<std::string>{"parameter wall.thickness_mm: 1.0 -> 2.0"});
   ASSERT_EQ(dry.stages[3].reasons.size(), 1u);
@@ -425,7 +428,7 @@ TEST_F(StageKeys, AnInterruptedRunGoesOnFromItsFinishedTrials) {
     EXPECT_EQ(total, 2);
   };
   EXPECT_EQ(not_cached(run_stages(given, options)),
-            (std::vector<std::string>{"trials", "manoeuvres", "report"}));
+            (std::vector<std::string>{"trials", "manoeuvres", "plans", "report"}));
   EXPECT_EQ(counts, std::vector<int>{2});
 }
 
@@ -484,7 +487,7 @@ TEST_F(StageKeys, AnInputThatChangesWhileItIsReadIsNotTrusted) {
   EXPECT_TRUE(Store(options.cache).artifacts().empty());
 }
 
-TEST_F(StageKeys, AnInterruptedReportKeepsItsRepeats) {
+TEST_F(StageKeys, AnInterruptedRunKeepsItsRepeats) {
   const Case given = read_case(folder_ / "case.json");
   RunOptions options;
   options.cache = folder_ / "cache";
@@ -496,7 +499,10 @@ TEST_F(StageKeys, AnInterruptedReportKeepsItsRepeats) {
   int kept = 0;
   for (const auto& entry : fs::recursive_directory_iterator(folder_ / "cache" / "pieces")) {
     if (!entry.is_regular_file()) continue;
-    kept += read_text(entry.path()).find("wireplan.repeat/") != std::string::npos ? 1 : 0;
+    const std::string text = read_text(entry.path());
+    const bool is_repeat = text.find("wireplan.measured/") != std::string::npos &&
+                           text.find("nodes_mm") == std::string::npos;  // else other elements
+    kept += is_repeat ? 1 : 0;
   }
   EXPECT_EQ(kept, 3);
 

@@ -18,7 +18,7 @@ simulate::Wire wire_of(const std::string& name, double EI, double radius = 0.4) 
 struct Answer {
   std::vector<Candidate> candidates;
   BatchResult batch;
-  std::vector<Metrics> metrics;
+  std::vector<Measured> measured;
   Ranking ranking;
 };
 
@@ -27,9 +27,9 @@ Answer solve(const Study& study, const simulate::VesselModel& vessel, const Cent
   answer.candidates = list_candidates(study);
   answer.batch = run_batch(study, answer.candidates, vessel, {.threads = 2});
   for (const simulate::TrialResult& trial : answer.batch.trials) {
-    answer.metrics.push_back(compute_metrics(trial, study, path));
+    answer.measured.push_back(measure(trial, study, path));
   }
-  answer.ranking = rank(study, answer.candidates, answer.batch.trials, answer.metrics, {}, {});
+  answer.ranking = rank(study, answer.candidates, answer.measured, {}, {});
   return answer;
 }
 
@@ -70,8 +70,9 @@ TEST(Construction, AWireTooStiffForTheBendLosesAndSaysWhy) {
   ASSERT_FALSE(answer.ranking.excluded.empty());
   EXPECT_EQ(answer.ranking.excluded[0].trial, 0);
   EXPECT_GT(answer.ranking.excluded[0].reason.size(), 20u);
-  if (answer.metrics[1].reached) {
-    EXPECT_GT(answer.metrics[1].peak_contact_force, 5.0 * answer.metrics[2].peak_contact_force);
+  if (answer.measured[1].metrics.reached) {
+    EXPECT_GT(answer.measured[1].metrics.peak_contact_force,
+              5.0 * answer.measured[2].metrics.peak_contact_force);
   }
 }
 
@@ -107,8 +108,9 @@ TEST(Construction, MirroredAzimuthsMirror) {
   EXPECT_GT(one.nodes.row(1).cwiseAbs().maxCoeff(), 1.0) << "not in the plane of symmetry";
   // The grid of the wall's field is not symmetric: its spline is off the facets by as much.
   EXPECT_LT((one.nodes - mirrored).colwise().norm().maxCoeff(), 0.05);
-  EXPECT_NEAR(answer.metrics[0].peak_contact_force, answer.metrics[1].peak_contact_force,
-              0.02 * answer.metrics[0].peak_contact_force);
+  EXPECT_NEAR(answer.measured[0].metrics.peak_contact_force,
+              answer.measured[1].metrics.peak_contact_force,
+              0.02 * answer.measured[0].metrics.peak_contact_force);
   if (!answer.ranking.plans.empty()) {
     EXPECT_EQ(answer.ranking.plans[0].tied_with.size(), 1u);
   }
@@ -132,9 +134,11 @@ TEST(Construction, AStraightTubeDoesNotCareForAzimuth) {
   const Answer answer = solve(study, vessel, path_along(axis, 4.0));
   ASSERT_EQ(answer.ranking.plans.size(), 6u);
   // The wall is off a circle by its facets' 0.03 mm, of 4 mm that the wire is bent by.
-  const double force = answer.metrics[0].peak_contact_force;
+  const double force = answer.measured[0].metrics.peak_contact_force;
   EXPECT_GT(force, 0.01);
-  for (const Metrics& m : answer.metrics) EXPECT_NEAR(m.peak_contact_force, force, 0.05 * force);
+  for (const Measured& m : answer.measured) {
+    EXPECT_NEAR(m.metrics.peak_contact_force, force, 0.05 * force);
+  }
   for (const RankedPlan& plan : answer.ranking.plans) {
     EXPECT_EQ(plan.tied_with.size(), 5u) << plan.sentence;
   }

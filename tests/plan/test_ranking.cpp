@@ -15,8 +15,7 @@ using simulate::Outcome;
 struct Bench {
   Study study;
   std::vector<Candidate> candidates;
-  std::vector<simulate::TrialResult> trials;
-  std::vector<Metrics> metrics;
+  std::vector<Measured> trials;
   std::vector<std::optional<NumericalError>> errors;
   Limits limits;
   Weights weights;
@@ -33,20 +32,16 @@ struct Bench {
   Metrics& add(int wire, double tip_to_target, double peak_force,
                Outcome outcome = Outcome::kReached) {
     candidates.push_back({.wire = wire});
-    simulate::TrialResult trial;
-    trial.outcome = outcome;
-    trials.push_back(trial);
-    Metrics m;
+    Metrics& m = trials.emplace_back(Measured{.outcome = outcome}).metrics;
     m.reached = outcome == Outcome::kReached;
     m.insertion = 120.0;
     m.tip_to_target = tip_to_target;
     m.peak_contact_force = peak_force;
-    metrics.push_back(m);
-    return metrics.back();
+    return m;
   }
 
   Ranking ranked() const {
-    return rank(study, candidates, trials, metrics, limits, weights, {.errors = errors});
+    return rank(study, candidates, trials, limits, weights, {.errors = errors});
   }
 };
 
@@ -316,8 +311,8 @@ TEST(Rank, RanksNoTrialThatWasScoutedOnly) {
   bench.add(0, 1.0, 0.1);
   bench.add(0, 1.0, 0.2);
   bench.add(0, 9.0, 0.2, Outcome::kMissed);
-  const Ranking ranking = rank(bench.study, bench.candidates, bench.trials, bench.metrics,
-                               bench.limits, bench.weights, {.scouted = {true, false, true}});
+  const Ranking ranking = rank(bench.study, bench.candidates, bench.trials, bench.limits,
+                               bench.weights, {.scouted = {true, false, true}});
   EXPECT_EQ(order_of(ranking), std::vector<int>{1});
   ASSERT_EQ(ranking.excluded.size(), 2u);
   EXPECT_NE(ranking.excluded[0].reason.find("scouted only: reaches with a score of 0.1"),
@@ -363,7 +358,7 @@ TEST(Rank, ParetoFrontIsWhatNoOtherPlanBeats) {
   for (const RankedPlan& a : bench.ranked().plans) {
     bool beaten = false;
     for (const RankedPlan& b : bench.ranked().plans) {
-      const Metrics &m = bench.metrics[a.trial], &n = bench.metrics[b.trial];
+      const Metrics &m = bench.trials[a.trial].metrics, &n = bench.trials[b.trial].metrics;
       const bool no_worse =
           n.peak_contact_force <= m.peak_contact_force && n.tip_to_target <= m.tip_to_target;
       const bool better =
@@ -375,8 +370,8 @@ TEST(Rank, ParetoFrontIsWhatNoOtherPlanBeats) {
   std::vector<int> front = bench.ranked().pareto;
   ASSERT_GT(front.size(), 1u);
   for (std::size_t k = 1; k < front.size(); ++k) {
-    EXPECT_LE(bench.metrics[front[k - 1]].peak_contact_force,
-              bench.metrics[front[k]].peak_contact_force);
+    EXPECT_LE(bench.trials[front[k - 1]].metrics.peak_contact_force,
+              bench.trials[front[k]].metrics.peak_contact_force);
   }
   std::sort(front.begin(), front.end());
   std::sort(expected.begin(), expected.end());

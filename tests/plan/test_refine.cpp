@@ -3,7 +3,10 @@
 #include <cmath>
 #include <functional>
 
+#include "plan/judge.h"
+#include "plan/make_plan.h"
 #include "plan/refine.h"
+#include "tests/plan/memory_log.h"
 #include "tests/shapes.h"
 
 namespace wireplan::plan {
@@ -28,7 +31,7 @@ RefinedRun run_of(double h, const std::function<double(double h, double s)>& off
   push.insertion = kLength;
   push.iterations = 7;
   push.peak_contact_force = push.total_contact_force = push.tip_force = force;
-  run.trial.pushes = {push};
+  run.trial.metrics = compute_push_metrics({push});
   return run;
 }
 
@@ -124,7 +127,7 @@ TEST(EstimateError, HasNoOrderWhereNothingChanges) {
 TEST(EstimateError, HasNoErrorWithoutTheFineRun) {
   auto runs = runs_of_order(2.0, 0.03);
   runs[2].trial.outcome = Outcome::kNotConverged;
-  runs[2].trial.pushes.back().insertion = 31.5;
+  runs[2].trial.metrics.insertion = 31.5;
   runs[2].trial.reason = "no equilibrium";
   const Refinement result = estimate_error(0, kLength, runs);
   EXPECT_FALSE(result.error.has_value());
@@ -139,7 +142,7 @@ TEST(EstimateError, HasNoErrorWithoutTheFineRun) {
 
 TEST(EstimateError, NeedsNoCoarseRunForTheError) {
   auto runs = runs_of_order(2.0, 0.03);
-  runs[0].trial = simulate::TrialResult{};
+  runs[0].trial = Measured{};
   const Refinement result = estimate_error(0, kLength, runs);
   EXPECT_NEAR(result.error.value().position, 0.03, 1e-13);
   EXPECT_FALSE(result.observed_order.has_value());
@@ -175,9 +178,7 @@ TEST(EstimateError, TellsTheTipFromTheRestOfTheWire) {
 /// A study with real trials: askew into a straight tube, where the wire lies against the wall.
 struct TubeStudy {
   Study study;
-  std::vector<Candidate> candidates;
-  std::vector<Metrics> metrics;
-  Ranking ranking;
+  Centerline path;
   simulate::VesselModel vessel{shapes::straight_tube(4.0, 50.0, 2.0)};
 
   TubeStudy() {
@@ -190,19 +191,18 @@ struct TubeStudy {
     study.goal = {.point = Vec3(0.0, 0.0, 30.0), .radius = 4.5};
     study.insertion.length = 35.0;
 
-    Centerline path;
     path.points.resize(3, 2);
     path.points << 0.0, 0.0, 0.0, 0.0, 5.0, 30.0;
     path.radius = Eigen::Vector2d(4.0, 4.0);
-    candidates = list_candidates(study);
-    const BatchResult batch = run_batch(study, candidates, vessel, {.threads = 2});
-    for (const auto& trial : batch.trials) metrics.push_back(compute_metrics(trial, study, path));
-    ranking = rank(study, candidates, batch.trials, metrics, {.tip_force_fail = 5.0}, {});
+    path.arc_length = Eigen::Vector2d(0.0, 25.0);
   }
 
-  std::vector<Refinement> refined(int threads) const {
-    return refine_plans(study, candidates, metrics, choose_plans_to_refine(ranking, {}, {}), vessel,
-                        {.threads = threads});
+  Plan planned(int threads) const {
+    PlanOptions options{.manoeuvres = Manoeuvring::kNever, .batch = {.threads = threads}};
+    options.robustness.repeats = 0;
+    const auto model = [&]() -> const simulate::VesselModel& { return vessel; };
+    MemoryLog log;
+    return make_plan(study, {.path = path, .model = model, .rigid_model = model}, options, log);
   }
 };
 
@@ -242,12 +242,14 @@ TEST(ChoosePlansToRefine, TakesNoMoreThanAskedButTheFirstAlways) {
 
 TEST(RefinePlans, EstimatesASmallErrorOfAWireAgainstTheWall) {
   const TubeStudy tube;
-  ASSERT_EQ(tube.ranking.plans.size(), 2u);
-  const auto refinements = tube.refined(2);
+  const Plan plan = tube.planned(2);
+  const std::vector<Refinement>& refinements = plan.refinements;
+  const Ranking ranking = judge(tube.study, plan, {}, {}).ranking;
+  ASSERT_EQ(ranking.plans.size(), 2u);
   ASSERT_EQ(refinements.size(), 2u);  // asked for three, there are two
   for (std::size_t k = 0; k < refinements.size(); ++k) {
     const Refinement& r = refinements[k];
-    EXPECT_EQ(r.trial, tube.ranking.plans[k].trial);
+    EXPECT_EQ(r.trial, ranking.plans[k].trial);
     ASSERT_TRUE(r.error.has_value()) << r.reason;
     EXPECT_GT(r.error->position, 0.0);
     EXPECT_LT(r.error->position, 1.0);  // an element's length: coarser would be no answer
@@ -260,7 +262,7 @@ TEST(RefinePlans, EstimatesASmallErrorOfAWireAgainstTheWall) {
 
 TEST(RefinePlans, GivesTheSameAtAnyThreadCount) {
   const TubeStudy tube;
-  const auto serial = tube.refined(1), parallel = tube.refined(3);
+  const auto serial = tube.planned(1).refinements, parallel = tube.planned(3).refinements;
   ASSERT_EQ(serial.size(), parallel.size());
   ASSERT_FALSE(serial.empty());
   for (std::size_t k = 0; k < serial.size(); ++k) {

@@ -210,14 +210,15 @@ Metrics reached(double peak_force) {
 
 TEST(JudgeRepeat, AFailureCostsOneAndSaysWhy) {
   Study study;
-  simulate::TrialResult trial;
-  trial.outcome = Outcome::kReached;
-  const Repeat good = judge_repeat(trial, reached(0.3), study, {}, {});
+  const auto judged = [&](const Metrics& metrics) {
+    return judge_repeat({.outcome = Outcome::kReached, .metrics = metrics}, study, {}, {});
+  };
+  const Repeat good = judged(reached(0.3));
   EXPECT_TRUE(good.success);
   EXPECT_EQ(good.score, compute_score(reached(0.3), study.goal, {}, {}).total);
   Metrics hard = reached(0.3);
   hard.peak_tip_force = 2.0;
-  const Repeat broken = judge_repeat(trial, hard, study, {}, {});
+  const Repeat broken = judged(hard);
   EXPECT_FALSE(broken.success);
   EXPECT_EQ(broken.score, 1.0);
   EXPECT_NE(broken.reason.find("over the limit"), std::string::npos);
@@ -228,16 +229,14 @@ TEST(JudgeRepeat, AFailureCostsOneAndSaysWhy) {
 struct Plans {
   Study study;
   std::vector<Candidate> candidates;
-  std::vector<simulate::TrialResult> trials;
-  std::vector<Metrics> metrics;
+  std::vector<Measured> trials;
   Findings findings;
 
   explicit Plans(const std::vector<double>& forces) {
     study.wires.resize(2);
     for (const double force : forces) {
       candidates.push_back({.wire = 0});
-      trials.emplace_back().outcome = Outcome::kReached;
-      metrics.push_back(reached(force));
+      trials.push_back({.outcome = Outcome::kReached, .metrics = reached(force)});
       findings.errors.push_back(NumericalError{});  // exact
     }
   }
@@ -250,7 +249,7 @@ struct Plans {
       repeat.score = score;
     }
   }
-  Ranking ranked() const { return rank(study, candidates, trials, metrics, {}, {}, findings); }
+  Ranking ranked() const { return rank(study, candidates, trials, {}, {}, findings); }
 };
 
 TEST(Rank, PlansThatStaySafeUnderDisturbancesComeFirst) {

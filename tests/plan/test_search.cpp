@@ -276,15 +276,13 @@ TEST(IsPinched, WhereAStuckTipHasLessRoomThanItIsThick) {
   path.arc_length = path.points.row(0);
   path.radius.setConstant(41, 2.0);
   path.radius[20] = 0.3;
-  simulate::TrialResult trial;
-  trial.outcome = Outcome::kStuck;
-  trial.pushes.push_back({.tip = {18.8, 0.2, 0.0}});
+  Measured trial{.outcome = Outcome::kStuck, .last_tip = {18.8, 0.2, 0.0}};
   EXPECT_TRUE(is_pinched(trial, 0.18, path));
   EXPECT_FALSE(is_pinched(trial, 0.14, path)) << "it has room";
   trial.outcome = Outcome::kMissed;
   EXPECT_FALSE(is_pinched(trial, 0.18, path));
   trial.outcome = Outcome::kStuck;
-  trial.pushes.back().tip = {10.0, 1.8, 0.0};
+  trial.last_tip = {10.0, 1.8, 0.0};
   EXPECT_FALSE(is_pinched(trial, 0.18, path)) << "it is stuck elsewhere";
 }
 
@@ -309,20 +307,19 @@ TEST(ScoutErrorOf, CountsWhatTheScoutSawWrong) {
 }
 
 TEST(LookAt, ScoresWhatReachedWhateverLimitItBroke) {
-  simulate::TrialResult trial;
-  trial.outcome = Outcome::kReached;
-  Metrics metrics;
+  Measured trial{.outcome = Outcome::kReached};
+  Metrics& metrics = trial.metrics;
   metrics.reached = true;
   metrics.tip_to_target = 1.0;
   metrics.peak_tip_force = 3.0;
-  const Sighting hard = look_at(trial, metrics, {}, {}, {});
+  const Sighting hard = look_at(trial, {}, {}, {});
   EXPECT_TRUE(hard.reached);
   EXPECT_FALSE(hard.plan);
   EXPECT_LT(hard.score, 1.0);
   trial.outcome = Outcome::kNotConverged;
   metrics.reached = false;
-  EXPECT_TRUE(look_at(trial, metrics, {}, {}, {}).unclear);
-  EXPECT_EQ(look_at(trial, metrics, {}, {}, {}).score, 1.0);
+  EXPECT_TRUE(look_at(trial, {}, {}, {}).unclear);
+  EXPECT_EQ(look_at(trial, {}, {}, {}).score, 1.0);
 }
 
 }  // namespace

@@ -1,4 +1,4 @@
-#include "pipeline/report/report_page.h"
+#include "pipeline/report/places.h"
 
 #include <algorithm>
 #include <cmath>
@@ -21,12 +21,11 @@ Eigen::Index nearest_on_path(const Centerline& path, const Vec3& point) {
   return nearest;
 }
 
-std::vector<Place> list_places(Workspace& work, const std::vector<double>& peak_force) {
-  const Centerline& path = work.path();
-  const plan::Study& study = work.study();
+std::vector<Place> list_places(const SlicedVessel& vessel, const std::vector<double>& peak_force) {
+  const Centerline& path = vessel.path;
   const double length = path.arc_length(path.arc_length.size() - 1);
-  std::vector<Stop> stops = {{0.0, {"access", study.access, {}}},
-                             {length, {"target", study.goal.point, {}}}};
+  std::vector<Stop> stops = {{0.0, {"access", vessel.access, {}}},
+                             {length, {"target", vessel.target, {}}}};
   for (int k = 1; k <= kPlacesOnTheWay; ++k) {
     const double wanted = length * k / (kPlacesOnTheWay + 1);
     Eigen::Index at = 0;
@@ -39,7 +38,7 @@ std::vector<Place> list_places(Workspace& work, const std::vector<double>& peak_
   }
   const auto worst = std::max_element(peak_force.begin(), peak_force.end());
   if (worst != peak_force.end() && *worst > 0.0) {
-    const Surface& surface = work.surface();
+    const Surface& surface = vessel.surface;
     Vec3 middle = Vec3::Zero();
     for (const int corner : surface.triangles.col(worst - peak_force.begin())) {
       middle += surface.vertices.col(corner) / 3.0;
@@ -56,44 +55,10 @@ std::vector<Place> list_places(Workspace& work, const std::vector<double>& peak_
 
 }  // namespace
 
-std::vector<int> best_of_each_wire(const ReportInput& report) {
-  std::vector<int> best;
-  for (std::size_t w = 0; w < report.study.wires.size(); ++w) {
-    std::optional<int> shown = report.ranking.wires[w].best_trial;
-    const bool ranked = shown.has_value();
-    for (std::size_t id = 0; !ranked && id < report.trials.size(); ++id) {
-      const plan::Metrics& metrics = report.metrics[id];
-      if (report.candidates[id].wire != static_cast<int>(w) || metrics.insertion <= 0.0) continue;
-      if (!shown || metrics.tip_to_target < report.metrics[*shown].tip_to_target) {
-        shown = static_cast<int>(id);
-      }
-    }
-    if (shown) best.push_back(*shown);
-  }
-  return best;
-}
-
-std::vector<int> choose_played(const ReportInput& report) {
-  std::vector<int> played;
-  const std::size_t count = std::min(kPlansPlayed, report.ranking.plans.size());
-  for (std::size_t k = 0; k < count; ++k) played.push_back(report.ranking.plans[k].trial);
-  for (const int id : best_of_each_wire(report)) {
-    const auto same_wire = [&](int other) {
-      return report.candidates[other].wire == report.candidates[id].wire;
-    };
-    if (std::none_of(played.begin(), played.end(), same_wire)) played.push_back(id);
-  }
-  return played;
-}
-
-std::optional<Slices> cut_case_slices(Workspace& work, const std::vector<double>& peak_force) {
-  const Case& given = work.given();
-  if (!given.volume) return {};
-  const preprocess::Image& image = work.image();
-
+Slices cut_vessel_slices(const preprocess::Image& image, const SlicedVessel& vessel,
+                         const Json& segment, const std::vector<double>& peak_force) {
   // The lumen's mean bright, as far below the threshold as above it; never past the values there
   // are.
-  const Json segment = work.figures("segment");
   const double threshold = segment.at("band").at("lower_hu");
   const double span = 2.0 * (segment.at("mean_hu").get<double>() - threshold);
   const auto [least, most] = std::minmax_element(image.values.begin(), image.values.end());
@@ -101,9 +66,7 @@ std::optional<Slices> cut_case_slices(Workspace& work, const std::vector<double>
   options.window_low = std::max(threshold - span, static_cast<double>(*least));
   options.window_high = std::min(threshold + span, static_cast<double>(*most));
   if (options.window_high <= options.window_low) options.window_high = options.window_low + 1.0;
-  Slices slices = cut_slices(image, work.surface(), list_places(work, peak_force), options);
-  work.drop_image();
-  return slices;
+  return cut_slices(image, vessel.surface, list_places(vessel, peak_force), options);
 }
 
 }  // namespace wireplan::pipeline

@@ -1,6 +1,6 @@
 #pragma once
-/// What each stage does with its inputs. The order of the stages, their keys and the cache are in
-/// stages.h.
+/// What a run knows while its stages are made: the case, the artifacts so far and what was read
+/// from them.
 #include <filesystem>
 #include <functional>
 #include <map>
@@ -11,17 +11,14 @@
 #include "pipeline/files/case_file.h"
 #include "pipeline/files/json_reader.h"
 #include "pipeline/store/store.h"
+#include "plan/trial_log.h"
 #include "preprocess/surface/openings.h"
 #include "preprocess/volume/image.h"
 #include "simulate/wall/vessel_model.h"
 
 namespace wireplan::pipeline {
 
-/// Work was stopped by the user; what was finished is kept.
-class Interrupted : public std::exception {
- public:
-  const char* what() const noexcept override { return "interrupted; what was finished is kept"; }
-};
+using plan::Interrupted;
 
 /// How a stage speaks to whom started it; each may be empty.
 struct WorkOptions {
@@ -64,9 +61,11 @@ class Workspace {
 
   std::filesystem::path input;  // the volume or surface that the case names
   std::string input_sha256;
-  std::string input_stamp;  // before it was hashed
-  Json parameters;          // of the case after defaults, without folder names
-  std::string key_text;     // of the stage under way
+  std::string input_stamp;                       // before it was hashed
+  Json parameters;                               // of the case after defaults, without folder names
+  std::map<std::string, std::string> key_texts;  // of the stages so far and the one under way
+  /// Trials that this process ran or read, by level and candidate.
+  std::map<std::pair<plan::Level, int>, plan::Measured> measured;
 
  private:
   Case given_;
@@ -88,34 +87,5 @@ class Workspace {
 /// The start of a stage's figures.json, and its end.
 Json figures_of(const std::string& stage);
 void write_figures(const Json& figures, const std::filesystem::path& folder);
-
-/// Each fills `folder` with the artifact of its stage. All but the report write figures.json,
-/// numbers for the report with a list of warnings.
-void make_volume(Workspace& work, const std::filesystem::path& folder);
-void make_segment(Workspace& work, const std::filesystem::path& folder);
-void make_surface(Workspace& work, const std::filesystem::path& folder);
-void make_centerline(Workspace& work, const std::filesystem::path& folder);
-void make_wall(Workspace& work, const std::filesystem::path& folder);
-void make_trials(Workspace& work, const std::filesystem::path& folder);
-void make_manoeuvres(Workspace& work, const std::filesystem::path& folder);
-void make_report(Workspace& work, const std::filesystem::path& folder);
-
-/// One of several processes' part of a case's trials. They are run in rounds: the scouts of all
-/// candidates (all in full where none are scouted), then probes and full runs that the rounds
-/// before name.
-struct Share {
-  int shard = 1, shards = 1;  // part `shard` of `shards`, from 1
-  int round = 1;
-};
-struct ShareOutcome {
-  std::string level;            // "scout", "probe" or "full"
-  int round_trials = 0;         // 0: there is no such round
-  int own_trials = 0, run = 0;  // of these in the part; run this time
-};
-
-/// Puts the trials of that part into the store, each a piece, for make_trials() to find; runs those
-/// that are missing. Expects `work` to be ready for make_trials(). Throws `Error` where a round
-/// before is not complete, and Interrupted.
-ShareOutcome run_share(Workspace& work, const Share& share);
 
 }  // namespace wireplan::pipeline

@@ -1,0 +1,205 @@
+#include "pipeline/files/plan_file.h"
+
+#include <cmath>
+#include <utility>
+
+#include "pipeline/files/trial_file.h"
+
+namespace wireplan::pipeline {
+namespace {
+
+constexpr const char* kMeasuredSchema = "wireplan.measured/1";
+
+// What is not finite is null.
+Json number(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
+double number_of(const Json& value) { return value.is_null() ? std::nan("") : value.get<double>(); }
+Json point(const Vec3& p) { return Json::array({number(p.x()), number(p.y()), number(p.z())}); }
+Vec3 point_of(const Json& row) {
+  return {number_of(row.at(0)), number_of(row.at(1)), number_of(row.at(2))};
+}
+Json optional(const std::optional<double>& value) { return value ? Json(*value) : Json(nullptr); }
+std::optional<double> optional_of(const Json& value) {
+  return value.is_null() ? std::nullopt : std::optional<double>(value);
+}
+
+plan::Level level_of(const std::string& name) {
+  for (const plan::Level level : {plan::Level::kScout, plan::Level::kProbe, plan::Level::kFull}) {
+    if (name == plan::level_name(level)) return level;
+  }
+  throw Error("level is " + name + ", expected scout, probe or full");
+}
+
+Json metrics_to_json(const plan::Metrics& metrics) {
+  Json json;
+  for (const plan::MetricField& field : plan::kMetricFields) {
+    json[field.name] = number(metrics.*field.value);
+  }
+  json["reached"] = metrics.reached;
+  json["iterations"] = metrics.iterations;
+  const plan::WallMotion& motion = metrics.wall_motion;
+  json["wall_motion"] = {{"displacement_mm", number(motion.displacement)},
+                         {"radius_mm", number(motion.radius)},
+                         {"point_mm", point(motion.point)}};
+  return json;
+}
+
+plan::Metrics metrics_of(const Json& json) {
+  plan::Metrics metrics;
+  for (const plan::MetricField& field : plan::kMetricFields) {
+    metrics.*field.value = number_of(json.at(field.name));
+  }
+  metrics.reached = json.at("reached");
+  metrics.iterations = json.at("iterations");
+  const Json& motion = json.at("wall_motion");
+  metrics.wall_motion = {.displacement = number_of(motion.at("displacement_mm")),
+                         .radius = number_of(motion.at("radius_mm")),
+                         .point = point_of(motion.at("point_mm"))};
+  return metrics;
+}
+
+Json measured_to_json(const plan::Measured& measured) {
+  return {{"outcome", simulate::outcome_name(measured.outcome)},
+          {"reason", measured.reason},
+          {"terms", measured.terms},
+          {"metrics", metrics_to_json(measured.metrics)},
+          {"progress_mm", number(measured.progress)},
+          {"last_tip_mm", point(measured.last_tip)}};
+}
+
+plan::Measured measured_of(const Json& json) {
+  return {.outcome = outcome_of(json.at("outcome")),
+          .reason = json.at("reason"),
+          .terms = json.at("terms").get<std::vector<std::string>>(),
+          .metrics = metrics_of(json.at("metrics")),
+          .progress = number_of(json.at("progress_mm")),
+          .last_tip = point_of(json.at("last_tip_mm"))};
+}
+
+Json refinement_to_json(const plan::Refinement& refinement) {
+  Json rows = Json::array(), error = nullptr;
+  for (const plan::NumericsRow& row : refinement.rows) {
+    rows.push_back({{"element_length_mm", row.element_length},
+                    {"position_error_mm", optional(row.position_error)},
+                    {"peak_force_n", row.peak_force},
+                    {"iterations", row.iterations}});
+  }
+  if (refinement.error) {
+    error = {{"position_mm", refinement.error->position},
+             {"tip_mm", refinement.error->tip},
+             {"peak_force_n", refinement.error->peak_force},
+             {"mean_force_n", refinement.error->mean_force},
+             {"tip_force_n", refinement.error->tip_force}};
+  }
+  return {{"trial", refinement.trial},
+          {"rows", std::move(rows)},
+          {"error", std::move(error)},
+          {"observed_order", optional(refinement.observed_order)},
+          {"reason", refinement.reason}};
+}
+
+plan::Refinement refinement_of(const Json& json) {
+  plan::Refinement refinement;
+  refinement.trial = json.at("trial");
+  refinement.observed_order = optional_of(json.at("observed_order"));
+  refinement.reason = json.at("reason");
+  for (const Json& row : json.at("rows")) {
+    refinement.rows.push_back({.element_length = row.at("element_length_mm"),
+                               .position_error = optional_of(row.at("position_error_mm")),
+                               .peak_force = row.at("peak_force_n"),
+                               .iterations = row.at("iterations")});
+  }
+  const Json& error = json.at("error");
+  if (!error.is_null()) {
+    refinement.error = plan::NumericalError{.position = error.at("position_mm"),
+                                            .tip = error.at("tip_mm"),
+                                            .peak_force = error.at("peak_force_n"),
+                                            .mean_force = error.at("mean_force_n"),
+                                            .tip_force = error.at("tip_force_n")};
+  }
+  return refinement;
+}
+
+// In internal units: these are not for reading, and come back bit for bit.
+Json robustness_to_json(const plan::RobustnessOptions& options) {
+  const plan::Unknowns& unknowns = options.unknowns;
+  return {{"repeats", options.repeats},
+          {"plans", options.plans},
+          {"seed", options.seed},
+          {"friction_factor", {unknowns.friction_low, unknowns.friction_high}},
+          {"wall_factor", {unknowns.wall_low, unknowns.wall_high}},
+          {"angle_rad", unknowns.angle},
+          {"entry_mm", unknowns.entry},
+          {"lumen_mm", unknowns.lumen}};
+}
+
+plan::RobustnessOptions robustness_of(const Json& json) {
+  return {.repeats = json.at("repeats"),
+          .plans = json.at("plans"),
+          .seed = json.at("seed"),
+          .unknowns = {.friction_low = json.at("friction_factor").at(0),
+                       .friction_high = json.at("friction_factor").at(1),
+                       .wall_low = json.at("wall_factor").at(0),
+                       .wall_high = json.at("wall_factor").at(1),
+                       .angle = json.at("angle_rad"),
+                       .entry = json.at("entry_mm"),
+                       .lumen = json.at("lumen_mm")}};
+}
+
+}  // namespace
+
+std::string measured_text(const plan::Measured& measured, bool with_shape) {
+  Json json = measured_to_json(measured);
+  json["schema"] = kMeasuredSchema;
+  json["cpu_s"] = measured.cpu_seconds;
+  if (with_shape) json["nodes_mm"] = to_json(measured.nodes);
+  return json.dump();
+}
+
+std::optional<plan::Measured> measured_from_text(const std::string& text) {
+  const Json json = Json::parse(text, nullptr, /*allow_exceptions=*/false);
+  if (!json.is_object() || json.value("schema", "") != kMeasuredSchema) return {};
+  plan::Measured measured = measured_of(json);
+  measured.cpu_seconds = json.at("cpu_s");
+  if (!json.contains("nodes_mm")) return measured;
+  const Json& nodes = json.at("nodes_mm");
+  measured.nodes.resize(3, static_cast<Eigen::Index>(nodes.size()));
+  for (std::size_t k = 0; k < nodes.size(); ++k) {
+    measured.nodes.col(static_cast<Eigen::Index>(k)) = point_of(nodes[k]);
+  }
+  return measured;
+}
+
+Json plan_to_json(const plan::Plan& plan) {
+  Json levels = Json::array(), trials = Json::array(), refinements = Json::array(),
+       repeated = Json::array();
+  for (const plan::Level level : plan.levels) levels.push_back(plan::level_name(level));
+  for (const plan::Measured& trial : plan.trials) trials.push_back(measured_to_json(trial));
+  for (const plan::Refinement& refinement : plan.refinements) {
+    refinements.push_back(refinement_to_json(refinement));
+  }
+  for (const plan::RepeatedTrials& repeats : plan.repeated) {
+    Json own = Json::array();
+    for (const plan::Measured& trial : repeats.trials) own.push_back(measured_to_json(trial));
+    repeated.push_back({{"trial", repeats.trial}, {"trials", std::move(own)}});
+  }
+  return {
+      {"levels", std::move(levels)},           {"trials", std::move(trials)},
+      {"refinements", std::move(refinements)}, {"robustness", robustness_to_json(plan.robustness)},
+      {"repeated", std::move(repeated)},       {"attempts", plan.attempts}};
+}
+
+void plan_from_json(const Json& json, plan::Plan& plan) {
+  for (const Json& level : json.at("levels")) plan.levels.push_back(level_of(level));
+  for (const Json& trial : json.at("trials")) plan.trials.push_back(measured_of(trial));
+  for (const Json& row : json.at("refinements")) plan.refinements.push_back(refinement_of(row));
+  plan.robustness = robustness_of(json.at("robustness"));
+  plan.disturbances = plan::draw_disturbances(plan.robustness);
+  for (const Json& row : json.at("repeated")) {
+    plan::RepeatedTrials& repeats = plan.repeated.emplace_back();
+    repeats.trial = row.at("trial");
+    for (const Json& trial : row.at("trials")) repeats.trials.push_back(measured_of(trial));
+  }
+  plan.attempts = json.at("attempts").get<std::vector<int>>();
+}
+
+}  // namespace wireplan::pipeline

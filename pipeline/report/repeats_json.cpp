@@ -1,0 +1,87 @@
+#include "pipeline/report/repeats_json.h"
+
+#include <utility>
+
+#include "plan/statistics.h"
+
+namespace wireplan::pipeline {
+namespace {
+
+Json spread_json(const plan::RepeatedPlan& plan, double plan::Repeat::*member) {
+  std::vector<double> values;
+  for (const plan::Repeat& repeat : plan.repeats) values.push_back(repeat.*member);
+  const plan::Spread spread = plan::find_spread(values);
+  return {{"low", spread.low}, {"median", spread.median}, {"high", spread.high}};
+}
+
+Json plan_json(const plan::RepeatedPlan& plan) {
+  Json scores = Json::array(), failures = Json::array();
+  double sum = 0.0;
+  for (std::size_t k = 0; k < plan.repeats.size(); ++k) {
+    const plan::Repeat& repeat = plan.repeats[k];
+    sum += repeat.score;
+    scores.push_back(repeat.score);
+    if (!repeat.success) failures.push_back({{"repeat", k}, {"reason", repeat.reason}});
+  }
+  const int count = static_cast<int>(plan.repeats.size());
+  const int successes = count - static_cast<int>(failures.size());
+  Json json;
+  json["trial"] = plan.trial;
+  json["repeats"] = count;
+  json["successes"] = successes;
+  json["success_rate"] = static_cast<double>(successes) / count;
+  json["success_rate_interval"] = plan::wilson_interval(successes, count);
+  json["mean_score"] = sum / count;
+  json["peak_contact_force_n"] = spread_json(plan, &plan::Repeat::peak_contact_force);
+  json["mean_contact_force_n"] = spread_json(plan, &plan::Repeat::mean_contact_force);
+  json["peak_tip_force_n"] = spread_json(plan, &plan::Repeat::peak_tip_force);
+  json["scores"] = std::move(scores);
+  json["failures"] = std::move(failures);
+  return json;
+}
+
+Json disturbances_json(const std::vector<plan::Disturbance>& disturbances) {
+  Json list = Json::array();
+  for (const plan::Disturbance& d : disturbances) {
+    list.push_back({{"friction_factor", d.friction_factor},
+                    {"wall_factor", d.wall_factor},
+                    {"tilt_deg", {d.tilt[0] / kRadPerDeg, d.tilt[1] / kRadPerDeg}},
+                    {"shift_mm", {d.shift[0], d.shift[1]}},
+                    {"lumen_inward_mm", d.inward}});
+  }
+  return list;
+}
+
+Json sensitivity_json(const plan::Plan& plan, const std::vector<plan::RepeatedPlan>& judged) {
+  const plan::Sensitivity found = plan::find_sensitivity(plan.disturbances, judged);
+  Json shares = Json::array(), json;
+  for (const auto& share : found.shares) {
+    shares.push_back({{"unknown", share.unknown}, {"share", share.of_all}});
+  }
+  json["explained"] = found.explained ? Json(*found.explained) : Json(nullptr);
+  json["shares"] = std::move(shares);
+  if (!found.reason.empty()) json["null_reasons"] = {{"explained", found.reason}};
+  return json;
+}
+
+}  // namespace
+
+Json repeats_json(const plan::Plan& plan, const std::vector<plan::RepeatedPlan>& judged) {
+  const plan::Unknowns& unknowns = plan.robustness.unknowns;
+  Json plans = Json::array();
+  for (const plan::RepeatedPlan& repeated : judged) plans.push_back(plan_json(repeated));
+  Json json;
+  json["repeats"] = plan.robustness.repeats;
+  json["seed"] = plan.robustness.seed;
+  json["unknowns"] = {{"friction_factor", {unknowns.friction_low, unknowns.friction_high}},
+                      {"wall_factor", {unknowns.wall_low, unknowns.wall_high}},
+                      {"angle_deg", clean(unknowns.angle / kRadPerDeg)},
+                      {"entry_mm", unknowns.entry},
+                      {"lumen_mm", unknowns.lumen}};
+  json["plans"] = std::move(plans);
+  json["sensitivity"] = sensitivity_json(plan, judged);
+  json["disturbances"] = disturbances_json(plan.disturbances);
+  return json;
+}
+
+}  // namespace wireplan::pipeline

@@ -1,0 +1,192 @@
+// The stages that simulate. Each asks for the whole plan as far as it is responsible for; what the
+// stages before it simulated is found in the log.
+#include <cmath>
+#include <utility>
+
+#include "pipeline/files/plan_file.h"
+#include "pipeline/files/trial_file.h"
+#include "pipeline/stages/makers.h"
+#include "pipeline/stages/plan_artifact.h"
+#include "pipeline/stages/stored_trials.h"
+
+namespace wireplan::pipeline {
+namespace {
+
+namespace fs = std::filesystem;
+using plan::Level;
+using Until = plan::PlanOptions::Until;
+
+/// How well a boundary is known: drawn on voxels to half of one; of a surface, assumed [mm].
+constexpr double kVoxelPart = 0.5, kSurfaceOffset = 0.25;
+
+double choose_lumen_offset(const Workspace& work) {
+  if (!work.has("volume")) return kSurfaceOffset;
+  const Json spacing = work.figures("volume").at("spacing_mm");
+  double product = 1.0;
+  for (const Json& side : spacing) product *= side.get<double>();
+  return kVoxelPart * std::cbrt(product);
+}
+
+plan::PlanOptions plan_options(const Workspace& work, Until until) {
+  const Case& given = work.given();
+  plan::PlanOptions options{.exhaustive = given.exhaustive,
+                            .manoeuvres = given.manoeuvres,
+                            .robustness = given.robustness,
+                            .until = until,
+                            .batch = {.threads = work.options().threads,
+                                      .progress = work.options().progress,
+                                      .cancelled = work.options().cancelled}};
+  double& lumen = options.robustness.unknowns.lumen;
+  if (lumen == 0.0) lumen = choose_lumen_offset(work);
+  return options;
+}
+
+plan::PlanVessel plan_vessel(Workspace& work) {
+  return {.path = work.path(),
+          .yields = work.given().wall.elastic,
+          .model = [&]() -> const simulate::VesselModel& { return work.model(); },
+          .rigid_model = [&]() -> const simulate::VesselModel& { return work.rigid_model(); }};
+}
+
+plan::Plan plan_until(Workspace& work, Until until, StoredTrials& log) {
+  return plan::make_plan(work.study(), plan_vessel(work), plan_options(work, until), log);
+}
+
+// What the report tells of the scouts; null where there are none.
+Json scouting_json(const std::optional<plan::ScoutSummary>& scouting) {
+  if (!scouting) return nullptr;
+  const plan::ScoutError& error = scouting->error;
+  const auto number = [](const std::optional<double>& value) {
+    return value ? Json(*value) : Json(nullptr);
+  };
+  return {{"element_length_mm", scouting->element_length},
+          {"step_mm", scouting->step},
+          {"wall", "rigid"},
+          {"trials", scouting->trials},
+          {"probed", scouting->probed},
+          {"compared", error.compared},
+          {"both_reached", error.both_reached},
+          {"median_score_error", number(error.median_score)},
+          {"largest_score_error", number(error.largest_score)},
+          {"missed", error.missed},
+          {"false_reached", error.false_reached}};
+}
+
+// The levels that the case has, lowest first.
+std::vector<std::pair<Level, plan::Spent>> levels_of(const plan::Plan& plan, bool elastic) {
+  std::vector<std::pair<Level, plan::Spent>> levels;
+  if (plan.scouting) levels.push_back({Level::kScout, plan.scouts});
+  if (plan.scouting && elastic) levels.push_back({Level::kProbe, plan.probes});
+  levels.push_back({Level::kFull, plan.full});
+  return levels;
+}
+
+}  // namespace
+
+void make_trials(Workspace& work, const fs::path& folder) {
+  const plan::Study& study = work.study();
+  StoredTrials log(work);
+  const plan::Plan plan = plan_until(work, Until::kTrials, log);
+  Json levels = Json::array();
+  plan::Spent all;
+  for (const auto& [level, spent] : levels_of(plan, work.given().wall.elastic)) {
+    log.place(level, 0, folder);
+    levels.push_back({{"level", plan::level_name(level)},
+                      {"trials_run", spent.runs},
+                      {"cpu_s", spent.cpu_seconds}});
+    all.runs += spent.runs;
+    all.cpu_seconds += spent.cpu_seconds;
+  }
+  const simulate::VesselModel& vessel = work.model();
+
+  Json figures = figures_of("trials");
+  figures["trials"] = plan.candidates.size();
+  figures["scout"] = scouting_json(plan.scouting);
+  figures["tangent"] = to_json(study.tangent);
+  figures["insertion_length_mm"] = study.insertion.length;
+  figures["lumen_grid_mm"] = vessel.lumen.grid_spacing();
+  figures["lumen_max_deviation_mm"] = vessel.lumen.max_deviation();
+  figures["lumen_mean_deviation_mm"] = vessel.lumen.mean_deviation();
+  if (study.insertion.friction == 0.0) {
+    figures["warnings"].push_back("trials: frictionless (friction is 0): " +
+                                  std::string("push forces are lower bounds"));
+  }
+  if (!work.given().wall.elastic) {
+    figures["warnings"].push_back("trials: rigid wall: contact forces are upper bounds");
+  }
+  write_figures(figures, folder);
+  write_json({{"schema", kTimingSchema},
+              {"trials_run", all.runs},
+              {"cpu_s", all.cpu_seconds},
+              {"levels", std::move(levels)}},
+             folder / kTimingFile);
+}
+
+void make_manoeuvres(Workspace& work, const fs::path& folder) {
+  StoredTrials log(work);
+  const plan::Plan plan = plan_until(work, Until::kManoeuvres, log);
+  const plan::Scripts& scripts = plan.scripts;
+  const std::size_t straight = plan.candidates.size() - scripts.found.size();
+  log.place(Level::kFull, static_cast<int>(straight), folder);
+
+  Json figures = figures_of("manoeuvres");
+  figures["starts"] = scripts.starts_tried;
+  figures["branches"] = scripts.branches;
+  figures["scripts"] = Json::array();
+  for (std::size_t k = 0; k < scripts.found.size(); ++k) {
+    figures["scripts"].push_back(
+        {{"start", scripts.starts[k]}, {"moves", moves_json(scripts.found[k].moves)}});
+  }
+  write_figures(figures, folder);
+}
+
+void make_plans(Workspace& work, const fs::path& folder) {
+  StoredTrials log(work);
+  const plan::Plan plan = plan_until(work, Until::kEnd, log);
+  for (const int id : plan.attempts) log.place_attempt(id, folder);
+  write_figures(figures_of("plans"), folder);
+  write_plan(plan, folder);
+}
+
+ShareOutcome run_share(Workspace& work, const Share& share) {
+  expects(share.shard >= 1 && share.shard <= share.shards && share.round >= 1);
+  StoredTrials log(work);
+  const plan::PlanVessel vessel = plan_vessel(work);
+  const std::vector<plan::Candidate> candidates = plan::list_candidates(work.study());
+  plan::Rounds rounds(work.study(), vessel, candidates, work.given().exhaustive);
+  std::vector<plan::Run> runs = rounds.next();
+  for (int round = 1; round < share.round && !runs.empty(); ++round) {
+    std::vector<plan::Measured> found;
+    for (const plan::Run& run : runs) {
+      if (std::optional<plan::Measured> known = log.find(run)) found.push_back(std::move(*known));
+    }
+    if (found.size() < runs.size()) {
+      throw Error("round " + std::to_string(share.round) + " follows from all " +
+                  std::to_string(runs.size()) + " trials of round " + std::to_string(round) +
+                  ", of which " + std::to_string(runs.size() - found.size()) +
+                  " are not in the store; run its other shards first, or \"wireplan report\", "
+                  "which runs what is missing");
+    }
+    rounds.take(std::move(found));
+    runs = rounds.next();
+  }
+
+  // Every N-th, so that the costly ones, which are neighbours, are shared out.
+  std::vector<plan::Run> own;
+  bool all_found = true;
+  const auto shards = static_cast<std::size_t>(share.shards);
+  for (auto k = static_cast<std::size_t>(share.shard - 1); k < runs.size(); k += shards) {
+    own.push_back(runs[k]);
+    all_found = all_found && log.find(runs[k]);
+  }
+  if (share.shards > 1 && !all_found) work.share_field();
+  plan::Spent spent;
+  plan::find_or_run(work.study(), vessel, own, log, plan_options(work, Until::kTrials).batch,
+                    spent);
+  return {.level = rounds.level(),
+          .round_trials = static_cast<int>(runs.size()),
+          .own_trials = static_cast<int>(own.size()),
+          .run = spent.runs};
+}
+
+}  // namespace wireplan::pipeline

@@ -1,0 +1,262 @@
+// The stages from the input to the wall.
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "pipeline/files/viewer_files.h"
+#include "pipeline/report/report.h"
+#include "pipeline/stages/makers.h"
+#include "preprocess/centerline/centerline.h"
+#include "preprocess/files/vessel_io.h"
+#include "preprocess/segment/segment.h"
+#include "preprocess/surface/openings.h"
+#include "preprocess/surface/surface.h"
+#include "preprocess/surface/surface_repair.h"
+#include "preprocess/wall/wall.h"
+
+namespace wireplan::pipeline {
+namespace {
+
+namespace fs = std::filesystem;
+
+// What was cut, in words; the largest leaks only.
+std::string leak_warning(const preprocess::Leak& leak) {
+  const auto rounded = [](double value) { return Json(std::round(value * 10.0) / 10.0).dump(); };
+  const Vec3& at = leak.place;
+  return "segment: cut a leak at (" + rounded(at.x()) + ", " + rounded(at.y()) + ", " +
+         rounded(at.z()) + ") mm: behind a neck of " + rounded(leak.neck_radius_mm) +
+         " mm radius lay " + rounded(leak.volume_mm3 / 1000.0) + " cm3, up to " +
+         rounded(leak.radius_mm) + " mm in radius, of " + rounded(leak.mean_hu) +
+         " HU in the mean" + (leak.bright_fraction > 0.2 ? ", much of it against bone" : "") +
+         "; if that is artery, add a point in it to segmentation.seeds_mm";
+}
+
+// Figures of the segment stage. What was chosen for the case is told as the report prints it.
+void add_segmentation(const preprocess::SegmentStatistics& statistics, bool chosen, Json& figures) {
+  constexpr std::size_t kLeaksTold = 5;
+  const preprocess::Band& band = statistics.band;
+  figures["band"] = {{"chosen", chosen},
+                     {"lower_hu", band.lower_hu},
+                     {"connect_hu", band.connect_hu},
+                     {"upper_hu", band.upper_hu},
+                     {"way_hu", band.way_hu},
+                     {"smoothing_mm", band.smoothing_mm},
+                     {"neck_opening_mm", band.neck_mm}};
+  figures["samples"] = Json::array();
+  for (const preprocess::LumenSample& sample : statistics.samples) {
+    figures["samples"].push_back({{"point_mm", to_json(sample.point)},
+                                  {"level_hu", sample.level_hu},
+                                  {"noise_hu", sample.noise_hu}});
+  }
+  figures["volume_mm3"] = statistics.volume_mm3;
+  figures["mean_hu"] = statistics.mean_hu;
+  figures["removed_by_opening_mm3"] = statistics.removed_by_opening_mm3;
+  figures["bright_boundary_fraction"] = statistics.bright_boundary;
+  figures["touches_border"] = statistics.touches_border;
+  figures["way_length_mm"] = statistics.search.route.length_mm;
+  figures["narrowest_radius_mm"] = statistics.search.route.narrowest_radius_mm;
+  figures["narrowest_mm"] = to_json(statistics.search.route.narrowest);
+  figures["leaks"] = Json::array();
+  for (const preprocess::Leak& leak : statistics.search.leaks) {
+    figures["leaks"].push_back({{"place_mm", to_json(leak.place)},
+                                {"neck_radius_mm", leak.neck_radius_mm},
+                                {"radius_mm", leak.radius_mm},
+                                {"volume_mm3", leak.volume_mm3},
+                                {"mean_hu", leak.mean_hu},
+                                {"bright_fraction", leak.bright_fraction}});
+    if (figures["leaks"].size() <= kLeaksTold) {
+      figures["warnings"].push_back(leak_warning(leak));
+    }
+  }
+}
+
+// What was mended of a given surface: each place, and in words.
+void add_mends(const std::vector<preprocess::Mend>& mends, Json& figures) {
+  figures["mended"] = Json::array();
+  for (const preprocess::Mend& mend : mends) {
+    figures["mended"].push_back({{"what", preprocess::name_of(mend.kind)},
+                                 {"count", mend.count},
+                                 {"place_mm", to_json(mend.place)},
+                                 {"size_mm", mend.size}});
+  }
+  for (const std::string& line : preprocess::tell_mends(mends)) {
+    figures["warnings"].push_back("surface: " + line);
+  }
+}
+
+// Length and width of a line, as the report has them of a branch.
+Json line_figures(const Centerline& line) {
+  const Eigen::Index last = line.points.cols() - 1;
+  const double length = line.arc_length(last);
+  const double distance = (line.points.col(last) - line.points.col(0)).norm();
+  return {{"length_mm", length},
+          {"mean_diameter_mm", 2.0 * line.radius.mean()},
+          {"min_diameter_mm", 2.0 * line.radius.minCoeff()},
+          {"max_diameter_mm", 2.0 * line.radius.maxCoeff()},
+          {"tortuosity", distance > 0.0 ? Json(length / distance) : Json(nullptr)}};
+}
+
+// The whole tree: files for viewers, and a list of its branches.
+Json write_tree(const std::vector<preprocess::Branch>& tree, const fs::path& folder) {
+  std::vector<Centerline> lines;
+  std::vector<NamedCurve> curves;
+  Json branches = Json::array();
+  for (std::size_t k = 0; k < tree.size(); ++k) {
+    const Centerline& line = tree[k].line;
+    const std::string name = "branch " + std::to_string(k + 1);
+    lines.push_back(line);
+    curves.push_back({name, line.points});
+    Json branch = {
+        {"name", name},
+        {"parent",
+         tree[k].parent < 0 ? Json(nullptr) : Json("branch " + std::to_string(tree[k].parent + 1))},
+        {"parent_arc_mm", tree[k].parent_arc},
+        {"start_mm", to_json(Vec3(line.points.col(0)))},
+        {"end_mm", to_json(Vec3(line.points.col(line.points.cols() - 1)))}};
+    branch.update(line_figures(line));
+    branches.push_back(std::move(branch));
+  }
+  preprocess::write_centerlines(lines, folder / "tree.vtp");
+  write_curve_markups(curves, folder / "tree.mrk.json");
+  return branches;
+}
+
+void require_inside(const Surface& surface, const std::string& key, const Vec3& point) {
+  const preprocess::InsideAnswer answer = preprocess::locate_point(surface, point);
+  if (answer.inside) return;
+  throw Error(key + " is " + to_json(point).dump() + ", " +
+              Json(std::round(answer.distance * 10.0) / 10.0).dump() +
+              " mm outside the vessel, expected a point inside it; look at surface.vtp and move " +
+              "the point, or mend the segmentation that left its place out");
+}
+
+}  // namespace
+
+void make_volume(Workspace& work, const fs::path& folder) {
+  const preprocess::Image& image = work.image();
+  const preprocess::Grid& grid = image.grid;
+
+  // Statistics of the values, summed in order.
+  double sum = 0.0;
+  for (const float value : image.values) sum += static_cast<double>(value);
+  const auto [low, high] = std::minmax_element(image.values.begin(), image.values.end());
+  expects(!image.values.empty());
+
+  Json figures = figures_of("volume");
+  figures["size"] = grid.size;
+  figures["spacing_mm"] = to_json(grid.spacing);
+  figures["origin_mm"] = to_json(grid.origin);
+  figures["direction_ijk_to_lps"] = to_json(Eigen::Matrix3Xd(grid.direction.transpose()));
+  figures["min_hu"] = *low;
+  figures["mean_hu"] = sum / static_cast<double>(image.values.size());
+  figures["max_hu"] = *high;
+  write_figures(figures, folder);
+}
+
+void make_segment(Workspace& work, const fs::path& folder) {
+  preprocess::SegmentOptions options = work.given().segmentation;
+  options.seeds.insert(options.seeds.begin(), work.given().study.access);
+  options.target = work.given().study.goal.point;
+  const preprocess::Segmentation segmentation = preprocess::segment(work.image(), options);
+  preprocess::write_mask(segmentation.mask, folder / "mask.nrrd");
+
+  const preprocess::SegmentStatistics& statistics = segmentation.statistics;
+  Json figures = figures_of("segment");
+  add_segmentation(statistics, !options.lower_hu.has_value(), figures);
+  if (statistics.touches_border) {
+    figures["warnings"].push_back(
+        "segment: the vessel touches the border of the volume and is closed there by a flat cap");
+  }
+  write_figures(figures, folder);
+}
+
+void make_surface(Workspace& work, const fs::path& folder) {
+  // From the mask, or from the case's file, mended where that is safe.
+  const Case& given = work.given();
+  Surface surface;
+  std::vector<preprocess::Mend> mends;
+  preprocess::FitStatistics fit;
+  if (given.surface_input) {
+    preprocess::RepairedSurface repaired =
+        preprocess::read_surface(work.input, given.surface_input->unit, given.surface_input->frame);
+    surface = std::move(repaired.surface);
+    mends = std::move(repaired.mends);
+    preprocess::require_sound(preprocess::check_surface(surface), work.input.string());
+    surface = preprocess::remesh(surface, given.surface.edge_length_mm);
+  } else {
+    surface = preprocess::surface_from_image(
+        work.image(), preprocess::read_mask(work.artifact("segment").folder / "mask.nrrd"),
+        given.surface, &fit);
+    work.drop_image();
+  }
+  const preprocess::SurfaceCheck check = preprocess::check_surface(surface);
+  preprocess::require_sound(check, "stage surface");
+  preprocess::write_surface(surface, folder / "surface.vtp");
+
+  Json figures = figures_of("surface");
+  figures["vertices"] = check.vertices;
+  figures["triangles"] = check.triangles;
+  figures["volume_mm3"] = check.volume_mm3;
+  figures["area_mm2"] = check.area_mm2;
+  figures["euler_number"] = check.euler_number;
+  figures["mean_edge_mm"] = check.mean_edge_mm;
+  figures["min_angle_deg"] = check.min_angle_deg;
+  figures["self_intersections"] = check.self_intersections;
+  if (given.volume) {
+    figures["fit"] = {{"lumen_value", fit.lumen_value},
+                      {"outside_value", fit.outside_value},
+                      {"mean_shift_mm", fit.mean_shift_mm},
+                      {"fitted_fraction", fit.fitted_fraction}};
+  }
+  if (given.surface_input) add_mends(mends, figures);
+  figures["openings"] = openings_json(preprocess::find_openings(surface));
+  if (check.euler_number != 2) {
+    figures["warnings"].push_back("surface: it has " +
+                                  std::to_string((2 - check.euler_number) / 2) +
+                                  " handles (Euler number " + std::to_string(check.euler_number) +
+                                  "): arteries that touch or loop; look whether the loop is real");
+  }
+  write_figures(figures, folder);
+}
+
+void make_centerline(Workspace& work, const fs::path& folder) {
+  // Both ends must lie inside, told by their keys.
+  const Surface surface =
+      preprocess::read_surface_artifact(work.artifact("surface").folder / "surface.vtp");
+  const plan::Study& study = work.given().study;
+  require_inside(surface, "access.point_mm", study.access);
+  require_inside(surface, "target.point_mm", study.goal.point);
+
+  const Centerline line = preprocess::find_centerline(surface, study.access, study.goal.point);
+  preprocess::write_centerline(line, folder / "centerline.vtp");
+  write_curve_markups(line.points, "centerline", folder / "centerline.mrk.json");
+
+  Json figures = figures_of("centerline");
+  figures.update(line_figures(line));
+  figures["branches"] = write_tree(preprocess::find_tree(surface, study.access), folder);
+  write_figures(figures, folder);
+}
+
+void make_wall(Workspace& work, const fs::path& folder) {
+  const Surface surface =
+      preprocess::read_surface_artifact(work.artifact("surface").folder / "surface.vtp");
+  const preprocess::WallOptions& options = work.given().wall.extrusion;
+  const preprocess::ExtrudedWall extruded = preprocess::extrude_wall(surface, options);
+  preprocess::write_wall(surface, extruded.wall, folder / "wall.vtu");
+
+  Json figures = figures_of("wall");
+  figures["tetrahedra"] = extruded.wall.apexes.cols();
+  figures["thickness_mm"] = options.thickness_mm;
+  figures["young_modulus_kpa"] = clean(extruded.wall.young_modulus / kMpaPerKpa);
+  figures["poisson_ratio"] = extruded.wall.poisson_ratio;
+  figures["normal_stiffness_kpa_per_mm"] =
+      clean(wall_normal_stiffness(extruded.wall.young_modulus, extruded.wall.poisson_ratio,
+                                  options.thickness_mm) /
+            kMpaPerKpa);
+  figures["inverted_tetrahedra"] = extruded.statistics.inverted;
+  figures["limited_tetrahedra"] = extruded.statistics.limited;
+  figures["min_height_mm"] = extruded.statistics.min_height_mm;
+  write_figures(figures, folder);
+}
+
+}  // namespace wireplan::pipeline

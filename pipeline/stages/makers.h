@@ -1,0 +1,41 @@
+#pragma once
+/// What each stage does with its inputs. The order of the stages, their keys and the cache are in
+/// stages.h.
+#include <filesystem>
+#include <string>
+
+#include "pipeline/stages/workspace.h"
+
+namespace wireplan::pipeline {
+
+/// Each fills `folder` with the artifact of its stage. All but the report write figures.json,
+/// numbers for the report with a list of warnings.
+void make_volume(Workspace& work, const std::filesystem::path& folder);
+void make_segment(Workspace& work, const std::filesystem::path& folder);
+void make_surface(Workspace& work, const std::filesystem::path& folder);
+void make_centerline(Workspace& work, const std::filesystem::path& folder);
+void make_wall(Workspace& work, const std::filesystem::path& folder);
+void make_trials(Workspace& work, const std::filesystem::path& folder);
+void make_manoeuvres(Workspace& work, const std::filesystem::path& folder);
+void make_plans(Workspace& work, const std::filesystem::path& folder);
+void make_report(Workspace& work, const std::filesystem::path& folder);
+
+/// One of several processes' part of a case's trials. They are run in rounds: the scouts of all
+/// candidates (all in full where none are scouted), then probes and full runs that the rounds
+/// before name.
+struct Share {
+  int shard = 1, shards = 1;  // part `shard` of `shards`, from 1
+  int round = 1;
+};
+struct ShareOutcome {
+  plan::Level level = plan::Level::kFull;
+  int round_trials = 0;         // 0: there is no such round
+  int own_trials = 0, run = 0;  // of these in the part; run this time
+};
+
+/// Puts the trials of that part into the store, each a piece, for make_trials() to find; runs those
+/// that are missing. Expects `work` to be ready for make_trials(). Throws `Error` where a round
+/// before is not complete, and Interrupted.
+ShareOutcome run_share(Workspace& work, const Share& share);
+
+}  // namespace wireplan::pipeline

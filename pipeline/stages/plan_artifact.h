@@ -1,0 +1,20 @@
+#pragma once
+/// The artifact of the stage `plans`, and all that was simulated as the report reads it.
+#include <filesystem>
+
+#include "pipeline/stages/workspace.h"
+#include "plan/make_plan.h"
+
+namespace wireplan::pipeline {
+
+inline constexpr const char* kTimingSchema = "wireplan.timing/1";
+
+void write_plan(const plan::Plan& plan, const std::filesystem::path& folder);
+
+/// Expects the stages up to `plans` to be done. Without shapes, and what was spent.
+plan::Plan read_plan(Workspace& work);
+
+/// Scripts as the artifact `manoeuvres` tells them, of these straight candidates.
+plan::Scripts read_scripts(const Json& figures, const std::vector<plan::Candidate>& straight);
+
+}  // namespace wireplan::pipeline

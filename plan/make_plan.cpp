@@ -1,0 +1,292 @@
+#include "plan/make_plan.h"
+
+#include <algorithm>
+#include <utility>
+
+#include "plan/judge.h"
+#include "plan/manoeuvre.h"
+
+namespace wireplan::plan {
+namespace {
+
+// Straight pushes of each wire that a search for scripts goes on from.
+constexpr int kStartsPerWire = 2;
+// Straight plans that are tried under so many disturbances before a search is made.
+constexpr std::size_t kPlansTried = 3;
+constexpr int kTries = 8;
+// Turns of the hub in one script: that scouts find, and that are searched for in full.
+constexpr int kTurnsOfScouts = 3, kTurns = 1;
+// Which plans are the best is found from so many repeats of each that may be. Plans that fall
+// behind let others up, which are repeated next.
+constexpr int kFirstRepeats = 32;
+constexpr int kRepeatRounds = 3;
+
+class Planner {
+ public:
+  Planner(const Study& study, const PlanVessel& vessel, const PlanOptions& options, TrialLog& log)
+      : study_(study), vessel_(vessel), options_(options), log_(log), silent_(options.batch) {
+    silent_.progress = nullptr;
+  }
+
+  Plan make() {
+    push_straight();
+    if (options_.until == PlanOptions::Until::kTrials) return std::move(plan_);
+    find_scripts();
+    if (options_.until == PlanOptions::Until::kManoeuvres) return std::move(plan_);
+    refine();
+    repeat();
+    refine();  // the repeats may have put others first
+    run_attempts();
+    return std::move(plan_);
+  }
+
+ private:
+  void push_straight() {
+    plan_.candidates = list_candidates(study_);
+    Rounds rounds(study_, vessel_, plan_.candidates, options_.exhaustive);
+    for (std::vector<Run> runs = rounds.next(); !runs.empty(); runs = rounds.next()) {
+      Spent& spent = rounds.level() == Level::kScout   ? plan_.scouts
+                     : rounds.level() == Level::kProbe ? plan_.probes
+                                                       : plan_.full;
+      rounds.take(find_or_run(study_, vessel_, runs, log_, options_.batch, spent));
+    }
+    plan_.trials = rounds.trials();
+    plan_.levels = rounds.levels();
+    plan_.scouting = rounds.scouting();
+  }
+
+  // Where they are wanted, and their trials behind the straight ones.
+  void find_scripts() {
+    if (std::optional<Scripts> known = log_.find_scripts()) {
+      plan_.scripts = std::move(*known);
+    } else {
+      search_scripts(find_starts());
+      log_.keep_scripts(plan_.scripts);
+    }
+    std::vector<Run> runs;
+    for (const Candidate& script : plan_.scripts.found) {
+      runs.push_back({.id = static_cast<int>(plan_.candidates.size()), .candidate = script});
+      plan_.candidates.push_back(script);
+      plan_.levels.push_back(Level::kFull);
+    }
+    for (Measured& trial : find_or_run(study_, vessel_, runs, log_, silent_, plan_.full)) {
+      plan_.trials.push_back(std::move(trial));
+    }
+  }
+
+  // The straight pushes that a search goes on from; none where no search is wanted or needed.
+  std::vector<int> find_starts() {
+    if (options_.manoeuvres == Manoeuvring::kNever) return {};
+    std::vector<double> progress;
+    std::vector<simulate::Outcome> outcomes;
+    for (const Measured& trial : plan_.trials) {
+      progress.push_back(trial.progress);
+      outcomes.push_back(trial.outcome);
+    }
+    std::vector<int> starts =
+        choose_starts(study_, plan_.candidates, progress, outcomes, kStartsPerWire);
+    const bool when_needed = options_.manoeuvres == Manoeuvring::kWhenNeeded;
+    if (!starts.empty() && when_needed && has_steady_plan()) starts.clear();
+    return starts;
+  }
+
+  // Whether one of the best straight plans works in at least half of a few tries under
+  // disturbances.
+  bool has_steady_plan() {
+    const Yardstick by;
+    std::vector<std::pair<double, int>> plans;  // score and trial
+    for (int id = 0; id < std::ssize(plan_.trials); ++id) {
+      const auto k = static_cast<std::size_t>(id);
+      const Repeat as_assumed = judge_repeat(plan_.trials[k], study_, by.limits, by.weights);
+      if (plan_.levels[k] == Level::kFull && as_assumed.success) {
+        plans.emplace_back(as_assumed.score, id);
+      }
+    }
+    if (plans.empty()) return false;
+    std::sort(plans.begin(), plans.end());
+    plans.resize(std::min(kPlansTried, plans.size()));
+
+    const std::vector<Disturbance> tries = draw_disturbances(unknowns(kTries));
+    const auto works = [&](const Measured& trial) {
+      return judge_repeat(trial, study_, by.limits, by.weights).success;
+    };
+    return std::any_of(plans.begin(), plans.end(), [&](const auto& plan) {
+      const std::vector<Measured> trials = find_or_run(
+          study_, vessel_, disturbed_runs(plan.second, tries), log_, silent_, plan_.repeats);
+      return 2 * std::count_if(trials.begin(), trials.end(), works) >= kTries;
+    });
+  }
+
+  // Thousands of pushes are tried, so the search is a scout's. What it finds is run in full, from
+  // start to end, as it is written down. Where nothing of that reaches, turns are tried in full.
+  void search_scripts(const std::vector<int>& start_ids) {
+    plan_.scripts.starts_tried = static_cast<int>(start_ids.size());
+    if (start_ids.empty()) return;
+    std::vector<Candidate> starts;
+    for (const int id : start_ids) starts.push_back(plan_.candidates[static_cast<std::size_t>(id)]);
+    keep_what_reaches(find_manoeuvres(study_at(study_, Level::kScout), starts, vessel_.path,
+                                      vessel_.rigid_model(), kTurnsOfScouts, options_.batch),
+                      start_ids);
+    if (!plan_.scripts.found.empty()) return;
+    keep_what_reaches(
+        find_manoeuvres(study_, starts, vessel_.path, vessel_.model(), kTurns, options_.batch),
+        start_ids);
+  }
+
+  void keep_what_reaches(const Manoeuvres& search, const std::vector<int>& start_ids) {
+    if (options_.batch.cancelled && options_.batch.cancelled()) throw Interrupted();
+    plan_.scripts.branches += search.branches;
+    std::vector<Run> runs;
+    for (const Candidate& found : search.found) {
+      runs.push_back({.candidate = found});
+      runs.back().candidate.moves = as_written(found.moves);
+    }
+    const std::vector<Measured> trials =
+        find_or_run(study_, vessel_, runs, log_, options_.batch, plan_.full);
+    for (std::size_t k = 0; k < runs.size(); ++k) {
+      if (trials[k].outcome != simulate::Outcome::kReached) continue;
+      plan_.scripts.found.push_back(runs[k].candidate);
+      plan_.scripts.starts.push_back(start_ids[static_cast<std::size_t>(search.starts[k])]);
+    }
+  }
+
+  Ranking ranked() const {
+    const Yardstick by;
+    return judge(study_, plan_, by.limits, by.weights).ranking;
+  }
+
+  // Finds errors by other elements, and ranks with these, until no other error matters.
+  void refine() {
+    for (;;) {
+      const std::vector<int> chosen = choose_plans_to_refine(ranked(), plan_.refinements, {});
+      if (chosen.empty()) return;
+      std::vector<Run> runs;
+      for (const int id : chosen) {
+        for (const double factor : kRefineFactors) {
+          runs.push_back({.id = id,
+                          .candidate = candidate(id),
+                          .elements = OtherElements{factor, trial(id).metrics.insertion}});
+        }
+      }
+      const std::vector<Measured> found =
+          find_or_run(study_, vessel_, runs, log_, silent_, plan_.full);
+      for (std::size_t k = 0; k < runs.size(); k += kRefineFactors.size()) {
+        std::vector<RefinedRun> rows;
+        for (std::size_t f = 0; f < kRefineFactors.size(); ++f) {
+          rows.push_back({kRefineFactors[f] * study_.insertion.element_length, found[k + f]});
+        }
+        plan_.refinements.push_back(estimate_error(runs[k].id, runs[k].elements->insertion, rows));
+      }
+    }
+  }
+
+  // Repeats the best under disturbances until the best are repeated ones, the very best at least;
+  // then what is best, as often as the case asks for, and what has come up by that.
+  void repeat() {
+    plan_.robustness = unknowns(options_.robustness.repeats);
+    plan_.disturbances = draw_disturbances(plan_.robustness);
+    const int asked = plan_.robustness.repeats, few = std::min(kFirstRepeats, asked);
+    repeat_best(few, kRepeatRounds);
+    if (asked > few) {
+      repeat_best(asked, 1);
+      repeat_best(few, kRepeatRounds);
+      repeat_best(asked, 0);
+    }
+  }
+
+  void repeat_best(int count, int rounds) {
+    for (int round = 0; count > 0; ++round) {
+      // In the end the first, and the best of each wire, alone.
+      const Yardstick by;
+      const Judgement judged = judge(study_, plan_, by.limits, by.weights);
+      const std::vector<int> chosen = choose_plans_to_repeat(
+          judged.ranking, judged.repeated, round < rounds ? plan_.robustness.plans : 1, count);
+      if (chosen.empty()) return;
+      add_repeats(chosen, static_cast<std::size_t>(count));
+    }
+  }
+
+  // Until each has `count`. Repeat by repeat, so that plans under one disturbance run at about the
+  // same time.
+  void add_repeats(const std::vector<int>& chosen, std::size_t count) {
+    std::vector<std::size_t> places;  // in plan_.repeated
+    for (const int id : chosen) {
+      const auto found =
+          std::find_if(plan_.repeated.begin(), plan_.repeated.end(),
+                       [&](const RepeatedTrials& repeated) { return repeated.trial == id; });
+      places.push_back(static_cast<std::size_t>(found - plan_.repeated.begin()));
+      if (found == plan_.repeated.end()) plan_.repeated.push_back({.trial = id});
+    }
+    std::vector<Run> runs;
+    std::vector<std::size_t> owners;
+    for (std::size_t k = 0; k < count; ++k) {
+      for (const std::size_t place : places) {
+        const RepeatedTrials& own = plan_.repeated[place];
+        if (k < own.trials.size()) continue;
+        runs.push_back({.id = own.trial,
+                        .candidate = candidate(own.trial),
+                        .disturbance = plan_.disturbances[k]});
+        owners.push_back(place);
+      }
+    }
+    std::vector<Measured> trials =
+        find_or_run(study_, vessel_, runs, log_, options_.batch, plan_.repeats);
+    for (std::size_t n = 0; n < runs.size(); ++n) {
+      plan_.repeated[owners[n]].trials.push_back(std::move(trials[n]));
+    }
+  }
+
+  // What is to be looked at needs its shapes on the way: plans have them from their trials.
+  void run_attempts() {
+    std::vector<Run> runs;
+    for (const int id : choose_played(study_, plan_, ranked())) {
+      const auto k = static_cast<std::size_t>(id);
+      runs.push_back({.id = id, .candidate = plan_.candidates[k], .shapes = true});
+      const bool is_plan =
+          plan_.levels[k] == Level::kFull && plan_.trials[k].outcome == simulate::Outcome::kReached;
+      if (!is_plan) plan_.attempts.push_back(id);
+    }
+    find_or_run(study_, vessel_, runs, log_, silent_, plan_.full);
+  }
+
+  // The case's, cut to what a trial can take, for so many repeats.
+  RobustnessOptions unknowns(int repeats) const {
+    RobustnessOptions options = options_.robustness;
+    options.repeats = repeats;
+    Unknowns& known = options.unknowns;
+    known.lumen = std::min(known.lumen, largest_lumen_offset(study_));
+    known.entry = std::min(known.entry, largest_entry_shift(study_, vessel_.model()));
+    if (study_.insertion.friction == 0.0) known.friction_low = known.friction_high = 1.0;
+    if (!vessel_.yields) known.wall_low = known.wall_high = 1.0;
+    return options;
+  }
+
+  std::vector<Run> disturbed_runs(int id, const std::vector<Disturbance>& disturbances) const {
+    std::vector<Run> runs;
+    for (const Disturbance& disturbance : disturbances) {
+      runs.push_back({.id = id, .candidate = candidate(id), .disturbance = disturbance});
+    }
+    return runs;
+  }
+
+  const Candidate& candidate(int id) const {
+    return plan_.candidates[static_cast<std::size_t>(id)];
+  }
+  const Measured& trial(int id) const { return plan_.trials[static_cast<std::size_t>(id)]; }
+
+  const Study& study_;
+  const PlanVessel& vessel_;
+  const PlanOptions& options_;
+  TrialLog& log_;
+  BatchOptions silent_;  // for what is too short to show
+  Plan plan_;
+};
+
+}  // namespace
+
+Plan make_plan(const Study& study, const PlanVessel& vessel, const PlanOptions& options,
+               TrialLog& log) {
+  return Planner(study, vessel, options, log).make();
+}
+
+}  // namespace wireplan::plan
