@@ -76,14 +76,6 @@ double median(std::vector<double> values) {
   return *middle;
 }
 
-#ifndef WIREPLAN_IMAGING  // else bench_preprocess.cpp
-BenchReport bench_preprocess(const BenchOptions&) {
-  throw Error(
-      "bench: preprocess needs images, and this wireplan is built without them; configure with "
-      "-DWIREPLAN_IMAGING=ON");
-}
-#endif
-
 int run_bench(const std::string& name, const std::filesystem::path& folder,
               const BenchOptions& options) {
   const auto make_report = name == "accuracy"     ? bench_accuracy

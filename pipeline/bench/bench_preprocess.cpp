@@ -231,6 +231,11 @@ Picture plot_of(const std::vector<Json>& rows) {
 }  // namespace
 
 BenchReport bench_preprocess(const BenchOptions& options) {
+  if (!preprocess::reads_volumes()) {
+    throw Error(
+        "bench: preprocess needs images, and this wireplan is built without them; configure with "
+        "-DWIREPLAN_IMAGING=ON");
+  }
   const preprocess::PhantomSpec spec = abdomen(options.quick);
   const Truth truth(spec);
   const fs::path file =

@@ -7,7 +7,6 @@
 namespace wireplan::pipeline {
 namespace {
 
-#ifdef WIREPLAN_IMAGING
 // Within the cell of some voxel.
 bool contains(const preprocess::Grid& grid, const Vec3& point) {
   const Vec3 ijk = grid.ijk_from_lps(point);
@@ -16,6 +15,11 @@ bool contains(const preprocess::Grid& grid, const Vec3& point) {
 }
 
 void check_volume(const Case& given, Problems& problems) {
+  if (!preprocess::reads_volumes()) {
+    problems.add("volume.path", given.volume->given, "a surface: this wireplan has no imaging",
+                 "configure with -DWIREPLAN_IMAGING=ON");
+    return;
+  }
   const preprocess::Grid grid = preprocess::read_image(given.volume->path).grid;
   const auto expect_inside = [&](const std::string& key, const Vec3& point) {
     if (!contains(grid, point)) {
@@ -29,12 +33,6 @@ void check_volume(const Case& given, Problems& problems) {
     expect_inside("segmentation.seeds_mm[" + std::to_string(k) + "]", given.segmentation.seeds[k]);
   }
 }
-#else
-void check_volume(const Case& given, Problems& problems) {
-  problems.add("volume.path", given.volume->given, "a surface: this wireplan has no imaging",
-               "configure with -DWIREPLAN_IMAGING=ON");
-}
-#endif
 
 std::vector<std::string> check_surface_file(const Case& given, Problems& problems) {
   const SurfaceInput& input = *given.surface_input;

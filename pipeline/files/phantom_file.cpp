@@ -205,8 +205,6 @@ PhantomCalcium read_calcium(JsonReader reader, const std::vector<PhantomTube>& t
   return calcium;
 }
 
-#ifdef WIREPLAN_IMAGING
-
 /// A folder that is gone, with all that is left in it, when the work in it ends.
 class TemporaryFolder {
  public:
@@ -259,8 +257,6 @@ void write_files(const Phantom& phantom, const fs::path& folder) {
          [&](const fs::path& beside) { preprocess::write_image(phantom.image, beside); });
 }
 
-#endif
-
 }  // namespace
 
 PhantomSpec read_phantom_spec(const fs::path& path) {
@@ -292,9 +288,12 @@ PhantomSpec read_phantom_spec(const fs::path& path) {
   return spec;
 }
 
-#ifdef WIREPLAN_IMAGING
-
 void write_phantom(const Phantom& phantom, const fs::path& folder) {
+  if (!preprocess::reads_volumes()) {
+    throw Error(folder.string() +
+                ": no volume can be written by this build of wireplan, which has no images (build "
+                "it with -DWIREPLAN_IMAGING=ON)");
+  }
   try {
     write_files(phantom, folder);
   } catch (const fs::filesystem_error& error) {
@@ -302,15 +301,5 @@ void write_phantom(const Phantom& phantom, const fs::path& folder) {
                     " (check its permissions and the free space)");
   }
 }
-
-#else
-
-void write_phantom(const Phantom&, const fs::path& folder) {
-  throw Error(folder.string() +
-              ": no volume can be written by this build of wireplan, which has no images (build "
-              "it with -DWIREPLAN_IMAGING=ON)");
-}
-
-#endif
 
 }  // namespace wireplan::pipeline

@@ -5,7 +5,6 @@
 #include "preprocess/segment/segment.h"
 #include "tests/pipeline/upper_abdomen.h"
 
-#ifdef WIREPLAN_IMAGING
 namespace wireplan::pipeline {
 namespace {
 
@@ -73,4 +72,3 @@ INSTANTIATE_TEST_SUITE_P(VoxelsAndNoise, SegmentPhantom,
 
 }  // namespace
 }  // namespace wireplan::pipeline
-#endif

@@ -9,7 +9,6 @@
 #include "preprocess/surface/surface.h"
 #include "tests/pipeline/upper_abdomen.h"
 
-#ifdef WIREPLAN_IMAGING
 namespace wireplan::pipeline {
 namespace {
 
@@ -142,4 +141,3 @@ TEST(VesselPhantom, SurfaceAxisAndRadiusOfAnAbdomenAreTheTrueOnes) {
 
 }  // namespace
 }  // namespace wireplan::pipeline
-#endif
