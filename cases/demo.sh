@@ -4,6 +4,6 @@
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 
-bash tests/build.sh release
+bash tests/build.sh release wireplan
 build/release/pipeline/wireplan phantom cases/abdomen/phantom.json -o cases/abdomen/phantom
 build/release/pipeline/wireplan run cases/abdomen

@@ -1,12 +1,21 @@
 #!/usr/bin/env bash
-# build.sh PRESET: installs what is missing, configures and builds a preset of CMakePresets.json
-# into build/PRESET. WIREPLAN_WERROR=ON makes warnings errors: not for users, whose compiler may know
+# build.sh PRESET [TARGET...]: installs what is missing, configures a preset of CMakePresets.json
+# and builds it, or these targets of it alone, into build/PRESET. WIREPLAN_WERROR=ON makes warnings errors: not for users, whose compiler may know
 # other ones than ours.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
-preset=${1:?usage: tests/build.sh PRESET (release, dev, tsan, tidy, fuzz or surface-only)}
+preset=${1:?usage: tests/build.sh PRESET [TARGET...] (release, dev, tsan, tidy, fuzz or surface-only)}
+targets=("${@:2}")
 
-bash tests/install.sh
+if [[ "${targets[*]}" == wireplan ]]; then
+  bash tests/install.sh --program
+else
+  bash tests/install.sh
+fi
+
+# What was compiled in another folder counts too, with its precompiled headers.
+export CCACHE_BASEDIR=${CCACHE_BASEDIR:-$PWD} CCACHE_NOHASHDIR=${CCACHE_NOHASHDIR:-1}
+export CCACHE_SLOPPINESS=${CCACHE_SLOPPINESS:-pch_defines,time_macros,include_file_mtime,include_file_ctime}
 
 # One job per core, as far as memory allows: a file that uses CGAL takes up to 2.4 GB to compile.
 available_kb=$(awk '/^MemAvailable:/ {print $2}' /proc/meminfo)
@@ -17,4 +26,4 @@ cores=$(nproc)
 
 # Status lines of the libraries' own package files are left out.
 cmake --preset "$preset" --log-level=NOTICE >/dev/null
-cmake --build --preset "$preset" --parallel "$jobs"
+cmake --build --preset "$preset" --parallel "$jobs" ${targets:+--target "${targets[@]}"}

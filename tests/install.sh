@@ -1,9 +1,14 @@
 #!/usr/bin/env bash
-# install.sh [LIST]: installs the packages of LIST, tests/packages.txt if none is named, that are
-# missing. Silent and quick where none is.
+# install.sh [--program] [LIST]: installs the packages of LIST, tests/packages.txt if none is named,
+# that are missing; with --program without those marked "tests". Silent and quick where none is.
 # WIREPLAN_SKIP_INSTALL=1 leaves the system as it is, for other distributions.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
+left_out='^$'  # lines
+if [[ "${1:-}" == --program ]]; then
+  left_out='# *tests[:,]'
+  shift
+fi
 list=${1:-tests/packages.txt}
 
 [[ -n "${WIREPLAN_SKIP_INSTALL:-}" ]] && exit 0
@@ -14,14 +19,14 @@ if ! { command -v apt-get && command -v dpkg-query; } >/dev/null; then
 fi
 
 # What the list names and no installed package is or provides (that of Node's makers has npm in it).
-mapfile -t wanted < <(sed 's/#.*//' "$list" | xargs -n 1 | sort -u)
+mapfile -t wanted < <(grep -v "$left_out" "$list" | sed 's/#.*//' | xargs -n 1 | sort -u)
 present=$(dpkg-query -W -f '${db:Status-Status} ${Package}, ${Provides}\n' 2>/dev/null |
   sed -n 's/^installed //p' | sed 's/([^)]*)//g' | tr -s ', ' '\n' | sort -u) || true
 mapfile -t missing < <(comm -23 <(printf '%s\n' "${wanted[@]}") <(echo "$present"))
 ((${#missing[@]} == 0)) && exit 0
 
 # What may be left out: optional ones, where no source that apt has read knows them.
-is_optional() { grep -q "^$1 .*# optional" "$list"; }
+is_optional() { grep -q "^$1 .*optional:" "$list"; }
 is_known() { apt-cache show "$1" 2>/dev/null | grep -q '^Filename:'; }
 drop_unknown() {
   local kept=() package

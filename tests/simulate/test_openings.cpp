@@ -11,9 +11,9 @@
 namespace wireplan::simulate {
 namespace {
 
-using preprocess::Opening;
 using preprocess::find_openings;
 using preprocess::left_through;
+using preprocess::Opening;
 
 /// Straight tube along z whose radius at each row is `radius_at(z)`.
 template <class RadiusAt>

@@ -12,8 +12,8 @@
 namespace wireplan::simulate {
 namespace {
 
-using preprocess::Opening;
 using preprocess::find_openings;
+using preprocess::Opening;
 
 Wire straight_wire(double EI) {
   return {.name = "straight",
