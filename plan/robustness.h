@@ -45,7 +45,7 @@ struct Disturbance {
 std::vector<Disturbance> draw_disturbances(const RobustnessOptions& options);
 
 /// Repeats are found to so many times the study's residual: what that moves is far below what the
-/// disturbances do (DESIGN.md).
+/// disturbances do (MEASUREMENTS.md).
 inline constexpr double kRepeatTolerance = 10.0;
 
 /// The trial of a candidate under a disturbance; no shapes on the way, no forces per triangle.

@@ -18,13 +18,13 @@ bool needs_search(const Study& study, bool exhaustive);
 /// the trial cuts them anyway, and to half the goal's radius, which they would step over; contact
 /// points twice as far apart; residuals up to 1e-4 N; no forces per triangle.
 ///
-/// The vessel's wall is to be rigid: one that yields costs several times as much (DESIGN.md), and
-/// its compliance where no good plan goes is then never needed.
+/// The vessel's wall is to be rigid: one that yields costs several times as much (MEASUREMENTS.md),
+/// and its compliance where no good plan goes is then never needed.
 Study scout_study(const Study& study);
 
 /// A candidate at the scout's or the probe's level. One whose tip has not come further along the
 /// path for 40 mm of push, or 10 mm once it was beside the target, is given up as `missed`: in the
-/// trials of five cases none of those reached (DESIGN.md).
+/// trials of five cases none of those reached (MEASUREMENTS.md).
 simulate::TrialResult run_scout(const Study& scout, const Candidate& candidate,
                                 const simulate::VesselModel& vessel, const Centerline& path);
 
@@ -77,7 +77,7 @@ NextRuns choose_next(const Study& study, const std::vector<Candidate>& candidate
                      const Sightings& seen, bool probing);
 
 /// Scouts of 221 trials were off by 0.012 up and 0.052 down where they and the full trials were
-/// plans (DESIGN.md): what is not known of a case yet is taken to be half of that.
+/// plans (MEASUREMENTS.md): what is not known of a case yet is taken to be half of that.
 inline constexpr double kScoutMargin = 0.03;
 
 /// How far the scout was off, over the candidates that were run in full too.
