@@ -6,7 +6,6 @@
 #include <sstream>
 
 #include "pipeline/bench/bench_report.h"
-#include "pipeline/commands/commands.h"
 #include "pipeline/files/disk.h"
 #include "pipeline/files/text.h"
 #include "pipeline/report/report.h"
@@ -76,8 +75,8 @@ double median(std::vector<double> values) {
   return *middle;
 }
 
-int run_bench(const std::string& name, const std::filesystem::path& folder,
-              const BenchOptions& options) {
+void run_bench(const std::string& name, const std::filesystem::path& folder,
+               const BenchOptions& options) {
   const auto make_report = name == "accuracy"     ? bench_accuracy
                            : name == "stability"  ? bench_stability
                            : name == "throughput" ? bench_throughput
@@ -110,7 +109,6 @@ int run_bench(const std::string& name, const std::filesystem::path& folder,
   }
   std::cout << report.text << "\n"
             << "files: " << (folder / name).string() << ".json, .csv, .png\n";
-  return kDone;
 }
 
 }  // namespace wireplan::pipeline

@@ -17,9 +17,9 @@ struct BenchOptions {
   std::filesystem::path cache = {};
 };
 
-/// Names: "accuracy", "stability", "throughput", "preprocess". Returns the exit code, kDone. Throws
-/// Error for another name and where a file cannot be written.
-int run_bench(const std::string& name, const std::filesystem::path& folder,
-              const BenchOptions& options);
+/// Names: "accuracy", "stability", "throughput", "preprocess". Throws Error for another name and
+/// where a file cannot be written.
+void run_bench(const std::string& name, const std::filesystem::path& folder,
+               const BenchOptions& options);
 
 }  // namespace wireplan::pipeline

@@ -1,0 +1,297 @@
+#include <fstream>
+#include <iostream>
+#include <memory>
+
+#include "pipeline/bench/bench.h"
+#include "pipeline/commands/check.h"
+#include "pipeline/commands/commands.h"
+#include "pipeline/commands/scene_run.h"
+#include "pipeline/commands/subcommands.h"
+#include "pipeline/files/case_file.h"
+#include "pipeline/files/catalogue.h"
+#include "pipeline/files/phantom_file.h"
+#include "pipeline/files/text.h"
+#include "pipeline/report/compare.h"
+#include "pipeline/report/render.h"
+#include "pipeline/store/cache.h"
+
+namespace wireplan::pipeline {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr double kBytesPerMb = 1e6;
+
+int print_cache(const std::string& folder) {
+  const Store store(cache_folder(folder));
+  std::cout << "stage       key           MB  unused days\n";
+  for (const CacheEntry& entry : list_cache(store)) {
+    std::cout << format("%-10s  %s  %8.2f  %11.1f\n", entry.artifact.stage.c_str(),
+                        entry.artifact.key.substr(0, 8).c_str(),
+                        static_cast<double>(entry.bytes) / kBytesPerMb, entry.days_unused);
+  }
+  std::cout << store.root().string() << ": "
+            << format("%.1f MB on the disk\n",
+                      static_cast<double>(bytes_on_disk(store)) / kBytesPerMb);
+  return kDone;
+}
+
+int verify_cache_command(const std::string& folder) {
+  const Store store(cache_folder(folder));
+  const std::vector<CacheDamage> damages = verify_cache(store);
+  for (const CacheDamage& damage : damages) {
+    std::cout << damage.place.string() << ": " << damage.what << "\n";
+  }
+  std::cout << (damages.empty() ? "every artifact is intact"
+                                : std::to_string(damages.size()) +
+                                      " damaged; they will be made again when they are needed")
+            << "\n";
+  return damages.empty() ? kDone : kBadInput;
+}
+
+int prune_cache_command(const std::string& folder, const PruneOptions& options) {
+  const PruneResult result = prune_cache(Store(cache_folder(folder)), options);
+  std::cout << format("removed %d artifacts, %d trials and %d leftovers of stopped runs: %.1f MB\n",
+                      result.artifacts, result.pieces, result.leftovers,
+                      static_cast<double>(result.bytes) / kBytesPerMb);
+  return kDone;
+}
+
+// The "schema" of a file, to tell a case from a scene; empty where it has none.
+std::string schema_of(const fs::path& path) {
+  if (!fs::is_regular_file(path)) return "";
+  std::ifstream stream(path);
+  const Json file = Json::parse(stream, nullptr, /*allow_exceptions=*/false);
+  return file.is_object() && file.contains("schema") && file["schema"].is_string()
+             ? file["schema"].get<std::string>()
+             : "";
+}
+
+int check_file(const std::string& path, const std::vector<std::string>& overrides) {
+  const std::string schema = schema_of(path);
+  if (schema.rfind("wireplan.scene/", 0) == 0) {
+    read_scene(path);
+    std::cout << path << ": the scene is in order\n";
+  } else if (schema.rfind("wireplan.phantom/", 0) == 0) {
+    read_phantom_spec(path);
+    std::cout << path << ": the description is in order\n";
+  } else {
+    const Case given = read_case(path, overrides);
+    const std::vector<std::string> mended = check_input(given);
+    std::cout << given.file.string() << ": the case is in order, "
+              << plan::list_candidates(given.study).size() << " trials\n";
+    for (const std::string& line : mended) std::cout << "  mended: " << line << "\n";
+  }
+  return kDone;
+}
+
+// Sections run from the tip backwards, so the shaft is the last.
+int print_wires() {
+  std::cout << "name                          diameter  EI tip  EI shaft  tip\n"
+               "                                    mm  N mm^2    N mm^2\n";
+  for (const CatalogueWire& entry : catalogue()) {
+    const simulate::Wire& wire = entry.wire;
+    std::string tip = "straight";
+    for (const simulate::Section& section : wire.sections) {
+      if (section.rest_curvature != 0.0) {
+        tip = format("curved, radius %.3g mm over %.3g mm", 1.0 / section.rest_curvature,
+                     section.length);
+      }
+    }
+    std::cout << format("%-28s  %8.3f  %6.4g  %8.4g  ", wire.name.c_str(), 2.0 * wire.radius,
+                        wire.sections.front().bending_stiffness,
+                        wire.sections.back().bending_stiffness)
+              << tip << "\n    " << entry.title << ". EI: " << entry.section_sources.back() << "; "
+              << entry.source << "\n";
+  }
+  return kDone;
+}
+
+int simulate_file(const std::string& path, const std::string& given_output) {
+  const SceneFile scene = read_scene(path);
+  const fs::path output =
+      given_output.empty() ? fs::path("wireplan-out") / scene.name : fs::path(given_output);
+  const SceneAnswer answer = run_scene_file(scene, output);
+  std::cout << answer.line << "\nresult: " << (output / "result.json").string() << "\n";
+  return answer.solved ? kDone : kNoPlan;
+}
+
+int render_pictures(const std::string& report, const std::string& output) {
+  for (const std::string& line : render_report(report, output)) std::cout << line << "\n";
+  return kDone;
+}
+
+int make_phantom_files(const std::string& path, const std::string& output) {
+  const preprocess::PhantomSpec spec = read_phantom_spec(path);
+  write_phantom(preprocess::make_phantom(spec), output);
+  std::cout << "volume: " << (fs::path(output) / "ct.nrrd").string() << "\n";
+  return kDone;
+}
+
+}  // namespace
+
+fs::path cache_folder(const std::string& given) {
+  return given.empty() ? Store::default_root() : fs::path(given);
+}
+
+void add_cache_option(CLI::App& command, std::string& folder) {
+  command.add_option(
+      "--cache", folder,
+      "Folder of the artifact store [$XDG_CACHE_HOME/wireplan or ~/.cache/wireplan]");
+}
+
+void add_cache(CLI::App& app, int& code) {
+  struct CacheArguments {
+    std::string folder;
+    double unused_days = 0.0, max_gb = 0.0;
+  };
+  const auto arguments = std::make_shared<CacheArguments>();
+  CLI::App* cache = app.add_subcommand("cache", "List, verify or prune the artifact store");
+  cache->require_subcommand(1);
+  cache->footer("Example: wireplan cache prune --unused-days 30");
+  CLI::App* list = cache->add_subcommand("list", "Every artifact, its size and when it was used");
+  add_cache_option(*list, arguments->folder);
+  list->callback([&code, arguments] { code = print_cache(arguments->folder); });
+  CLI::App* verify = cache->add_subcommand("verify", "Read every byte; exits 2 where some differ");
+  add_cache_option(*verify, arguments->folder);
+  verify->callback([&code, arguments] { code = verify_cache_command(arguments->folder); });
+  CLI::App* prune =
+      cache->add_subcommand("prune", "Remove what is damaged, and what stopped runs left");
+  add_cache_option(*prune, arguments->folder);
+  CLI::Option* days = prune
+                          ->add_option("--unused-days", arguments->unused_days,
+                                       "Also what was not used for so many days")
+                          ->check(CLI::Range(0.0, 1e5));
+  CLI::Option* most = prune
+                          ->add_option("--max-gb", arguments->max_gb,
+                                       "Also what was not used for longest, down to this size")
+                          ->check(CLI::Range(0.0, 1e6));
+  prune->callback([&code, arguments, days, most] {
+    PruneOptions prune_options;
+    if (days->count() > 0) prune_options.unused_days = arguments->unused_days;
+    if (most->count() > 0) {
+      prune_options.max_bytes = static_cast<std::uintmax_t>(arguments->max_gb * 1e3 * kBytesPerMb);
+    }
+    code = prune_cache_command(arguments->folder, prune_options);
+  });
+}
+
+void add_check(CLI::App& app, int& code) {
+  struct Arguments {
+    std::string path;
+    std::vector<std::string> overrides;
+  };
+  const auto arguments = std::make_shared<Arguments>();
+  CLI::App* check = app.add_subcommand("check", "Check a case or scene without running it");
+  check->add_option("FILE", arguments->path, "Case file or folder, or a scene file")->required();
+  check
+      ->add_option("--set", arguments->overrides, "Change a value of the case: wall.thickness_mm=2")
+      ->allow_extra_args(false);
+  check->footer("Tells all that is wrong at once. Example: wireplan check cases/abdomen");
+  check->callback([&code, arguments] { code = check_file(arguments->path, arguments->overrides); });
+}
+
+void add_wires(CLI::App& app, int& code) {
+  CLI::App* wires = app.add_subcommand("wires", "The wire catalogue with its sources");
+  wires->footer("Example: wireplan wires");
+  wires->callback([&code] { code = print_wires(); });
+}
+
+void add_compare(CLI::App& app, int& code) {
+  const auto reports = std::make_shared<std::vector<fs::path>>();
+  CLI::App* compare = app.add_subcommand("compare", "Wires and plans of several reports");
+  compare->add_option("REPORT", *reports, "report.json of two cases or more")
+      ->required()
+      ->expected(2, 100000);
+  compare->footer(
+      "The same patient with other wires, or many patients with the same.\n"
+      "Example: wireplan compare out/one/report.json out/two/report.json");
+  compare->callback([&code, reports] {
+    std::cout << compare_reports(*reports);
+    code = kDone;
+  });
+}
+
+void add_simulate(CLI::App& app, int& code) {
+  struct Arguments {
+    std::string path;
+    std::string output;
+  };
+  const auto arguments = std::make_shared<Arguments>();
+  CLI::App* simulate = app.add_subcommand("simulate", "One wire, its supports, loads and vessel");
+  simulate->add_option("SCENE", arguments->path, "Scene file")->required();
+  simulate->add_option("-o,--output", arguments->output,
+                       "Results [wireplan-out/NAME OF SCENE OR FOLDER]");
+  simulate->footer(
+      "Writes result.json, wire.vtp and wire.png; of an insertion the shapes on the way\n"
+      "(shapes.pvd), in a vessel the forces on its wall (forces.vtu). Exits 1 where no\n"
+      "equilibrium was found.\n"
+      "Example: wireplan simulate cases/cantilever/scene.json -o out");
+  simulate->callback(
+      [&code, arguments] { code = simulate_file(arguments->path, arguments->output); });
+}
+
+void add_phantom(CLI::App& app, int& code) {
+  struct Arguments {
+    std::string path;
+    std::string output;
+  };
+  const auto arguments = std::make_shared<Arguments>();
+  CLI::App* phantom =
+      app.add_subcommand("phantom", "A CT volume from an anatomical description, with its truth");
+  phantom->add_option("SPEC", arguments->path, "Description")->required();
+  phantom->add_option("-o,--output", arguments->output, "Folder for volume and truth")->required();
+  phantom->footer("Example: wireplan phantom cases/abdomen/phantom.json -o cases/abdomen/data");
+  phantom->callback(
+      [&code, arguments] { code = make_phantom_files(arguments->path, arguments->output); });
+}
+
+void add_render(CLI::App& app, int& code) {
+  struct Arguments {
+    std::string report;
+    std::string output;
+  };
+  const auto arguments = std::make_shared<Arguments>();
+  CLI::App* render = app.add_subcommand("render", "Pictures of a report, without a display");
+  render->add_option("REPORT", arguments->report, "report.json among the files of its run")
+      ->required();
+  render->add_option("-o,--output", arguments->output, "Folder for the pictures")->required();
+  render->footer(
+      "Writes vessel.png (the best plans), forces.png (the largest force on the wall),\n"
+      "angles.png (every trial) and numerics.png (error against run time).\n"
+      "Example: wireplan render wireplan-out/abdomen/report.json -o pictures");
+  render->callback(
+      [&code, arguments] { code = render_pictures(arguments->report, arguments->output); });
+}
+
+void add_bench(CLI::App& app, int& code) {
+  struct Arguments {
+    std::string name;
+    std::string output = "wireplan-out/bench";
+    BenchOptions options;
+  };
+  const auto arguments = std::make_shared<Arguments>();
+  CLI::App* bench =
+      app.add_subcommand("bench", "Error against run time, stability, throughput, preprocessing");
+  bench->add_option("NAME", arguments->name, "accuracy, stability, throughput or preprocess")
+      ->required();
+  bench->add_option("-o,--output", arguments->output, "Folder for results [wireplan-out/bench]");
+  bench->add_flag("--quick", arguments->options.quick, "A small size, under 20 s");
+  bench->add_option("--case", arguments->options.case_path,
+                    "Throughput: the case whose vessel to take");
+  bench->add_option("--set", arguments->options.overrides, "Throughput: key=value of that case")
+      ->allow_extra_args(false);
+  bench->add_option("--cache", arguments->options.cache, "Throughput: store of that case's stages");
+  bench->footer(
+      "Writes NAME.json, NAME.csv and the plot NAME.png, and prints the table.\n"
+      "  accuracy   each method's error and time on scenes whose answer is known\n"
+      "  stability  stiff and extreme scenes: which method converges, stops or fails\n"
+      "  throughput insertions per second and core, rigid and yielding, with their error\n"
+      "Example: wireplan bench accuracy -o out");
+  bench->callback([&code, arguments] {
+    run_bench(arguments->name, arguments->output, arguments->options);
+    code = kDone;
+  });
+}
+
+}  // namespace wireplan::pipeline
