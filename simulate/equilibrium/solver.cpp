@@ -78,7 +78,7 @@ Energy assemble_with_contact(const Problem& problem, const RodState& state, Sink
   if (problem.contact == nullptr) return energy;
   problem.contact->expect_nothing();
   problem.contact->begin(state.x);
-  const ContactEnergy contact = problem.contact->refresh(true);
+  const ContactEnergy contact = problem.contact->refresh(true).energy;
   problem.contact->add(sink);
   energy.contact += contact.contact;
   energy.wall += contact.wall;
@@ -612,7 +612,7 @@ NewtonResult Statics::solve_with(BlockBand<D>& hessian, BlockBand<D>& factored,
           EnergySink sink;
           trial_wire_energy = assemble(problem, trial_, sink, chain).total() + chain.energy(trial_);
         }
-        trial_energy = trial_wire_energy + contact->sample(trial_.x).total();
+        trial_energy = trial_wire_energy + contact->sample(trial_.x).energy.total();
       }
       accepted = trial_energy <= energy + 1e-4 * length * slope + rounding;
       if (accepted) {

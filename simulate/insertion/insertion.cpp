@@ -444,7 +444,7 @@ void Insertion::measure(Push& record) {
             .triangle;
     if (triangle >= 0) triangle_forces_.emplace_back(triangle, touch.normal_force);
   }
-  if (contact_.lost()) {
+  if (contact_.latest().lost) {
     record.max_penetration = std::max(record.max_penetration, vessel_.lumen.band());
   }
   record.tip_force = at_tip.norm();

@@ -267,7 +267,8 @@ TEST(HelixInATube, HasTheWallForceAndPitchOfTheory) {
   const VesselModel vessel(long_tube(r + radius, 700.0, 48), {.grid_spacing = 0.5, .band = 1.0});
   const double start_q = 1.1 * q, climb = 1.0 / std::hypot(1.0, r * start_q);
   Bench bench(uniform_wire(640.0, radius, EI), 160, vessel,
-              {.law = {.stiffness = 20.0, .smoothing = 0.005}, .spacing = 4.0}, [&](double s) {
+              {.law = {LinearLaw{.stiffness = 20.0, .smoothing = 0.005}}, .spacing = 4.0},
+              [&](double s) {
                 const double z = climb * s;
                 return Vec3(r * std::cos(start_q * z), r * std::sin(start_q * z), 30.0 + z);
               });
@@ -382,7 +383,8 @@ TEST(UniformBend, IsFeltAtTheEndsOfTheWireAlone) {
                            {.grid_spacing = 0.5});
   const double start = 0.05, end = 0.8, r = lumen - radius;
   Bench bench(uniform_wire(bend_radius * (end - start), radius, EI), 100, vessel,
-              {.law = {.stiffness = 0.5, .smoothing = 0.01}, .spacing = 1.5}, [&](double s) {
+              {.law = {LinearLaw{.stiffness = 0.5, .smoothing = 0.01}}, .spacing = 1.5},
+              [&](double s) {
                 const double at = start + s / bend_radius;
                 return Vec3(bend_radius * (1.0 - std::cos(at)), 0.0, bend_radius * std::sin(at));
               });
@@ -433,7 +435,8 @@ TEST(SinusoidalBuckling, StartsAtTheLoadOfDawsonAndPaslay) {
   const VesselModel vessel(long_tube(r + radius, length + 20.0, 128), {.grid_spacing = 0.8});
   const auto buckled_angle = [&](double thrust) {
     Bench bench(uniform_wire(length, radius, EI), 76, vessel,
-                {.law = {.stiffness = 20.0, .smoothing = 0.005}, .spacing = 4.0}, [&](double s) {
+                {.law = {LinearLaw{.stiffness = 20.0, .smoothing = 0.005}}, .spacing = 4.0},
+                [&](double s) {
                   const double across = 0.02 * std::sin(q * s);
                   return Vec3(r * std::sin(across), 0.004 - r * std::cos(across), 10.0 + s);
                 });
@@ -712,8 +715,8 @@ TEST(YieldingWall, HeldFeetAreRefreshedOnlyWhereTheyAreFarOff) {
     bench.contact.begin(bench.state.x);
     if (held) bench.contact.hold_feet();
     const Bench moved(uniform_wire(27.0, 1.0, 50.0), 27, vessel, {}, wire_at(along, round / off));
-    const double before = bench.contact.sample(moved.state.x).total();
-    return bench.contact.refresh(true).total() - before;
+    const double before = bench.contact.sample(moved.state.x).energy.total();
+    return bench.contact.refresh(true).energy.total() - before;
   };
   EXPECT_NEAR(change(0.2, 0.0, true), 0.0, 1e-12);
   EXPECT_GT(std::abs(change(0.2, 0.0, false)), 1e-6);
@@ -785,7 +788,7 @@ TEST(WallContact, FindsWhatTouchesAfterManyMotions) {
       p.head<2>() *= std::min(1.0, 2.7 / p.head<2>().norm());
       bench.state.x.col(i) = p;
     }
-    const double found = bench.contact.sample(bench.state.x).contact;
+    const double found = bench.contact.sample(bench.state.x).energy.contact;
     WallContact fresh(bench.rod, vessel, options);
     fresh.start_at(bench.state.x);
     fresh.free_from(out);

@@ -103,14 +103,14 @@ TEST(Lumen, GradientIsTheUnitNormalNearTheWall) {
 }
 
 TEST(ContactLaw, IsThePapersLinearForceBelowItsSmoothing) {
-  const ContactLaw law{.stiffness = 20.0, .smoothing = 0.05};
+  const ContactLaw law{LinearLaw{.stiffness = 20.0, .smoothing = 0.05}};
   EXPECT_DOUBLE_EQ(law.at(-0.3).slope, -20.0 * 0.3);  // f = k_c d
   EXPECT_DOUBLE_EQ(law.at(0.05).energy, 0.0);
   EXPECT_DOUBLE_EQ(law.at(1.0).slope, 0.0);
 }
 
 TEST(ContactLaw, EnergyForceAndStiffnessAreContinuousAndAgree) {
-  const ContactLaw law{.stiffness = 20.0, .smoothing = 0.05};
+  const ContactLaw law{LinearLaw{.stiffness = 20.0, .smoothing = 0.05}};
   for (const double gap : {-0.05, 0.05}) {
     const ContactLaw::Value below = law.at(gap - 1e-9), above = law.at(gap + 1e-9);
     EXPECT_NEAR(below.energy, above.energy, 1e-8);
@@ -127,7 +127,7 @@ TEST(ContactLaw, EnergyForceAndStiffnessAreContinuousAndAgree) {
 }
 
 TEST(ContactLaw, ChordPassesThroughTheForceAtTheGapAndTheExpectedOne) {
-  const ContactLaw law{.stiffness = 20.0, .smoothing = 0.05};
+  const ContactLaw law{LinearLaw{.stiffness = 20.0, .smoothing = 0.05}};
   for (const double gap : {-0.3, -0.06, -0.04, 0.0, 0.03, 0.2}) {
     for (const double other : {-0.4, -0.05, -0.01, 0.02, 0.05}) {
       const double expected = -law.at(other).slope;

@@ -1,0 +1,204 @@
+#include "simulate/contact/contact_points.h"
+
+#include <limits>
+
+namespace wireplan::simulate {
+
+namespace {
+
+/// A point that is expected to touch stays in sight so much further from the wall than contact
+/// reaches [mm].
+constexpr double kInSight = 0.3;
+
+/// Points are half as far apart in so much wire behind the tip: it alone slides across ridges,
+/// round the mouths of branches [mm].
+constexpr double kFineTip = 20.0;
+
+/// A point that touched and moved by no more than this has the field of there to second order: its
+/// third derivatives, up to some 4/mm^2 where it turns by 60 degrees within a cell, leave 1e-10 mm
+/// and 5e-7 of the force [mm].
+constexpr double kSamePlace = 5e-4;
+
+/// Of a point that is looked at in every state, see ContactPoints::asleep_until_.
+constexpr double kAwake = -1.0;
+
+/// How deep into the wall a step may lead a point, or one of its parts [mm].
+constexpr double kInto = 0.25;
+
+/// How much further from the wall than before a point may be than its motion says: the gradient of
+/// the smooth field is not quite 1.
+constexpr double kLipschitz = 1.2;
+
+std::vector<ContactPoint> build_points(const Rod& rod, double most_apart) {
+  std::vector<ContactPoint> points;
+  const int edges = rod.nodes() - 1;
+  double before = 0.0;  // length of wire that the next point gets from behind it
+  for (int e = 0; e < edges; ++e) {
+    const double l = rod.rest_length[e];
+    const double spacing = (rod.tip_distance[e] <= kFineTip + 1e-9 ? 0.5 : 1.0) * most_apart;
+    const int parts = std::max(1, static_cast<int>(std::ceil(l / spacing - 1e-9)));
+    const double half = 0.5 * l / parts;
+    for (int k = 0; k < parts; ++k) {
+      const double part = static_cast<double>(k) / parts;
+      points.push_back({e, part, (k == 0 ? before : half) + half, rod.tip_distance[e] - part * l});
+    }
+    before = half;
+  }
+  points.push_back({edges - 1, 1.0, before, 0.0});
+  return points;
+}
+
+}  // namespace
+
+bool in_band(const ContactPoint& p, const ContactPoint& q) {
+  const auto last_node = [](const ContactPoint& point) {
+    return point.edge + (point.part > 0.0 ? 1 : 0);
+  };
+  return std::max(last_node(p), last_node(q)) - std::min(p.edge, q.edge) <= 2;
+}
+
+double WireMotion::longest() const {
+  double longest = 0.0;
+  for (int i = first; i < last; ++i) longest = std::max(longest, of_node(i).squaredNorm());
+  return std::sqrt(longest);
+}
+
+void WireMotion::scatter(const ContactPoint& point, const Vec3& force,
+                         Eigen::VectorXd& target) const {
+  const auto add_to = [&](int i, double weight) {
+    if (weight == 0.0 || i < first || i >= last) return;
+    target.segment<3>(stride * (i - first)) += weight * force;
+  };
+  add_to(point.edge, 1.0 - point.part);
+  add_to(point.edge + 1, point.part);
+}
+
+ContactPoints::ContactPoints(const Rod& rod, const Lumen& lumen, double spacing, double reach)
+    : lumen_(lumen), reach_(reach) {
+  expects(spacing > 0.0 && lumen.band() > reach);
+  points_ = build_points(rod, spacing);
+  x_.setZero(3, rod.nodes());
+  asleep_until_.setConstant(size(), kAwake);
+  known_position_.setConstant(3, size(), std::numeric_limits<double>::infinity());
+  known_distance_.setZero(size());
+  known_.resize(points_.size());
+  touched_.assign(points_.size(), 0);
+}
+
+void ContactPoints::free_from(double tip_distance) {
+  const auto first = std::partition_point(
+      points_.begin(), points_.end() - 1,
+      [&](const ContactPoint& point) { return point.tip_distance > tip_distance + 1e-9; });
+  first_free_ = static_cast<int>(first - points_.begin());
+  asleep_until_.head(first_free_).setConstant(kAwake);
+}
+
+void ContactPoints::carry_back(const Eigen::VectorXd& from, double distance, Eigen::VectorXd& to) {
+  // Tip distances fall along the points: walk through them and through where their forces go, from
+  // the tip on. The tip's own goes with it.
+  to.setZero();
+  int target = size() - 1;
+  const auto tip_distance = [&](int k) { return (*this)[k].tip_distance; };
+  for (int k = size() - 1; k >= 0; --k) {
+    if (from[k] == 0.0) continue;
+    const double wanted = tip_distance(k) > 0.0 ? tip_distance(k) + distance : 0.0;
+    while (target > 0 && tip_distance(target - 1) <= wanted) --target;
+    const double past = wanted - tip_distance(target);  // it, toward the point before it
+    const double part =
+        target > 0 && past > 0.0 ? past / (tip_distance(target - 1) - tip_distance(target)) : 0.0;
+    to[target] += (1.0 - part) * from[k];
+    if (part > 0.0) to[target - 1] += part * from[k];
+    asleep_until_.segment(std::max(0, target - 1), target > 0 ? 2 : 1).setConstant(kAwake);
+  }
+}
+
+void ContactPoints::find_active(const Eigen::Matrix3Xd& x, const Eigen::VectorXd& expected,
+                                ContactSample& sample) {
+  const Eigen::Index moving = x.cols() - (*this)[first_free_].edge;
+  travelled_ += std::sqrt((x - x_).rightCols(moving).colwise().squaredNorm().maxCoeff());
+  x_ = x;
+  sample.lost = false;
+  sample.active.clear();
+  // One that was far enough for its motion since is not looked at.
+  for (int k = first_free_; k < size(); ++k) {
+    if (asleep_until_[k] >= travelled_) continue;
+    const Vec3 p = position(k);
+    const double near = reach_ + (expected[k] > 0.0 ? kInSight : 0.0);
+    const double least = least_distance(k, p);
+    if (least >= near) {
+      asleep_until_[k] = travelled_ + (least - near) / kLipschitz;
+      continue;
+    }
+    const WallSample wall = look_at(k, p, near);
+    asleep_until_[k] = travelled_ + (wall.distance - near) / kLipschitz;
+    const bool touches = wall.distance < near;
+    touched_[static_cast<std::size_t>(k)] = touches ? 1 : 0;
+    if (!touches) continue;
+    if (wall.gradient.squaredNorm() < kSmallestSlope * kSmallestSlope) {
+      sample.lost = sample.lost || wall.distance < 0.0;
+      continue;
+    }
+    sample.active.push_back({.point = k, .position = p, .wall = wall});
+  }
+}
+
+/// How far from the wall a point is at least, now that it is at `position`.
+double ContactPoints::least_distance(int k, const Vec3& position) const {
+  return known_distance_[k] - kLipschitz * (position - known_position_.col(k)).norm();
+}
+
+/// The wall at point k, without derivatives where it is further than `near`.
+WallSample ContactPoints::look_at(int k, const Vec3& position, double near) {
+  const bool touched = touched_[static_cast<std::size_t>(k)] != 0;
+  WallSample wall;
+  if (!touched) wall.distance = lumen_.distance(position);
+  if (touched || wall.distance < near) {
+    WallSample& known = known_[static_cast<std::size_t>(k)];
+    const Vec3 moved = position - known_position_.col(k);
+    if (touched && moved.squaredNorm() <= kSamePlace * kSamePlace) {
+      const Vec3 turned = known.hessian * moved;
+      wall.distance = known.distance + moved.dot(known.gradient + 0.5 * turned);
+      wall.gradient = known.gradient + turned;
+      wall.hessian = known.hessian;
+      return wall;
+    }
+    wall = known = lumen_.sample(position);
+  }
+  known_position_.col(k) = position;
+  known_distance_[k] = wall.distance;
+  return wall;
+}
+
+double ContactPoints::largest_safe_part(const WireMotion& motion, int looks) const {
+  const double longest = motion.longest();
+  double cap = std::numeric_limits<double>::infinity();
+  if (longest <= kInto) return cap;
+  for (int k = first_free_; k < size(); ++k) {
+    if (asleep_until_[k] >= travelled_ && longest <= kInto + reach_) continue;
+    const Vec3 move = motion.of((*this)[k]), from = position(k);
+    const double distance = least_distance(k, from);
+    const double room = kInto + std::max(0.0, distance), length = move.norm();
+    if (length > room && room < cap * length) {
+      cap = std::min(cap, way_inside(from, move / length, length, distance, looks) / length);
+    }
+  }
+  return cap;
+}
+
+/// How far a point may go from a place that is `distance` inside the wall, of `length`; infinite:
+/// as far as it likes. Looks ahead in strides that are safe by the distance where they start.
+double ContactPoints::way_inside(const Vec3& from, const Vec3& toward, double length,
+                                 double distance, int looks) const {
+  const double deepest = std::min(0.0, distance);
+  double way = 0.0;
+  for (int look = 0; look < looks; ++look) {
+    const double next = way + kInto + std::max(0.0, distance);
+    if (next >= length) return std::numeric_limits<double>::infinity();
+    distance = lumen_.distance(from + next * toward);
+    if (distance < deepest - kInto) return look == 0 ? next : way;
+    way = next;
+  }
+  return way;
+}
+
+}  // namespace wireplan::simulate

@@ -1,0 +1,100 @@
+#pragma once
+/// Coulomb's friction between wire and wall.
+#include <Eigen/Core>
+#include <vector>
+
+#include "simulate/contact/contact_points.h"
+#include "simulate/contact/contact_sample.h"
+#include "simulate/wall/lumen.h"
+
+namespace wireplan::simulate {
+
+/// Where a point is, from where friction holds it, along the wall.
+struct Rubbing {
+  double length;                    //                                                    [mm]
+  Vec3 toward;                      // unit
+  double limit;                     // friction's largest force                           [N]
+  double energy, slope, curvature;  // of the potential per `limit`
+};
+
+/// Each point is held to an anchor; the force grows smoothly to the coefficient times the normal
+/// force over the slip, then the anchor is to follow. That has no potential, since the normal force
+/// and the normal depend on the state; with those of a lag, a state of before, it has one.
+///
+/// In a solve: begin() with what was predicted; per state find_rubbing(), which what asks for
+/// rubbing needs; refresh() between them as often as wanted, with find_rubbing() after it; settle()
+/// in the equilibrium.
+class Friction {
+ public:
+  Friction(double coefficient, double slip, int points);
+  bool acts() const { return coefficient_ > 0.0; }
+
+  // ---- the lag
+
+  /// Normal forces, per point, of the state that the next solve starts from [N].
+  void predict(const Eigen::VectorXd& normal_force) { lag_.force = normal_force; }
+  void predict_nothing() { lag_.force.setZero(); }
+  /// Points that have a predicted force rub along the wall where they are now, unless that is
+  /// further from the wire's axis than `near` by a millimetre.
+  void begin(const ContactPoints& points, const ContactSample& sample, const Lumen& lumen,
+             double near);
+  /// Takes the lag from the sample, whose rubbing is known; `fully`: and nothing of the one before.
+  /// Returns whether nothing of it is left.
+  bool refresh(const ContactSample& sample, bool fully);
+  void save() { saved_ = lag_; }
+  void restore() { lag_ = saved_; }
+
+  // ---- in the state that the points are in
+
+  void find_rubbing(const ContactPoints& points, const ContactMemory& memory);
+  const Rubbing& rubbing(int point) const { return rubbing_[static_cast<std::size_t>(point)]; }
+  /// Of the potential [N mm].
+  double energy() const;
+  /// Force on the point [N].
+  Vec3 force(int point) const {
+    return -(rubbing(point).limit * rubbing(point).slope) * rubbing(point).toward;
+  }
+  /// Size of the force per normal force on the point, if the lag is the state's own.
+  double per_normal_force(int point) const { return coefficient_ * rubbing(point).slope; }
+
+  /// Has points that slipped remember so: one that rubbed keeps its anchor the slip behind it, one
+  /// that does not touch, where it is. Returns the heat, the friction now times the way that the
+  /// anchors went [N mm].
+  double settle(const ContactPoints& points, ContactMemory& memory) const;
+
+  /// Adds gradient and Hessian of the potential to a sink of elements.h.
+  template <class Sink>
+  void add(const ContactPoints& points, Sink& sink) const;
+
+ private:
+  double coefficient_, slip_;
+
+  struct Lag {
+    Eigen::VectorXd force;    // normal, per point                                          [N]
+    Eigen::Matrix3Xd normal;  // per point, unit
+    std::vector<int> points;  // that rub: those that have both
+  };
+  Lag lag_, saved_;
+  std::vector<int> kept_;         // scratch
+  std::vector<Rubbing> rubbing_;  // per point, of those that rub
+};
+
+template <class Sink>
+void Friction::add(const ContactPoints& points, Sink& sink) const {
+  for (const int k : lag_.points) {
+    const Rubbing& r = rubbing(k);
+    const Vec3& t = r.toward;  // 0 at the anchor, where friction is as stiff to all sides
+    add_gradient(sink, points[k], (r.limit * r.slope) * t);
+    if constexpr (Sink::kHessian) {
+      const Vec3 normal = lag_.normal.col(k);
+      const double across = r.length > 0.0 ? r.slope / r.length : r.curvature;
+      add_hessian(sink, points[k], [&](int row, int column) {
+        const double along = t[row] * t[column], off = normal[row] * normal[column],
+                     own = row == column ? 1.0 : 0.0;
+        return r.limit * (r.curvature * along + across * (own - along - off));
+      });
+    }
+  }
+}
+
+}  // namespace wireplan::simulate
