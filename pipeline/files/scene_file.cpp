@@ -338,6 +338,7 @@ void check_method(const simulate::Scene& scene, Problems& problems) {
 void add_vessel(const SceneVessel& vessel, simulate::Scene& scene, Problems& problems) {
   scene.contact.friction = vessel.friction;
   scene.contact.spacing = vessel.contact_spacing;
+  scene.contact.law = vessel.contact_law;
   if (scene.solver.method != simulate::Method::kNewton) {
     problems.add("solver.method", "not \"newton\"", "\"newton\"",
                  "the paper's own methods know no vessel in this version");
@@ -434,6 +435,7 @@ InsertionScene read_insertion_scene(JsonReader& root, const simulate::Scene& wir
   scene.options.element_length = wire.wire.length() / wire.elements;
   scene.options.section_element_length = wire.element_length;
   scene.options.contact_spacing = vessel.contact_spacing;
+  scene.options.contact_law = vessel.contact_law;
   scene.options.friction = vessel.friction;
   scene.options.residual_tolerance = solver.residual_tolerance;
   scene.options.max_iterations = solver.max_iterations;

@@ -19,6 +19,7 @@ struct SceneVessel {
   WallInput wall;
   double friction = 0.0;
   double contact_spacing = 1.0;  // [mm]
+  simulate::ContactLaw contact_law = {};
 };
 
 /// A wire pushed into a vessel: what run_trial asks for.

@@ -69,6 +69,7 @@ Eigen::VectorXd layout(const Wire& wire, const InsertionOptions& options) {
 
 ContactOptions contact_options(const InsertionOptions& options) {
   ContactOptions contact;
+  contact.law = options.contact_law;
   contact.spacing = options.contact_spacing;
   contact.friction = options.friction;
   return contact;

@@ -22,6 +22,7 @@ struct InsertionOptions {
   std::vector<double> section_element_length = {};
   double contact_spacing = 1.0;      // see ContactOptions::spacing                      [mm]
   double friction = 0.0;             // Coulomb's coefficient
+  ContactLaw contact_law = {};       // the default; see contact_law.h
   double residual_tolerance = 1e-6;  // largest nodal force out of balance               [N]
   int max_iterations = 50;           // Newton iterations per solve; see Insertion::push()
   double record_every = 5.0;         // spacing of the stored shapes                     [mm]
