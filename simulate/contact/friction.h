@@ -21,9 +21,8 @@ struct Rubbing {
 /// force over the slip, then the anchor is to follow. That has no potential, since the normal force
 /// and the normal depend on the state; with those of a lag, a state of before, it has one.
 ///
-/// In a solve: begin() with what was predicted; per state find_rubbing(), which what asks for
-/// rubbing needs; refresh() between them as often as wanted, with find_rubbing() after it; settle()
-/// in the equilibrium.
+/// In a solve: begin() with what was predicted; find_rubbing() in each state and after each change
+/// of the lag, before anything is asked of that state; settle() in the equilibrium.
 class Friction {
  public:
   Friction(double coefficient, double slip, int points);
