@@ -43,11 +43,8 @@ Eigen::Vector2d on_disc(double radius, double part, double turn) {
 simulate::Wire softened(const simulate::Wire& wire, double factor) {
   simulate::Wire soft = wire;
   for (simulate::Section& section : soft.sections) {
-    const double EI = section.bending_stiffness;
     // Written out, since the default follows the radius, which a disturbance changes.
-    if (section.axial_stiffness == 0.0) {
-      section.axial_stiffness = 4.0 * EI / (wire.radius * wire.radius);
-    }
+    section.axial_stiffness = section.ea(wire.radius);
     section.bending_stiffness /= factor;
     section.bending_stiffness_2 /= factor;
     section.axial_stiffness /= factor;

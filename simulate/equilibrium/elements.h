@@ -1,11 +1,10 @@
 #pragma once
-/// The energy of the wire, element by element, with first and second derivatives. Part of
-/// solver.cpp, apart from it for its length; needs the Problem and the states of solver.h.
+/// The energy of the wire, element by element, with first and second derivatives.
 #include <Eigen/Geometry>
 #include <array>
 #include <cmath>
 
-#include "simulate/equilibrium/solver.h"
+#include "simulate/equilibrium/problem.h"
 
 namespace wireplan::simulate {
 

@@ -133,22 +133,15 @@ void set_up(const Scene& scene, Setup& s) {
   s.moment_zero = moment_energy(s);
 }
 
-std::vector<std::string> name_terms(const Scene& scene, const Rod& rod) {
-  std::vector<std::string> terms = {"stretch", "bend"};
-  if (rod.twisted) terms.push_back("twist");
-  if (!rod.strip.isZero(0.0)) terms.push_back("strip");
-  if (scene.twist == Twist::kDecoupled) terms.push_back("decoupled_twist");
-  if (!scene.loads.gravity.isZero(0.0) && !rod.mass.isZero(0.0)) terms.push_back("gravity");
-  if (!scene.loads.tip_force.isZero(0.0)) terms.push_back("tip_force");
-  if (!scene.loads.tip_moment.isZero(0.0)) terms.push_back("tip_moment");
-  if (scene.loads.tip_torque != 0.0) terms.push_back("tip_torque");
-  if (scene.plane) terms.push_back("plane");
-  if (scene.vessel != nullptr) {
-    terms.push_back("contact");
-    if (scene.contact.friction > 0.0) terms.push_back("friction");
-    if (scene.vessel->compliance != nullptr) terms.push_back("yielding_wall");
-  }
-  return terms;
+std::vector<std::string> terms_of(const Scene& scene, const Rod& rod) {
+  std::vector<std::string> own;
+  if (scene.twist == Twist::kDecoupled) own.push_back("decoupled_twist");
+  if (!scene.loads.gravity.isZero(0.0) && !rod.mass.isZero(0.0)) own.push_back("gravity");
+  if (!scene.loads.tip_force.isZero(0.0)) own.push_back("tip_force");
+  if (!scene.loads.tip_moment.isZero(0.0)) own.push_back("tip_moment");
+  if (scene.loads.tip_torque != 0.0) own.push_back("tip_torque");
+  if (scene.plane) own.push_back("plane");
+  return name_terms(rod, own, scene.vessel, scene.contact.friction);
 }
 
 /// Contact with the vessel, from the state in which the wire is.
@@ -308,9 +301,7 @@ double twist_compliance(const Wire& wire, double a, double b) {
   double sum = 0.0, start = 0.0;
   for (const Section& section : wire.sections) {
     const double end = start + section.length;
-    const double GJ =
-        section.twist_stiffness > 0.0 ? section.twist_stiffness : section.bending_stiffness / 1.3;
-    sum += std::max(0.0, std::min(b, end) - std::max(a, start)) / GJ;
+    sum += std::max(0.0, std::min(b, end) - std::max(a, start)) / section.gj();
     start = end;
   }
   return sum;
@@ -381,7 +372,7 @@ SceneResult run_scene(const Scene& scene) {
   set_up(scene, setup);
   if (scene.vessel != nullptr) add_vessel(scene, setup);
   SceneResult result;
-  result.terms = name_terms(scene, setup.rod);
+  result.terms = terms_of(scene, setup.rod);
   const double begin = thread_seconds();
   if (scene.solver.method == Method::kNewton) {
     run_newton(scene, setup, result);

@@ -61,11 +61,7 @@ Trial::Trial(const Wire& wire, const Introducer& introducer, const Goal& goal,
       options_(options),
       insertion_(wire, introducer, vessel, options),
       best_distance_((insertion_.tip() - goal.point).norm()) {
-  result_.terms = {"stretch", "bend"};
-  if (insertion_.rod().twisted) result_.terms.push_back("twist");
-  result_.terms.push_back("contact");
-  if (options.friction > 0.0) result_.terms.push_back("friction");
-  if (vessel.compliance) result_.terms.push_back("yielding_wall");
+  result_.terms = name_terms(insertion_.rod(), {}, &vessel, options.friction);
 }
 
 void Trial::make(const Move& move) {

@@ -44,9 +44,7 @@ Average average_over(const Wire& wire, double a, double b) {
     start = end;
     if (part == 0.0) continue;
     const double EI = section.bending_stiffness;
-    const double EA = section.axial_stiffness > 0.0 ? section.axial_stiffness
-                                                    : 4.0 * EI / (wire.radius * wire.radius);
-    const double GJ = section.twist_stiffness > 0.0 ? section.twist_stiffness : EI / 1.3;
+    const double EA = section.ea(wire.radius), GJ = section.gj();
     inverse_EI += part / EI;
     inverse_EI_2 += part / (section.round() ? EI : section.bending_stiffness_2);
     inverse_EA += part / EA;

@@ -24,6 +24,11 @@ struct Section {
   bool round() const {
     return bending_stiffness_2 == 0.0 || bending_stiffness_2 == bending_stiffness;
   }
+  /// EA and GJ as they act; the radius is the wire's.
+  double ea(double radius) const {
+    return axial_stiffness > 0.0 ? axial_stiffness : 4.0 * bending_stiffness / (radius * radius);
+  }
+  double gj() const { return twist_stiffness > 0.0 ? twist_stiffness : bending_stiffness / 1.3; }
 };
 
 /// A device: sections listed from the tip backwards.

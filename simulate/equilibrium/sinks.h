@@ -1,0 +1,156 @@
+#pragma once
+/// Where elements add their derivatives (elements.h says what they call).
+#include <Eigen/Core>
+
+#include "simulate/equilibrium/problem.h"
+#include "simulate/wire/block_band.h"
+#include "simulate/wire/rod.h"
+#include "simulate/wire/wire_pass.h"
+
+namespace wireplan::simulate {
+
+/// Energy alone.
+struct EnergySink {
+  static constexpr bool kHessian = false;
+  void gradient(int, const Vec3&) {}
+  void gradient_theta(int, double) {}
+};
+
+/// Sum of the gradient over the nodes and edges before `first`.
+struct HeldSink {
+  static constexpr bool kHessian = false;
+  int first;
+  HeldEnd sum = {};
+  void gradient(int i, const Vec3& g) {
+    if (i < first) sum.force += g;
+  }
+  void gradient_theta(int e, double g) {
+    if (e < first) sum.torque += g;
+  }
+};
+
+/// Gradient with respect to every node; no Hessian.
+struct GradientSink {
+  static constexpr bool kHessian = false;
+  Eigen::Ref<Eigen::Matrix3Xd> target;
+  void gradient(int i, const Vec3& g) { target.col(i) += g; }
+  void gradient_theta(int, double) {}
+};
+
+/// Gradient and dense Hessian over all x, then all theta.
+struct DenseSink {
+  static constexpr bool kHessian = true;
+  int n;
+  Eigen::VectorXd& g;
+  Eigen::MatrixXd& H;
+
+  void gradient(int i, const Vec3& v) { g.segment<3>(3 * i) += v; }
+  void gradient_theta(int e, double v) { g[3 * n + e] += v; }
+  void hessian(int i, int j, const Mat3& block) {
+    H.block<3, 3>(3 * i, 3 * j) += block;
+    if (i != j) H.block<3, 3>(3 * j, 3 * i) += block.transpose();
+  }
+  void hessian_scaled(int i, int j, double scale, const Mat3& block) {
+    hessian(i, j, scale * block);
+  }
+  void hessian_of_edge(int i, const Mat3& block) {
+    hessian(i, i, block);
+    hessian(i + 1, i + 1, block);
+    hessian(i + 1, i, -block);
+  }
+  void hessian_scaled_identity(int i, int j, double v) { hessian(i, j, v * Mat3::Identity()); }
+  void hessian_theta(int e, int i, const Vec3& v) {
+    H.block<3, 1>(3 * i, 3 * n + e) += v;
+    H.block<1, 3>(3 * n + e, 3 * i) += v.transpose();
+  }
+  void hessian_theta_theta(int e, int f, double v) {
+    H(3 * n + e, 3 * n + f) += v;
+    if (e != f) H(3 * n + f, 3 * n + e) += v;
+  }
+};
+
+/// Gradient of the free nodes: block k holds x and, for D = 4, theta of node first + k.
+template <int D>
+struct FreeSink {
+  static constexpr bool kHessian = false;
+  int first, last;
+  WirePass& pass;
+  Eigen::VectorXd& g;
+
+  bool is_free(int i) const { return i >= first && i < last; }
+  void add_to(Eigen::VectorXd& vector, int i, const Vec3& v) {
+    if (is_free(i)) vector.template segment<3>(D * (i - first)) += v;
+  }
+  void gradient(int i, const Vec3& v) { add_to(g, i, v); }
+  void gradient_theta(int e, double v) {
+    if (D == 4 && is_free(e)) g[D * (e - first) + 3] += v;
+  }
+  WirePass::Energy add_wire(const Rod& rod, const RodState& state) {
+    return pass.add_gradient<D>(rod, first, last, state.x, g);
+  }
+};
+
+/// And their banded Hessian.
+template <int D>
+struct BandSink : FreeSink<D> {
+  static constexpr bool kHessian = true;
+  using FreeSink<D>::first;
+  using FreeSink<D>::is_free;
+  BlockBand<D>& H;
+
+  WirePass::Energy add_wire(const Rod& rod, const RodState& state) {
+    const WirePass::Energy energy = FreeSink<D>::add_wire(rod, state);
+    this->pass.set_hessian(H);
+    return energy;
+  }
+  typename BlockBand<D>::Block& block(int i, int j) {  // i >= j
+    return i == j ? H.own(i - first) : i == j + 1 ? H.one(i - first) : H.two(i - first);
+  }
+  void hessian(int i, int j, const Mat3& v) { hessian_scaled(i, j, 1.0, v); }
+  void hessian_scaled(int i, int j, double scale, const Mat3& v) {
+    if (!is_free(i) || !is_free(j)) return;
+    auto& target = block(i, j);
+    for (int c = 0; c < 3; ++c) {
+      for (int r = 0; r < 3; ++r) target(r, c) += scale * v(r, c);
+    }
+  }
+  void hessian_of_edge(int i, const Mat3& v) {
+    if (!is_free(i) || !is_free(i + 1)) {
+      hessian(i, i, v);
+      hessian(i + 1, i + 1, v);
+      return;
+    }
+    auto& own = H.own(i - first);
+    auto& next = H.own(i + 1 - first);
+    auto& one = H.one(i + 1 - first);
+    for (int c = 0; c < 3; ++c) {
+      for (int r = 0; r < 3; ++r) {
+        own(r, c) += v(r, c);
+        next(r, c) += v(r, c);
+        one(r, c) -= v(r, c);
+      }
+    }
+  }
+  void hessian_scaled_identity(int i, int j, double v) {
+    if (is_free(i) && is_free(j))
+      block(i, j).template topLeftCorner<3, 3>().diagonal().array() += v;
+  }
+  void hessian_theta(int e, int i, const Vec3& v) {
+    if constexpr (D == 4) {
+      if (!is_free(e) || !is_free(i)) return;
+      if (e >= i) {
+        block(e, i).template block<1, 3>(3, 0) += v.transpose();
+      }
+      if (i >= e) {
+        block(i, e).template block<3, 1>(0, 3) += v;
+      }
+    }
+  }
+  void hessian_theta_theta(int e, int f, double v) {
+    if constexpr (D == 4) {
+      if (is_free(e) && is_free(f)) block(e, f)(3, 3) += v;
+    }
+  }
+};
+
+}  // namespace wireplan::simulate
