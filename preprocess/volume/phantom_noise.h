@@ -1,0 +1,13 @@
+#pragma once
+/// Noise and point spread of a phantom; for use in this folder.
+#include <cstdint>
+
+#include "preprocess/volume/image.h"
+
+namespace wireplan::preprocess {
+
+/// Adds noise of sigma `noise_hu` from the seed, and blurs the image with a Gaussian of sigma
+/// `blur_mm`, which correlates the noise. The same bits at any thread count.
+void add_noise_and_blur(double noise_hu, std::uint64_t seed, double blur_mm, Image& image);
+
+}  // namespace wireplan::preprocess
