@@ -5,279 +5,28 @@
 #include <array>
 #include <cmath>
 #include <cstdio>
-#include <functional>
 #include <limits>
-#include <memory>
-#include <queue>
 #include <utility>
 #include <vector>
 
+#include "preprocess/centerline/grid_search.h"
 #include "preprocess/centerline/nearest_wall.h"
 #include "preprocess/surface/surface.h"
 
 namespace wireplan::preprocess {
 namespace {
 
-using Points = std::vector<Vec3>;
-
 // The search grid starts with about this many nodes in the lumen, within these spacings [mm], and
 // is halved where the lumen is too thin for it. That of the tree, which is not, starts finer.
 constexpr double kNodesWanted = 20e3, kTreeNodesWanted = 80e3;
 constexpr double kCoarsestGrid = 1.0, kFirstGrid = 0.25, kFinestGrid = 0.12;
-constexpr std::size_t kMostNodes = 3'000'000;  // bounds memory (0.25 GB) and time (about 10 s)
-constexpr double kInfinite = std::numeric_limits<double>::infinity();
 constexpr std::size_t kFewPoints = 5;  // fewer have no direction
 constexpr int kRounds = 2;             // of moving to the ridge and smoothing
 // Smoothing along the line, as part of the inscribed radius. It shortens the radius r of a bend by
 // sigma^2/(2r): in a bend as sharp as r = 3 R, by 0.24 % of R.
 constexpr double kSmoothing = 0.12;
 
-// ---------------------------------------------------------------------------------- the wall
-
-/// From a point near the wall straight away from it, as far as the distance grows and at most to
-/// `depth`: there the ball is large enough to meet the grid.
-Vec3 leave_wall(const NearestWall& wall, Vec3 point, double depth) {
-  Nearest here = wall.find(point);
-  while (here.distance < depth) {
-    const Vec3 next = point + 0.5 * (point - here.foot);
-    const Nearest there = wall.find(next, here);
-    if (there.distance < 1.2 * here.distance) break;  // free growth is by 1.5: near the ridge
-    point = next;
-    here = there;
-  }
-  return point;
-}
-
 // -------------------------------------------------------------------------------- the search
-
-struct Node {
-  Vec3 point = Vec3::Zero();
-  Eigen::Vector3i ijk = Eigen::Vector3i::Zero();  // of a grid point; not used by the two ends
-  Nearest wall;
-  double cost = kInfinite;  // from the start
-  int parent = -1;
-  bool settled = false;
-  bool allowed = true;  // may the path pass here?
-};
-
-/// Cost of a path per length, for inscribed radius r [mm]. The route is the shortest one that is
-/// passable: as length, but twice as dear where r is 1 mm. The line that follows the route is drawn
-/// to the middle.
-enum class Cost { kRoute, kMiddle };
-
-double cost_per_mm(Cost cost, double r) {
-  const double narrow = 1.0 / (r * r);
-  return cost == Cost::kRoute ? 1.0 + narrow : narrow;
-}
-
-/// Cheapest paths on a grid whose points are made, and their wall distance computed, when first
-/// touched. Two points are joined when their inscribed balls overlap: then no wall is between them,
-/// and so all that is reached lies in the same lumen as the start, without any inside test.
-class GridSearch {
- public:
-  GridSearch(const NearestWall& wall, const Surface& surface, double spacing, const Vec3& start,
-             const Vec3& goal)
-      : wall_(wall), spacing_(spacing) {
-    origin_ = surface.vertices.rowwise().minCoeff();
-    const Vec3 extent = surface.vertices.rowwise().maxCoeff() - origin_;
-    size_ = (extent / spacing).array().ceil().cast<int>() + 1;
-    bricks_ = (size_.array() + kBrick - 1) / kBrick;
-    slots_.resize(static_cast<std::size_t>(bricks_.x()) * static_cast<std::size_t>(bricks_.y()) *
-                  static_cast<std::size_t>(bricks_.z()));
-    nodes_.push_back({.point = start, .wall = wall_.find(start)});
-    nodes_.push_back({.point = goal, .wall = wall_.find(goal)});
-  }
-
-  /// True when the goal was reached. A* with the straight way to the goal as bound, which the route
-  /// cannot undercut; for the middle there is no such bound.
-  bool run(Cost kind) {
-    kind_ = kind;
-    for (Node& n : nodes_) {
-      n.cost = kInfinite;
-      n.parent = -1;
-      n.settled = false;
-    }
-    queue_ = {};
-    nodes_[kStart].cost = 0.0;
-    queue_.emplace(0.0, kStart);
-    while (!queue_.empty() && nodes_.size() < kMostNodes) {
-      const int here = queue_.top().second;
-      queue_.pop();
-      if (here == kGoal) return true;
-      if (node(here).settled) continue;
-      nodes_[static_cast<std::size_t>(here)].settled = true;
-      relax(here, kGoal);
-      if (here == kStart) {
-        visit_block(here, (node(here).point - origin_) / spacing_);
-      } else {
-        visit_neighbours(here);
-      }
-    }
-    return false;
-  }
-
-  /// Cheapest ways from the start to all that is connected to it.
-  void run_everywhere(Cost kind) {
-    nodes_[kGoal].allowed = false;
-    run(kind);
-  }
-
-  // The nodes by number, for a look at all of them; 0 is the start, 1 the goal.
-  std::size_t count() const { return nodes_.size(); }
-  const Node& at(std::size_t i) const { return nodes_[i]; }
-  double spacing() const { return spacing_; }
-
-  /// Numbers of the grid's nodes that are made within `reach` of a point.
-  std::vector<int> nodes_near(const Vec3& point, double reach) const {
-    std::vector<int> near;
-    const Vec3 place = (point - origin_) / spacing_;
-    const Eigen::Vector3i low = (place.array() - reach / spacing_).ceil().cast<int>().max(0);
-    const Eigen::Vector3i high =
-        (place.array() + reach / spacing_).floor().cast<int>().min(size_.array() - 1);
-    for (int k = low.z(); k <= high.z(); ++k) {
-      for (int j = low.y(); j <= high.y(); ++j) {
-        for (int i = low.x(); i <= high.x(); ++i) {
-          const int n = made({i, j, k});
-          if (n != kUntouched && (node(n).point - point).norm() <= reach) near.push_back(n);
-        }
-      }
-    }
-    return near;
-  }
-
-  /// From now on paths stay in the vessel round `route`: within 1.5 radii of its middle.
-  void stay_near(const Points& route);
-
-  /// From the goal back to the start.
-  Points path() const {
-    Points points;
-    for (int i = kGoal; i >= 0; i = node(i).parent) points.push_back(node(i).point);
-    return points;
-  }
-
-  /// The place reached nearest to `point`.
-  Vec3 nearest_reached(const Vec3& point) const {
-    double least = kInfinite;
-    Vec3 best = nodes_.front().point;
-    for (const Node& n : nodes_) {
-      const double squared_distance = (n.point - point).squaredNorm();
-      if (!std::isfinite(n.cost) || squared_distance >= least) continue;
-      least = squared_distance;
-      best = n.point;
-    }
-    return best;
-  }
-
- private:
-  static constexpr int kBrick = 8, kStart = 0, kGoal = 1;
-  static constexpr int kUntouched = -1;
-  // Two balls on either side of a flat wall touch to the last bit: more than that is asked for.
-  static constexpr double kOverlap = 1.0 + 1e-6;
-  using Brick = std::array<int, kBrick * kBrick * kBrick>;
-
-  const Node& node(int i) const { return nodes_[static_cast<std::size_t>(i)]; }
-
-  void visit_neighbours(int here) {
-    const Eigen::Vector3i center = node(here).ijk;
-    for (int k = -1; k <= 1; ++k) {
-      for (int j = -1; j <= 1; ++j) {
-        for (int i = -1; i <= 1; ++i) {
-          if (i != 0 || j != 0 || k != 0) visit(here, center + Eigen::Vector3i(i, j, k));
-        }
-      }
-    }
-  }
-
-  /// The 4 x 4 x 4 grid points round a place that is itself not on the grid.
-  void visit_block(int here, const Vec3& place) {
-    const Eigen::Vector3i corner = place.array().floor().cast<int>() - 1;
-    for (int k = 0; k < 4; ++k) {
-      for (int j = 0; j < 4; ++j) {
-        for (int i = 0; i < 4; ++i) visit(here, corner + Eigen::Vector3i(i, j, k));
-      }
-    }
-  }
-
-  void visit(int here, const Eigen::Vector3i& ijk) {
-    if ((ijk.array() < 0).any() || (ijk.array() >= size_.array()).any()) return;
-    int& there = slot(ijk);
-    if (there == kUntouched) {
-      there = static_cast<int>(nodes_.size());
-      const Vec3 point = origin_ + spacing_ * ijk.cast<double>();
-      nodes_.push_back({.point = point, .ijk = ijk, .wall = wall_.find(point, node(here).wall)});
-    }
-    relax(here, there);
-  }
-
-  void relax(int here, int there) {
-    const Node& a = node(here);
-    Node& b = nodes_[static_cast<std::size_t>(there)];
-    const double length = (a.point - b.point).norm();
-    const double r_a = a.wall.distance, r_b = b.wall.distance;
-    if (!b.allowed || r_a + r_b < kOverlap * length) return;  // the wall may be between them
-    const double cost = a.cost + 0.5 * length * (cost_per_mm(kind_, r_a) + cost_per_mm(kind_, r_b));
-    if (cost >= b.cost) return;
-    b.cost = cost;
-    b.parent = here;
-    const double bound = kind_ == Cost::kRoute ? (b.point - node(kGoal).point).norm() : 0.0;
-    queue_.emplace(cost + bound, there);
-  }
-
-  /// Index into nodes_ of a grid point, or kUntouched.
-  int made(const Eigen::Vector3i& ijk) const {
-    const Eigen::Vector3i brick = ijk / kBrick, in = ijk - kBrick * brick;
-    const std::unique_ptr<Brick>& entries = slots_[brick_number(brick)];
-    return entries
-               ? (*entries)[static_cast<std::size_t>(in.x() + kBrick * (in.y() + kBrick * in.z()))]
-               : kUntouched;
-  }
-
-  std::size_t brick_number(const Eigen::Vector3i& brick) const {
-    return static_cast<std::size_t>(brick.x()) +
-           static_cast<std::size_t>(bricks_.x()) *
-               (static_cast<std::size_t>(brick.y()) +
-                static_cast<std::size_t>(bricks_.y()) * static_cast<std::size_t>(brick.z()));
-  }
-
-  /// Index into nodes_ of a grid point, in bricks that exist where the search has been.
-  int& slot(const Eigen::Vector3i& ijk) {
-    const Eigen::Vector3i brick = ijk / kBrick, in = ijk - kBrick * brick;
-    const std::size_t b = brick_number(brick);
-    if (!slots_[b]) {
-      slots_[b] = std::make_unique<Brick>();
-      slots_[b]->fill(kUntouched);
-    }
-    return (*slots_[b])[static_cast<std::size_t>(in.x() + kBrick * (in.y() + kBrick * in.z()))];
-  }
-
-  // Cheapest first; of equal costs the point that was touched first, so that ties are settled.
-  using Entry = std::pair<double, int>;
-
-  const NearestWall& wall_;
-  double spacing_;
-  Cost kind_ = Cost::kRoute;
-  Vec3 origin_;
-  Eigen::Vector3i size_, bricks_;
-  std::vector<std::unique_ptr<Brick>> slots_;
-  std::vector<Node> nodes_;
-  std::priority_queue<Entry, std::vector<Entry>, std::greater<>> queue_;
-};
-
-void GridSearch::stay_near(const Points& route) {
-  // Balls in the middle of the vessel: the route itself may run along the wall.
-  std::vector<std::pair<Vec3, double>> balls;  // centre, squared radius
-  for (const Vec3& p : route) {
-    const Vec3 center = leave_wall(wall_, p, kInfinite);
-    balls.emplace_back(center, std::pow(1.5 * wall_.find(center).distance, 2));
-  }
-  const auto covered = [&](const Vec3& p) {
-    return std::any_of(balls.begin(), balls.end(), [&](const auto& ball) {
-      return (p - ball.first).squaredNorm() <= ball.second;
-    });
-  };
-  for (Node& n : nodes_) n.allowed = covered(n.point);
-  for (const int end : {kStart, kGoal}) nodes_[static_cast<std::size_t>(end)].allowed = true;
-}
 
 std::string text(const Vec3& p) {
   std::array<char, 96> buffer{};
