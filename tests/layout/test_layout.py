@@ -14,7 +14,6 @@ FOLDERS = ["preprocess", "simulate", "plan", "pipeline"]  # each includes those 
 KNOWN = {
     "preprocess/surface/surface_fit.cpp: fit_to_image": 105,
     "preprocess/volume/image.cpp": 806,
-    "preprocess/volume/phantom.cpp": 607,
     "simulate/contact/wall_contact.cpp": 605,
     "simulate/equilibrium/solver.cpp": 811,
     "simulate/equilibrium/solver.cpp: Statics::solve_with": 321,
@@ -26,8 +25,6 @@ KNOWN = {
     "tests/pipeline/test_case_file.cpp": 1018,
     "tests/pipeline/test_case_file.cpp: TEST_F": 100,
     "tests/preprocess/test_image.cpp": 602,
-    "tests/preprocess/test_segment.cpp": 606,
-    "tests/preprocess/test_surface.cpp": 793,
     "tests/simulate/test_contact_verification.cpp": 989,
     "tests/simulate/test_solver.cpp": 825,
     "tests/simulate/test_verification.cpp": 702,
