@@ -15,38 +15,13 @@
 #include "preprocess/volume/dicom_check.h"
 #include "preprocess/volume/image.h"
 #include "tests/dicom.h"
+#include "tests/preprocess/image_file.h"
 
 namespace wireplan::preprocess {
 namespace {
 
 using dicom_files::dicom;
 using dicom_files::DicomSlice;
-
-namespace fs = std::filesystem;
-
-/// A folder of the test's own, removed afterwards.
-class ImageFile : public ::testing::Test {
- protected:
-  ImageFile() {
-    const auto* info = ::testing::UnitTest::GetInstance()->current_test_info();
-    folder_ = fs::path(::testing::TempDir()) / (std::string("wireplan_image_") + info->name());
-    fs::remove_all(folder_);
-    fs::create_directories(folder_);
-  }
-  ~ImageFile() override { fs::remove_all(folder_); }
-
-  fs::path write(const std::string& name, const std::string& bytes) const {
-    std::ofstream(folder_ / name, std::ios::binary) << bytes;
-    return folder_ / name;
-  }
-
-  fs::path folder_;
-};
-
-std::string bytes_of(const fs::path& path) {
-  std::ifstream file(path, std::ios::binary);
-  return {std::istreambuf_iterator<char>(file), {}};
-}
 
 /// The message of the Error that reading throws; a failure where it throws none.
 template <typename Read>

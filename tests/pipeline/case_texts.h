@@ -1,0 +1,146 @@
+#pragma once
+/// Case files as texts, for the tests of what reads them.
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdlib>
+#include <fstream>
+#include <functional>
+#include <limits>
+#include <map>
+#include <set>
+#include <string>
+
+#include "pipeline/files/case_file.h"
+#include "pipeline/files/catalogue.h"
+#include "pipeline/files/scene_file.h"
+#include "tests/pipeline/small_case.h"
+
+namespace wireplan::pipeline {
+
+namespace fs = std::filesystem;
+
+inline const fs::path kSource = WIREPLAN_SOURCE_DIR;
+
+/// A folder of its own for each test, with an empty image and surface that files can name.
+class CaseFile : public testing::Test {
+ protected:
+  void SetUp() override {
+    const std::string name = testing::UnitTest::GetInstance()->current_test_info()->name();
+    folder_ =
+        fs::temp_directory_path() / ("wireplan-case-" + name + "-" + std::to_string(::getpid()));
+    fs::create_directories(folder_);
+    write("ct.nrrd", "");
+    write("vessel.stl", "");
+    write("vessel.vtp", "");
+  }
+  void TearDown() override { fs::remove_all(folder_); }
+
+  fs::path write(const std::string& name, const std::string& text) const {
+    std::ofstream(folder_ / name) << text;
+    return folder_ / name;
+  }
+
+  Case read(const Json& json, const std::vector<std::string>& overrides = {}) const {
+    return read_case(write("case.json", json.dump()), overrides);
+  }
+
+  /// What read_case says; empty where it accepts.
+  std::string problem(const Json& json, const std::vector<std::string>& overrides = {}) const {
+    try {
+      read(json, overrides);
+    } catch (const Error& error) {
+      return error.what();
+    }
+    return "";
+  }
+
+  std::string scene_problem(const Json& json) const {
+    try {
+      read_scene(write("scene.json", json.dump()));
+    } catch (const Error& error) {
+      return error.what();
+    }
+    return "";
+  }
+
+  fs::path folder_;
+};
+
+inline Json volume_case() {
+  return {{"schema", "wireplan.case/1"},
+          {"volume", {{"path", "ct.nrrd"}}},
+          {"segmentation", {{"lower_hu", 150}, {"upper_hu", 600}}},
+          {"access", {{"point_mm", {1, 2, 3}}}},
+          {"target", {{"point_mm", {1, 2, 100}}}},
+          {"wires", {"amplatz"}}};
+}
+
+inline Json surface_case() {
+  Json json = volume_case();
+  json.erase("volume");
+  json.erase("segmentation");
+  json["surface"] = {{"path", "vessel.stl"}, {"unit", "mm"}, {"frame", "LPS"}};
+  return json;
+}
+
+/// A wire of the user's own, with every key.
+inline Json own_wire() {
+  return {{"name", "mine"},
+          {"title", "My wire"},
+          {"source", "measured"},
+          {"diameter_mm", 0.889},
+          {"sections",
+           {{{"length_mm", 3000},
+             {"bending_stiffness_n_mm2", 5},
+             {"axial_stiffness_n", 100},
+             {"twist_stiffness_n_mm2", 4},
+             {"mass_kg_per_m", 0.005},
+             {"rest_radius_mm", 12},
+             {"source", "measured"}}}}};
+}
+
+/// The case with every key that goes with its input.
+inline Json full_case(Json json) {
+  json["name"] = "full";
+  if (json.contains("segmentation")) {
+    json["segmentation"].update(Json{
+        {"seeds_mm", Json::array({{1, 2, 3}})}, {"smoothing_mm", 0.8}, {"neck_opening_mm", 1.5}});
+  }
+  json["surface"]["edge_length_mm"] = 1.5;
+  json["wall"] = {
+      {"model", "rigid"}, {"thickness_mm", 2}, {"young_modulus_kpa", 56}, {"poisson_ratio", 0.4}};
+  json["access"].update(Json{{"inclination_deg", {0, 15}}, {"azimuth_deg", {0, 90}}});
+  json["target"]["radius_mm"] = 5;
+  json["wires"] = {own_wire(), "amplatz"};
+  json["tip_roll_deg"] = {0, 180};
+  json["friction"] = 0.12;
+  json["insertion"] = {{"length_mm", 250},
+                       {"step_mm", 2},
+                       {"element_length_mm", 0.5},
+                       {"contact_spacing_mm", 2},
+                       {"residual_tolerance_n", 1e-5},
+                       {"max_iterations", 50},
+                       {"record_every_mm", 10}};
+  json["limits"] = {{"tip_force_warn_n", 0.2},
+                    {"tip_force_fail_n", 1},
+                    {"penetration_fail_mm", 0.5},
+                    {"off_path_fail_mm", 20}};
+  json["search"] = {{"exhaustive", true}};
+  json["manoeuvres"] = "always";
+  json["robustness"] = {
+      {"repeats", 32},         {"plans", 3},     {"seed", 7},       {"friction_factor", {0.25, 4}},
+      {"wall_factor", {1, 1}}, {"angle_deg", 3}, {"entry_mm", 0.5}, {"lumen_mm", 0.1}};
+  json["ranking"]["weights"] = {{"reach", 2}, {"peak_force", 3}, {"mean_force", 0}, {"margin", 1}};
+  return json;
+}
+
+inline void expect_mentions(const std::string& text, const std::vector<std::string>& parts) {
+  for (const std::string& part : parts) {
+    EXPECT_NE(text.find(part), std::string::npos) << "\"" << part << "\" is not in: " << text;
+  }
+}
+
+}  // namespace wireplan::pipeline

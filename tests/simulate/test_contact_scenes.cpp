@@ -1,0 +1,103 @@
+// Scenes of one wire in a vessel: what floor, clamp and friction carry.
+#include <gtest/gtest.h>
+
+#include <Eigen/Geometry>
+#include <Eigen/LU>
+#include <Eigen/SparseCore>
+#include <Eigen/SparseLU>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <functional>
+#include <random>
+#include <vector>
+
+#include "simulate/insertion/scene.h"
+#include "tests/shapes.h"
+#include "tests/simulate/contact_bench.h"
+
+namespace wireplan::simulate {
+namespace {
+
+// ---------------------------------------------------------------- scenes
+
+Scene wire_on_the_floor(const VesselModel& vessel, double friction) {
+  Scene scene;
+  scene.wire = uniform_wire(40.0, 0.5, 100.0);
+  scene.wire.sections[0].mass_per_length = 1e-7;
+  scene.elements = 20;
+  scene.supports = {{.at = WireEnd::kProximal,
+                     .kind = SupportKind::kClamped,
+                     .point = Vec3(-20.0, 0.0, 0.547)}};  // as high as it will lie
+  scene.loads.gravity = Vec3(0.0, 0.0, -9810.0);
+  scene.vessel = &vessel;
+  scene.contact.friction = friction;
+  scene.solver.load_steps = 2;
+  return scene;
+}
+
+const VesselModel& floor_box() {
+  static const VesselModel vessel(shapes::box(Vec3(-40.0, -40.0, 0.0), Vec3(40.0, 40.0, 30.0)),
+                                  {.grid_spacing = 2.0, .band = 4.0});
+  return vessel;
+}
+
+TEST(SceneWithAVessel, FloorAndClampCarryTheWeight) {
+  const SceneResult result = run_scene(wire_on_the_floor(floor_box(), 0.0));
+  ASSERT_EQ(result.outcome, SceneOutcome::kConverged) << result.reason;
+  EXPECT_EQ(result.terms, (std::vector<std::string>{"stretch", "bend", "gravity", "contact"}));
+  const double weight = 40.0 * 1e-7 * 9810.0;
+  double carried = result.reactions.at(0).force.z();
+  EXPECT_LT(std::abs(carried), 0.05 * weight);
+  for (const Touch& touch : result.contacts) {
+    EXPECT_TRUE(touch.normal.isApprox(Vec3::UnitZ(), 1e-4));
+    carried += touch.normal_force;
+  }
+  // Every millimetre, and every half of one in the last 20 mm; nodes among them.
+  ASSERT_EQ(result.contacts.size(), 61u);
+  for (std::size_t k = 0; k < 61; ++k) {
+    const double expected =
+        k <= 20 ? 40.0 - static_cast<double>(k) : 0.5 * static_cast<double>(60 - k);
+    EXPECT_NEAR(result.contacts[k].tip_distance, expected, 1e-9);
+  }
+  EXPECT_NEAR(carried, weight, 21 * 1e-6);  // residual of each node
+  EXPECT_GT(result.energy.contact, 0.0);
+  EXPECT_EQ(result.friction_work, 0.0);
+}
+
+TEST(SceneWithAVessel, FrictionAloneHoldsAWireAgainstAPull) {
+  const double friction = 0.2, weight = 40.0 * 1e-7 * 9810.0, pull = 0.7 * friction * weight;
+  Scene scene = wire_on_the_floor(floor_box(), friction);
+  scene.supports[0].kind = SupportKind::kGuided;
+  scene.loads.tip_force = Vec3(pull, 0.0, 0.0);
+  const SceneResult result = run_scene(scene);
+  ASSERT_EQ(result.outcome, SceneOutcome::kConverged) << result.reason;
+  EXPECT_EQ(result.terms, (std::vector<std::string>{"stretch", "bend", "gravity", "tip_force",
+                                                    "contact", "friction"}));
+  Vec3 held = Vec3::Zero();
+  for (const Touch& touch : result.contacts) held += touch.friction;
+  EXPECT_NEAR(held.x(), -pull, 21 * 1e-6);  // residual of each node
+  EXPECT_LT(result.nodes(0, 0) + 20.0, scene.contact.slip);
+  EXPECT_EQ(result.friction_work, 0.0);
+}
+
+TEST(SceneWithAVessel, AStretchedWireRubsAlongTheFloor) {
+  // Clamped, and pulled by more than friction can hold: it slips but next to the clamp, where it
+  // moves by less than the slip.
+  const double friction = 0.2, weight = 40.0 * 1e-7 * 9810.0, pull = 2.0 * friction * weight;
+  Scene scene = wire_on_the_floor(floor_box(), friction);
+  scene.wire.sections[0].axial_stiffness = 1.0;
+  scene.loads.tip_force = Vec3(pull, 0.0, 0.0);
+  const SceneResult result = run_scene(scene);
+  ASSERT_EQ(result.outcome, SceneOutcome::kConverged) << result.reason;
+  Vec3 held = Vec3::Zero();
+  for (const Touch& touch : result.contacts) held += touch.friction;
+  EXPECT_NEAR(held.x() + result.reactions.at(0).force.x() + pull, 0.0, 21 * 1e-6);
+  EXPECT_LT(held.x(), -0.85 * friction * weight);
+  EXPECT_GE(held.x(), -friction * weight - 21 * 1e-6);
+  EXPECT_GT(result.friction_work, 0.0);
+  EXPECT_LT(result.friction_work, pull * (result.nodes(0, 20) - 20.0));
+}
+
+}  // namespace
+}  // namespace wireplan::simulate
