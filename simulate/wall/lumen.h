@@ -12,6 +12,8 @@
 
 namespace wireplan::simulate {
 
+struct SampleGrid;
+
 struct LumenOptions {
   double grid_spacing = 0.5;  // of the distance samples                                  [mm]
   double band = 2.0;          // the field follows the wall within this distance of it    [mm]
@@ -72,6 +74,11 @@ class Lumen {
     Eigen::Array4d row(int j, int k) const;
   };
   Place find_place(const Vec3& point) const;
+
+  /// Keeps with each brick all coefficients that its cells need, so that a look-up stays in one.
+  void keep_bricks(const SampleGrid& grid, const std::vector<double>& coefficients);
+  /// How well the smooth wall follows the triangles, caps left out.
+  void measure_deviation(const Surface& surface);
 
   double spacing_ = 0.0, band_ = 0.0, max_deviation_ = 0.0, mean_deviation_ = 0.0;
   Vec3 origin_ = Vec3::Zero();             // of brick (0, 0, 0)                          [mm]

@@ -14,7 +14,6 @@ FOLDERS = ["preprocess", "simulate", "plan", "pipeline"]  # each includes those 
 KNOWN = {
     "preprocess/surface/surface_fit.cpp: fit_to_image": 105,
     "preprocess/volume/image.cpp": 806,
-    "simulate/wall/lumen.cpp": 729,
     "pipeline/bench/bench_preprocess.cpp: bench_preprocess": 92,
     "pipeline/bench/bench_stability.cpp": 672,
     "pipeline/bench/bench_throughput.cpp": 714,

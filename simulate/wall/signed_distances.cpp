@@ -1,0 +1,276 @@
+#include "simulate/wall/signed_distances.h"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <map>
+#include <utility>
+
+#include "preprocess/surface/triangle.h"
+#include "simulate/wall/parallel.h"
+
+namespace wireplan::simulate {
+namespace {
+
+// ---------------------------------------------------------------- exact signed distance
+
+/// Outward normals of faces, edges and vertices, angle-weighted at vertices, so that the sign of
+/// the distance to the nearest feature is right everywhere (Baerentzen & Aanaes, "Signed distance
+/// computation using the angle weighted pseudonormal", IEEE TVCG 2005).
+struct PseudoNormals {
+  Eigen::Matrix3Xd face, vertex;
+  std::vector<std::array<Vec3, 3>> edge;  // of each triangle: edges 01, 12, 20
+};
+
+PseudoNormals compute_pseudo_normals(const Surface& surface) {
+  const Eigen::Index m = surface.triangles.cols();
+  PseudoNormals normals;
+  normals.face.resize(3, m);
+  normals.vertex = Eigen::Matrix3Xd::Zero(3, surface.vertices.cols());
+  std::map<std::pair<int, int>, Vec3> edges;
+  const auto key = [](int a, int b) { return std::pair(std::min(a, b), std::max(a, b)); };
+  for (Eigen::Index f = 0; f < m; ++f) {
+    const Eigen::Vector3i t = surface.triangles.col(f);
+    std::array<Vec3, 3> p;
+    for (int c = 0; c < 3; ++c) p[c] = surface.vertices.col(t[c]);
+    const Vec3 normal = (p[1] - p[0]).cross(p[2] - p[0]).normalized();
+    normals.face.col(f) = normal;
+    for (int c = 0; c < 3; ++c) {
+      const Vec3 u = p[(c + 1) % 3] - p[c], v = p[(c + 2) % 3] - p[c];
+      normals.vertex.col(t[c]) += std::atan2(u.cross(v).norm(), u.dot(v)) * normal;
+      auto [place, fresh] = edges.try_emplace(key(t[c], t[(c + 1) % 3]), Vec3::Zero());
+      place->second += normal;
+    }
+  }
+  normals.edge.resize(m);
+  for (Eigen::Index f = 0; f < m; ++f) {
+    const Eigen::Vector3i t = surface.triangles.col(f);
+    for (int c = 0; c < 3; ++c) normals.edge[f][c] = edges.at(key(t[c], t[(c + 1) % 3]));
+  }
+  return normals;
+}
+
+/// Normal of what a point nearest to another lies on, in triangle f with the corners t.
+Vec3 normal_of(const NearestOnTriangle& nearest, const PseudoNormals& normals, Eigen::Index f,
+               const Eigen::Vector3i& t) {
+  if (nearest.feature < 3) return normals.vertex.col(t[nearest.feature]);
+  if (nearest.feature < 6) return normals.edge[f][nearest.feature - 3];
+  return normals.face.col(f);
+}
+
+// ---------------------------------------------------------------- triangles to nodes
+
+/// Distances of triangles to the nodes of a brick. A block of nodes is halved down to two along
+/// each axis, each time without the triangles that cannot be the nearest of any of its nodes.
+class BlockDistances {
+ public:
+  BlockDistances(SampleGrid& grid, const Surface& surface)
+      : grid_(grid), surface_(surface), normals_(compute_pseudo_normals(surface)) {
+    const Eigen::Index m = surface.triangles.cols();
+    middle_.resize(3, m);
+    radius_.resize(m);
+    for (Eigen::Index f = 0; f < m; ++f) {
+      const Eigen::Vector3i t = surface.triangles.col(f);
+      Mat3 corners;
+      for (int c = 0; c < 3; ++c) corners.col(c) = surface.vertices.col(t[c]);
+      middle_.col(f) = corners.rowwise().mean();
+      radius_[f] =
+          std::sqrt((corners.colwise() - middle_.col(f)).colwise().squaredNorm().maxCoeff());
+    }
+  }
+
+  /// Takes over what is shorter than what a node has, and than the grid's limit. Expects a
+  /// triangle near.
+  void take(std::size_t slot, const std::vector<int>& near) const {
+    take(slot, {0, 0, 0}, SampleGrid::kSide, near);
+  }
+
+ private:
+  void take(std::size_t slot, const std::array<int, 3>& first, int side,
+            const std::vector<int>& near) const {
+    // The ball round the block; what is farther than the nearest one by its width is no one's.
+    const std::array<int, 3>& brick = grid_.sampled[slot];
+    const Vec3 low(SampleGrid::kSide * brick[0] + first[0], SampleGrid::kSide * brick[1] + first[1],
+                   SampleGrid::kSide * brick[2] + first[2]);
+    const Vec3 center = grid_.origin + grid_.spacing * (low.array() + 0.5 * (side - 1)).matrix();
+    const double reach = 0.5 * (side - 1) * std::sqrt(3.0) * grid_.spacing;
+    std::vector<double> distance;
+    distance.reserve(near.size());
+    for (const int f : near) distance.push_back((middle_.col(f) - center).norm());
+    const auto nearest = std::min_element(distance.begin(), distance.end());
+    const double least = std::min(grid_.limit, *nearest + reach);
+    std::vector<int> left;
+    left.reserve(near.size());
+    for (std::size_t k = 0; k < near.size(); ++k) {
+      if (distance[k] - radius_[near[k]] - reach <= least + kRounding) left.push_back(near[k]);
+    }
+    if (left.empty()) return;
+
+    if (side > 2) {
+      const int half = side / 2;
+      for (int octant = 0; octant < 8; ++octant) {
+        const std::array<int, 3> at = {first[0] + (octant & 1 ? half : 0),
+                                       first[1] + (octant & 2 ? half : 0),
+                                       first[2] + (octant & 4 ? half : 0)};
+        take(slot, at, half, left);
+      }
+      return;
+    }
+    double* values = grid_.values.data() + slot * SampleGrid::kVolume;
+    for (int node = 0; node < 8; ++node) {
+      const int i = node & 1, j = (node >> 1) & 1, k = node >> 2;
+      double& value = values[SampleGrid::node_index(first[0] + i, first[1] + j, first[2] + k)];
+      const Vec3 p = grid_.origin + grid_.spacing * (low + Vec3(i, j, k));
+      take(value, p, near[static_cast<std::size_t>(nearest - distance.begin())]);
+      for (const int f : left) take(value, p, f);
+    }
+  }
+
+  static constexpr double kRounding = 1e-9;  // [mm]
+
+  void take(double& value, const Vec3& p, Eigen::Index f) const {
+    const Eigen::Vector3i t = surface_.triangles.col(f);
+    const Vec3 a = surface_.vertices.col(t[0]);
+    const double bound = std::min(std::abs(value), grid_.limit);
+    const double far = bound + radius_[f] + kRounding;
+    if ((p - middle_.col(f)).squaredNorm() >= far * far) return;
+    const Vec3 plane = normals_.face.col(f);
+    if (std::abs(plane.dot(p - a)) >= bound) return;
+    const NearestOnTriangle nearest =
+        nearest_on_triangle(p, a, surface_.vertices.col(t[1]), surface_.vertices.col(t[2]));
+    const double squared_distance = nearest.offset.squaredNorm();
+    if (squared_distance >= bound * bound) return;
+    const bool outside = nearest.offset.dot(normal_of(nearest, normals_, f, t)) > 0.0;
+    value = outside ? -std::sqrt(squared_distance) : std::sqrt(squared_distance);
+  }
+
+  SampleGrid& grid_;
+  const Surface& surface_;
+  const PseudoNormals normals_;
+  Eigen::Matrix3Xd middle_;  // of each triangle                                         [mm]
+  Eigen::VectorXd radius_;   // of the ball round its middle that holds it               [mm]
+};
+
+// ---------------------------------------------------------------- signs where no wall is near
+
+using Index = std::array<int, 3>;  // of a node or a brick in the whole grid
+
+/// Null where the node is beyond the grid or in a brick without samples.
+double* value_at(SampleGrid& grid, const Index& n) {
+  for (int d = 0; d < 3; ++d) {
+    if (n[d] < 0 || n[d] >= SampleGrid::kSide * grid.bricks[d]) return nullptr;
+  }
+  const std::int32_t s = grid.slot[grid.brick_index(n[0] >> 3, n[1] >> 3, n[2] >> 3)];
+  if (s < 0) return nullptr;
+  return &grid.values[static_cast<std::size_t>(s) * SampleGrid::kVolume +
+                      SampleGrid::node_index(n[0] & 7, n[1] & 7, n[2] & 7)];
+}
+
+template <class Visit>
+void for_each_neighbour(const Index& n, const Visit& visit) {
+  for (int d = 0; d < 3; ++d) {
+    for (const int step : {-1, 1}) {
+      Index neighbour = n;
+      neighbour[d] += step;
+      visit(neighbour);
+    }
+  }
+}
+
+/// To nodes: sweeps until nothing changes; each brick holds a few layers of them.
+void spread_signs_over_nodes(SampleGrid& grid) {
+  std::vector<Index> front, next;
+  for (const auto& [i, j, k] : grid.sampled) {
+    for (int v = 0; v < SampleGrid::kVolume; ++v) {
+      const Index n = {8 * i + (v & 7), 8 * j + ((v >> 3) & 7), 8 * k + (v >> 6)};
+      if (std::isfinite(*value_at(grid, n))) front.push_back(n);
+    }
+  }
+  for (; !front.empty(); std::swap(front, next)) {
+    next.clear();
+    for (const Index& n : front) {
+      const double sign = std::copysign(grid.limit, *value_at(grid, n));
+      for_each_neighbour(n, [&](const Index& neighbour) {
+        double* value = value_at(grid, neighbour);
+        if (value == nullptr || std::isfinite(*value)) return;
+        *value = sign;
+        next.push_back(neighbour);
+      });
+    }
+  }
+  for (double& value : grid.values) {
+    if (!std::isfinite(value)) value = -grid.limit;  // a brick that no distance reached
+  }
+}
+
+/// Whether a brick without samples lies at one whose samples on the shared face are inside.
+bool touches_inside(SampleGrid& grid, const Index& brick) {
+  for (int d = 0; d < 3; ++d) {
+    for (const int side : {-1, 8}) {
+      Index n = {8 * brick[0] + 4, 8 * brick[1] + 4, 8 * brick[2] + 4};
+      n[d] = 8 * brick[d] + side;
+      const double* value = value_at(grid, n);
+      if (value != nullptr && *value > 0.0) return true;
+    }
+  }
+  return false;
+}
+
+/// To bricks: from those with samples inward; the rest, and the rim of the grid, is outside.
+void spread_signs_over_bricks(SampleGrid& grid) {
+  const auto in_grid = [&](const Index& b) {
+    return b[0] >= 0 && b[1] >= 0 && b[2] >= 0 && b[0] < grid.bricks[0] && b[1] < grid.bricks[1] &&
+           b[2] < grid.bricks[2];
+  };
+  std::vector<Index> inside;
+  for (int k = 0; k < grid.bricks[2]; ++k) {
+    for (int j = 0; j < grid.bricks[1]; ++j) {
+      for (int i = 0; i < grid.bricks[0]; ++i) {
+        const bool has_samples = grid.slot[grid.brick_index(i, j, k)] >= 0;
+        if (!has_samples && touches_inside(grid, {i, j, k})) inside.push_back({i, j, k});
+      }
+    }
+  }
+  while (!inside.empty()) {
+    const Index b = inside.back();
+    inside.pop_back();
+    std::int32_t& s = grid.slot[grid.brick_index(b[0], b[1], b[2])];
+    if (s != SampleGrid::kUnknown) continue;
+    s = SampleGrid::kInside;
+    for_each_neighbour(b, [&](const Index& neighbour) {
+      if (in_grid(neighbour)) inside.push_back(neighbour);
+    });
+  }
+  for (std::int32_t& s : grid.slot) {
+    if (s == SampleGrid::kUnknown) s = SampleGrid::kOutside;
+  }
+}
+
+}  // namespace
+
+void scatter_distances(SampleGrid& grid, const Surface& surface,
+                       const std::vector<NodeBox>& boxes) {
+  std::vector<std::vector<int>> near(grid.sampled.size());
+  for (Eigen::Index f = 0; f < surface.triangles.cols(); ++f) {
+    const NodeBox box = node_box(grid, surface, f);
+    if (std::none_of(boxes.begin(), boxes.end(),
+                     [&](const NodeBox& other) { return overlap(box, other); })) {
+      continue;
+    }
+    for_each_brick(grid, box, [&](std::int32_t& s, int, int, int) {
+      near[static_cast<std::size_t>(s)].push_back(static_cast<int>(f));
+    });
+  }
+  const BlockDistances distances(grid, surface);
+  for_each_index(grid.sampled.size(), [&](std::size_t s) {
+    if (!near[s].empty()) distances.take(s, near[s]);
+  });
+}
+
+void spread_signs(SampleGrid& grid) {
+  spread_signs_over_nodes(grid);
+  spread_signs_over_bricks(grid);
+}
+
+}  // namespace wireplan::simulate
