@@ -12,19 +12,22 @@
 #include <cmath>
 #include <exception>
 #include <mutex>
+#include <variant>
 
 namespace wireplan::plan {
 namespace {
 
+bool is_finite(int) { return true; }
+bool is_finite(double number) { return std::isfinite(number); }
+bool is_finite(const Vec3& point) { return point.allFinite(); }
+
 /// A number that is not finite would pass through maxima and comparisons unseen.
 bool is_finite(const simulate::TrialResult& trial) {
   const auto push_is_finite = [](const simulate::Push& push) {
-    const double sum = push.insertion + push.push_force + push.tip.sum() + push.tip_force +
-                       push.peak_contact_force + push.total_contact_force + push.friction_force +
-                       push.max_penetration + push.wall_displacement +
-                       push.wall_displacement_point.sum() + push.peak_curvature + push.push_work +
-                       push.stored_energy + push.friction_work + push.residual;
-    return std::isfinite(sum);
+    const auto field_is_finite = [&](const simulate::PushField& field) {
+      return std::visit([&](auto member) { return is_finite(push.*member); }, field.member);
+    };
+    return std::all_of(simulate::kPushFields.begin(), simulate::kPushFields.end(), field_is_finite);
   };
   const auto contact_is_finite = [](const simulate::WireContact& contact) {
     const Vec3 sum = contact.point + contact.normal_force + contact.friction_force;

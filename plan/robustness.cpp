@@ -6,6 +6,7 @@
 #include <cmath>
 #include <numeric>
 #include <random>
+#include <variant>
 
 #include "plan/batch.h"
 #include "plan/statistics.h"
@@ -55,10 +56,8 @@ simulate::Wire softened(const simulate::Wire& wire, double factor) {
 
 void multiply_forces(simulate::TrialResult& trial, double factor) {
   for (simulate::Push& push : trial.pushes) {
-    for (double* force : {&push.push_force, &push.tip_force, &push.peak_contact_force,
-                          &push.total_contact_force, &push.friction_force, &push.push_work,
-                          &push.stored_energy, &push.friction_work, &push.residual}) {
-      *force *= factor;
+    for (const simulate::PushField& field : simulate::kPushFields) {
+      if (field.is_load) push.*std::get<double simulate::Push::*>(field.member) *= factor;
     }
   }
   for (simulate::WireContact& contact : trial.contacts) {

@@ -8,6 +8,7 @@
 #include <sstream>
 #include <string_view>
 #include <utility>
+#include <variant>
 
 #include "pipeline/files/json_reader.h"
 #include "pipeline/files/text.h"
@@ -29,62 +30,43 @@ constexpr std::array kOutcomes = {
     Outcome::kReached,     Outcome::kMissed,    Outcome::kStuck,        Outcome::kProlapsed,
     Outcome::kLeftOpening, Outcome::kLeftLumen, Outcome::kNotConverged, Outcome::kFailed};
 
-// The numbers of a push, each a column of the file.
-constexpr std::array<std::pair<const char*, double Push::*>, 15> kColumns = {{
-    {"hub_angle_rad", &Push::hub_angle},
-    {"hub_torque_n_mm", &Push::hub_torque},
-    {"insertion_mm", &Push::insertion},
-    {"push_force_n", &Push::push_force},
-    {"tip_force_n", &Push::tip_force},
-    {"peak_contact_force_n", &Push::peak_contact_force},
-    {"total_contact_force_n", &Push::total_contact_force},
-    {"friction_force_n", &Push::friction_force},
-    {"max_penetration_mm", &Push::max_penetration},
-    {"wall_displacement_mm", &Push::wall_displacement},
-    {"peak_curvature_per_mm", &Push::peak_curvature},
-    {"push_work_n_mm", &Push::push_work},
-    {"stored_energy_n_mm", &Push::stored_energy},
-    {"friction_work_n_mm", &Push::friction_work},
-    {"residual_n", &Push::residual},
-}};
-
-// Its points, columns too.
-constexpr std::array<std::pair<const char*, Vec3 Push::*>, 2> kPointColumns = {{
-    {"tip_mm", &Push::tip},
-    {"wall_displacement_point_mm", &Push::wall_displacement_point},
-}};
-
 // A number of a trial that failed may not be finite: null, with the trial's reason beside it.
 double number(const Json& value) { return value.is_null() ? std::nan("") : value.get<double>(); }
 
 Vec3 point(const Json& row) { return {number(row.at(0)), number(row.at(1)), number(row.at(2))}; }
 
+Json value_json(double value) { return value; }
+Json value_json(int value) { return value; }
+Json value_json(const Vec3& value) { return to_json(value); }
+
+void take(double& value, const Json& json) { value = number(json); }
+void take(int& value, const Json& json) { value = json; }
+void take(Vec3& value, const Json& json) { value = point(json); }
+
+// A column for each field of a push.
 Json pushes_to_json(const std::vector<Push>& pushes) {
   Json columns;
-  for (const auto& [name, member] : kColumns) {
+  for (const simulate::PushField& field : simulate::kPushFields) {
     Json column = Json::array();
-    for (const Push& push : pushes) column.push_back(push.*member);
-    columns[name] = std::move(column);
+    std::visit(
+        [&](auto member) {
+          for (const Push& push : pushes) column.push_back(value_json(push.*member));
+        },
+        field.member);
+    columns[field.name] = std::move(column);
   }
-  for (const auto& [name, member] : kPointColumns) {
-    Json column = Json::array();
-    for (const Push& push : pushes) column.push_back(to_json(push.*member));
-    columns[name] = std::move(column);
-  }
-  Json iterations = Json::array();
-  for (const Push& push : pushes) iterations.push_back(push.iterations);
-  columns["iterations"] = std::move(iterations);
   return columns;
 }
 
 std::vector<Push> pushes_from_json(const Json& columns) {
-  std::vector<Push> pushes(columns.at("iterations").size());
-  for (std::size_t k = 0; k < pushes.size(); ++k) {
-    for (const auto& [name, member] : kColumns) pushes[k].*member = number(columns.at(name).at(k));
-    for (const auto& [name, member] : kPointColumns) {
-      pushes[k].*member = point(columns.at(name).at(k));
-    }
-    pushes[k].iterations = columns.at("iterations").at(k);
+  std::vector<Push> pushes(columns.at(simulate::kPushFields.back().name).size());
+  for (const simulate::PushField& field : simulate::kPushFields) {
+    const Json& column = columns.at(field.name);
+    std::visit(
+        [&](auto member) {
+          for (std::size_t k = 0; k < pushes.size(); ++k) take(pushes[k].*member, column.at(k));
+        },
+        field.member);
   }
   return pushes;
 }

@@ -7,6 +7,7 @@
 
 #include "simulate/contact/wall_contact.h"
 #include "simulate/equilibrium/solver.h"
+#include "simulate/insertion/push.h"
 #include "simulate/wall/vessel_model.h"
 #include "simulate/wire/rod.h"
 
@@ -34,31 +35,6 @@ struct Introducer {
   Vec3 point = Vec3::Zero();       // where the wire becomes free, inside the lumen      [mm]
   Vec3 direction = Vec3::UnitZ();  // unit, into the vessel
   double roll = 0.0;               // of the hub, right-handed about the direction     [rad]
-};
-
-/// State after one step of a push, pull or turn, in equilibrium. Forces are those of the wall on
-/// the wire. A contact is a maximal run of neighbouring contact points that touch; its force is the
-/// norm of their sum.
-struct Push {
-  double insertion = 0.0;            // wire beyond the introducer's point               [mm]
-  double hub_angle = 0.0;            // turned since the start                          [rad]
-  double push_force = 0.0;           // axial force of the hand on the wire              [N]
-  double hub_torque = 0.0;           // of the hand, about the introducer's direction  [N mm]
-  Vec3 tip = Vec3::Zero();           //                                                  [mm]
-  double tip_force = 0.0;            // norm of the contact force on the last 2 mm       [N]
-  double peak_contact_force = 0.0;   // of the largest contact                           [N]
-  double total_contact_force = 0.0;  // sum of the normal forces of all points           [N]
-  double friction_force = 0.0;       // sum of the friction forces of all points         [N]
-  double max_penetration = 0.0;      // of the wire's surface past the (yielded) wall    [mm]
-  double wall_displacement = 0.0;    // largest of the wall under a contact              [mm]
-  Vec3 wall_displacement_point = Vec3::Zero();  // where                                 [mm]
-  double peak_curvature = 0.0;                  //                                       [1/mm]
-  double push_work = 0.0;      // of the hand since the start, its turning included ...  [N mm]
-  double stored_energy = 0.0;  // ... of wire, contact and wall now ...                  [N mm]
-  double friction_work = 0.0;  // ... and turned into heat since the start; what is left of the
-                               // work was released in jumps [N mm]
-  double residual = 0.0;       //                                                        [N]
-  int iterations = 0;          // Newton iterations of this step
 };
 
 /// Where the wire touches the wall in the final shape.

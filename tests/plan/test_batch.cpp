@@ -10,6 +10,7 @@
 #include <set>
 #include <stdexcept>
 #include <thread>
+#include <variant>
 
 #include "plan/batch.h"
 #include "tests/shapes.h"
@@ -26,6 +27,7 @@ class Hash {
     }
   }
   void add(double number) { add(&number, sizeof number); }
+  void add(int number) { add(static_cast<double>(number)); }
   void add(const std::string& text) { add(text.data(), text.size()); }
   template <class Derived>
   void add(const Eigen::PlainObjectBase<Derived>& matrix) {
@@ -45,15 +47,9 @@ std::uint64_t hash_of(const std::vector<simulate::TrialResult>& trials) {
     hash.add(trial.reason);
     hash.add(trial.nodes);
     for (const simulate::Push& push : trial.pushes) {
-      for (const double number :
-           {push.insertion, push.push_force, push.tip_force, push.peak_contact_force,
-            push.total_contact_force, push.friction_force, push.max_penetration,
-            push.wall_displacement, push.peak_curvature, push.push_work, push.stored_energy,
-            push.friction_work, push.residual, static_cast<double>(push.iterations)}) {
-        hash.add(number);
+      for (const simulate::PushField& field : simulate::kPushFields) {
+        std::visit([&](auto member) { hash.add(push.*member); }, field.member);
       }
-      hash.add(push.tip);
-      hash.add(push.wall_displacement_point);
     }
     for (const simulate::WireContact& contact : trial.contacts) {
       hash.add(static_cast<double>(contact.node));
