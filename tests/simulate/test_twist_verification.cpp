@@ -1,7 +1,6 @@
 // Strips and twisted rods against theory. Numbers and tolerances: references D and D11.
 #include <gtest/gtest.h>
 
-#include <Eigen/Cholesky>
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <atomic>

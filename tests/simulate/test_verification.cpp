@@ -2,7 +2,6 @@
 // tolerances: references D and D11; inextensible theory is met by a large EA.
 #include <gtest/gtest.h>
 
-#include <Eigen/Cholesky>
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <atomic>

@@ -2,9 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Geometry>
-#include <Eigen/LU>
 #include <Eigen/SparseCore>
-#include <Eigen/SparseLU>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -15,6 +13,7 @@
 #include "simulate/insertion/scene.h"
 #include "tests/shapes.h"
 #include "tests/simulate/contact_bench.h"
+#include "tests/simulate/direct_solvers.h"
 
 namespace wireplan::simulate {
 namespace {
@@ -51,8 +50,7 @@ class Monolith {
       differentiate(state, at, gradient, hessian);
       at.residual = gradient.cwiseAbs().maxCoeff();
       if (at.residual < 1e-10) break;
-      Eigen::SparseLU<Eigen::SparseMatrix<double>> lu(hessian);
-      Eigen::VectorXd step = -lu.solve(gradient);
+      Eigen::VectorXd step = -SparseFactors(hessian).solve(gradient);
       if (step.dot(gradient) > 0.0) step = -step;
       double part = std::min(1.0, 0.25 / step.cwiseAbs().maxCoeff());
       const double before = energy(state, at.u);

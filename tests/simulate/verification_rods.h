@@ -2,7 +2,6 @@
 /// Wires, supports and solves, as the verifications need them.
 #include <gtest/gtest.h>
 
-#include <Eigen/Cholesky>
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <atomic>
@@ -13,6 +12,7 @@
 
 #include "simulate/equilibrium/solver.h"
 #include "tests/simulate/analytic.h"
+#include "tests/simulate/direct_solvers.h"
 
 namespace wireplan::simulate {
 
@@ -118,7 +118,7 @@ inline bool stable(const Problem& problem, const RodState& state, int flat_node 
     if (!held) unknowns.push_back(3 * n + e);
   }
   const Eigen::MatrixXd kept = hessian(unknowns, unknowns);
-  return kept.llt().info() == Eigen::Success;
+  return is_positive_definite(kept);
 }
 
 /// Where `is_stable` of a load turns from true to false, by bisection between `low`
