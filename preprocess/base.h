@@ -43,8 +43,8 @@ inline void expects(bool condition, const char* file = __builtin_FILE(),
   }
 }
 
-/// The number to 12 digits: what a conversion of units adds is gone, 15 deg and
-/// not 15.000000000000002.
+/// The number rounded to 12 digits, which removes what converting units adds: 15 deg and not
+/// 15.000000000000002.
 double clean(double value);
 
 inline constexpr double kPi = std::numbers::pi;

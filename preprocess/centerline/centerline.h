@@ -13,13 +13,17 @@ struct CenterlineOptions {
   double sample_mm = 0.5;  // spacing of the points handed on                           [mm]
 };
 
-/// The shortest passable route (length counts twice where the inscribed radius R is 1 mm), along it
-/// the path that is cheapest with cost 1/R^2, moved to the ridge of the exact wall distance and
-/// smoothed (prototypes C). A cost of 1/R^2 alone, as there, prefers a wide detour: in a real tree,
-/// the vertebral artery and the circle of Willis to the carotid. Starts at the point of the ridge
-/// nearest to `access`, ends at the one nearest to `target`; the surface must be closed. Throws
-/// `Error` when access or target lies outside the surface (with its distance) or the two are not
-/// connected (with the place nearest to the target that is reached).
+/// Finds the line in three steps (R is the inscribed radius):
+///   1. The shortest passable route. A narrow place makes it longer: at R = 1 mm, length counts
+///      twice.
+///   2. Near this route, the path with the least sum of 1/R^2 per length (prototypes C).
+///   3. Its points are moved to the ridge of the exact wall distance, and the line is smoothed.
+/// Without step 1, the path of step 2 takes wide detours: in a real tree it ran through the
+/// vertebral artery and the circle of Willis and not through the carotid.
+/// The line starts at the point of the ridge nearest to `access` and ends at the one nearest to
+/// `target`. Expects a closed surface. Throws `Error` when access or target lies outside the
+/// surface (with its distance) or the two are not connected (with the place nearest to the target
+/// that is reached).
 Centerline find_centerline(const Surface& surface, const Vec3& access, const Vec3& target,
                            const CenterlineOptions& options = {});
 
@@ -30,13 +34,16 @@ struct Branch {
   double parent_arc = 0;  // where on the parent                                          [mm]
 };
 
-/// The middle of the whole lumen that is connected to `root`, ends found by themselves: from each
-/// place that is farthest from the root and not yet inside 1.5 radii of a line, the cheapest way
-/// with cost 1/R^2 to the lines found before, as a branch of its own where it goes on for more than
-/// the parent's radius and its own. The longest first. Lines are moved to the ridge as
-/// `find_centerline` does, and end in the middle, 0.2 radii before the wall ahead. A loop is cut
-/// where its two ways meet. Vessels thinner than about the search grid (0.25 to 1 mm by the size of
-/// the lumen) are not followed. Throws `Error` when the root lies outside the surface.
+/// The middle of the whole lumen that is connected to `root`. Ends are found, not given:
+///   1. The place that is farthest from the root, and not within 1.5 radii of a line found before,
+///      is the next end.
+///   2. The cheapest way (1/R^2 per length) from there to the lines found before is a branch, if it
+///      is longer than the parent's radius and its own together.
+///   3. This is repeated until lines cover the lumen, so branches come farthest end first.
+/// Lines are moved to the ridge as in `find_centerline`, and end in the middle, 0.2 radii before
+/// the wall ahead. A loop is cut where its two ways meet. Vessels thinner than about the search
+/// grid (0.25 to 1 mm by the size of the lumen) are not followed. Throws `Error` when the root lies
+/// outside the surface.
 std::vector<Branch> find_tree(const Surface& surface, const Vec3& root,
                               const CenterlineOptions& options = {});
 

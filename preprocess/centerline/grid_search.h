@@ -20,8 +20,8 @@ inline constexpr double kInfinite = std::numeric_limits<double>::infinity();
 inline constexpr std::size_t kMostNodes =
     3'000'000;  // bounds memory (0.25 GB) and time (about 10 s)
 
-/// From a point near the wall straight away from it, as far as the distance grows and at most to
-/// `depth`: there the ball is large enough to meet the grid.
+/// Moves a point near the wall straight away from it, as long as its distance from the wall grows
+/// and until that is `depth`. Its inscribed ball is then large enough to reach points of the grid.
 Vec3 leave_wall(const NearestWall& wall, Vec3 point, double depth);
 
 struct Node {
@@ -34,9 +34,9 @@ struct Node {
   bool allowed = true;  // may the path pass here?
 };
 
-/// Cost of a path per length, for inscribed radius r [mm]. The route is the shortest one that is
-/// passable: as length, but twice as dear where r is 1 mm. The line that follows the route is drawn
-/// to the middle.
+/// Which cost a path has per length, for inscribed radius r [mm]. kRoute, 1 + 1/r^2, finds the
+/// shortest passable way: a length counts twice where r is 1 mm. kMiddle, 1/r^2, keeps a path in
+/// the middle of the vessel.
 enum class Cost { kRoute, kMiddle };
 
 inline double cost_per_mm(Cost cost, double r) {
@@ -62,8 +62,8 @@ class GridSearch {
     nodes_.push_back({.point = goal, .wall = wall_.find(goal)});
   }
 
-  /// True when the goal was reached. A* with the straight way to the goal as bound, which the route
-  /// cannot undercut; for the middle there is no such bound.
+  /// True when the goal was reached. For kRoute this is A*: no route costs less than the straight
+  /// way to the goal. For kMiddle there is no such bound, and the search goes by cost alone.
   bool run(Cost kind) {
     kind_ = kind;
     for (Node& n : nodes_) {
@@ -145,7 +145,8 @@ class GridSearch {
  private:
   static constexpr int kBrick = 8, kStart = 0, kGoal = 1;
   static constexpr int kUntouched = -1;
-  // Two balls on either side of a flat wall touch to the last bit: more than that is asked for.
+  // Two inscribed balls on either side of a flat wall just touch, up to rounding. So points are
+  // joined only if their balls overlap by more than that.
   static constexpr double kOverlap = 1.0 + 1e-6;
   using Brick = std::array<int, kBrick * kBrick * kBrick>;
 
@@ -224,7 +225,8 @@ class GridSearch {
     return (*slots_[b])[static_cast<std::size_t>(in.x() + kBrick * (in.y() + kBrick * in.z()))];
   }
 
-  // Cheapest first; of equal costs the point that was touched first, so that ties are settled.
+  // Cheapest first; among equals the node that was made first, so that the order is always the
+  // same.
   using Entry = std::pair<double, int>;
 
   const NearestWall& wall_;

@@ -1,6 +1,6 @@
 #pragma once
-/// Exact distance to a surface, fast in the middle of a vessel, where a whole ring of the wall is
-/// about as near: there CGAL's tree takes ten times as long.
+/// Exact distance to a surface. It is fast in the middle of a vessel, where a whole ring of the
+/// wall is almost equally near; CGAL's tree is slow there (MEASUREMENTS.md).
 #include <array>
 #include <vector>
 
@@ -12,7 +12,7 @@ namespace wireplan::preprocess {
 struct Nearest {
   Vec3 foot = Vec3::Zero();  //                                                          [mm]
   double distance = 0.0;     //                                                          [mm]
-  int triangle = 0;          // of the tree's, for a later search from here
+  int triangle = 0;          // number within the tree, for a later search that starts here
 };
 
 /// A tree of boxes over the triangles.
@@ -22,7 +22,7 @@ class NearestWall {
 
   Nearest find(const Vec3& p) const { return find(p, {}); }
 
-  /// The same answer, sooner: from the answer for a point close by.
+  /// The same answer, found sooner if `near` is the answer for a point close by.
   Nearest find(const Vec3& p, const Nearest& near) const;
 
  private:

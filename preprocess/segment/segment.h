@@ -11,15 +11,17 @@
 namespace wireplan::preprocess {
 
 struct SegmentOptions {
-  /// Band of contrast-filled lumen, inclusive, lower < upper; both or none. None: chosen from what
-  /// the volume holds at the seeds and the target, which may then lie 2.5 mm beside the lumen. [HU]
+  /// Band of contrast-filled lumen, inclusive, lower < upper. Give both or neither. Without them
+  /// the band is chosen from the volume at the seeds and the target, and these points may lie up to
+  /// 2.5 mm beside the lumen.                                                              [HU]
   std::optional<double> lower_hu = {}, upper_hu = {};
   std::vector<Vec3> seeds = {};     // inside the lumen; at least one                       [mm]
   std::optional<Vec3> target = {};  // to be in one piece with the first seed               [mm]
-  /// Gaussian sigma before the band is applied; none: 0 with a band given, chosen with it  [mm]
+  /// Gaussian sigma before the band is applied. Without it: 0 where the band is given, else chosen
+  /// with the band.                                                                        [mm]
   std::optional<double> smoothing_mm = {};
-  /// Contacts with other bright things thinner than twice this are cut, and so are arteries thinner
-  /// than that; none: as above                                                               [mm]
+  /// Contacts with other bright things are cut where they are thinner than twice this, and so are
+  /// arteries. Without it: as smoothing_mm.                                                [mm]
   std::optional<double> neck_opening_mm = {};
 };
 
@@ -29,7 +31,7 @@ struct SegmentStatistics {
   Band band;                         // that was used
   double volume_mm3 = 0.0;
   double mean_hu = 0.0;                 // of the unsmoothed image inside the mask             [HU]
-  double removed_by_opening_mm3 = 0.0;  // much more than the vessel itself where a leak was cut
+  double removed_by_opening_mm3 = 0.0;  // if it is much more than the vessel, a leak was cut
   double bright_boundary = 0.0;         // share of the surface that lies against bone or calcium
   bool touches_border = false;          // of the volume: the vessel is cut there
   LeakSearch search;                    // the way from seed to target, and the leaks cut
@@ -40,14 +42,18 @@ struct Segmentation {
   SegmentStatistics statistics;
 };
 
-/// Smooth, take the band, keep what is connected to the seeds through voxel faces, cut thin necks
-/// (prototypes A), add the rim down to half of the contrast where the band was chosen, cut leaks
-/// (segment_leak.h), fill cavities closed in all directions (calcium, noise). Calcium on the wall
-/// stays out: the wire cannot pass there. Works in the part of the volume that the vessel needs;
-/// the answer does not depend on that. Throws `Error` when a seed lies outside the volume, outside
-/// the band (with the HU found there), or in a vessel that the opening removes; without contrast;
-/// when the target is not connected, with the nearest point reached; when what was found lies in
-/// a shell of bone.
+/// The steps:
+///   1. Smooth, and take the voxels in the band.
+///   2. Keep what is connected to the seeds through voxel faces.
+///   3. Cut thin necks (prototypes A).
+///   4. Where the band was chosen and not given, add the rim down to half of the contrast.
+///   5. Cut leaks (segment_leak.h).
+///   6. Fill cavities that are closed in all directions (calcium, noise). Calcium on the wall stays
+///      out: a wire cannot pass there.
+/// All this is done in the part of the volume that holds the vessel; the answer is that of the
+/// whole. Throws `Error` when a seed lies outside the volume, outside the band (with the HU found
+/// there) or in a vessel that step 3 removes; when there is no contrast; when the target is not
+/// connected (with the nearest point reached); and when what was found lies in a shell of bone.
 Segmentation segment(const Image& image, const SegmentOptions& options);
 
 /// True where the voxel nearest to the point [mm] is labelled; false outside the grid.

@@ -31,31 +31,34 @@ struct Band {
   std::vector<Vec3> way;      // voxels of the brightest way from seed to target; may be empty
 };
 
-/// Level: median in a ball of 1 mm (or one voxel) round the middle of the vessel. Noise: the less
-/// of two figures that both err upward, from second differences over tissue and lumen within 10 mm,
-/// to which edges add, and from the spread in the lumen within 4 mm, to which the wall adds. A
-/// point without contrast keeps its own level.
+/// Level: the median of the lumen within 4 mm of the vessel's middle; where that are too few
+/// voxels, of a ball of 1 mm (or one voxel) there. A point without contrast keeps the level at the
+/// point. Noise: the smaller of two estimates, since each can only be too large. One is from second
+/// differences within 10 mm, to which edges add; the other is the spread of the lumen within 4 mm,
+/// to which the wall adds.
 LumenSample sample_lumen(const Image& image, const Vec3& point);
 
-/// The band from the samples; those of seeds first. Surroundings count as 50 HU (soft tissue and
-/// blood without contrast have 20 to 70, references B5), the lumen as the brightest of the samples
-/// (in thin vessels the wall's share darkens it).
-/// - lower: half way; upper: 40 % of the contrast and three sigma above the lumen;
+/// The band from the samples; those of seeds come first. The surroundings count as 50 HU (soft
+/// tissue and blood without contrast have 20 to 70, references B5), the lumen as the brightest of
+/// the samples, since the wall darkens thin vessels. Contrast is the difference of the two.
+/// - lower: half way between them. upper: 40 % of the contrast and three sigma above the lumen.
 /// - smoothing: the least of 0, 0.4, 0.6 and 0.8 mm that brings the noise under 5 % of the
-/// contrast;
-/// - neck: half a millimetre, or as much as it takes to ask for the nearest neighbours as well: a
-///   vessel is three voxels wide at least, and rims of bone and of brighter veins are not;
-/// - connect: 75 % of the contrast. With `to_target` the way from the first sample to the last is
-///   looked for that nowhere needs less than it must, within 60 mm of both, but not below 30 %:
-///   along it way_hu is enough, so that a narrow place does not lower the bar for veins elsewhere.
-/// Throws `Error` with the measured HU where there is no contrast (below 150 HU) or where the
-/// noise is more than 35 % of it.
-/// `smoothing_mm` and `neck_mm` are used where they are given.
+///   contrast; 0.8 mm if none does.
+/// - neck: half a millimetre, but always so much that a voxel's nearest neighbours have to be lumen
+///   too. A vessel is at least three voxels wide; rims of bone and of brighter veins are not.
+/// - connect: 75 % of the contrast.
+/// - way: with `to_target`, the way from the first sample to the last, within 60 mm of both, whose
+///   darkest place is as bright as can be, and not below 30 % of the contrast. That place's value
+///   is way_hu, or connect_hu where that is less. It is enough along the way alone: a narrow place
+///   does not lower the bar for veins elsewhere.
+/// `smoothing_mm` and `neck_mm` are used where they are given. Throws `Error` with the measured HU
+/// where there is no contrast (below 150 HU) or where the noise is more than 35 % of it.
 Band choose_band(const Image& image, const std::vector<LumenSample>& samples, bool to_target,
                  std::optional<double> smoothing_mm, std::optional<double> neck_mm);
 
-/// Of the voxels within 2.5 mm of the point, the one that lies deepest in the band's lumen (all
-/// voxels of a ball of the neck's radius round it are bright enough); none where there is none.
+/// Of the voxels within 2.5 mm of the point that lie in the band's lumen with all of a ball of the
+/// neck's radius round them, the one whose ball is brightest at its darkest voxel. Empty where
+/// there is none.
 std::optional<Vec3> find_lumen_near(const Image& image, const Vec3& point, const Band& band);
 
 }  // namespace wireplan::preprocess

@@ -30,15 +30,17 @@ struct LeakSearch {
   std::vector<Leak> leaks;  // largest first
 };
 
-/// Cuts from `labels` (1 inside) what cannot be the artery of the seeds. Arteries taper: seen from
-/// the ways between the seeds, no branch grows wider than what it was entered through. Each voxel
-/// is compared with the widest way that leads to it from there (the largest least inscribed radius
-/// on the way); where its own inscribed radius is more than twice that and a millimetre, the way
-/// has passed a neck into a vein, an organ, the heart or a bone. The cut lies in the neck: both
-/// sides flood the mask from wide to narrow until they meet. Ways between seeds are trusted, so a
-/// seed beyond a real neck (a stenosis before an aneurysm) keeps what lies there.
+/// Cuts from `labels` (1 inside) what cannot be the artery of the seeds. Arteries taper: a branch
+/// is nowhere wider than where it was entered.
+///   1. The ways between the seeds are trusted.
+///   2. From these, the widest way to each voxel is found: the one whose narrowest place has the
+///      largest inscribed radius.
+///   3. A voxel whose own inscribed radius is more than twice that of this narrowest place, and a
+///      millimetre more, lies behind a neck: in a vein, an organ, the heart or a bone.
+///   4. The cut is made in the neck: both sides flood the mask from wide to narrow until they meet.
+/// A seed beyond a real neck (a stenosis before an aneurysm) keeps what lies there, by step 1.
 /// `seeds` are labelled voxels, `values` [HU] those of the grid, `upper` the end of the band. Seeds
-/// that no way joins each start their own vessel.
+/// that no way joins each start a vessel of their own.
 LeakSearch cut_leaks(const Grid& grid, const std::vector<float>& values, double upper,
                      const std::vector<std::size_t>& seeds, Labels& labels);
 

@@ -15,18 +15,20 @@ struct Opening {
   std::vector<int> triangles;   // of the cap, ascending
 };
 
-/// Finds caps by their shape alone: a flat patch of at least four triangles, roughly a disc (an
-/// ellipse up to 2.2 : 1, so oblique cuts count), with a tube behind it: the section of the vessel
-/// keeps its size for a radius, goes on for a diameter, and its side runs along the cap's normal.
-/// The rim may be rounded as smoothing leaves it; an end rounded to a dome is no opening, nor is a
-/// flat place on a vessel's side, nor a face of a body no deeper than it is wide. The lip of a
-/// rounded rim, steeper than 30 degrees, stays wall. Caps are ordered by their first triangle.
-/// Expects a closed, manifold surface with outward triangles.
+/// Finds caps by their shape alone. A cap is a flat patch of at least four triangles
+///   - that is roughly a disc: an ellipse up to 2.2 : 1, so that oblique cuts count;
+///   - with a tube behind it: the vessel's section keeps its size for a radius and goes on for a
+///     diameter, and its side runs along the cap's normal.
+/// So these are no openings: an end rounded to a dome, a flat place on a vessel's side, a face of a
+/// body no deeper than it is wide. The rim may be rounded as smoothing leaves it; its lip, steeper
+/// than 30 degrees, stays wall. Caps are ordered by their first triangle. Expects a closed,
+/// manifold surface with outward triangles.
 std::vector<Opening> find_openings(const Surface& surface);
 
-/// The opening that a wire, whose nodes (3, n) end with the tip [mm], has left through: at least
-/// 1 mm of it is beyond where it comes out of the cap, a disc of 1.5 radii, which covers oval ones.
-/// Looks at the last 40 mm of the wire.
+/// The opening through which a wire has left, if any. It has left if it crosses the cap's plane
+/// outward within 1.5 radii of the cap's centre (which covers oval caps), and 1 mm or more of wire
+/// lies beyond that crossing. The wire's nodes (3, n) end with the tip [mm]; its last 40 mm are
+/// looked at.
 std::optional<int> left_through(const std::vector<Opening>& openings,
                                 const Eigen::Ref<const Eigen::Matrix3Xd>& wire);
 

@@ -14,9 +14,9 @@ struct SurfaceOptions {
   double edge_length_mm = 1.0;  // of the remesh; shorter where a vessel is thin         [mm]
 };
 
-/// What a surface is, as measured. A sound surface: one piece, closed, manifold, normals outward,
-/// no degenerate triangle, no self-intersection; handles (Euler number 2 - 2g) are reported, not
-/// refused.
+/// What was measured of a surface. It is sound if it is one piece, closed and manifold, with
+/// normals outward, without degenerate triangles and self-intersections. Handles (g of them make
+/// the Euler number 2 - 2g) are reported, not refused.
 struct SurfaceCheck {
   int vertices = 0, triangles = 0, pieces = 0;  // vertices that a triangle uses
   int open_edges = 0;                           // of one triangle
@@ -35,10 +35,10 @@ struct SurfaceCheck {
   double min_angle_deg = 0.0, mean_edge_mm = 0.0, max_edge_mm = 0.0;
 };
 
-/// Isosurface of the mask at 1/2, smoothed with a volume-keeping windowed sinc, remeshed to the
-/// edge length, largest piece (cavities inside it are filled). Where the mask meets the border of
-/// its grid the surface is capped there. Sound but for handles; throws `Error` for an empty mask or
-/// where no sound surface is found.
+/// Isosurface of the mask at 1/2, smoothed by a windowed sinc that keeps the volume, and remeshed
+/// to the edge length. The largest piece is kept, cavities inside it are filled, and it is capped
+/// where the mask meets the border of its grid. The surface is sound. Throws `Error` for an empty
+/// mask or where no sound surface is found.
 Surface surface_from_mask(const Mask& mask, const SurfaceOptions& options);
 
 /// The same, then fitted to the image before the remesh: its edge lies where the grey value passes
@@ -47,18 +47,19 @@ Surface surface_from_mask(const Mask& mask, const SurfaceOptions& options);
 Surface surface_from_image(const Image& image, const Mask& mask, const SurfaceOptions& options,
                            FitStatistics* statistics = nullptr);
 
-/// Reads the triangles of an STL, PLY, OBJ or VTP file as they stand there, but for points merged
-/// that are equal to 1e-7 of the size, and polygons cut into triangles. `unit` is "mm", "cm" or
-/// "m"; `frame` is "LPS" or "RAS" (x, y flipped). Throws `Error` where the file is missing or no
-/// surface.
+/// Reads the triangles of an STL, PLY, OBJ or VTP file as they stand there, with two changes:
+/// points that are equal to 1e-7 of the size are merged, and polygons are cut into triangles.
+/// `unit` is "mm", "cm" or "m"; `frame` is "LPS" or "RAS" (x, y flipped). Throws `Error` where the
+/// file is missing or no surface.
 Surface read_triangles(const std::filesystem::path& path, const std::string& unit,
                        const std::string& frame);
 
 /// Remeshes isotropically to the edge length, or to half of the local inscribed radius where that
-/// is less, so that thin branches and their caps keep their shape. Checks for self-intersections
-/// the remesh brought in and retries finer where they are (prototypes B). A surface that already
-/// has such edges (mean within 10 %, none over twice as long) is left as it is. Expects a sound
-/// surface; throws `Error` where none of the tries gives one.
+/// is less, so that thin branches and their caps keep their shape. Where the remesh makes triangles
+/// cut each other, it is tried again with shorter edges, first there and then everywhere
+/// (prototypes B). A surface that already has such edges (mean within 10 %, none over twice as
+/// long) is left as it is. Expects a sound surface; throws `Error` where none of the tries gives
+/// one.
 Surface remesh(const Surface& surface, double edge_length_mm);
 
 SurfaceCheck check_surface(const Surface& surface);
@@ -81,7 +82,8 @@ struct Piece {
   bool turned = false;  // it faced inward, and was turned as a whole
 };
 
-/// The one of the largest volume first. Of an open piece the volume is that up to its first vertex.
+/// The piece of the largest volume comes first. An open piece counts with the volume that it
+/// encloses together with its first vertex.
 std::vector<Piece> pieces_of(const Surface& surface);
 
 /// The first of these.

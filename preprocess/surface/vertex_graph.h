@@ -47,8 +47,9 @@ inline Eigen::Matrix3Xd vertex_normals(const Surface& surface) {
   return normals;
 }
 
-/// Values at vertices averaged over neighbours, `passes` times; each pass keeps half of a vertex's
-/// own. Where a vertex's weight is 0 it takes what its neighbours have.
+/// Averages the values at vertices over their neighbours, `passes` times. In each pass half of the
+/// new value is the vertex's own. Values count by their weights: a vertex of weight 0 takes what
+/// its neighbours have.
 inline void average(const Neighbours& neighbours, int passes, Eigen::VectorXd& values,
                     Eigen::VectorXd& weights) {
   const Eigen::Index n = values.size();
@@ -81,7 +82,7 @@ inline double mean_edge(const Surface& surface) {
   return sum / static_cast<double>(surface.triangles.cols());
 }
 
-/// Averaging passes that reach about `distance`: one spreads by edge / sqrt(2).
+/// How many passes of average() spread values by about `distance`: one spreads by edge / sqrt(2).
 inline int passes_for(double distance, double edge) {
   return std::clamp(static_cast<int>(std::lround(2.0 * std::pow(distance / edge, 2))), 1, 200);
 }

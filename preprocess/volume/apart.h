@@ -1,6 +1,6 @@
 #pragma once
-/// Work in a process of its own, for a library that ends the process it runs in where a file is not
-/// what it expects.
+/// Work in a process of its own: for a library that ends its process when a file is not what it
+/// expects.
 #include <cstddef>
 #include <functional>
 #include <string>
@@ -12,11 +12,13 @@ using Receive = std::function<void(void* bytes, std::size_t count)>;
 /// Says which file the work is at, for the error if it ends there.
 using At = std::function<void(const std::string& place)>;
 
-/// Runs `work` in a child of this process and `take` here, which receives what the other sends. An
-/// Error of the work is thrown here; where the child ends in the midst of it, or neither sends nor
-/// comes to another place for `patience` seconds, an Error of the place where it was and `ended`.
-/// What it prints is dropped. The child begins as a copy of this process with this thread alone, so
-/// the work starts no threads and waits for none.
+/// Runs `work` in a child of this process, and `take` here, which receives what the child sends.
+/// What the child prints is dropped. Throws `Error`
+///   - where the work throws one: the same;
+///   - where the child ends before the work is done, or neither sends anything nor names another
+///     place for `patience` seconds: one that names the last place, followed by `ended`.
+/// The child starts as a copy of this process that has the calling thread alone, so `work` must not
+/// start threads or wait for any.
 void run_apart(const std::function<void(const Send&, const At&)>& work,
                const std::function<void(const Receive&)>& take, const std::string& ended,
                unsigned patience = 300);

@@ -21,11 +21,12 @@ struct ExtrudedWall {
   WallStatistics statistics;
 };
 
-/// One tetrahedron per triangle: apex = centroid + height * outward normal. The height is the
-/// thickness, or half of the free distance outward where another part of the surface is nearer
-/// (prototypes D), so that no apex comes to lie inside a lumen. It is halved on until the apex
-/// keeps half of its height from all other wall, but not below 5 % of the thickness for that, nor
-/// for a neighbour across a crease: there the apex may come to lie that little beyond it, where a
+/// One tetrahedron per triangle: apex = centroid + height * outward normal. The height is
+///   1. the thickness, or half of the free way outward where that is less, so that no apex lies
+///      inside another lumen (prototypes D);
+///   2. halved until the apex is at least half of its height away from all of the surface.
+/// Step 2 stops at 5 % of the thickness. A neighbouring triangle across a crease does not reduce
+/// the height of step 1 below 5 % either: the apex may then lie a little beyond that neighbour. A
 /// height of 1 % would make one element a hundred times as stiff.
 /// Expects a closed surface with outward normals. The same at any thread count.
 ExtrudedWall extrude_wall(const Surface& surface, const WallOptions& options);
