@@ -15,8 +15,8 @@ Judgement judge(const Study& study, const Plan& plan, const Limits& limits, cons
 /// wires that never entered are left out.
 std::vector<int> best_of_each_wire(const Study& study, const Plan& plan, const Ranking& ranking);
 
-/// Trials whose insertion is worth looking at: the best `plans` by rank, then of each wire without
-/// one among them its best plan, or the attempt that ended nearest to the target.
+/// Trials whose insertion is worth looking at: the best kPlansPlayed plans by rank, then, for each
+/// wire that has none among them, its best plan or the attempt that ended nearest to the target.
 std::vector<int> choose_played(const Study& study, const Plan& plan, const Ranking& ranking);
 
 }  // namespace wireplan::plan

@@ -1,7 +1,11 @@
 #pragma once
-/// Everything that a case simulates, in the order in which one thing decides the next: straight
-/// pushes in rounds, manoeuvres where those do not do, the errors of what may be the best, repeats
-/// of the best under disturbances. What it is worth by the case's limits and weights is judge.h.
+/// Everything that a case simulates, each step deciding what the next one runs:
+///   1. straight pushes, in rounds;
+///   2. manoeuvres, where no straight push reaches the target and holds;
+///   3. refinement, which finds the numerical error of what may be best;
+///   4. repeats of the best under disturbances, and refinement again if that puts others first;
+///   5. attempts: for wires without a plan, the closest trial in full, to be looked at.
+/// What the runs are worth by the case's limits and weights is found in judge.h.
 #include <optional>
 #include <vector>
 
@@ -17,7 +21,8 @@ enum class Manoeuvring {
   kAlways,
 };
 
-/// The best so many plans can be played, and the closest attempt of each wire without a plan.
+/// A report plays the insertions of this many best plans, and of the closest attempt of each wire
+/// without a plan.
 inline constexpr std::size_t kPlansPlayed = 20;
 
 struct PlanOptions {
@@ -25,8 +30,8 @@ struct PlanOptions {
 
   bool exhaustive = false;  // no scouts: all in full
   Manoeuvring manoeuvres = Manoeuvring::kWhenNeeded;
-  RobustnessOptions robustness = {};  // unknowns that no trial can take are cut to what one can
-  Until until = Until::kEnd;          // what comes after is left out
+  RobustnessOptions robustness = {};  // ranges are cut to what trials can be run with
+  Until until = Until::kEnd;          // the last step that is done
   BatchOptions batch = {};
 };
 
@@ -47,7 +52,7 @@ struct Plan {
   RobustnessOptions robustness;  // as used
   std::vector<Disturbance> disturbances;
   std::vector<RepeatedTrials> repeated;
-  std::vector<int> attempts;  // trials of wires without a plan, in full for their shapes on the way
+  std::vector<int> attempts;  // trials of wires without a plan, run in full to have their shapes
 
   /// What this call did not find in the log; timing.
   Spent scouts, probes, full, repeats;

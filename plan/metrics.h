@@ -77,10 +77,10 @@ inline constexpr std::array kMetricFields = {
 Metrics compute_metrics(const simulate::TrialResult& trial, const Study& study,
                         const Centerline& path);
 
-/// The part that the pushes alone tell: insertion, forces, curvature, penetration, displacement,
-/// work, residual and iterations. The impulse is the integral of the total contact force over the
-/// way of the wire, in and out, by the trapezoidal rule, from rest (no force at insertion 0); the
-/// mean is the impulse over that way.
+/// The metrics that follow from the pushes alone: insertion, forces, curvature, penetration,
+/// displacement, work, residual and iterations. The impulse is the integral of the total contact
+/// force over the wire's way, in and out, by the trapezoidal rule; it starts with no force at
+/// insertion 0. The mean force is the impulse divided by that way.
 Metrics compute_push_metrics(const std::vector<simulate::Push>& pushes);
 
 /// What planning and judging keep of a trial.

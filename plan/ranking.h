@@ -8,9 +8,9 @@
 
 namespace wireplan::plan {
 
-/// Beyond these a trial is excluded; beyond `tip_force_warn`, where the wall moved beyond linear
-/// theory (metrics.h), or where the tip's numerical error is as large as what it is inside the
-/// target, its sentence warns.
+/// A trial beyond one of the `_fail` limits is excluded. A plan's sentence warns where its tip
+/// force is beyond `tip_force_warn`, where the wall moved beyond linear theory (metrics.h), and
+/// where the tip is so close to the target's border that its numerical error may put it outside.
 struct Limits {
   double tip_force_warn = 0.3;    // references B3                                          [N]
   double tip_force_fail = 1.5;    // references B3                                          [N]
@@ -31,7 +31,8 @@ struct Weights {
 ///   peak_force  f / (f + s), f = peak_contact_force                 C1, contact force, max
 ///   mean_force  f / (f + s), f = mean_contact_force                 C1, contact force, mean
 ///   margin      peak_tip_force / Limits::tip_force_fail: what is used up of it   C1, tip force
-/// f / (f + s) is 1/2 at the scale and never full, as side-wall forces have no agreed limit.
+/// f / (f + s) is 1/2 at f = s and never reaches 1, since no limit of side-wall forces is agreed
+/// on.
 struct Score {
   double total = 0.0;  // smaller is better
   double reach = 0.0, peak_force = 0.0, mean_force = 0.0, margin = 0.0;
@@ -56,8 +57,8 @@ NumericalError assumed_error(const Metrics& metrics);
 Score compute_score(const Metrics& metrics, const simulate::Goal& goal, const Limits& limits,
                     const Weights& weights);
 
-/// Largest change of the total score that the error allows, to first order: the components' changes
-/// added without regard to sign, as one cause moves all forces alike.
+/// Largest change of the total score that the error allows, to first order. The components' changes
+/// are added without regard to sign, since one cause may move all forces alike.
 double compute_score_error(const Metrics& metrics, const NumericalError& error,
                            const simulate::Goal& goal, const Limits& limits,
                            const Weights& weights);
@@ -119,16 +120,21 @@ struct Findings {
   std::vector<bool> scouted = {};  // per trial: its numbers are a scout's (search.h); empty: none
 };
 
-/// Plans are ordered by their mean score over the repeats, in which a failure costs 1, and those
-/// with fewer repeats than others, or none, by what that is expected to be: the mean over those
-/// they have, or their score, and what the further disturbances typically add, the median over the
-/// plans that have them; equals by index of the candidate. Two plans are tied if their scores
-/// differ by no more than both errors, or if the central 90 % of their paired differences over the
-/// repeats that both have, widened by both errors, holds 0: then the unknowns decide which is
-/// better. Where one has no repeats, they are tied if their scores differ by no more than both
-/// errors and what the unknowns typically move repeated plans against each other, the median over
-/// their pairs. A trial that was only scouted is no plan. Expects one trial per candidate, and
-/// positive limits.
+/// Orders the plans, and says which of them are tied.
+///
+/// Order: by the mean score over all repeats, in which a failure costs 1; equals by index of the
+/// candidate. A plan with fewer repeats than others, or none, stands by what this mean is expected
+/// to be: the mean over the repeats it has (its own score without any) plus what the repeats that
+/// it lacks typically add, which is the median over the plans that have them.
+///
+/// Ties: two plans are tied
+///   - if their scores differ by no more than the sum of their errors; or
+///   - if both have repeats, and the central 90 % of their paired differences over the repeats that
+///     both have, widened by both errors, holds 0: then the unknowns decide which is better; or
+///   - if one has no repeats, and their scores differ by no more than both errors and what the
+///     unknowns typically shift two repeated plans against each other (the median over pairs).
+///
+/// A trial that was only scouted is no plan. Expects one trial per candidate, and positive limits.
 Ranking rank(const Study& study, const std::vector<Candidate>& candidates,
              const std::vector<Measured>& trials, const Limits& limits, const Weights& weights,
              const Findings& findings = {});

@@ -1,7 +1,7 @@
 #pragma once
-/// How far the best plans may be from the truth: each is run again with elements twice and half as
-/// long, and contact points as far apart, which also gives the error against run time of the case
-/// at hand (design section 8).
+/// The numerical error of the best plans: each is run again with elements and contact spacing twice
+/// and half as long. This also gives the error against run time of the case at hand (design section
+/// 8).
 #include <array>
 #include <optional>
 #include <string>
@@ -12,8 +12,8 @@
 namespace wireplan::plan {
 
 struct RefineOptions {
-  int plans = 3;  // the best so many are refined, ...
-  int most = 8;   // ... and then what cannot be told from the first, up to so many in all
+  int plans = 3;  // this many of the best are refined, ...
+  int most = 8;   // ... and then plans that are tied with the first, up to this many in all
 };
 
 /// One run of a plan: one row of the report's error-against-time table.
@@ -39,7 +39,7 @@ struct RefinedRun {
   Measured trial;
 };
 
-/// Each plan is run with elements of so many times the study's.
+/// Each plan is run with elements of these multiples of the study's length.
 inline constexpr std::array kRefineFactors = {2.0, 1.0, 0.5};
 
 /// The study of one such run: elements and contact points `factor` times as far apart, and pushed
@@ -47,26 +47,26 @@ inline constexpr std::array kRefineFactors = {2.0, 1.0, 0.5};
 /// insertion are compared.
 Study refined_study(const Study& study, double factor, double insertion);
 
-/// The plans to refine next: of the first `options.plans` those that are not in `known` yet, and,
-/// where `options.most` allows, those tied with the first plan, whose error may change which is
-/// first. Trials, best first. With their errors known the plans are ranked and this is asked again,
-/// until it is empty: then no error that is still assumed touches the first plan.
+/// The plans to refine next, as trials, best first: those of the first `options.plans` that are not
+/// in `known` yet, and those tied with the first plan, since their error may change which is first,
+/// up to `options.most` in all. Once their errors are known the plans are ranked again and this is
+/// asked again, until it is empty. Then, unless `options.most` was reached, no plan with an assumed
+/// error is tied with the first.
 std::vector<int> choose_plans_to_refine(const Ranking& ranking,
                                         const std::vector<Refinement>& known,
                                         const RefineOptions& options);
 
 /// Richardson's estimate from three runs to the same `insertion`, with elements of 2h, h and h/2.
-/// With d the change from one run to the next finer one, the longer elements' error is
-/// d 2^p / (2^p - 1), for p = 2: 4/3 d, and the shorter elements' is 1 / (2^p - 1). The observed
-/// order log2(d_coarse / d_fine) is that of the positions; p is the observed order kept within
-/// [0.5, 2], since the rod is of second order at best (design section 7), and 2 where there is
-/// none. Positions are compared by shape_distance, forces by their size.
+/// With d the change from one run to the next finer one, the error of the longer elements is
+/// d 2^p / (2^p - 1), which is 4/3 d for p = 2, and that of the shorter ones d / (2^p - 1). The
+/// observed order is log2(d_coarse / d_fine) of the positions. p is the observed order kept within
+/// [0.5, 2], since the rod is of second order at best (design section 7), and 2 where there is no
+/// observed order. Positions are compared by shape_distance, forces by their size.
 Refinement estimate_error(int trial, double insertion, const std::vector<RefinedRun>& runs);
 
 /// Largest distance between two wires at equal arc length from their tips, taken at the nodes of
-/// the first as far as the second reaches [mm]. Nodes are (3, k), proximal to distal. At the nodes
-/// of the longer elements, those of half the length have a node too, so that the comparison adds no
-/// chord error.
+/// `coarse` as far as `fine` reaches [mm]. Nodes are (3, k), proximal to distal. Elements of half
+/// the length have a node at each of these places too, so the comparison adds no chord error.
 double shape_distance(const Eigen::Matrix3Xd& coarse, const Eigen::Matrix3Xd& fine);
 
 /// What rank() takes: the errors found, in the slots of their trials.

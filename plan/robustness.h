@@ -1,6 +1,6 @@
 #pragma once
-/// What plans are worth when patient and hand are not quite as assumed: each is run again under
-/// disturbances that are the same for all plans, so that plans are compared and not luck.
+/// What plans are worth when patient and hand are not quite as assumed. The best are run again
+/// under disturbances, the same ones for all plans, so that none is better by luck.
 #include <Eigen/Core>
 #include <cstdint>
 #include <optional>
@@ -11,8 +11,9 @@
 
 namespace wireplan::plan {
 
-/// How far the values may be from the assumed ones. Factors are spread evenly in their logarithm
-/// between the bounds, directions and shifts evenly over a disc, the lumen evenly over both signs.
+/// How far the values may be from the assumed ones. Friction and wall are factors, spread evenly in
+/// their logarithm between the bounds. Angle and entry are radii of a disc over which the
+/// introducer's tilt and shift are spread evenly; the lumen's offset is spread evenly over +-lumen.
 struct Unknowns {
   double friction_low = 0.5, friction_high = 2.0;  // assumed: of one coating, references A3
   /// The femoral artery stiffens 2.4 times from under 35 to over 60 years (references B1).
@@ -24,14 +25,15 @@ struct Unknowns {
 
 struct RobustnessOptions {
   int repeats = 16;        // of each of the best plans; 0: none
-  int plans = 5;           // the best so many are repeated, and the best of each wire
+  int plans = 5;           // this many of the best are repeated, and the best of each wire
   std::uint64_t seed = 1;  // of the disturbances
   Unknowns unknowns = {};
 };
 
-/// One patient and hand as they may be. `tilt` turns the introducer about, and `shift` moves its
-/// point along, the two directions across the vessel's tangent at the access that azimuth 0 and 90
-/// deg name. A positive `inward` brings the wall nearer to the middle of the lumen.
+/// One patient and hand as they may be. `tilt` and `shift` have two components, for the directions
+/// across the vessel's tangent at the access that azimuth 0 and 90 deg name: the introducer is
+/// turned toward them by `tilt`, and its point is moved along them by `shift`. A positive `inward`
+/// brings the wall nearer to the middle of the lumen.
 struct Disturbance {
   double friction_factor = 1.0, wall_factor = 1.0;
   Eigen::Vector2d tilt = Eigen::Vector2d::Zero();   //                                     [rad]
@@ -44,33 +46,35 @@ struct Disturbance {
 /// Conover, Technometrics 1979). The same on every machine.
 std::vector<Disturbance> draw_disturbances(const RobustnessOptions& options);
 
-/// Repeats are found to so many times the study's residual: what that moves is far below what the
-/// disturbances do (MEASUREMENTS.md).
+/// Repeats are solved to this many times the study's residual. What that changes is far below what
+/// the disturbances do (MEASUREMENTS.md).
 inline constexpr double kRepeatTolerance = 10.0;
 
 /// The trial of a candidate under a disturbance; no shapes on the way, no forces per triangle.
 /// Never throws, as run_candidate does not.
 ///
-/// A wall that is f times as stiff is had from the wall as it is: equilibrium depends on the ratio
-/// of wire and wall, so EI, EA, GJ and the tolerance are divided by f, and all forces and works
-/// multiplied by it. Exact but for the contact law, whose stiffness goes with the wall's. A lumen
-/// that is narrower by d is the lumen as it is with a contact radius larger by d.
+/// The vessel model serves all disturbances as it is. A wall that is f times as stiff: equilibrium
+/// depends on the ratio of wire and wall alone, so EI, EA, GJ and the tolerance are divided by f
+/// instead, and all forces and works are multiplied by f afterwards. This is exact but for the
+/// contact law, which is then f times as stiff too. A lumen that is narrower by d: the wire's
+/// contact radius is larger by d instead.
 simulate::TrialResult run_disturbed(const Study& study, const Candidate& candidate,
                                     const simulate::VesselModel& vessel,
                                     const Disturbance& disturbance);
 
-/// The largest inward and outward offset of the wall, and the largest shift of the entry, that the
-/// trials can take: 0.8 of the thinnest wire's radius, and half the way from access to wall as far
-/// as the field follows the wall [mm].
+/// The largest offsets that trials can be run with [mm]. Of the wall, in or out: 0.8 of the
+/// thinnest wire's radius. Of the entry: half the distance from the access to the wall, which the
+/// field gives up to its band.
 double largest_lumen_offset(const Study& study);
 double largest_entry_shift(const Study& study, const simulate::VesselModel& vessel);
 
-/// What is kept of a repeat: how it ended and what it cost, by the rules of the ranking.
+/// What is kept of a repeat: whether it is a plan by the rules of the ranking, its score, its
+/// forces.
 Repeat judge_repeat(const Measured& trial, const Study& study, const Limits& limits,
                     const Weights& weights);
 
-/// The plans to repeat next: of the first `plans` and of the first of each wire, those that have
-/// fewer than `count` repeats. Trials, best first.
+/// The plans to repeat next, as trials, best first: the first `plans` of the ranking and the best
+/// of each wire, without those that have `count` repeats already.
 std::vector<int> choose_plans_to_repeat(const Ranking& ranking,
                                         const std::vector<RepeatedPlan>& repeated, int plans,
                                         int count);
@@ -87,11 +91,15 @@ struct Sensitivity {
   std::string reason;               // why there are no shares; else empty
 };
 
-/// What moves the order is how far each plan's score is from the mean of all in the same repeat.
-/// Its ranks over the repeats are regressed on those of the unknowns (standardised rank regression:
-/// Helton and Davis, Reliab. Eng. Syst. Saf. 2003); an unknown's share is its squared coefficients,
-/// of both directions where it has two, summed over plans by how much each moves. Plans with fewer
-/// repeats than there are disturbances are left out.
+/// Finds the shares by a standardised rank regression (Helton and Davis, Reliab. Eng. Syst. Saf.
+/// 2003):
+///   1. What moves the order is how far each plan's score is from the mean of all plans in the same
+///      repeat.
+///   2. For each plan the ranks of these differences over the repeats are regressed on the
+///      unknowns' ranks.
+///   3. An unknown's share is the sum of its squared coefficients (of both directions, where it has
+///      two) over all plans, each weighted by how much its differences vary.
+/// Plans with fewer repeats than there are disturbances are left out.
 Sensitivity find_sensitivity(const std::vector<Disturbance>& disturbances,
                              const std::vector<RepeatedPlan>& plans);
 

@@ -1,7 +1,7 @@
 #pragma once
-/// The straight pushes of a case in rounds: first the scouts of all candidates, then probes and
-/// full runs of those that may be among the best, by what is known of the rounds before (search.h);
-/// or all in full at once.
+/// The straight pushes of a case, in rounds. The first round scouts all candidates; each later one
+/// probes, or runs in full, those that the rounds before say may be among the best (search.h).
+/// Where no search is needed, one round runs all in full.
 #include <optional>
 #include <vector>
 
@@ -10,9 +10,9 @@
 
 namespace wireplan::plan {
 
-/// By what the case's own trials are judged while it is decided which of them to run. Never the
-/// case's limits and weights: those judge what was simulated, so that a changed one simulates
-/// nothing (judge.h).
+/// The limits and weights by which it is decided what to run: always the defaults, never the
+/// case's. The case's own are applied to what was simulated (judge.h), so that changing them
+/// simulates nothing.
 struct Yardstick {
   Limits limits = {};
   Weights weights = {};

@@ -5,8 +5,8 @@
 
 namespace wireplan::plan {
 
-/// Median and the bounds of the central 90 %, between neighbours linearly (type 7 of Hyndman and
-/// Fan, Am. Stat. 1996).
+/// Median and the bounds of the central 90 %, interpolated linearly between sorted values (type 7
+/// of Hyndman and Fan, Am. Stat. 1996).
 struct Spread {
   double low = 0.0, median = 0.0, high = 0.0;
 };

@@ -1,7 +1,7 @@
 #pragma once
-/// What planning simulates, one run at a time, and where it is kept: planning asks the log before
-/// it simulates and tells it afterwards, so that it goes on where it was stopped and what is known
-/// is never computed again. The log is an interface: files in pipeline, a map in the tests.
+/// What planning simulates, one run at a time, and where it is kept. Planning asks the log for each
+/// run, and simulates and keeps it only if it is not there. So a stopped plan goes on where it was,
+/// and nothing is computed twice. The log is an interface: files in pipeline, a map in the tests.
 #include <functional>
 #include <optional>
 #include <vector>
@@ -19,7 +19,7 @@ enum class Level {
 };
 const char* level_name(Level level);  // "scout", "probe", "full"
 
-/// A plan again with other elements, to an insertion (refine.h).
+/// The run of a plan with other elements, up to the insertion at which the plan ended (refine.h).
 struct OtherElements {
   double factor = 1.0;     // of the study's length
   double insertion = 0.0;  //                                                              [mm]
@@ -32,9 +32,9 @@ struct Run {
   Candidate candidate = {};
   std::optional<Disturbance> disturbance = {};
   std::optional<OtherElements> elements = {};
-  bool shapes = false;  // those on the way are asked for: a trial kept without is none
+  bool shapes = false;  // shapes on the way are needed: a trial kept without them does not count
 
-  /// The trial of a candidate, and not one that tells how far it can be trusted.
+  /// Whether it is the trial of a candidate itself, and neither a repeat nor a refinement of it.
   bool is_plain() const { return !disturbance && !elements; }
 };
 
@@ -46,23 +46,23 @@ struct Scripts {
   long branches = 0;  // pushes that were tried
 };
 
-/// Called from one thread at a time, but for keep(), which is called by any.
+/// keep() is called from many threads at once, everything else from one at a time.
 class TrialLog {
  public:
   virtual ~TrialLog() = default;
 
   virtual std::optional<Measured> find(const Run& run) = 0;
-  /// `trial.shapes` is empty where nobody will ask for them.
+  /// `trial.shapes` is empty for runs whose shapes on the way nobody will ask for.
   virtual void keep(const Run& run, const simulate::TrialResult& trial,
                     const Measured& measured) = 0;
 
-  /// Those of the study, once they were searched for.
+  /// The study's scripts; empty as long as they were not searched for.
   virtual std::optional<Scripts> find_scripts() = 0;
   virtual void keep_scripts(const Scripts& scripts) = 0;
 };
 
-/// The vessel as the runs need it: what is costly is made where a run first asks for it. The use of
-/// either model ends before the other is asked for.
+/// The vessel as the runs need it. The models are costly, so each is made when a run first asks for
+/// it. A reference to one model is no longer used once the other is asked for.
 struct PlanVessel {
   const Centerline& path;  // access to target
   bool yields = false;
@@ -72,15 +72,16 @@ struct PlanVessel {
 /// The study at a level.
 Study study_at(const Study& study, Level level);
 
-/// What was not in the log.
+/// What simulating took of the runs that were not in the log.
 struct Spent {
   int runs = 0;
   double cpu_seconds = 0.0;  // timing, so never twice the same                             [s]
 };
 
-/// Finds each run in the log, or simulates it, many at once, and keeps it; adds to `spent` what
-/// that took. In order of `runs`, which are of one level. Progress counts all of them, those found
-/// first. Throws Interrupted; what was finished is kept by then.
+/// Finds each run in the log; simulates and keeps those that are not there, many at once, and adds
+/// to `spent` what that took. The results are in the order of `runs`, which must be of one level.
+/// Progress counts all runs, starting with those found. Throws Interrupted when cancelled; what was
+/// finished is kept by then.
 std::vector<Measured> find_or_run(const Study& study, const PlanVessel& vessel,
                                   const std::vector<Run>& runs, TrialLog& log,
                                   const BatchOptions& batch, Spent& spent);
