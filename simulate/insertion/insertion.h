@@ -18,8 +18,8 @@ struct InsertionOptions {
   double length = 250.0;        // most wire to bring into the body                      [mm]
   double step = 1.0;            // of one push                                           [mm]
   double element_length = 1.0;  //                                                       [mm]
-  /// If not empty: of each section of the wire, tip first, shortened so that whole elements fill
-  /// it; 0: element_length [mm].
+  /// If not empty: the element length of each section of the wire, tip first; 0 stands for
+  /// element_length. It is shortened so that whole elements fill the section [mm].
   std::vector<double> section_element_length = {};
   double contact_spacing = 1.0;      // see ContactOptions::spacing                      [mm]
   double friction = 0.0;             // Coulomb's coefficient
@@ -66,20 +66,21 @@ class Insertion {
   Insertion(const Wire& wire, const Introducer& introducer, const VesselModel& vessel,
             const InsertionOptions& options);
 
-  /// Pushes the wire in by `distance`, or pulls it back by -`distance` [mm], in parts that friction
-  /// can follow. A part that runs out of iterations is a jump: it is solved again from where it
-  /// got, up to six times. One that has no equilibrium is cut smaller. Empty when even the smallest
-  /// cut has none; the wire is then somewhere on the way: see take_back(). Expects wire that is
-  /// left to push, or in the body.
+  /// Pushes the wire in by `distance`, or pulls it back by -`distance` [mm], in parts that are
+  /// short enough for friction to follow. A part that runs out of iterations is taken for a jump:
+  /// the solve goes on from where it got, up to six times. A part that has no equilibrium is cut
+  /// smaller. Empty when even the smallest cut has none; the wire is then somewhere on the way, and
+  /// take_back() undoes the move. Expects that so much wire is left to push, or in the body to
+  /// pull.
   std::optional<Push> push(double distance);
 
   /// Turns the hub by `angle`, right-handed about the introducer's direction [rad], in the same
   /// way. A straight round wire does not feel it.
   std::optional<Push> turn(double angle);
 
-  /// The opening that the wire has left through, and the one that it was through when a part of the
-  /// last move found no equilibrium: it springs out further than the free space before an opening
-  /// goes.
+  /// The opening that the wire has left through; and the one through which it was when a part of
+  /// the last move found no equilibrium. A stiff wire may find none there, since it springs out
+  /// further than the free space in front of an opening reaches.
   std::optional<int> left_through() const;
   std::optional<int> slipped_out() const { return slipped_out_; }
 
@@ -96,8 +97,8 @@ class Insertion {
   std::vector<WireContact> contacts();
   std::vector<TriangleForce> peak_forces() const;  // over all moves so far, if mapped
 
-  /// Where the wire has turned back on itself, within a short length and more than at rest, so that
-  /// its bow leads and its tip is behind.
+  /// Where the wire has folded: within a short length it turns back on itself, more than at rest,
+  /// so that its bow leads and its tip is behind.
   std::optional<Vec3> find_fold() const;
   Vec3 most_bent() const;
 

@@ -66,12 +66,13 @@ class Trial {
   bool ended() const { return ended_; }
 
   double depth() const { return insertion_.depth(); }
-  /// So far; its final shape and contacts are those of the end, which finish() brings about.
+  /// What the trial gave so far. The final shape and contacts are filled in when it ends.
   const TrialResult& result() const { return result_; }
-  /// Ends the trial as one that missed, unless it has ended, and hands out the result.
+  /// Ends the trial, unless it has ended: as reached if the tip is in the goal, else as missed.
+  /// Hands out the result.
   TrialResult finish();
 
-  /// Takes an unfinished trial back to where it was, but for its peak forces.
+  /// save() marks where an unfinished trial is, restore() takes it back there; peak forces stay.
   struct Mark {
     Insertion::Snapshot insertion;
     std::size_t pushes = 0, shapes = 0, pushing_since = 0;

@@ -18,12 +18,12 @@ namespace wireplan::simulate {
 /// modulus or Poisson ratio are out of range.
 Eigen::SparseMatrix<double> wall_stiffness(const Surface& surface, const Wall& wall);
 
-/// The wall's stiffness, factored once per patient; what unit forces do to it is found when first
-/// asked for and kept. Shared by all trials and threads: every answer is the same whoever asks
-/// first, and reading takes no lock.
+/// The wall's stiffness, factored once per patient. The response to a unit force at a vertex is
+/// found when first asked for, and kept. Shared by all trials and threads: an answer does not
+/// depend on who asked first, and reading takes no lock.
 class WallCompliance {
  public:
-  /// Displacements below this part of those under the forces themselves count as none.
+  /// A displacement counts as 0 where it is below this part of that under the force itself.
   static constexpr double kKeptFraction = 1e-8;
 
   /// Throws Error as `wall_stiffness` does, and where the factorisation does not solve it.
@@ -32,19 +32,19 @@ class WallCompliance {
   WallCompliance(const WallCompliance&) = delete;
   WallCompliance& operator=(const WallCompliance&) = delete;
 
-  /// A force on a point of the surface acts on the vertices of its triangle and, so that the wall
-  /// is not softer at a vertex than between them, on those joined to them: half of a vertex's part
-  /// on itself, half on its neighbours. The motion of a point is the mean of theirs in the same
-  /// way.
+  /// How a force at a vertex is spread: half of it acts on the vertex, half on the vertices joined
+  /// to it by an edge. Without that the wall would be softer at a vertex than between vertices. A
+  /// force on a point within a triangle goes to the three vertices first, by the point's weights.
+  /// The motion of a point is the mean of the same vertices' motions with the same parts.
   struct Part {
     int vertex;
     double part;
   };
   std::vector<Part> spread(int vertex) const;
 
-  /// y = L^-1 f of a unit outward normal force on a point at a vertex, K = L L': half of the way to
-  /// the displacements, and all that their scalar products need. It is 0 but at ancestors of the
-  /// force's vertices in the elimination tree, and next to nothing at those far away, which are
+  /// y = L^-1 f for a unit outward normal force f at a vertex, where K = L L'. This is half of the
+  /// way to the displacements K^-1 f, and enough for `between`. y is 0 but at ancestors of the
+  /// force's vertices in the elimination tree; ancestors far away, where it is next to nothing, are
   /// left out.
   struct HalfResponse {
     std::vector<int> places;  // in the order of elimination, ascending
@@ -56,9 +56,9 @@ class WallCompliance {
   /// Expects a vertex with a triangle. The reference stays good as long as this object.
   const HalfResponse& half_response(int vertex) const;
 
-  /// Normal displacement of a point at a vertex, outward, under a unit outward normal force on a
-  /// point at another: c_ab = sum over spread(a) and spread(b) of n . (K^-1 n), n the vertices'
-  /// normals, = y_a . y_b [mm/N]. The same to the bit from a to b and back. 0 where it is less than
+  /// Outward normal displacement at one vertex under a unit outward normal force at another, both
+  /// spread: c_ab = y_a . y_b, which is the sum over spread(a) and spread(b) of n . (K^-1 n), n the
+  /// vertices' normals [mm/N]. c_ab and c_ba are the same to the bit. 0 where it is less than
   /// kKeptFraction of both c_a and c_b.
   static double between(const HalfResponse& a, const HalfResponse& b);
 

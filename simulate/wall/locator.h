@@ -26,17 +26,19 @@ class TriangleLocator {
   /// of lowest index. Fastest within 0.4 mm of the surface. Allocates nothing.
   SurfacePoint nearest(const Vec3& point) const;
 
-  /// Where the line through `point` along `direction`, across the surface there, goes through it:
-  /// unlike the nearest point, this does not jump where the surface folds toward `point`. Found by
-  /// walking from triangle `from`, or where there is none, or that leads nowhere or further than
-  /// half a millimetre from the point, from the one nearest to it; the nearest point where no walk
-  /// leads anywhere.
+  /// Where the line through `point` along `direction` goes through the surface. Unlike the nearest
+  /// point, this does not jump where the surface folds toward `point`. It is found by walking from
+  /// triangle to triangle:
+  ///   1. from `from`, if one is given;
+  ///   2. from the triangle nearest to `point`, if walk 1 leads nowhere or to a place further than
+  ///      half a millimetre from `point`.
+  /// Where neither leads anywhere, the nearest point is returned.
   SurfacePoint pierced(const Vec3& point, const Vec3& direction, std::int32_t from = -1) const;
 
   Vec3 position(const SurfacePoint& at) const;  // expects one that was found                [mm]
 
-  /// How the weights of a point that pierced() found change as the line moves along itself or
-  /// aside: per weight (row) and coordinate [1/mm].
+  /// How the weights of a point that pierced() found change as the line's point moves: a row per
+  /// weight, a column per coordinate [1/mm].
   Mat3 weight_slopes(const SurfacePoint& at, const Vec3& direction) const;
 
   std::size_t memory_bytes() const;

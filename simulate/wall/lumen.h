@@ -27,13 +27,16 @@ struct WallSample {
   Mat3 hessian = Mat3::Zero();   //                                                       [1/mm]
 };
 
-/// The lumen as a wire feels it. Signed distances to the triangles, exact on the nodes of a sparse
-/// grid round the wall, interpolated by cubic B-splines (C2), so that a wire slides over facets
-/// without chatter. Beyond the band the distance is +-band, without derivatives.
+/// The lumen as a wire feels it: a field of signed distances to the wall. The distances to the
+/// triangles are exact on the nodes of a sparse grid round the wall, and interpolated by cubic
+/// B-splines. These are twice differentiable, so a wire slides over facets without chatter. Beyond
+/// the band the distance is +-band, without derivatives.
 ///
-/// Caps of openings are not wall. The lumen goes on through them into free space, as far as 8 mm
-/// beyond the cap's plane and 3 mm round its rim (less where another vessel is near); there the
-/// distance is that to the rim, or round it to the cap's plane, as if the vessel ended in a flange.
+/// Caps of openings are not wall: the lumen goes on through them into free space, as if the vessel
+/// ended in a flange. The flange is a ring of the cap's plane round the rim, as wide as band and
+/// two cells (3 mm by default; less where another vessel is near). The free space reaches 8 mm
+/// beyond the plane and is as wide as the flange; the distance there is that to the rim or the
+/// flange.
 class Lumen {
  public:
   static constexpr double kFreeLength = 8.0;  // how far the lumen goes on beyond a cap      [mm]
@@ -53,9 +56,9 @@ class Lumen {
   double mean_deviation() const { return mean_deviation_; }
   std::size_t memory_bytes() const;
 
-  /// The field as bytes, and back bit for bit, for processes that need not compute it each
-  /// (lumen_bytes.cpp). The bytes are of this machine's number formats; other ones, or cut ones,
-  /// give nothing.
+  /// The field as bytes, and back bit for bit, so that not every process has to compute it
+  /// (lumen_bytes.cpp). The bytes are in this machine's number formats. Bytes in other formats, or
+  /// cut ones, give nothing.
   std::string to_bytes() const;
   static std::optional<Lumen> from_bytes(std::string_view bytes);
 

@@ -1,5 +1,6 @@
 #pragma once
-/// What the lumen's field is before the openings of a vessel: free, as if it ended in a flange.
+/// The lumen's field in front of the openings of a vessel: free space, as if the vessel ended in a
+/// flange there.
 #include <Eigen/Geometry>
 #include <vector>
 

@@ -10,8 +10,8 @@ namespace wireplan::simulate {
 /// than what is there, and than the grid's limit.
 void scatter_distances(SampleGrid& grid, const Surface& surface, const std::vector<NodeBox>& boxes);
 
-/// Gives unreached nodes, then bricks without samples, the sign of a neighbour: between two
-/// neighbours beyond the band there is no wall.
+/// Gives each node that no distance reached, and then each brick without samples, the sign of a
+/// neighbour. That is right, since there is no wall between two neighbours beyond the band.
 void spread_signs(SampleGrid& grid);
 
 }  // namespace wireplan::simulate

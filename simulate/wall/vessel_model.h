@@ -10,9 +10,8 @@
 
 namespace wireplan::simulate {
 
-/// Of a field that follows this surface: cells of half a millimetre, or of two thirds of a
-/// triangle's edge in the mean where that is less; not less than a tenth of a millimetre. Its
-/// openings are open.
+/// The options of a field that follows this surface, with its openings open. Its cells are two
+/// thirds of the mean edge of the triangles, but at most 0.5 mm and at least 0.1 mm.
 LumenOptions follow(const Surface& surface);
 
 struct VesselModel {

@@ -1,7 +1,8 @@
 #pragma once
-/// Where a wire is straight at rest and round, nothing but twist depends on the thetas of its
-/// edges, and in equilibrium all of it carries one torque. Those thetas are then no unknowns: the
-/// free part of the wire up to its first shaped node is one torsion spring. Part of solver.cpp.
+/// The straight round shaft of a twisted wire as one torsion spring. Where a wire is straight at
+/// rest and round, nothing but its twist depends on the thetas of its edges, and in equilibrium all
+/// of it carries one torque. So these thetas are no unknowns: one spring stands for the free part
+/// of the wire up to its first node that is curved or a strip. Used by Newton's method.
 #include <Eigen/Core>
 #include <Eigen/LU>
 
@@ -10,10 +11,11 @@
 
 namespace wireplan::simulate {
 
-/// W = k/2 psi^2, psi = theta of edge `last` - theta of edge first-1 + reference twist at the nodes
-/// from `first` to `last`, 1/k the sum of their 1/T. During a solve the directors of the edges
-/// first..last-1 follow those behind without twist and are not kept: the reference twist of all the
-/// nodes is that of node `last`.
+/// The spring's energy is W = k/2 psi^2. Its angle psi is theta of edge `last` minus theta of edge
+/// first-1, plus the reference twist at the nodes `first` to `last`; 1/k is the sum of these nodes'
+/// 1/T. During a solve the directors of the edges first to last-1 are not kept, since they follow
+/// the edge behind them without twist. The reference twist of all these nodes then stands at node
+/// `last`.
 struct TwistChain {
   int first = 0, last = -1;  // none where last <= first
   double stiffness = 0.0;    // k                                                       [N mm]
@@ -46,7 +48,7 @@ inline TwistChain find_chain(const Rod& rod, int first) {
   return chain;
 }
 
-/// Takes the reference twist of the chain's nodes together at its last one.
+/// Moves the reference twist of all the chain's nodes to its last one.
 inline void gather_chain(const TwistChain& chain, RodState& state) {
   for (int i = chain.first; i < chain.last; ++i) {
     state.reference_twist[chain.last] += state.reference_twist[i];
@@ -54,7 +56,7 @@ inline void gather_chain(const TwistChain& chain, RodState& state) {
   }
 }
 
-/// Gives the chain's edges their directors and thetas: one torque all along.
+/// Gives the chain's edges their directors and thetas back, so that all carry one torque.
 inline void spread_chain(const TwistChain& chain, const Rod& rod, RodState& state) {
   if (!chain.exists()) return;
   const double torque = chain.stiffness * chain.angle(state);
