@@ -31,11 +31,11 @@ struct BatchRunOptions {
   std::function<void(const std::string&)> on_line = {};  // told a line per patient; may be empty
 };
 
-/// Runs them and writes OUTPUT/batch.json anew after each; OUTPUT/NAME/ has what `wireplan run`
-/// puts there, OUTPUT/NAME.log its log. A patient starts when there is room for what it is expected
-/// to need; where all together take more than the limit the youngest is stopped and begun again
-/// later, and one that takes more on its own has failed. Returns the contents of batch.json. To be
-/// called before the process has other threads: it forks.
+/// Runs them and writes OUTPUT/batch.json anew after each. OUTPUT/NAME/ gets what `wireplan run`
+/// puts there, OUTPUT/NAME.log its log. A patient starts when there is room for the memory that it
+/// is expected to need. Where all together take more than the limit, the youngest is stopped and
+/// begun again later; a patient that takes more than the limit on its own has failed. Returns the
+/// contents of batch.json. Call it before the process has other threads, since it forks.
 Json run_batch_cases(const std::vector<BatchCase>& cases, const BatchRunOptions& options);
 
 /// The exit code of a batch: that of the patient that ended worst.

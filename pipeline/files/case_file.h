@@ -15,8 +15,8 @@
 
 namespace wireplan::pipeline {
 
-/// An input has its path twice: resolved, and as the case file gives it, which names no folder of
-/// this machine and so may stand in a report.
+/// An input has its path twice: resolved, for reading; and as the case file gives it, for reports,
+/// which must not name folders of this machine.
 struct VolumeInput {
   std::filesystem::path path;
   std::string given;
@@ -45,14 +45,14 @@ struct Case {
   preprocess::SegmentOptions segmentation;  // of a volume; seeds besides the access point
   preprocess::SurfaceOptions surface;
   WallInput wall;
-  /// Its tangent is found later, from the centerline. insertion.length 0: chosen from the path's
-  /// length by the trials stage, 1.25 times it and 20 mm more.
+  /// Its tangent is found later, from the centerline. Where insertion.length is 0 the trials stage
+  /// takes 1.25 times the path's length and 20 mm more.
   plan::Study study;
   Manoeuvring manoeuvres = Manoeuvring::kWhenNeeded;
   plan::Limits limits;
   plan::Weights weights;
-  /// unknowns.lumen 0: chosen by the stages that repeat, half a voxel of a volume, 0.25 mm of a
-  /// surface.
+  /// Where unknowns.lumen is 0 the stages that repeat choose it: half a voxel if the input is a
+  /// volume, 0.25 mm if it is a surface.
   plan::RobustnessOptions robustness;
   bool exhaustive = false;  // all candidates are run in full, none is only scouted
 };

@@ -1,6 +1,7 @@
 #pragma once
-/// The wires that wireplan knows by name: pipeline/wires.json, which is built into the program, so
-/// that it needs no data folder. Each section says where its values come from, or "assumed".
+/// The wires that wireplan knows by name: wires.json beside this file, which is built into the
+/// program, so that it needs no data folder. Each section says where its values come from, or
+/// "assumed".
 #include <string>
 #include <vector>
 

@@ -13,8 +13,8 @@ namespace wireplan::pipeline {
 /// All bytes of a file; empty where it cannot be read, for files whose absence is no error.
 std::string read_if_there(const std::filesystem::path& file);
 
-/// Whether the bytes must survive a power failure at once. Those that are checked by their digest
-/// on reading need not: what is lost is made again.
+/// Whether the bytes must be safe from a power failure when the call returns. Files that are
+/// checked by their digest on reading need not be: what is lost is made again.
 enum class Durability { kSynced, kChecked };
 
 /// Writes under a temporary name beside the place and renames. A failure leaves the place as it was

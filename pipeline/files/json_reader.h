@@ -42,7 +42,8 @@ class Problems {
   void add(const std::string& key, const std::string& value, const std::string& expected,
            const std::string& remedy = "");
   bool empty() const { return messages_.empty(); }
-  /// How many so far. Values that belong together are compared only where none came up between.
+  /// How many so far. A caller compares values that belong together only if reading them added
+  /// none.
   std::size_t count() const { return messages_.size(); }
   /// Throws one Error with every message on a line of its own, unless there is none.
   void throw_if_any() const;
@@ -83,8 +84,9 @@ class JsonReader {
   std::vector<Vec3> points(const std::string& key, bool required);
   std::vector<double> numbers(const std::string& key, std::optional<std::vector<double>> fallback,
                               Range range);
-  /// The object under the key; an empty one where it is absent and not required. Where it is told
-  /// as missing or of the wrong type, its own required keys are not told again.
+  /// The object under the key; an empty one where it is absent and not required. If the object is
+  /// missing or of the wrong type, that is reported once, and not again for each key it should
+  /// hold.
   JsonReader object(const std::string& key, bool required);
   /// The elements of an array of objects.
   std::vector<JsonReader> objects(const std::string& key, bool required);

@@ -1,7 +1,7 @@
 #pragma once
 /// One trial <-> trials/NNNN.json: what was tried, how it ended, every push as columns, the final
-/// shape, its contacts and the largest force on each triangle. The shapes on the way are not kept:
-/// a trial is deterministic and is repeated for the few plans whose pictures are wanted.
+/// shape, its contacts and the largest force on each triangle. The shapes on the way are not in it;
+/// trials that may be played have them in a file of their own, as bytes.
 #include <filesystem>
 #include <optional>
 #include <string>

@@ -1,7 +1,7 @@
 #pragma once
-/// Slices of the volume with the outline of the lumen, for the eye to check the segmentation:
-/// axial, coronal and sagittal through places on the way from access to target. Cut in patient
-/// LPS, so that the grid's own axes and a surface file lie on one another however the volume is
+/// Slices of the volume with the outline of the lumen, by which a person checks the segmentation:
+/// axial, coronal and sagittal, through places on the way from access to target. They are cut in
+/// patient LPS and not along the grid, so that volume and surface match however the volume is
 /// stored.
 #include <Eigen/Core>
 #include <array>
@@ -14,8 +14,8 @@
 
 namespace wireplan::pipeline {
 
-/// Which two axes of LPS run right and down in a slice, and how much of each one step to the right
-/// or down is: as radiologists look at it, patient's right at the left, head up.
+/// The plane of a slice, shown as radiologists look at it: the patient's right at the left, head
+/// up. right_of() and down_of() are the directions in LPS that run right and down in the picture.
 enum class Plane { kAxial, kCoronal, kSagittal };
 inline constexpr std::array kPlanes = {Plane::kAxial, Plane::kCoronal, Plane::kSagittal};
 const char* plane_name(Plane plane);  // "axial", ...

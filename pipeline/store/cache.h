@@ -30,8 +30,8 @@ struct CacheDamage {
 std::vector<CacheDamage> verify_cache(const Store& store);
 
 struct PruneOptions {
-  std::optional<double> unused_days;        // takes out what was not used for as long
-  std::optional<std::uintmax_t> max_bytes;  // then what was not used for longest, down to this
+  std::optional<double> unused_days;        // removes what was not used for this long
+  std::optional<std::uintmax_t> max_bytes;  // then the longest unused, until so much is left
 };
 
 struct PruneResult {
@@ -39,9 +39,9 @@ struct PruneResult {
   std::uintmax_t bytes = 0;  // that it freed on the disk
 };
 
-/// Takes out what killed runs left (temporary files and folders, locks), what is damaged, what the
-/// options say, and pieces that no artifact holds any longer once they are older than a day. Throws
-/// `Error` where another process uses the cache.
+/// Removes what killed runs left (temporary files and folders, locks), what is damaged, what the
+/// options say, and pieces older than a day that no artifact holds. Throws `Error` where another
+/// process uses the cache.
 PruneResult prune_cache(const Store& store, const PruneOptions& options);
 
 }  // namespace wireplan::pipeline

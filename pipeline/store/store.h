@@ -84,17 +84,17 @@ class Store {
   std::optional<std::filesystem::path> find_piece(const std::string& key_text) const;
   std::filesystem::path keep_piece(const std::string& key_text, const std::string& bytes) const;
 
-  /// The right to make one artifact, among all processes that share the cache: waits until no other
-  /// makes it; look it up again then. Nothing where `give_up`, asked every tenth of a second, says
-  /// so first; it may be empty.
+  /// The right to make one artifact, among all processes that share the cache. Waits while another
+  /// process makes it, so look it up again afterwards. `give_up` may be empty; else it is asked
+  /// every tenth of a second while waiting, and where it says so nothing is returned.
   std::optional<FileLock> lock(const std::string& stage, const std::string& key_text,
                                const std::function<bool()>& give_up = {}) const;
 
-  /// Held by who reads or makes artifacts; nothing is removed from the cache meanwhile. Nothing
-  /// where the cache cannot be written.
+  /// The lock of a process that reads or makes artifacts: as long as it is held nothing is removed
+  /// from the cache. Empty where the cache cannot be written.
   std::optional<FileLock> use() const;
 
-  /// Held by who removes; nothing where the cache is in use.
+  /// The lock of a process that removes artifacts. Empty where the cache is in use.
   std::optional<FileLock> own() const;
 
   /// Takes the artifact out of the cache, so that it is made again.
