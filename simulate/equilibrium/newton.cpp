@@ -15,7 +15,7 @@ namespace {
 
 constexpr NewtonTuning kTuning;
 constexpr double kEpsilon = std::numeric_limits<double>::epsilon();
-constexpr int kKrylov = 10;  // directions of GMRES at most
+constexpr int kKrylov = kTuning.most_directions;
 
 /// Residual that 64 bit numbers leave in the stiffest element.
 double find_rounding_floor(const Rod& rod, double extent) {
@@ -60,7 +60,8 @@ class Newton {
         return finish(false);
       }
       if (!find_step()) return finish(false);
-      const bool is_rounding = step_.cwiseAbs().maxCoeff() < 64.0 * kEpsilon * extent_;
+      const bool is_rounding =
+          step_.cwiseAbs().maxCoeff() < kTuning.last_places * kEpsilon * extent_;
       if (is_rounding && result_.residual <= result_.rounding_floor) return finish(true);
 
       if (contact_ != nullptr) contact_->expect_after(motion());
@@ -259,7 +260,8 @@ class Newton {
     // Where the energy falls nearly as fast all along the step as at its start, as it does while a
     // wire jumps, the Hessian's shift or what it folds made the step too short.
     while (accepted_ && contact_ != nullptr &&
-           energy_ - lowest > std::max(-kTuning.doubled_from * part * slope_, 10.0 * rounding_) &&
+           energy_ - lowest >
+               std::max(-kTuning.doubled_from * part * slope_, kTuning.roundings * rounding_) &&
            may_go_as_far_again(part)) {
       part *= 2.0;
       const double further = go(part);

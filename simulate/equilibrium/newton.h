@@ -27,13 +27,13 @@ struct NewtonResult {
 struct NewtonTuning {
   // The Hessian's diagonal is shifted until it factors, and further until a vessel lets the whole
   // step be taken: a floppy wire's soft modes ask for centimetres.
-  double smallest_shift = 1e-7;    // chosen: far below the softest wire's stiffness    [N/mm]
+  double smallest_shift = 1e-7;    // chosen, small: at 1e-4 tips that slid crept       [N/mm]
   double largest_shift = 1e30;     // beyond it a number in the Hessian is not finite   [N/mm]
   double shift_growth = 4.0;       // 8 left more slow pushes, 2.5 did no better
   double kept_shift = 0.1;         // of the last iteration's, to start from; chosen
   double first_long_shift = 1e-4;  // of a step that is too long; chosen                [N/mm]
   double kept_long_shift = 0.25;   // of the last iteration's, to start from; chosen
-  int most_long_shifts = 6;        // chosen: from 1e-4 to 0.4 N/mm
+  int most_long_shifts = 6;        // chosen: from 1e-4 to 0.1 N/mm
 
   // Friction and feet are lagged. Refreshed at first after every step, then only where the residual
   // is met: iterations else go round between two lags.
@@ -58,7 +58,8 @@ struct NewtonTuning {
 
   // Line search.
   double armijo = 1e-4;        // part of the slope; the usual value
-  double rounding = 1e-13;     // of an energy
+  double rounding = 1e-13;     // of an energy; chosen
+  double roundings = 10.0;     // by which it must fall for a step to be doubled; chosen
   double doubled_from = 0.75;  // fall of the energy, of what the slope says, from which on
                                // the step was too short: it is a half where the Hessian is
                                // exact
@@ -67,10 +68,16 @@ struct NewtonTuning {
   int most_cuts = 40;          // chosen: to 1e-12 of the step by halves
   double least_cut = 0.1, most_cut = 0.5;  // safe bracket of the parabola; the usual values
 
-  // GMRES for what the band leaves out.
-  double enough = 0.01;     // of the first residual; 0.1 took more iterations in all
-  double not_worth = 5e-4;  // of the gradient: not worth a solve
-  double kept_slope = 0.1;  // of the banded step's: else the refined step is dropped
+  // GMRES for what the band leaves out. To 0.1, and not at all below 0.02 of the gradient, took as
+  // much time and more iterations.
+  int most_directions = 10;  // chosen
+  double enough = 0.01;      // of the first residual
+  double not_worth = 5e-4;   // of the gradient: not worth a solve
+  double kept_slope = 0.1;   // of the banded step's, else the refined step is dropped; chosen
+
+  // A solve that has met its rounding floor ends once no number of a step is above this many last
+  // places of the largest coordinate.
+  double last_places = 64.0;  // chosen
 };
 
 /// Moves `state` to equilibrium, starting from where it is; on failure it is the last iterate. D is

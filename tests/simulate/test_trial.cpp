@@ -396,6 +396,16 @@ TEST(FrictionTrial, StaysWithinCoulombsConeEverywhere) {
 
 // ---------------------------------------------------------------- records
 
+TEST(Trial, NamesTheTermsOfAStrip) {
+  const InsertionOptions options = {.length = 10.0, .friction = 0.1};
+  Wire wire = straight_wire(50.0);
+  EXPECT_EQ(run_trial(wire, along_z(), end_of_bend(), bend(), options).terms,
+            (std::vector<std::string>{"stretch", "bend", "contact", "friction"}));
+  wire.sections[0].bending_stiffness_2 = 200.0;
+  EXPECT_EQ(run_trial(wire, along_z(), end_of_bend(), bend(), options).terms,
+            (std::vector<std::string>{"stretch", "bend", "twist", "strip", "contact", "friction"}));
+}
+
 TEST(Trial, ShapesAreKeptAtTheAskedSpacing) {
   InsertionOptions some = options();
   some.record_every = 10.0;
