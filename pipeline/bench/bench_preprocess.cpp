@@ -228,28 +228,27 @@ Picture plot_of(const std::vector<Json>& rows) {
   return draw_fronts("wireplan bench preprocess", {plot}, 1, legend);
 }
 
-}  // namespace
+/// What the steps cost, and what came of them.
+struct Preprocessed {
+  std::vector<Json> rows{};            // a step each, then their sum
+  double wall_s = 0.0, most_mb = 0.0;  // of all steps; no memory known: 0
+  Surface surface{};
+  SurfaceError error{};
+};
 
-BenchReport bench_preprocess(const BenchOptions& options) {
-  if (!preprocess::reads_volumes()) {
-    throw Error(
-        "bench: preprocess needs images, and this wireplan is built without them; configure with "
-        "-DWIREPLAN_IMAGING=ON");
-  }
-  const preprocess::PhantomSpec spec = abdomen(options.quick);
+/// Each step on what the one before left, as the pipeline does it.
+Preprocessed run_steps(const preprocess::PhantomSpec& spec, bool quick) {
   const Truth truth(spec);
   const fs::path file =
       fs::temp_directory_path() / ("wireplan-bench-" + std::to_string(::getpid()) + ".nrrd");
   write_raw_nrrd(preprocess::make_phantom(spec).image, file);
 
-  // Each step on what the one before left, as the pipeline does it.
-  BenchReport report;
+  Preprocessed all;
   preprocess::Image image;
   preprocess::Segmentation lumen;
-  Surface surface;
   preprocess::ExtrudedWall wall;
   std::optional<SurfaceError> error;
-  double cpu_sum = 0.0, wall_sum = 0.0, most_mb = 0.0;
+  double cpu_sum = 0.0;
   const auto run = [&](const std::string& name, const std::function<void()>& step) {
     const PeakMemory memory;
     const double cpu = cpu_seconds();
@@ -259,15 +258,15 @@ BenchReport bench_preprocess(const BenchOptions& options) {
         std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
     const double cpu_s = cpu_seconds() - cpu;
     const Json peak = memory.megabytes();
-    if (!error && surface.triangles.cols() > 0) error = compare(surface, truth, spec.grid);
+    if (!error && all.surface.triangles.cols() > 0) error = compare(all.surface, truth, spec.grid);
     cpu_sum += cpu_s;
-    wall_sum += wall_s;
-    most_mb = std::max(most_mb, peak.is_null() ? 0.0 : peak.get<double>());
-    report.rows.push_back({{"step", name},
-                           {"cpu_s", cpu_s},
-                           {"wall_s", wall_s},
-                           {"peak_mb", peak},
-                           {"surface_error_mm", error ? Json(error->mean) : Json(nullptr)}});
+    all.wall_s += wall_s;
+    all.most_mb = std::max(all.most_mb, peak.is_null() ? 0.0 : peak.get<double>());
+    all.rows.push_back({{"step", name},
+                        {"cpu_s", cpu_s},
+                        {"wall_s", wall_s},
+                        {"peak_mb", peak},
+                        {"surface_error_mm", error ? Json(error->mean) : Json(nullptr)}});
   };
   run("read", [&] { image = preprocess::read_image(file); });
   fs::remove(file);
@@ -275,35 +274,49 @@ BenchReport bench_preprocess(const BenchOptions& options) {
     lumen = preprocess::segment(image, {.lower_hu = 200.0,
                                         .upper_hu = 600.0,
                                         .seeds = {kTarget, {5.0, 6.0, 90.0}},
-                                        .neck_opening_mm = options.quick ? 0.0 : 1.2});
+                                        .neck_opening_mm = quick ? 0.0 : 1.2});
   });
   run("surface", [&] {
-    surface = preprocess::surface_from_image(image, lumen.mask,
-                                             {.edge_length_mm = options.quick ? 2.0 : 1.15});
+    all.surface =
+        preprocess::surface_from_image(image, lumen.mask, {.edge_length_mm = quick ? 2.0 : 1.15});
   });
   image = {};
   lumen = {};
-  run("centerline", [&] { preprocess::find_centerline(surface, kAccess, kTarget); });
-  run("wall", [&] { wall = preprocess::extrude_wall(surface, {}); });
+  run("centerline", [&] { preprocess::find_centerline(all.surface, kAccess, kTarget); });
+  run("wall", [&] { wall = preprocess::extrude_wall(all.surface, {}); });
   run("distance field and factored wall", [&] {
-    const simulate::VesselModel model(surface, wall.wall, simulate::follow(surface));
+    const simulate::VesselModel model(all.surface, wall.wall, simulate::follow(all.surface));
     expects(model.compliance != nullptr);
   });
-  report.rows.push_back({{"step", "total"},
-                         {"cpu_s", cpu_sum},
-                         {"wall_s", wall_sum},
-                         {"peak_mb", most_mb > 0.0 ? Json(most_mb) : Json(nullptr)},
-                         {"surface_error_mm", error->mean}});
+  all.rows.push_back({{"step", "total"},
+                      {"cpu_s", cpu_sum},
+                      {"wall_s", all.wall_s},
+                      {"peak_mb", all.most_mb > 0.0 ? Json(all.most_mb) : Json(nullptr)},
+                      {"surface_error_mm", error->mean}});
+  all.error = *error;
+  return all;
+}
 
-  // What it comes to.
-  const preprocess::SurfaceCheck check = preprocess::check_surface(surface);
+}  // namespace
+
+BenchReport bench_preprocess(const BenchOptions& options) {
+  if (!preprocess::reads_volumes()) {
+    throw Error(
+        "bench: preprocess needs images, and this wireplan is built without them; configure with "
+        "-DWIREPLAN_IMAGING=ON");
+  }
+  const preprocess::PhantomSpec spec = abdomen(options.quick);
+  Preprocessed all = run_steps(spec, options.quick);
+  BenchReport report;
+  report.rows = std::move(all.rows);
+  const preprocess::SurfaceCheck check = preprocess::check_surface(all.surface);
   report.results["triangles"] = check.triangles;
   report.results["euler_number"] = check.euler_number;
   report.results["self_intersections"] = check.self_intersections;
-  report.results["surface_error_p95_mm"] = error->p95;
+  report.results["surface_error_p95_mm"] = all.error.p95;
   report.results["aims"] = {
-      {{"what", "wall time of all steps, s"}, {"aim", kAimSeconds}, {"found", wall_sum}},
-      {{"what", "largest memory, MB"}, {"aim", kAimMegabytes}, {"found", most_mb}}};
+      {{"what", "wall time of all steps, s"}, {"aim", kAimSeconds}, {"found", all.wall_s}},
+      {{"what", "largest memory, MB"}, {"aim", kAimMegabytes}, {"found", all.most_mb}}};
   report.description["volume"] = {
       {"size", spec.grid.size},
       {"spacing_mm", {spec.grid.spacing[0], spec.grid.spacing[1], spec.grid.spacing[2]}},
@@ -316,7 +329,7 @@ BenchReport bench_preprocess(const BenchOptions& options) {
        "surface"}};
   report.text = table_text(report.rows) + "\n" + std::to_string(check.triangles) +
                 " triangles, Euler number " + std::to_string(check.euler_number) +
-                ", surface within " + format("%.3f mm", error->p95) + " of the truth at 95 %\n" +
+                ", surface within " + format("%.3f mm", all.error.p95) + " of the truth at 95 %\n" +
                 format("aims for 512 x 512 x 400 voxels on 2 idle cores: %g s", kAimSeconds) +
                 format(" and %g MB\n", kAimMegabytes);
   report.plot = plot_of(report.rows);

@@ -1,5 +1,6 @@
 #pragma once
 /// What a bench hands to run_bench, which prints and writes it. For use in this folder.
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -34,6 +35,9 @@ BenchReport bench_preprocess(const BenchOptions& options);
 
 /// Rows as a table for people: columns aligned, numbers with 4 digits.
 std::string table_text(const std::vector<Json>& rows);
+
+/// Null where there is no number to tell.
+Json number_or_null(const std::optional<double>& value);
 
 /// CPU time of this thread [ms].
 double thread_milliseconds();

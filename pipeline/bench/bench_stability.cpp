@@ -7,8 +7,9 @@
 
 #include "pipeline/bench/bench_report.h"
 #include "pipeline/bench/bench_walls.h"
+#include "pipeline/bench/stability_results.h"
+#include "pipeline/bench/stability_scenes.h"
 #include "pipeline/files/text.h"
-#include "pipeline/report/plot.h"
 #include "simulate/equilibrium/dynamics.h"
 #include "simulate/equilibrium/solver.h"
 #include "simulate/insertion/trial.h"
@@ -29,37 +30,11 @@ using simulate::Statics;
 using simulate::TrialResult;
 using simulate::Wire;
 
-constexpr double kNPerMmFromNPerM = 1e-3, kNPerMm3FromNPerM3 = 1e-9;
-constexpr double kGravity = 9810.0;                    // [mm/s^2]
 constexpr double kMass = 0.1 * kTonnePerMmFromKgPerM;  // of the paper's wire [t/mm]
 constexpr double kDamping = 100.0;                     // of the Euler schemes [1/s]
-const std::vector<double> kBend = {1e-2, 1e-1, 1e0, 1e1, 1e2, 1e3, 1e4, 1e5, 1e6, 1e7};   // [N/m]
-const std::vector<double> kStretch = {1e6, 1e7, 1e8, 1e9, 1e10, 1e11, 1e12, 1e13, 1e14};  // [N/m^3]
-const std::vector<double> kTimeSteps = {1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 1e-1, 1e0};         // [s]
+const std::vector<double> kTimeSteps = {1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 1e-1, 1e0};  // [s]
 
 // ---------------------------------------------------------------- scenes without a wall
-
-/// A wire clamped level at its proximal end, from its straight shape.
-struct StaticScene {
-  std::string name{}, group{};
-  double bend = 1e2;            // k_b of the stiffest part                            [N/m]
-  double stretch = 1e10;        // k_s of the stiffest part                            [N/m^3]
-  double ratio = 1.0;           // stiffest to softest part, bending and stretching alike
-  int soft_part = 0;            // third of the wire that is soft: 0 tip, 1 middle, 2 base
-  double element_length = 2.0;  //                                                     [mm]
-  int nodes = 21;
-  double gravity = kGravity;  // along -y                                            [mm/s^2]
-  double load_across = 0.0;   // at the tip, along -y, in EI/L^2 of the stiffest part
-  double load_along = 0.0;    // at the tip, along -x, in EI/L^2
-  double squeeze = 0.0;       // distal end clamped too, nearer by this part of the length
-
-  double length() const { return element_length * (nodes - 1); }
-  double EI() const { return bend * kNPerMmFromNPerM * std::pow(element_length, 3); }
-  double EA() const { return 2.0 * stretch * kNPerMm3FromNPerM3 * std::pow(element_length, 3); }
-  Vec3 tip_force() const {
-    return EI() / (length() * length()) * Vec3(-load_along, -load_across, 0.0);
-  }
-};
 
 Wire wire_of(const StaticScene& scene) {
   Wire wire{.name = scene.name, .radius = 0.4, .sections = {}};
@@ -106,74 +81,6 @@ struct Model {
   bool squeezed() const { return problem.distal.hold_along; }
 };
 
-std::vector<StaticScene> static_scenes() {
-  std::vector<StaticScene> scenes;
-  const auto add = [&scenes](StaticScene scene, const std::string& group) {
-    scene.group = group;
-    scene.name = group + "-" + std::to_string(scenes.size());
-    scenes.push_back(scene);
-  };
-  // The whole range of coefficients under gravity.
-  for (const double bend : kBend) {
-    for (const double stretch : kStretch) add({.bend = bend, .stretch = stretch}, "coefficients");
-  }
-  // Tip loads from next to nothing to absurd, across and along the wire.
-  for (const double bend : {1e-2, 1e0, 1e2, 1e4, 1e7}) {
-    for (const double stretch : {1e6, 1e8, 1e10, 1e12, 1e14}) {
-      const StaticScene scene{.bend = bend, .stretch = stretch, .gravity = 0.0};
-      StaticScene small = scene, across = scene, along = scene;
-      small.load_across = 1e-6;
-      across.load_across = 1e4;
-      along.load_along = 1e3;
-      along.load_across = 1.0;
-      add(small, "tiny_load");
-      add(across, "huge_load");
-      add(along, "huge_push");
-    }
-  }
-  // Element lengths and node numbers, with the paper's coefficients and with the stiffness of a
-  // 0.035 inch wire (EI 620 N mm^2, EA 49600 N), whose coefficients leave the range at short
-  // elements.
-  for (const double h : {0.05, 0.2, 1.0, 5.0, 10.0}) {
-    for (const int nodes : {3, 10, 100, 1000, 5000}) {
-      add({.element_length = h, .nodes = nodes}, "size");
-      add({.bend = 620.0 / (h * h * h) / kNPerMmFromNPerM,
-           .stretch = 49600.0 / (2.0 * h * h * h) / kNPerMm3FromNPerM3,
-           .element_length = h,
-           .nodes = nodes},
-          "device_size");
-    }
-  }
-  // Stiffness that jumps along the wire.
-  for (const double ratio : {1e0, 1e1, 1e2, 1e3, 1e4}) {
-    for (const int soft : {0, 1, 2}) {
-      for (const int nodes : {21, 201}) {
-        add({.bend = 1e4, .stretch = 1e12, .ratio = ratio, .soft_part = soft, .nodes = nodes},
-            "ratio");
-      }
-    }
-  }
-  // Squeezed between two clamps, past buckling.
-  for (const double bend : {1e-2, 1e2, 1e7}) {
-    for (const double stretch : {1e6, 1e10, 1e14}) {
-      for (const double squeeze : {0.02, 0.3}) {
-        add({.bend = bend, .stretch = stretch, .squeeze = squeeze}, "squeezed");
-      }
-    }
-  }
-  // All extremes at once.
-  for (const int soft : {0, 1, 2}) {
-    add({.bend = 1e7,
-         .stretch = 1e14,
-         .ratio = 1e4,
-         .soft_part = soft,
-         .element_length = 0.05,
-         .nodes = 5000},
-        "all_at_once");
-  }
-  return scenes;
-}
-
 // ---------------------------------------------------------------- rows
 
 struct Finding {
@@ -185,11 +92,6 @@ struct Finding {
 void fail(Finding& finding, const std::string& note) {
   finding.verdict = "failed";
   finding.note += (finding.note.empty() ? "" : "; ") + note;
-}
-
-/// Null where there is no number to tell.
-Json number_or_null(const std::optional<double>& value) {
-  return value && std::isfinite(*value) ? Json(*value) : Json();
 }
 
 Json finding_row(const std::string& scene, const std::string& method, const Finding& finding) {
@@ -517,129 +419,6 @@ void run_contact_scenes(int stride, std::vector<Json>& rows) {
   }
 }
 
-// ---------------------------------------------------------------- what came out
-
-const std::vector<std::string> kVerdicts = {"ok", "limit", "failed"};
-const std::vector<std::string> kMethods = {"newton", "conjugate_gradient", "explicit",
-                                           "semi_implicit"};
-
-std::vector<Json> summary_of(const std::vector<Json>& rows) {
-  std::vector<Json> summary;
-  for (const std::string& method : kMethods) {
-    Json entry;
-    entry["method"] = method;
-    const auto count = [&](const char* key, const std::string& value) {
-      return std::count_if(rows.begin(), rows.end(), [&](const Json& row) {
-        return row.at("method") == method && row.at(key) == value;
-      });
-    };
-    entry["rows"] = count("method", method);
-    for (const std::string& verdict : kVerdicts) entry[verdict] = count("verdict", verdict);
-    for (const char* outcome : {"converged", "finished", "not_converged", "unstable", "reached",
-                                "missed", "stuck", "prolapsed", "left_lumen"}) {
-      entry[outcome] = count("outcome", outcome);
-    }
-    summary.push_back(entry);
-  }
-  return summary;
-}
-
-std::size_t count_scenes(const std::vector<Json>& rows) {
-  return static_cast<std::size_t>(std::count_if(
-      rows.begin(), rows.end(), [](const Json& row) { return row.at("method") == "newton"; }));
-}
-
-/// Scenes where another method, on its way or at its end, has less energy than Newton's
-/// equilibrium: there it found a higher minimum, or none.
-std::vector<std::string> find_lower_energies(const std::vector<Json>& rows) {
-  std::vector<std::string> scenes;
-  const Json* newton = nullptr;
-  for (const Json& row : rows) {
-    if (row.at("method") == "newton") newton = &row;
-    if (newton->at("outcome") != "converged" || row.at("energy_n_mm").is_null()) continue;
-    const double energy = row.at("energy_n_mm"), least = newton->at("energy_n_mm");
-    const bool known = !scenes.empty() && scenes.back() == row.at("scene");
-    if (energy < least - 1e-9 * (1.0 + std::abs(least)) && !known) {
-      scenes.push_back(row.at("scene"));
-    }
-  }
-  return scenes;
-}
-
-/// Verdicts over the grid of coefficients, for one method at one time step.
-MatrixPlot matrix_of(const std::vector<Json>& rows, const std::string& method,
-                     std::optional<double> time_step) {
-  MatrixPlot plot;
-  plot.title = method + (time_step ? format(", %g s", *time_step) : std::string());
-  plot.x_label = "log10 of k_b [N/m]";
-  plot.y_label = "log10 of k_s [N/m^3]";
-  for (const double bend : kBend) plot.x_ticks.push_back(format("%.0f", std::log10(bend)));
-  for (const double stretch : kStretch) plot.y_ticks.push_back(format("%.0f", std::log10(stretch)));
-  plot.cells.assign(kBend.size() * kStretch.size(), -1);
-  for (const Json& row : rows) {
-    const bool shown = row.at("method") == method &&
-                       row.at("scene").get<std::string>().starts_with("coefficients") &&
-                       (!time_step || row.at("time_step_s") == *time_step);
-    if (!shown) continue;
-    const auto index = [](const std::vector<double>& values, double value) {
-      return std::find(values.begin(), values.end(), value) - values.begin();
-    };
-    const auto c = index(kBend, row.at("bend_coefficient_n_per_m"));
-    const auto r = index(kStretch, row.at("stretch_coefficient_n_per_m3"));
-    const auto verdict = std::find(kVerdicts.begin(), kVerdicts.end(), row.at("verdict"));
-    plot.cells[static_cast<std::size_t>(r) * kBend.size() + static_cast<std::size_t>(c)] =
-        static_cast<int>(verdict - kVerdicts.begin());
-  }
-  return plot;
-}
-
-Picture plot_of(const std::vector<Json>& rows) {
-  std::vector<MatrixPlot> plots = {matrix_of(rows, "newton", {}),
-                                   matrix_of(rows, "conjugate_gradient", {})};
-  for (const char* method : {"explicit", "semi_implicit"}) {
-    for (const double step : {1e-6, 1e-4, 1e-2}) plots.push_back(matrix_of(rows, method, step));
-  }
-  return draw_matrices("Stability over the coefficients, 20 elements of 2 mm under gravity", plots,
-                       4,
-                       {{"ok", Color(0.35F, 0.70F, 0.45F)},
-                        {"limit: named as unstable or not converged", Color(0.95F, 0.75F, 0.25F)},
-                        {"failed", Color(0.80F, 0.10F, 0.10F)}});
-}
-
-Json describe() {
-  Json walls;
-  for (const BenchWall& wall : make_bench_walls()) walls[wall.name] = wall.text;
-  return {
-      {"scenes",
-       {{"coefficients",
-         "k_b 1e-2 to 1e7 N/m and k_s 1e6 to 1e14 N/m^3, 20 elements of 2 mm, "
-         "clamped level at one end, 0.1 kg/m, gravity"},
-        {"tiny_load", "tip load of 1e-6 EI/L^2 across, no gravity"},
-        {"huge_load", "tip load of 1e4 EI/L^2 across"},
-        {"huge_push", "tip load of 1e3 EI/L^2 along and 1 EI/L^2 across"},
-        {"size", "elements of 0.05 to 10 mm, 3 to 5000 nodes, k_b 100 N/m, k_s 1e10 N/m^3"},
-        {"device_size", "the same with EI 620 N mm^2 and EA 49600 N"},
-        {"ratio", "stiffness that falls by 1 to 1e4 in one third of the wire"},
-        {"squeezed", "clamped at both ends, these nearer by 2 or 30 % of the length"},
-        {"all_at_once", "ratio 1e4, k_b 1e7, k_s 1e14, 5000 nodes, elements of 0.05 mm"}}},
-      {"walls", walls},
-      {"wall_entries", "along the axis, 0.1 mm beside the wall, 80 degrees into it; EI 1 to 1e5"},
-      {"verdicts",
-       {{"ok", "ended finite, balanced or with no more energy than it began with"},
-        {"limit",
-         "the method says that it did not get there: unstable, not_converged, left_lumen, or an "
-         "energy that grows at a time step beyond the critical one that it tells"},
-        {"failed",
-         "not finite, an exception, energy that rose, or an answer that the checks refute"}}},
-      {"columns",
-       {{"worst_energy_rise",
-         "of the potential energy in one accepted step [N mm]; Euler's swing freely; null for "
-         "trials, whose result does not hold it"},
-        {"time_step_s", "null for newton, which is static"},
-        {"critical_time_step_s", "null where there is none"},
-        {"iterations", "of newton, or time steps"}}}};
-}
-
 }  // namespace
 
 BenchReport bench_stability(const BenchOptions& options) {
@@ -647,8 +426,8 @@ BenchReport bench_stability(const BenchOptions& options) {
   const int stride = options.quick ? 7 : 1;
   run_static_scenes(stride, report.rows);
   run_contact_scenes(stride, report.rows);
-  report.description = describe();
-  const std::vector<Json> summary = summary_of(report.rows);
+  report.description = describe_stability();
+  const std::vector<Json> summary = summarize_stability(report.rows);
   const std::vector<std::string> lower = find_lower_energies(report.rows);
   std::vector<Json> failed, limits;
   for (const Json& row : report.rows) {
@@ -665,7 +444,7 @@ BenchReport bench_stability(const BenchOptions& options) {
                 std::to_string(lower.size()) + "\n" +
                 "\nFailed rows: " + std::to_string(failed.size()) + "\n" + table_text(failed) +
                 "\nNewton's limits: " + std::to_string(limits.size()) + "\n" + table_text(limits);
-  report.plot = plot_of(report.rows);
+  report.plot = plot_stability(report.rows);
   return report;
 }
 

@@ -3,6 +3,7 @@
 #include <map>
 #include <memory>
 
+#include "pipeline/files/result_file.h"
 #include "pipeline/files/text.h"
 #include "pipeline/files/trial_file.h"
 #include "pipeline/report/picture.h"

@@ -4,15 +4,14 @@
 #include <algorithm>
 #include <cmath>
 
+#include "pipeline/files/json_reader.h"
+
 namespace wireplan::pipeline {
 namespace {
 
 constexpr const char* kSceneSchema = "wireplan.scene/1";
-constexpr const char* kResultSchema = "wireplan.result/1";
 constexpr Range kAboveZero{.min = 0.0, .open_min = true};
 constexpr Range kFromZero{.min = 0.0};
-
-// ---- reading ----------------------------------------------------------------------------------
 
 /// A stiffness given as such or as the paper's coefficient, whose value depends on the edge length.
 struct StiffnessKeys {
@@ -444,121 +443,6 @@ InsertionScene read_insertion_scene(JsonReader& root, const simulate::Scene& wir
   return scene;
 }
 
-// ---- writing ----------------------------------------------------------------------------------
-
-constexpr const char* kNotFinite = "the solver left no finite number here";
-
-/// Adds the value, or null and the reason where it is not finite.
-void put(Json& object, const std::string& key, double value, const char* reason = kNotFinite) {
-  object[key] = std::isfinite(value) ? Json(value) : Json();
-  if (!std::isfinite(value)) object[key + "_reason"] = reason;
-}
-
-/// The same for angles; `reason` tells why there are none.
-void put_angles(Json& object, const std::string& key, const Eigen::VectorXd& angles,
-                const char* reason) {
-  const bool given = angles.size() > 0 && angles.allFinite();
-  object[key] = given ? Json(std::vector<double>(angles.begin(), angles.end())) : Json();
-  if (!given) object[key + "_reason"] = angles.size() == 0 ? reason : kNotFinite;
-}
-
-template <typename Matrix>
-void put_points(Json& object, const std::string& key, const Matrix& points) {
-  object[key] = points.allFinite() ? to_json(points) : Json();
-  if (!points.allFinite()) object[key + "_reason"] = kNotFinite;
-}
-
-Json energy_json(const simulate::SceneResult& result) {
-  Json json = Json::object();
-  put(json, "stretch", result.energy.stretch);
-  put(json, "bend", result.energy.bend);
-  put(json, "twist", result.energy.twist);
-  put(json, "gravity", result.gravity_energy);
-  put(json, "tip_force", result.energy.load - result.gravity_energy - result.moment_energy);
-  put(json, "tip_moment", result.moment_energy);
-  put(json, "contact", result.energy.contact);
-  put(json, "wall", result.energy.wall);
-  put(json, "total", result.energy.total());
-  return json;
-}
-
-Json reaction_json(const simulate::Reaction& reaction) {
-  Json json = {{"at", reaction.at == simulate::WireEnd::kProximal ? "proximal" : "distal"}};
-  put_points(json, "force_n", reaction.force);
-  put_points(json, "moment_n_mm", reaction.moment);
-  return json;
-}
-
-Json contact_json(const simulate::WireContact& contact) {
-  Json json = {{"node", contact.node}, {"part", contact.part}};
-  if (contact.triangle >= 0) {
-    json["triangle"] = contact.triangle;
-  } else {
-    json["triangle"] = nullptr;
-    json["triangle_reason"] = "none lies within reach of the point";
-  }
-  put_points(json, "point_mm", contact.point);
-  put_points(json, "normal_force_n", contact.normal_force);
-  put_points(json, "friction_force_n", contact.friction_force);
-  put(json, "penetration_mm", contact.penetration);
-  put(json, "wall_displacement_mm", contact.wall_displacement);
-  return json;
-}
-
-Json contacts_json(const std::vector<simulate::WireContact>& contacts) {
-  Json rows = Json::array();
-  for (const simulate::WireContact& contact : contacts) rows.push_back(contact_json(contact));
-  return rows;
-}
-
-/// Of an insertion: the sum alone is known.
-Json energy_json(const simulate::Push& push) {
-  Json json = Json::object();
-  for (const char* term : {"stretch", "bend", "twist", "contact", "wall"}) {
-    put(json, term, std::nan(""), "an insertion gives the sum of its terms alone");
-  }
-  put(json, "total", push.stored_energy);
-  return json;
-}
-
-void put_work(Json& json, const simulate::Push& push) {
-  put(json, "push_work_n_mm", push.push_work);
-  put(json, "stored_energy_n_mm", push.stored_energy);
-  put(json, "friction_work_n_mm", push.friction_work);
-  put(json, "energy_released_n_mm", push.push_work - push.stored_energy - push.friction_work);
-}
-
-/// One row per `every_mm` of insertion, and one for the last push.
-Json history_json(const std::vector<simulate::Push>& pushes, double every_mm) {
-  Json rows = Json::array();
-  double next = every_mm, peak = 0.0, peak_tip = 0.0, penetration = 0.0, displacement = 0.0;
-  for (std::size_t i = 0; i < pushes.size(); ++i) {
-    const simulate::Push& push = pushes[i];
-    peak = std::max(peak, push.peak_contact_force);
-    peak_tip = std::max(peak_tip, push.tip_force);
-    penetration = std::max(penetration, push.max_penetration);
-    displacement = std::max(displacement, push.wall_displacement);
-    if (push.insertion < next && i + 1 < pushes.size()) continue;
-    Json row;
-    put(row, "insertion_mm", push.insertion);
-    put(row, "push_force_n", push.push_force);
-    put_points(row, "tip_mm", push.tip);
-    put(row, "peak_tip_force_n", peak_tip);
-    put(row, "peak_contact_force_n", peak);
-    put(row, "total_contact_force_n", push.total_contact_force);
-    put(row, "friction_force_n", push.friction_force);
-    put(row, "max_penetration_mm", penetration);
-    put(row, "wall_displacement_mm", displacement);
-    put_work(row, push);
-    put(row, "residual_n", push.residual);
-    row["iterations"] = push.iterations;
-    rows.push_back(row);
-    peak = peak_tip = penetration = displacement = 0.0;
-    while (next <= push.insertion) next += every_mm;
-  }
-  return rows;
-}
-
 }  // namespace
 
 double axial_stiffness_from_paper(double stretch_coefficient, double edge_length) {
@@ -597,60 +481,6 @@ SceneFile read_scene(const std::filesystem::path& path) {
   root.finish();
   problems.throw_if_any();
   return scene;
-}
-
-Json result_json(const simulate::SceneResult& result,
-                 const std::vector<simulate::WireContact>& contacts) {
-  Json json = {{"schema", kResultSchema}, {"outcome", simulate::outcome_name(result.outcome)}};
-  if (!result.reason.empty()) json["reason"] = result.reason;
-  json["terms"] = result.terms;
-  put_points(json, "nodes_mm", result.nodes);
-  put_angles(json, "twist_rad", result.twist,
-             "the wire is straight at rest, so no twist was solved for");
-  put_angles(json, "roll_rad", result.roll, "only decoupled twist gives it");
-  json["energy_n_mm"] = energy_json(result);
-  put(json, "residual_n", result.residual);
-  json["iterations"] = result.iterations;
-  json["steps"] = result.steps;
-  put(json, "simulated_time_s", result.time);
-  put(json, "critical_time_step_s", result.critical_time_step,
-      "the method is stable at any time step");
-  put(json, "worst_energy_rise_n_mm", result.worst_energy_rise);
-  put(json, "cpu_time_s", result.cpu_time_s);
-  json["reactions"] = Json::array();
-  for (const simulate::Reaction& reaction : result.reactions) {
-    json["reactions"].push_back(reaction_json(reaction));
-  }
-  json["contacts"] = contacts_json(contacts);
-  put(json, "friction_work_n_mm", result.friction_work);
-  return json;
-}
-
-Json result_json(const simulate::TrialResult& result, double every_mm, double cpu_time_s) {
-  Json json = {{"schema", kResultSchema}, {"outcome", simulate::outcome_name(result.outcome)}};
-  if (!result.reason.empty()) json["reason"] = result.reason;
-  json["terms"] = result.terms;
-  put_points(json, "nodes_mm", result.nodes);
-  long iterations = 0;
-  double residual = 0.0, penetration = 0.0, displacement = 0.0;
-  for (const simulate::Push& push : result.pushes) {
-    iterations += push.iterations;
-    residual = std::max(residual, push.residual);
-    penetration = std::max(penetration, push.max_penetration);
-    displacement = std::max(displacement, push.wall_displacement);
-  }
-  const simulate::Push last = result.pushes.empty() ? simulate::Push() : result.pushes.back();
-  json["energy_n_mm"] = energy_json(last);
-  put_work(json, last);
-  put(json, "residual_n", residual);
-  json["iterations"] = iterations;
-  json["steps"] = result.pushes.size();
-  put(json, "cpu_time_s", cpu_time_s);
-  json["contacts"] = contacts_json(result.contacts);
-  put(json, "max_penetration_mm", penetration);
-  put(json, "max_wall_displacement_mm", displacement);
-  json["history"] = history_json(result.pushes, every_mm);
-  return json;
 }
 
 }  // namespace wireplan::pipeline

@@ -1,13 +1,12 @@
 #pragma once
 /// SCENE.json -> one wire on the laboratory bench, with or without a vessel round it, or one
-/// insertion into a vessel (design section 5), and its result.json. What the design has and this
-/// version not is refused by name.
+/// insertion into a vessel (design section 5). What the design has and this version not is refused
+/// by name.
 #include <filesystem>
 #include <optional>
 #include <string>
 
 #include "pipeline/files/case_file.h"
-#include "pipeline/files/json_reader.h"
 #include "simulate/insertion/scene.h"
 #include "simulate/insertion/trial.h"
 
@@ -47,14 +46,5 @@ SceneFile read_scene(const std::filesystem::path& path);
 /// `edge_length` h [mm]: k_s = EA / (2 h^3) and k_b = EI / h^3 with h in m.
 double axial_stiffness_from_paper(double stretch_coefficient, double edge_length);
 double bending_stiffness_from_paper(double bend_coefficient, double edge_length);
-
-/// result.json, "wireplan.result/1". A number that is not finite becomes null with the reason
-/// beside it, under "KEY_reason". `contacts` are those of a wire in a vessel.
-Json result_json(const simulate::SceneResult& result,
-                 const std::vector<simulate::WireContact>& contacts);
-
-/// The same for an insertion, which took `cpu_time_s`; `every_mm` spaces the rows of its history,
-/// whose forces are the largest since the row before.
-Json result_json(const simulate::TrialResult& result, double every_mm, double cpu_time_s);
 
 }  // namespace wireplan::pipeline

@@ -14,10 +14,6 @@ FOLDERS = ["preprocess", "simulate", "plan", "pipeline"]  # each includes those 
 KNOWN = {
     "preprocess/surface/surface_fit.cpp: fit_to_image": 105,
     "preprocess/volume/image.cpp": 806,
-    "pipeline/bench/bench_preprocess.cpp: bench_preprocess": 92,
-    "pipeline/bench/bench_stability.cpp": 672,
-    "pipeline/bench/bench_throughput.cpp": 714,
-    "pipeline/files/scene_file.cpp": 656,
 }
 
 

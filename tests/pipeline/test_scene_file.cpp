@@ -15,6 +15,7 @@
 
 #include "pipeline/files/case_file.h"
 #include "pipeline/files/catalogue.h"
+#include "pipeline/files/result_file.h"
 #include "pipeline/files/scene_file.h"
 #include "tests/pipeline/case_texts.h"
 #include "tests/pipeline/small_case.h"
