@@ -123,7 +123,7 @@ class Planner {
     plan_.scripts.starts_tried = static_cast<int>(start_ids.size());
     if (start_ids.empty()) return;
     std::vector<Candidate> starts;
-    for (const int id : start_ids) starts.push_back(plan_.candidates[static_cast<std::size_t>(id)]);
+    for (const int id : start_ids) starts.push_back(candidate(id));
     keep_what_reaches(find_manoeuvres(study_at(study_, Level::kScout), starts, vessel_.path,
                                       vessel_.rigid_model(), kTurnsOfScouts, options_.batch),
                       start_ids);
@@ -150,15 +150,16 @@ class Planner {
     }
   }
 
-  Ranking ranked() const {
+  Judgement judged() const {
     const Yardstick by;
-    return judge(study_, plan_, by.limits, by.weights).ranking;
+    return judge(study_, plan_, by.limits, by.weights);
   }
 
   // Finds errors by other elements, and ranks with these, until no other error matters.
   void refine() {
     for (;;) {
-      const std::vector<int> chosen = choose_plans_to_refine(ranked(), plan_.refinements, {});
+      const std::vector<int> chosen =
+          choose_plans_to_refine(judged().ranking, plan_.refinements, {});
       if (chosen.empty()) return;
       std::vector<Run> runs;
       for (const int id : chosen) {
@@ -197,10 +198,9 @@ class Planner {
   void repeat_best(int count, int rounds) {
     for (int round = 0; count > 0; ++round) {
       // In the end the first, and the best of each wire, alone.
-      const Yardstick by;
-      const Judgement judged = judge(study_, plan_, by.limits, by.weights);
+      const Judgement now = judged();
       const std::vector<int> chosen = choose_plans_to_repeat(
-          judged.ranking, judged.repeated, round < rounds ? plan_.robustness.plans : 1, count);
+          now.ranking, now.repeated, round < rounds ? plan_.robustness.plans : 1, count);
       if (chosen.empty()) return;
       add_repeats(chosen, static_cast<std::size_t>(count));
     }
@@ -239,11 +239,10 @@ class Planner {
   // What is to be looked at needs its shapes on the way: plans have them from their trials.
   void run_attempts() {
     std::vector<Run> runs;
-    for (const int id : choose_played(study_, plan_, ranked())) {
-      const auto k = static_cast<std::size_t>(id);
-      runs.push_back({.id = id, .candidate = plan_.candidates[k], .shapes = true});
-      const bool is_plan =
-          plan_.levels[k] == Level::kFull && plan_.trials[k].outcome == simulate::Outcome::kReached;
+    for (const int id : choose_played(study_, plan_, judged().ranking)) {
+      runs.push_back({.id = id, .candidate = candidate(id), .shapes = true});
+      const bool is_plan = plan_.levels[static_cast<std::size_t>(id)] == Level::kFull &&
+                           trial(id).outcome == simulate::Outcome::kReached;
       if (!is_plan) plan_.attempts.push_back(id);
     }
     find_or_run(study_, vessel_, runs, log_, silent_, plan_.full);

@@ -1,7 +1,6 @@
 #include "pipeline/bench/bench.h"
 
 #include <algorithm>
-#include <cmath>
 #include <ctime>
 #include <iostream>
 #include <sstream>
@@ -61,10 +60,6 @@ std::string table_text(const std::vector<Json>& rows) {
     for (const auto& [key, value] : row.items()) lines.back().push_back(cell_text(value));
   }
   return format_table(lines);
-}
-
-Json number_or_null(const std::optional<double>& value) {
-  return value && std::isfinite(*value) ? Json(*value) : Json();
 }
 
 double thread_milliseconds() {

@@ -36,9 +36,6 @@ BenchReport bench_preprocess(const BenchOptions& options);
 /// Rows as a table for people: columns aligned, numbers with 4 digits.
 std::string table_text(const std::vector<Json>& rows);
 
-/// Null where there is no number to tell.
-Json number_or_null(const std::optional<double>& value);
-
 /// CPU time of this thread [ms].
 double thread_milliseconds();
 

@@ -264,6 +264,24 @@ Json to_json(const Eigen::Matrix3Xd& points) {
   return rows;
 }
 
+Json number_or_null(const std::optional<double>& value) {
+  return value && std::isfinite(*value) ? Json(*value) : Json();
+}
+
+double number_of(const Json& value) { return value.is_null() ? std::nan("") : value.get<double>(); }
+
+Vec3 point_of(const Json& row) {
+  return {number_of(row.at(0)), number_of(row.at(1)), number_of(row.at(2))};
+}
+
+Eigen::Matrix3Xd points_of(const Json& rows) {
+  Eigen::Matrix3Xd points(3, static_cast<Eigen::Index>(rows.size()));
+  for (Eigen::Index k = 0; k < points.cols(); ++k) {
+    points.col(k) = point_of(rows.at(static_cast<std::size_t>(k)));
+  }
+  return points;
+}
+
 void Problems::add(const std::string& key, const std::string& value, const std::string& expected,
                    const std::string& remedy) {
   messages_.push_back(file_ + ": " + key + " is " + value + ", expected " + expected +

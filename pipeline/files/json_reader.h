@@ -32,6 +32,14 @@ void write_json(const Json& value, const std::filesystem::path& path);
 Json to_json(const Vec3& v);
 Json to_json(const Eigen::Matrix3Xd& points);
 
+/// Null where there is no number or it is not finite.
+Json number_or_null(const std::optional<double>& value);
+/// Back from a file: not a number where it holds null. Points are rows of three, `points_of` (3,
+/// n).
+double number_of(const Json& value);
+Vec3 point_of(const Json& row);
+Eigen::Matrix3Xd points_of(const Json& rows);
+
 /// The known name nearest by edit distance; empty where none is near enough to be meant.
 std::string nearest_name(const std::string& name, const std::vector<std::string>& known);
 

@@ -1,6 +1,5 @@
 #include "pipeline/files/plan_file.h"
 
-#include <cmath>
 #include <utility>
 
 #include "pipeline/files/trial_file.h"
@@ -10,14 +9,9 @@ namespace {
 
 constexpr const char* kMeasuredSchema = "wireplan.measured/1";
 
-// What is not finite is null.
-Json number(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
-double number_of(const Json& value) { return value.is_null() ? std::nan("") : value.get<double>(); }
-Json point(const Vec3& p) { return Json::array({number(p.x()), number(p.y()), number(p.z())}); }
-Vec3 point_of(const Json& row) {
-  return {number_of(row.at(0)), number_of(row.at(1)), number_of(row.at(2))};
+Json point(const Vec3& p) {
+  return Json::array({number_or_null(p.x()), number_or_null(p.y()), number_or_null(p.z())});
 }
-Json optional(const std::optional<double>& value) { return value ? Json(*value) : Json(nullptr); }
 std::optional<double> optional_of(const Json& value) {
   return value.is_null() ? std::nullopt : std::optional<double>(value);
 }
@@ -32,13 +26,13 @@ plan::Level level_of(const std::string& name) {
 Json metrics_to_json(const plan::Metrics& metrics) {
   Json json;
   for (const plan::MetricField& field : plan::kMetricFields) {
-    json[field.name] = number(metrics.*field.value);
+    json[field.name] = number_or_null(metrics.*field.value);
   }
   json["reached"] = metrics.reached;
   json["iterations"] = metrics.iterations;
   const plan::WallMotion& motion = metrics.wall_motion;
-  json["wall_motion"] = {{"displacement_mm", number(motion.displacement)},
-                         {"radius_mm", number(motion.radius)},
+  json["wall_motion"] = {{"displacement_mm", number_or_null(motion.displacement)},
+                         {"radius_mm", number_or_null(motion.radius)},
                          {"point_mm", point(motion.point)}};
   return json;
 }
@@ -62,7 +56,7 @@ Json measured_to_json(const plan::Measured& measured) {
           {"reason", measured.reason},
           {"terms", measured.terms},
           {"metrics", metrics_to_json(measured.metrics)},
-          {"progress_mm", number(measured.progress)},
+          {"progress_mm", number_or_null(measured.progress)},
           {"last_tip_mm", point(measured.last_tip)}};
 }
 
@@ -79,7 +73,7 @@ Json refinement_to_json(const plan::Refinement& refinement) {
   Json rows = Json::array(), error = nullptr;
   for (const plan::NumericsRow& row : refinement.rows) {
     rows.push_back({{"element_length_mm", row.element_length},
-                    {"position_error_mm", optional(row.position_error)},
+                    {"position_error_mm", number_or_null(row.position_error)},
                     {"peak_force_n", row.peak_force},
                     {"iterations", row.iterations}});
   }
@@ -93,7 +87,7 @@ Json refinement_to_json(const plan::Refinement& refinement) {
   return {{"trial", refinement.trial},
           {"rows", std::move(rows)},
           {"error", std::move(error)},
-          {"observed_order", optional(refinement.observed_order)},
+          {"observed_order", number_or_null(refinement.observed_order)},
           {"reason", refinement.reason}};
 }
 
@@ -161,11 +155,7 @@ std::optional<plan::Measured> measured_from_text(const std::string& text) {
   plan::Measured measured = measured_of(json);
   measured.cpu_seconds = json.at("cpu_s");
   if (!json.contains("nodes_mm")) return measured;
-  const Json& nodes = json.at("nodes_mm");
-  measured.nodes.resize(3, static_cast<Eigen::Index>(nodes.size()));
-  for (std::size_t k = 0; k < nodes.size(); ++k) {
-    measured.nodes.col(static_cast<Eigen::Index>(k)) = point_of(nodes[k]);
-  }
+  measured.nodes = points_of(json.at("nodes_mm"));
   return measured;
 }
 

@@ -1,7 +1,6 @@
 #include "pipeline/files/trial_file.h"
 
 #include <array>
-#include <cmath>
 #include <cstdint>
 #include <cstring>
 #include <fstream>
@@ -30,18 +29,14 @@ constexpr std::array kOutcomes = {
     Outcome::kReached,     Outcome::kMissed,    Outcome::kStuck,        Outcome::kProlapsed,
     Outcome::kLeftOpening, Outcome::kLeftLumen, Outcome::kNotConverged, Outcome::kFailed};
 
-// A number of a trial that failed may not be finite: null, with the trial's reason beside it.
-double number(const Json& value) { return value.is_null() ? std::nan("") : value.get<double>(); }
-
-Vec3 point(const Json& row) { return {number(row.at(0)), number(row.at(1)), number(row.at(2))}; }
-
+// Numbers of a trial that failed may not be finite: null, with the trial's reason beside them.
 Json value_json(double value) { return value; }
 Json value_json(int value) { return value; }
 Json value_json(const Vec3& value) { return to_json(value); }
 
-void take(double& value, const Json& json) { value = number(json); }
+void take(double& value, const Json& json) { value = number_of(json); }
 void take(int& value, const Json& json) { value = json; }
-void take(Vec3& value, const Json& json) { value = point(json); }
+void take(Vec3& value, const Json& json) { value = point_of(json); }
 
 // A column for each field of a push.
 Json pushes_to_json(const std::vector<Push>& pushes) {
@@ -90,13 +85,13 @@ std::vector<WireContact> contacts_from_json(const Json& rows) {
   std::vector<WireContact> contacts;
   for (const Json& row : rows) {
     contacts.push_back({.node = row.at("node"),
-                        .part = number(row.at("part")),
+                        .part = number_of(row.at("part")),
                         .triangle = row.at("triangle"),
-                        .point = point(row.at("point_mm")),
-                        .normal_force = point(row.at("normal_force_n")),
-                        .friction_force = point(row.at("friction_force_n")),
-                        .penetration = number(row.at("penetration_mm")),
-                        .wall_displacement = number(row.at("wall_displacement_mm"))});
+                        .point = point_of(row.at("point_mm")),
+                        .normal_force = point_of(row.at("normal_force_n")),
+                        .friction_force = point_of(row.at("friction_force_n")),
+                        .penetration = number_of(row.at("penetration_mm")),
+                        .wall_displacement = number_of(row.at("wall_displacement_mm"))});
   }
   return contacts;
 }
@@ -114,7 +109,7 @@ Json peaks_to_json(const std::vector<TriangleForce>& peaks) {
 std::vector<TriangleForce> peaks_from_json(const Json& columns) {
   std::vector<TriangleForce> peaks(columns.at("triangle").size());
   for (std::size_t k = 0; k < peaks.size(); ++k) {
-    peaks[k] = {columns.at("triangle").at(k), number(columns.at("force_n").at(k))};
+    peaks[k] = {columns.at("triangle").at(k), number_of(columns.at("force_n").at(k))};
   }
   return peaks;
 }
@@ -242,11 +237,7 @@ std::optional<TrialResult> find_trial(const std::filesystem::path& path) {
   trial.reason = file.at("reason");
   trial.terms = file.at("terms").get<std::vector<std::string>>();
   trial.pushes = pushes_from_json(file.at("pushes"));
-  const Json& nodes = file.at("nodes_mm");
-  trial.nodes.resize(3, static_cast<Eigen::Index>(nodes.size()));
-  for (std::size_t k = 0; k < nodes.size(); ++k) {
-    trial.nodes.col(static_cast<Eigen::Index>(k)) = point(nodes[k]);
-  }
+  trial.nodes = points_of(file.at("nodes_mm"));
   trial.contacts = contacts_from_json(file.at("contacts"));
   trial.peak_forces = peaks_from_json(file.at("peak_forces"));
   return trial;

@@ -56,9 +56,6 @@ plan::Plan plan_until(Workspace& work, Until until, StoredTrials& log) {
 Json scouting_json(const std::optional<plan::ScoutSummary>& scouting) {
   if (!scouting) return nullptr;
   const plan::ScoutError& error = scouting->error;
-  const auto number = [](const std::optional<double>& value) {
-    return value ? Json(*value) : Json(nullptr);
-  };
   return {{"element_length_mm", scouting->element_length},
           {"step_mm", scouting->step},
           {"wall", "rigid"},
@@ -66,8 +63,8 @@ Json scouting_json(const std::optional<plan::ScoutSummary>& scouting) {
           {"probed", scouting->probed},
           {"compared", error.compared},
           {"both_reached", error.both_reached},
-          {"median_score_error", number(error.median_score)},
-          {"largest_score_error", number(error.largest_score)},
+          {"median_score_error", number_or_null(error.median_score)},
+          {"largest_score_error", number_or_null(error.largest_score)},
           {"missed", error.missed},
           {"false_reached", error.false_reached}};
 }
@@ -151,7 +148,15 @@ void make_plans(Workspace& work, const fs::path& folder) {
 ShareOutcome run_share(Workspace& work, const Share& share) {
   expects(share.shard >= 1 && share.shard <= share.shards && share.round >= 1);
   StoredTrials log(work);
-  const plan::PlanVessel vessel = plan_vessel(work);
+  plan::PlanVessel vessel = plan_vessel(work);
+  if (share.shards > 1) {  // one of the processes makes the field, where there is a trial to run
+    for (auto* model : {&vessel.model, &vessel.rigid_model}) {
+      *model = [&work, make = *model]() -> const simulate::VesselModel& {
+        work.share_field();
+        return make();
+      };
+    }
+  }
   const std::vector<plan::Candidate> candidates = plan::list_candidates(work.study());
   plan::Rounds rounds(work.study(), vessel, candidates, work.given().exhaustive);
   std::vector<plan::Run> runs = rounds.next();
@@ -173,13 +178,10 @@ ShareOutcome run_share(Workspace& work, const Share& share) {
 
   // Every N-th, so that the costly ones, which are neighbours, are shared out.
   std::vector<plan::Run> own;
-  bool all_found = true;
   const auto shards = static_cast<std::size_t>(share.shards);
   for (auto k = static_cast<std::size_t>(share.shard - 1); k < runs.size(); k += shards) {
     own.push_back(runs[k]);
-    all_found = all_found && log.find(runs[k]);
   }
-  if (share.shards > 1 && !all_found) work.share_field();
   plan::Spent spent;
   plan::find_or_run(work.study(), vessel, own, log, plan_options(work, Until::kTrials).batch,
                     spent);

@@ -161,8 +161,11 @@ void do_at_once(const Workspace& work, const std::vector<std::function<void()>>&
   if (work.options().cancelled && work.options().cancelled()) throw Interrupted();
 }
 
-/// Reads what the page shows of every trial, and the volume; adds the forces of those in full.
-void read_inputs(Workspace& work, const ReportInput& report, PageInput& page, ForceMap& forces) {
+/// Reads what the page shows of every trial, and the volume. Returns the largest forces of those in
+/// full.
+std::vector<std::vector<simulate::TriangleForce>> read_inputs(Workspace& work,
+                                                              const ReportInput& report,
+                                                              PageInput& page) {
   const std::size_t count = report.plan.candidates.size();
   page.trials.resize(count);
   std::vector<std::vector<simulate::TriangleForce>> peaks(count);
@@ -178,7 +181,7 @@ void read_inputs(Workspace& work, const ReportInput& report, PageInput& page, Fo
     });
   }
   do_at_once(work, jobs);
-  for (const auto& trial : peaks) forces.add(trial);
+  return peaks;
 }
 
 /// The insertions that can be played, those of the first plans for viewers too.
@@ -211,15 +214,6 @@ void write_ranked_markups(const ReportInput& report, const PageInput& page,
   }
 }
 
-/// The largest forces on the wall of the best plan, or of all trials where there is none.
-ForceMap best_forces(const Workspace& work, const ReportInput& report, const ForceMap& all) {
-  if (report.judgement.ranking.plans.empty()) return all;
-  ForceMap best(std::ssize(all.values()));
-  const int id = report.judgement.ranking.plans.front().trial;
-  best.add(read_trial(work, plan::Level::kFull, id).peak_forces);
-  return best;
-}
-
 void write_forces(Workspace& work, const ReportInput& report, const ForceMap& all,
                   const ForceMap& best, const fs::path& folder) {
   std::vector<preprocess::NamedArray> forces = {{"peak_force_n", all.values()}};
@@ -236,9 +230,12 @@ void make_report(Workspace& work, const fs::path& folder) {
   ReportInput report = describe_run(work);
   warn_of_other_first(work.given(), report);
   PageInput page = start_page(work);
-  ForceMap all_forces(page.surface.triangles.cols());
-  read_inputs(work, report, page, all_forces);
-  const ForceMap forces = best_forces(work, report, all_forces);
+  const auto peaks = read_inputs(work, report, page);
+  ForceMap all_forces(page.surface.triangles.cols()), best_forces = all_forces;
+  for (const auto& trial : peaks) all_forces.add(trial);
+  const std::vector<plan::RankedPlan>& plans = report.judgement.ranking.plans;
+  if (!plans.empty()) best_forces.add(peaks[static_cast<std::size_t>(plans.front().trial)]);
+  const ForceMap& forces = plans.empty() ? all_forces : best_forces;  // where the volume is cut
   page.peak_force = all_forces.values();
 
   std::vector<std::function<void()>> jobs = {
@@ -247,7 +244,7 @@ void make_report(Workspace& work, const fs::path& folder) {
         write_whole(page.picture_png, folder / "plans.png");
       },
       [&] { add_insertions(work, report, page, folder); },
-      [&] { write_forces(work, report, all_forces, forces, folder); },
+      [&] { write_forces(work, report, all_forces, best_forces, folder); },
       [&] { write_ranked_markups(report, page, folder / "trials"); }};
   if (has_slices(work)) {
     jobs.insert(jobs.begin(), [&, segment = work.figures("segment")] {
