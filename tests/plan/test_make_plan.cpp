@@ -6,18 +6,15 @@
 #include "plan/judge.h"
 #include "plan/make_plan.h"
 #include "tests/plan/memory_log.h"
-#include "tests/shapes.h"
+#include "tests/plan/tube_case.h"
 
 namespace wireplan::plan {
 namespace {
 
 using simulate::Outcome;
 
-/// A tube with as many candidates as are asked for, of two wires. Its field is made once.
-struct Tube {
-  Study study;
-  Centerline path;
-
+/// A tube with as many candidates as are asked for, of two wires.
+struct Tube : TubeCase {
   explicit Tube(int rolls) {
     for (const char* name : {"soft", "stiff"}) {
       study.wires.push_back({.name = name,
@@ -29,21 +26,6 @@ struct Tube {
     study.inclinations = {5.0 * kRadPerDeg};
     study.azimuths = {0.0};
     for (int k = 0; k < rolls; ++k) study.rolls.push_back(0.1 * k);
-    study.access = Vec3(0.0, 0.0, 5.0);
-    study.goal = {.point = Vec3(0.0, 0.0, 30.0), .radius = 4.5};
-    study.insertion.length = 35.0;
-    path.points.resize(3, 2);
-    path.points << 0.0, 0.0, 0.0, 0.0, 5.0, 30.0;
-    path.radius = Eigen::Vector2d(4.0, 4.0);
-    path.arc_length = Eigen::Vector2d(0.0, 25.0);
-  }
-  static const simulate::VesselModel& model() {
-    static const simulate::VesselModel tube(shapes::straight_tube(4.0, 50.0, 2.0));
-    return tube;
-  }
-  Plan plan(TrialLog& log, const PlanOptions& options) const {
-    const PlanVessel vessel{.path = path, .yields = false, .model = model, .rigid_model = model};
-    return make_plan(study, vessel, options, log);
   }
   Judgement judged(const Plan& plan) const { return judge(study, plan, {}, {}); }
 };

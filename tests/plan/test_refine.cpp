@@ -7,6 +7,7 @@
 #include "plan/make_plan.h"
 #include "plan/refine.h"
 #include "tests/plan/memory_log.h"
+#include "tests/plan/tube_case.h"
 #include "tests/shapes.h"
 
 namespace wireplan::plan {
@@ -176,33 +177,20 @@ TEST(EstimateError, TellsTheTipFromTheRestOfTheWire) {
 }
 
 /// A study with real trials: askew into a straight tube, where the wire lies against the wall.
-struct TubeStudy {
-  Study study;
-  Centerline path;
-  simulate::VesselModel vessel{shapes::straight_tube(4.0, 50.0, 2.0)};
-
+struct TubeStudy : TubeCase {
   TubeStudy() {
     study.wires = {
         {.name = "soft", .radius = 0.4, .sections = {{.length = 60.0, .bending_stiffness = 50.0}}}};
     study.inclinations = {15.0 * kRadPerDeg};
     study.azimuths = {0.0, 1.0};
     study.rolls = {0.0};
-    study.access = Vec3(0.0, 0.0, 5.0);
-    study.goal = {.point = Vec3(0.0, 0.0, 30.0), .radius = 4.5};
-    study.insertion.length = 35.0;
-
-    path.points.resize(3, 2);
-    path.points << 0.0, 0.0, 0.0, 0.0, 5.0, 30.0;
-    path.radius = Eigen::Vector2d(4.0, 4.0);
-    path.arc_length = Eigen::Vector2d(0.0, 25.0);
   }
 
   Plan planned(int threads) const {
     PlanOptions options{.manoeuvres = Manoeuvring::kNever, .batch = {.threads = threads}};
     options.robustness.repeats = 0;
-    const auto model = [&]() -> const simulate::VesselModel& { return vessel; };
     MemoryLog log;
-    return make_plan(study, {.path = path, .model = model, .rigid_model = model}, options, log);
+    return plan(log, options);
   }
 };
 
