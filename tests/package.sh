@@ -21,21 +21,24 @@ if [[ ! -e "$root/etc/debian_version" ]]; then
   mkdir -p "$root"
   debootstrap --variant=minbase bookworm "$root" >/dev/null
 fi
-cp "$package" "$root/root/wireplan.deb"
+# Where it is tried, in the root.
+place=/opt/try
+mkdir -p "$root$place"
+cp "$package" "$root$place/wireplan.deb"
 
 # What is on this machine is not seen: neither its environment nor its files.
 inside() {
-  env -i PATH=/usr/sbin:/usr/bin:/sbin:/bin HOME=/root LANG=C.UTF-8 DEBIAN_FRONTEND=noninteractive \
+  env -i PATH=/usr/sbin:/usr/bin:/sbin:/bin HOME="$place" LANG=C.UTF-8 DEBIAN_FRONTEND=noninteractive \
     ${http_proxy:+http_proxy="$http_proxy"} chroot "$root" "$@" </dev/null
 }
 inside apt-get -q -q update
-inside apt-get -q -q -y --no-install-recommends -o Dpkg::Use-Pty=0 install --reinstall /root/wireplan.deb >/dev/null
+inside apt-get -q -q -y --no-install-recommends -o Dpkg::Use-Pty=0 install --reinstall "$place/wireplan.deb" >/dev/null
 inside sh -eu -c '
-  wireplan wires >/root/wires.txt
-  grep -q amplatz /root/wires.txt
-  rm -rf /root/case /root/out
-  cp -r /usr/share/wireplan/cases/abdomen /root/case
-  cd /root
+  cd "$HOME"
+  wireplan wires >wires.txt
+  grep -q amplatz wires.txt
+  rm -rf case out
+  cp -r /usr/share/wireplan/cases/abdomen case
   wireplan phantom case/phantom.json -o case/phantom
   wireplan run case -o out
   grep -q "wireplan.report/" out/report.json
