@@ -47,6 +47,10 @@ inline void expects(bool condition, const char* file = __builtin_FILE(),
 /// 15.000000000000002.
 double clean(double value);
 
+/// For messages: a point as "(12.3, -4.5, 6.7)", a number with three digits.
+std::string place_text(const Vec3& place);
+std::string number_text(double value);
+
 inline constexpr double kPi = std::numbers::pi;
 inline constexpr double kRadPerDeg = kPi / 180.0;
 inline constexpr double kMpaPerKpa = 1e-3;

@@ -37,6 +37,17 @@ struct Vessel {
   Wall wall;
 };
 
+/// Outward unit normal of triangle k; zero where it has no area.
+Vec3 unit_normal(const Surface& surface, Eigen::Index k);
+
+/// (3, v) at each vertex the sum of its triangles' unit normals times their angles there: the sum's
+/// direction does not depend on how the wall round the vertex is cut into triangles.
+Eigen::Matrix3Xd angle_weighted_normals(const Surface& surface);
+
+/// (3, v) unit: at each vertex the direction of the sum of its triangles' areas; zero where no
+/// triangle is.
+Eigen::Matrix3Xd area_weighted_normals(const Surface& surface);
+
 /// Normal stiffness of the extruded wall per area, k_n = M/(3t) with M = E(1-nu)/((1+nu)(1-2nu))
 /// [MPa/mm], for the thickness t [mm] (references B2).
 inline double wall_normal_stiffness(double young_modulus, double poisson_ratio, double thickness) {

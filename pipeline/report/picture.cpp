@@ -206,18 +206,6 @@ double largest_force(const std::vector<PictureWire>& wires) {
   return largest;
 }
 
-/// Area unweighted by angle is enough for shading: the sum of the neighbours' area vectors.
-Eigen::Matrix3Xd vertex_normals(const Surface& vessel) {
-  Eigen::Matrix3Xd normals = Eigen::Matrix3Xd::Zero(3, vessel.vertices.cols());
-  for (const Eigen::Vector3i& t : vessel.triangles.colwise()) {
-    const Vec3 a = vessel.vertices.col(t[0]);
-    const Vec3 area_vector =
-        Vec3(vessel.vertices.col(t[1]) - a).cross(Vec3(vessel.vertices.col(t[2]) - a));
-    for (int k = 0; k < 3; ++k) normals.col(t[k]) += area_vector;
-  }
-  return normals.colwise().normalized();
-}
-
 /// What turns mm into samples of a panel: the scene's middle goes to the panel's middle.
 struct Projection {
   Mat3 axes;
@@ -270,7 +258,7 @@ double largest_wall_force(const PictureMarks& marks) {
 
 void draw_vessel(Panel& panel, const Projection& project, const Surface& vessel,
                  const PictureMarks& marks) {
-  const Eigen::Matrix3Xd normals = vertex_normals(vessel);
+  const Eigen::Matrix3Xd normals = area_weighted_normals(vessel);
   const double scale = largest_wall_force(marks);
   for (Eigen::Index m = 0; m < vessel.triangles.cols(); ++m) {
     std::array<Vec3, 3> corners, corner_normals;

@@ -28,24 +28,12 @@ constexpr double kSmoothing = 0.12;
 
 // -------------------------------------------------------------------------------- the search
 
-std::string text(const Vec3& p) {
-  std::array<char, 96> buffer{};
-  std::snprintf(buffer.data(), buffer.size(), "(%.1f, %.1f, %.1f)", p.x(), p.y(), p.z());
-  return buffer.data();
-}
-
-std::string text(double value) {
-  std::array<char, 32> buffer{};
-  std::snprintf(buffer.data(), buffer.size(), "%.3g", value);
-  return buffer.data();
-}
-
 void require_inside(const Surface& surface, const std::string& name, const Vec3& point) {
   constexpr double kOnTheWall = 1e-6;  // mm
   const InsideAnswer answer = locate_point(surface, point);
   if (answer.inside && answer.distance > kOnTheWall) return;
-  throw Error(name + " " + text(point) + " mm lies outside the vessel surface, " +
-              text(answer.distance) +
+  throw Error(name + " " + place_text(point) + " mm lies outside the vessel surface, " +
+              number_text(answer.distance) +
               " mm from the wall; expected a point in the lumen. Move it inward, or check that "
               "point and surface share one frame (LPS, mm)");
 }
@@ -79,10 +67,10 @@ RawPath search_path(const NearestWall& wall, const Surface& surface, const Vec3&
   GridSearch search = search_on(first_spacing, access, target);
   search.run(Cost::kRoute);
   const Vec3 reached = search.nearest_reached(target);
-  throw Error("target " + text(target) + " mm is not connected to access " + text(access) +
-              " mm inside the vessel surface (finest search grid " + text(spacing) +
-              " mm): the nearest place reached, " + text(reached) + " mm, is " +
-              text((target - reached).norm()) +
+  throw Error("target " + place_text(target) + " mm is not connected to access " +
+              place_text(access) + " mm inside the vessel surface (finest search grid " +
+              number_text(spacing) + " mm): the nearest place reached, " + place_text(reached) +
+              " mm, is " + number_text((target - reached).norm()) +
               " mm from the target. Check the segmentation band (segmentation.lower_hu, "
               "upper_hu), which may cut the vessel there, and the target point");
 }
@@ -453,9 +441,9 @@ Centerline find_centerline(const Surface& surface, const Vec3& access, const Vec
     std::reverse(line.begin(), line.end());
   }
   if (arc_length(line).back() < sample) {
-    throw Error("target " + text(target) + " mm and access " + text(access) +
-                " mm lie at the same place along the vessel; expected at least " + text(sample) +
-                " mm between them. Check the target point");
+    throw Error("target " + place_text(target) + " mm and access " + place_text(access) +
+                " mm lie at the same place along the vessel; expected at least " +
+                number_text(sample) + " mm between them. Check the target point");
   }
   line = smooth(wall, resample(line, sample), sample, {.least = sample, .part = kSmoothing});
 

@@ -5,9 +5,10 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <map>
 #include <numeric>
 #include <set>
+
+#include "preprocess/surface/triangle_sides.h"
 
 namespace wireplan::preprocess {
 
@@ -34,13 +35,14 @@ constexpr double kLargestReach = 40.0;  // area of the side that is looked at, p
 struct Facets {
   Eigen::Matrix3Xd normal, centroid;
   Eigen::VectorXd area;
-  std::vector<std::array<int, 3>> neighbour;  // across edges 01, 12, 20
+  Eigen::Matrix3Xi neighbour;  // across edges 01, 12, 20
 };
 
 Facets describe_facets(const Surface& surface) {
   const Eigen::Index m = surface.triangles.cols();
-  Facets facets{Eigen::Matrix3Xd(3, m), Eigen::Matrix3Xd(3, m), Eigen::VectorXd(m), {}};
-  std::map<std::pair<int, int>, int> triangle_of;  // directed edge
+  Facets facets{Eigen::Matrix3Xd(3, m), Eigen::Matrix3Xd(3, m), Eigen::VectorXd(m),
+                triangle_neighbours(surface)};
+  expects((facets.neighbour.array() >= 0).all());
   for (int f = 0; f < m; ++f) {
     const Eigen::Vector3i t = surface.triangles.col(f);
     const Vec3 a = surface.vertices.col(t[0]), b = surface.vertices.col(t[1]),
@@ -49,16 +51,6 @@ Facets describe_facets(const Surface& surface) {
     facets.area[f] = 0.5 * twice_area.norm();
     facets.normal.col(f) = twice_area.normalized();
     facets.centroid.col(f) = (a + b + c) / 3.0;
-    for (int e = 0; e < 3; ++e) triangle_of[{t[e], t[(e + 1) % 3]}] = f;
-  }
-  facets.neighbour.resize(static_cast<std::size_t>(m));
-  for (int f = 0; f < m; ++f) {
-    const Eigen::Vector3i t = surface.triangles.col(f);
-    for (int e = 0; e < 3; ++e) {
-      const auto other = triangle_of.find({t[(e + 1) % 3], t[e]});
-      expects(other != triangle_of.end());
-      facets.neighbour[static_cast<std::size_t>(f)][static_cast<std::size_t>(e)] = other->second;
-    }
   }
   return facets;
 }
@@ -69,9 +61,9 @@ class CapFinder {
       : surface_(surface),
         facets_(describe_facets(surface)),
         all_(facets_.area.sum()),
-        seen_(facets_.neighbour.size(), 0),
-        tried_(facets_.neighbour.size(), false),
-        taken_(facets_.neighbour.size(), false) {}
+        seen_(static_cast<std::size_t>(facets_.area.size()), 0),
+        tried_(seen_.size(), false),
+        taken_(seen_.size(), false) {}
 
   std::vector<Opening> find() {
     std::vector<Opening> openings;
@@ -93,10 +85,10 @@ class CapFinder {
 
  private:
   std::vector<int> flattest_first() const {
-    std::vector<double> cosine(facets_.neighbour.size());
+    std::vector<double> cosine(seen_.size());
     for (std::size_t f = 0; f < cosine.size(); ++f) {
       cosine[f] = 1.0;
-      for (const int g : facets_.neighbour[f]) {
+      for (const int g : facets_.neighbour.col(static_cast<Eigen::Index>(f))) {
         const double between =
             facets_.normal.col(static_cast<Eigen::Index>(f)).dot(facets_.normal.col(g));
         cosine[f] = std::min(cosine[f], between);
@@ -121,7 +113,7 @@ class CapFinder {
       area += facets_.area[f];
     }
     for (std::size_t k = 0; k < patch.size() && area <= limit; ++k) {
-      for (const int g : facets_.neighbour[static_cast<std::size_t>(patch[k])]) {
+      for (const int g : facets_.neighbour.col(patch[k])) {
         if (seen_[static_cast<std::size_t>(g)] == stamp_ || !belongs(g)) continue;
         seen_[static_cast<std::size_t>(g)] = stamp_;
         patch.push_back(g);
@@ -169,7 +161,7 @@ class CapFinder {
       before = cap.triangles.size();
       flood(cap.triangles, all_, [&](int f) {
         int inside = 0;
-        for (const int g : facets_.neighbour[static_cast<std::size_t>(f)]) {
+        for (const int g : facets_.neighbour.col(f)) {
           if (seen_[static_cast<std::size_t>(g)] == stamp_) ++inside;
         }
         return inside >= 2 && !taken_[static_cast<std::size_t>(f)] &&

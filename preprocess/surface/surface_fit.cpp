@@ -135,112 +135,163 @@ Eigen::VectorXd moved_by_blur(const Surface& surface, const Neighbours& neighbou
   return inward;
 }
 
-}  // namespace
+/// What the lumen holds near each vertex and what lies just outside, as the image reads and
+/// averaged along the surface.
+struct Levels {
+  Eigen::VectorXd lumen, outside, beyond;         // (n)
+  double usual_lumen = 0.0, usual_outside = 0.0;  // medians
+  double reach = 0.0;                             // of averages along the surface    [units]
+  double contrast() const { return usual_lumen - usual_outside; }
+};
 
-Surface fit_to_image(const Surface& surface, const Image& image, FitStatistics* statistics) {
-  expects(image.values.size() == image.grid.voxels() && surface.triangles.cols() > 0);
-  const Eigen::Index n = surface.vertices.cols();
-  const Interpolated grey(image);
-  const Neighbours neighbours = find_neighbours(surface);
-  const double voxel = std::cbrt(image.grid.spacing.prod()), edge = mean_edge(surface);
-  double unit = voxel;  // of distances along the normal                                  [mm]
-  const int half = static_cast<int>(std::lround(kReach / kStep));
+/// The edge along the normal of each vertex.
+struct Edges {
+  Eigen::VectorXd shift;      // (n) outward to it, back to the mask where there is none      [mm]
+  Eigen::VectorXd certainty;  // (n) 1, or kHold where there is none
+  Eigen::VectorXd width;      // (n) from it to where the lumen is one sigma deep, or 0       [mm]
+};
 
-  std::vector<char> fixed(static_cast<std::size_t>(n));
-  for (Eigen::Index v = 0; v < n; ++v) fixed[v] = grey.at_border(surface.vertices.col(v)) ? 1 : 0;
+/// The surface while it moves.
+class Fit {
+ public:
+  Fit(const Surface& surface, const Image& image)
+      : grey_(image),
+        neighbours_(find_neighbours(surface)),
+        voxel_(std::cbrt(image.grid.spacing.prod())),
+        edge_(mean_edge(surface)),
+        unit_(voxel_),
+        fitted_(surface),
+        total_(Eigen::VectorXd::Zero(surface.vertices.cols())),
+        fixed_(static_cast<std::size_t>(surface.vertices.cols())) {
+    for (Eigen::Index v = 0; v < total_.size(); ++v) {
+      fixed_[v] = grey_.at_border(surface.vertices.col(v)) ? 1 : 0;
+    }
+  }
 
-  Surface fitted = surface;
-  Eigen::VectorXd total = Eigen::VectorXd::Zero(n);
-  for (int round = 0; round < kRounds; ++round) {
-    const Eigen::Matrix3Xd normals = vertex_normals(fitted);
+  void round(FitStatistics* statistics) {
+    const Eigen::Matrix3Xd normals = area_weighted_normals(fitted_);
+    Levels levels = read_levels(normals);
+    if (statistics) {
+      statistics->lumen_value = levels.usual_lumen;
+      statistics->outside_value = levels.usual_outside;
+    }
+    // The wall is soft tissue, though thin enough for the fat behind it to be what was read.
+    if (levels.contrast() > kLeastHu) levels.outside = levels.outside.cwiseMax(kWallHu);
 
-    // What the lumen holds near each vertex, and what lies just outside.
-    Eigen::VectorXd lumen(n), outside(n), beyond(n), weight = Eigen::VectorXd::Ones(n);
+    Edges edges = find_edges(normals, levels);
+    undo_blur(normals, edges);
+    if (statistics) {
+      statistics->fitted_fraction = static_cast<double>((edges.certainty.array() == 1.0).count()) /
+                                    static_cast<double>(total_.size());
+    }
+    // Against noise and gaps: the average of the neighbourhood.
+    average(neighbours_, passes_for(levels.reach * unit_, edge_), edges.shift, edges.certainty);
+    move(normals, edges.shift);
+  }
+
+  const Surface& surface() const { return fitted_; }
+  double mean_shift() const { return total_.cwiseAbs().mean(); }
+
+ private:
+  Levels read_levels(const Eigen::Matrix3Xd& normals) const {
+    const Eigen::Index n = total_.size();
+    Levels levels{Eigen::VectorXd(n), Eigen::VectorXd(n), Eigen::VectorXd(n)};
 #pragma omp parallel for schedule(static)
     for (Eigen::Index v = 0; v < n; ++v) {
-      const Vec3 p = fitted.vertices.col(v), out = unit * normals.col(v);
-      const double deep = 0.5 * (grey.at(p - kInside * out) + grey.at(p - (kInside + 0.5) * out));
-      lumen(v) = std::max(deep, grey.at(p - kNearInside * out));
-      beyond(v) = grey.at(p + kOutside * out);
-      outside(v) = beyond(v);
+      const Vec3 p = fitted_.vertices.col(v), out = unit_ * normals.col(v);
+      const double deep = 0.5 * (grey_.at(p - kInside * out) + grey_.at(p - (kInside + 0.5) * out));
+      levels.lumen(v) = std::max(deep, grey_.at(p - kNearInside * out));
+      levels.beyond(v) = grey_.at(p + kOutside * out);
+      levels.outside(v) = levels.beyond(v);
       for (double way = kStep; way < kOutside; way += kStep) {
-        outside(v) = std::min(outside(v), grey.at(p + way * out));
+        levels.outside(v) = std::min(levels.outside(v), grey_.at(p + way * out));
       }
     }
-    const double usual_lumen = median({lumen.begin(), lumen.end()});
-    const double usual_outside = median({outside.begin(), outside.end()});
-    const double contrast = usual_lumen - usual_outside;
-    const Eigen::VectorXd as_read = lumen;
-    average(neighbours, passes_for(kLevelSmoothing * unit, edge), lumen, weight);
-    const Eigen::VectorXd off = (as_read - lumen).cwiseAbs();
+    levels.usual_lumen = median({levels.lumen.begin(), levels.lumen.end()});
+    levels.usual_outside = median({levels.outside.begin(), levels.outside.end()});
+
+    Eigen::VectorXd weight = Eigen::VectorXd::Ones(n);
+    const Eigen::VectorXd as_read = levels.lumen;
+    average(neighbours_, passes_for(kLevelSmoothing * unit_, edge_), levels.lumen, weight);
+    const Eigen::VectorXd off = (as_read - levels.lumen).cwiseAbs();
     const double noise = median({off.begin(), off.end()}) /
-                         std::max(std::abs(contrast), std::numeric_limits<double>::min());
-    const double reach = kSmoothing * std::clamp(noise / kQuiet, 1.0, kMostOfSmoothing);
+                         std::max(std::abs(levels.contrast()), std::numeric_limits<double>::min());
+    levels.reach = kSmoothing * std::clamp(noise / kQuiet, 1.0, kMostOfSmoothing);
     weight.setOnes();
-    average(neighbours, passes_for(reach * unit, edge), outside, weight);
-    if (statistics) {
-      statistics->lumen_value = usual_lumen;
-      statistics->outside_value = usual_outside;
-    }
+    average(neighbours_, passes_for(levels.reach * unit_, edge_), levels.outside, weight);
+    return levels;
+  }
 
-    // The wall is soft tissue, though thin enough for the fat behind it to be what was read.
-    if (contrast > kLeastHu) outside = outside.cwiseMax(kWallHu);
-
-    // The edge along each normal.
-    Eigen::VectorXd shift = Eigen::VectorXd::Zero(n), certainty(n),
-                    width = Eigen::VectorXd::Zero(n);
+  Edges find_edges(const Eigen::Matrix3Xd& normals, const Levels& levels) const {
+    const Eigen::Index n = total_.size();
+    const int half = static_cast<int>(std::lround(kReach / kStep));
+    // Darker outside, if only between the lumen and a bone; else brighter, or no edge.
+    const double least = kLeastContrast * std::abs(levels.contrast());
+    Edges edges{-total_, Eigen::VectorXd::Constant(n, kHold), Eigen::VectorXd::Zero(n)};
 #pragma omp parallel
     {
       std::vector<double> profile(static_cast<std::size_t>(2 * half + 1));
 #pragma omp for schedule(static)
       for (Eigen::Index v = 0; v < n; ++v) {
-        certainty(v) = kHold;
-        shift(v) = -total(v);
-        // Darker outside, if only between the lumen and a bone; else brighter, or no edge.
-        const double least = kLeastContrast * std::abs(contrast);
-        const bool falls = lumen(v) - outside(v) >= least;
-        if (!falls && beyond(v) - lumen(v) < least) continue;
-        const Vec3 p = fitted.vertices.col(v), out = kStep * unit * normals.col(v);
+        const double lumen = levels.lumen(v);
+        const bool falls = lumen - levels.outside(v) >= least;
+        if (!falls && levels.beyond(v) - lumen < least) continue;
+        const Vec3 p = fitted_.vertices.col(v), out = kStep * unit_ * normals.col(v);
         for (int k = -half; k <= half; ++k) {
-          profile[static_cast<std::size_t>(k + half)] = grey.at(p + k * out);
+          profile[static_cast<std::size_t>(k + half)] = grey_.at(p + k * out);
         }
-        const double level = 0.5 * (lumen(v) + (falls ? outside(v) : beyond(v)));
+        const double level = 0.5 * (lumen + (falls ? levels.outside(v) : levels.beyond(v)));
         const std::optional<double> at = crossing(profile, level, falls);
         if (!at) continue;
-        shift(v) = *at * kStep * unit;
-        certainty(v) = 1.0;
-        const double deep = level + (2.0 * kDeep - 1.0) * (lumen(v) - level);
-        width(v) = way_inward(profile, *at, deep, falls).value_or(0.0) * kStep * unit;
+        edges.shift(v) = *at * kStep * unit_;
+        edges.certainty(v) = 1.0;
+        const double deep = level + (2.0 * kDeep - 1.0) * (lumen - level);
+        edges.width(v) = way_inward(profile, *at, deep, falls).value_or(0.0) * kStep * unit_;
       }
     }
+    return edges;
+  }
 
-    // Blur moved it toward the middle of the vessel.
+  /// Blur moved the edges toward the middle of the vessel. Its width is the next round's unit.
+  void undo_blur(const Eigen::Matrix3Xd& normals, Edges& edges) {
     std::vector<double> widths;
-    std::copy_if(width.begin(), width.end(), std::back_inserter(widths),
+    std::copy_if(edges.width.begin(), edges.width.end(), std::back_inserter(widths),
                  [](double w) { return w > 0.0; });
-    if (!widths.empty()) {
-      const double sigma = median(widths);
-      const Eigen::VectorXd inward = moved_by_blur(fitted, neighbours, normals, sigma, edge);
-      shift += (certainty.array() == 1.0).select(inward.cwiseMin(kMostMoved * sigma), 0.0).matrix();
-      unit = std::clamp(kUnitPerSigma * sigma, voxel, kMostUnit * voxel);
-    }
-    if (statistics) {
-      statistics->fitted_fraction =
-          static_cast<double>((certainty.array() == 1.0).count()) / static_cast<double>(n);
-    }
+    if (widths.empty()) return;
+    const double sigma = median(widths);
+    const Eigen::VectorXd inward = moved_by_blur(fitted_, neighbours_, normals, sigma, edge_);
+    edges.shift +=
+        (edges.certainty.array() == 1.0).select(inward.cwiseMin(kMostMoved * sigma), 0.0).matrix();
+    unit_ = std::clamp(kUnitPerSigma * sigma, voxel_, kMostUnit * voxel_);
+  }
 
-    // Against noise and gaps: the average of the neighbourhood.
-    average(neighbours, passes_for(reach * unit, edge), shift, certainty);
-    for (Eigen::Index v = 0; v < n; ++v) {
-      if (fixed[v] != 0) continue;
-      const double most = kReach * unit;
-      const double move = std::clamp(total(v) + shift(v), -most, most) - total(v);
-      total(v) += move;
-      fitted.vertices.col(v) += move * normals.col(v);
+  void move(const Eigen::Matrix3Xd& normals, const Eigen::VectorXd& shift) {
+    for (Eigen::Index v = 0; v < total_.size(); ++v) {
+      if (fixed_[v] != 0) continue;
+      const double most = kReach * unit_;
+      const double way = std::clamp(total_(v) + shift(v), -most, most) - total_(v);
+      total_(v) += way;
+      fitted_.vertices.col(v) += way * normals.col(v);
     }
   }
-  if (statistics) statistics->mean_shift_mm = total.cwiseAbs().mean();
-  return fitted;
+
+  Interpolated grey_;
+  Neighbours neighbours_;
+  double voxel_, edge_;  // sizes of the image's voxels and of the surface's edges          [mm]
+  double unit_;          // of distances along the normal                                   [mm]
+  Surface fitted_;
+  Eigen::VectorXd total_;    // (n) moved so far, outward                                   [mm]
+  std::vector<char> fixed_;  // (n) at the image's border, where the vessel is cut
+};
+
+}  // namespace
+
+Surface fit_to_image(const Surface& surface, const Image& image, FitStatistics* statistics) {
+  expects(image.values.size() == image.grid.voxels() && surface.triangles.cols() > 0);
+  Fit fit(surface, image);
+  for (int round = 0; round < kRounds; ++round) fit.round(statistics);
+  if (statistics) statistics->mean_shift_mm = fit.mean_shift();
+  return fit.surface();
 }
 
 }  // namespace wireplan::preprocess

@@ -20,8 +20,4 @@ Surface without_intersections(const Surface& surface, std::vector<Mend>& mends);
 /// closed surface is a thin wall with an inner and an outer skin; else the surface as it is.
 Surface inner_skin(const Surface& closed, std::vector<Mend>& mends);
 
-/// "(12.3, -4.5, 6.7)"                                                                      [mm]
-std::string place_text(const Vec3& place);
-std::string number_text(double value);
-
 }  // namespace wireplan::preprocess

@@ -157,18 +157,6 @@ bool counts_triangles(MendKind kind) {
 
 }  // namespace
 
-std::string place_text(const Vec3& p) {
-  std::array<char, 96> buffer{};
-  std::snprintf(buffer.data(), buffer.size(), "(%.1f, %.1f, %.1f)", p.x(), p.y(), p.z());
-  return buffer.data();
-}
-
-std::string number_text(double value) {
-  std::array<char, 32> buffer{};
-  std::snprintf(buffer.data(), buffer.size(), "%.3g", value);
-  return buffer.data();
-}
-
 std::string name_of(MendKind kind) { return kWordings.at(static_cast<std::size_t>(kind)).name; }
 
 std::vector<std::string> tell_mends(const std::vector<Mend>& mends) {

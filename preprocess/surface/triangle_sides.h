@@ -1,6 +1,6 @@
 #pragma once
-/// How triangles hang together, whatever they make: their sides by edges, and disjoint sets; for
-/// the .cpp files here.
+/// How triangles hang together, whatever they make: their sides by edges, their neighbours, and
+/// disjoint sets.
 #include <algorithm>
 #include <cstddef>
 #include <numeric>
@@ -44,6 +44,19 @@ void for_each_edge(const std::vector<Side>& sides, Visit visit) {
     visit(begin, end);
     begin = end;
   }
+}
+
+/// (3, m) the triangle across the edge from corner k to the next, -1 where there is none. At most
+/// two triangles share an edge.
+inline Eigen::Matrix3Xi triangle_neighbours(const Surface& surface) {
+  Eigen::Matrix3Xi neighbours = Eigen::Matrix3Xi::Constant(3, surface.triangles.cols(), -1);
+  for_each_edge(sorted_sides(surface), [&](auto begin, auto end) {
+    if (end - begin != 2) return;
+    const Side &a = *begin, &b = *(begin + 1);
+    neighbours(a.corner, a.triangle) = b.triangle;
+    neighbours(b.corner, b.triangle) = a.triangle;
+  });
+  return neighbours;
 }
 
 /// Disjoint sets of 0..n-1; a set is named by its lowest member.

@@ -35,18 +35,6 @@ inline Neighbours find_neighbours(const Surface& surface) {
   return result;
 }
 
-inline Eigen::Matrix3Xd vertex_normals(const Surface& surface) {
-  Eigen::Matrix3Xd normals = Eigen::Matrix3Xd::Zero(3, surface.vertices.cols());
-  for (const auto& t : surface.triangles.colwise()) {
-    const Vec3 a = surface.vertices.col(t(0));
-    const Vec3 twice_area =
-        (surface.vertices.col(t(1)) - a).cross(Vec3(surface.vertices.col(t(2))) - a);
-    for (int k = 0; k < 3; ++k) normals.col(t(k)) += twice_area;
-  }
-  normals.colwise().normalize();
-  return normals;
-}
-
 /// Averages the values at vertices over their neighbours, `passes` times. In each pass half of the
 /// new value is the vertex's own. Values count by their weights: a vertex of weight 0 takes what
 /// its neighbours have.

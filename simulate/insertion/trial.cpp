@@ -40,12 +40,6 @@ constexpr double kOutside = 1.0;       // penetration that contact does not expl
 constexpr double kTurnStep = 15.0 * kRadPerDeg;      // of the hub between two records
 constexpr double kTurnPerShape = 30.0 * kRadPerDeg;  // of the hub between two shapes
 
-std::string place(const Vec3& p) {
-  char text[80];
-  std::snprintf(text, sizeof text, "(%.1f, %.1f, %.1f) mm", p[0], p[1], p[2]);
-  return text;
-}
-
 std::string millimetres(double value) {
   char text[32];
   std::snprintf(text, sizeof text, "%.1f mm", value);
@@ -89,10 +83,11 @@ bool Trial::step(const Move& move) {
       return end(Outcome::kLeftOpening,
                  "the wire springs out of the vessel through the opening at " + place_of(*opening) +
                      " after " + millimetres(depth) + " of insertion, from " +
-                     place(insertion_.tip()));
+                     place_text(insertion_.tip()) + " mm");
     }
     return end(Outcome::kNotConverged, "no equilibrium after " + millimetres(depth) +
-                                           " of insertion, tip at " + place(insertion_.tip()));
+                                           " of insertion, tip at " + place_text(insertion_.tip()) +
+                                           " mm");
   }
   // Inside the goal the wire goes on until the tip is nearest to its centre.
   const double to_goal = (push->tip - goal_.point).norm();
@@ -110,7 +105,7 @@ bool Trial::step(const Move& move) {
 }
 
 std::string Trial::place_of(int opening) const {
-  return place(vessel_.lumen.openings()[static_cast<std::size_t>(opening)].center);
+  return place_text(vessel_.lumen.openings()[static_cast<std::size_t>(opening)].center) + " mm";
 }
 
 /// False where the last step ended the trial.
@@ -124,7 +119,7 @@ bool Trial::check_progress() {
   if (push.max_penetration > kOutside) {
     return end(Outcome::kLeftLumen, millimetres(push.max_penetration) + " through the wall after " +
                                         millimetres(push.insertion) + " of insertion, tip at " +
-                                        place(push.tip));
+                                        place_text(push.tip) + " mm");
   }
   const std::size_t back = static_cast<std::size_t>(std::ceil(kStuckPush / options_.step));
   if (result_.pushes.size() - pushing_since_ <= back) return true;
@@ -134,14 +129,16 @@ bool Trial::check_progress() {
   const std::optional<Vec3> fold =
       moved < kProlapseMove * went ? insertion_.find_fold() : std::nullopt;
   if (fold) {
-    return end(Outcome::kProlapsed, "the wire folds back at " + place(*fold) + " after " +
+    return end(Outcome::kProlapsed, "the wire folds back at " + place_text(*fold) + " mm after " +
                                         millimetres(push.insertion) +
-                                        " of insertion; its tip is behind at " + place(push.tip));
+                                        " of insertion; its tip is behind at " +
+                                        place_text(push.tip) + " mm");
   }
   if (moved < kStuckMove) {
-    return end(Outcome::kStuck,
-               "the tip stays at " + place(push.tip) + " while " + millimetres(went) +
-                   " of wire went in; the wire bends most at " + place(insertion_.most_bent()));
+    return end(Outcome::kStuck, "the tip stays at " + place_text(push.tip) + " mm while " +
+                                    millimetres(went) +
+                                    " of wire went in; the wire bends most at " +
+                                    place_text(insertion_.most_bent()) + " mm");
   }
   return true;
 }
@@ -186,7 +183,7 @@ TrialResult Trial::finish() {
     const bool all = insertion_.longest() - insertion_.depth() < 1e-9;
     end(Outcome::kMissed, (all ? "all " : "") + millimetres(insertion_.depth()) +
                               " of wire went in, tip ended " + millimetres(best_distance_) +
-                              " from the target at " + place(insertion_.tip()));
+                              " from the target at " + place_text(insertion_.tip()) + " mm");
   }
   return std::move(result_);
 }

@@ -188,18 +188,8 @@ std::vector<int> elimination_places(const BlockStiffness& blocks) {
 
 // ---------------------------------------------------------------- normals
 
-Eigen::Matrix3Xd vertex_normals(const Surface& surface) {
-  Eigen::Matrix3Xd normals = Eigen::Matrix3Xd::Zero(3, surface.vertices.cols());
-  for (Eigen::Index k = 0; k < surface.triangles.cols(); ++k) {
-    const Eigen::Vector3i t = surface.triangles.col(k);
-    std::array<Vec3, 3> p;
-    for (int c = 0; c < 3; ++c) p[c] = surface.vertices.col(t[c]);
-    const Vec3 normal = (p[1] - p[0]).cross(p[2] - p[0]).normalized();
-    for (int c = 0; c < 3; ++c) {
-      const Vec3 u = p[(c + 1) % 3] - p[c], v = p[(c + 2) % 3] - p[c];
-      normals.col(t[c]) += std::atan2(u.cross(v).norm(), u.dot(v)) * normal;
-    }
-  }
+Eigen::Matrix3Xd unit_vertex_normals(const Surface& surface) {
+  Eigen::Matrix3Xd normals = angle_weighted_normals(surface);
   for (auto normal : normals.colwise()) normal.normalize();  // leaves zeros as they are
   return normals;
 }
@@ -237,7 +227,7 @@ Eigen::SparseMatrix<double> wall_stiffness(const Surface& surface, const Wall& w
 
 WallCompliance::WallCompliance(const Surface& surface, const Wall& wall)
     : vertices_(surface.vertices),
-      normals_(vertex_normals(surface)),
+      normals_(unit_vertex_normals(surface)),
       responses_(static_cast<std::size_t>(surface.vertices.cols())) {
   BlockStiffness blocks = assemble(surface, wall);
   place_ = elimination_places(blocks);

@@ -3,10 +3,10 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <map>
 #include <utility>
 
 #include "preprocess/surface/triangle.h"
+#include "preprocess/surface/triangle_sides.h"
 
 namespace wireplan::simulate {
 
@@ -67,26 +67,12 @@ TriangleLocator::TriangleLocator(const Surface& surface, double reach)
                     static_cast<std::size_t>(bricks_[2]),
                 -1);
   register_triangles();
-  find_neighbours();
+  neighbour_ = preprocess::triangle_neighbours(surface_);
 }
 
 std::array<Vec3, 3> TriangleLocator::corners(std::int32_t triangle) const {
   const Eigen::Vector3i t = surface_.triangles.col(triangle);
   return {surface_.vertices.col(t[0]), surface_.vertices.col(t[1]), surface_.vertices.col(t[2])};
-}
-
-void TriangleLocator::find_neighbours() {
-  neighbour_.setConstant(3, surface_.triangles.cols(), -1);
-  std::map<std::pair<int, int>, std::pair<int, int>> open;  // edge -> its corner and triangle
-  for (int f = 0; f < surface_.triangles.cols(); ++f) {
-    for (int c = 0; c < 3; ++c) {
-      const int a = surface_.triangles((c + 1) % 3, f), b = surface_.triangles((c + 2) % 3, f);
-      const auto [other, fresh] = open.try_emplace(std::minmax(a, b), c, f);
-      if (fresh) continue;
-      neighbour_(c, f) = other->second.second;
-      neighbour_(other->second.first, other->second.second) = f;
-    }
-  }
 }
 
 /// Cells that a box overlaps; low > high beyond the grid.
@@ -209,7 +195,7 @@ SurfacePoint TriangleLocator::walk(const Vec3& point, const Vec3& direction,
       const Eigen::Vector3i t = surface_.triangles.col(triangle);
       return {triangle, {t[0], t[1], t[2]}, weight / weight.sum()};
     }
-    triangle = neighbour_(lowest, triangle);
+    triangle = neighbour_((lowest + 1) % 3, triangle);
   }
   return {};
 }

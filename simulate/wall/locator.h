@@ -54,16 +54,15 @@ class TriangleLocator {
   template <typename Visit>
   void for_each_cell(const CellBox& box, const Visit& visit) const;
   std::array<Vec3, 3> corners(std::int32_t triangle) const;
-  void find_neighbours();
   void register_triangles();
   void search(const CellBox& box, const Vec3& point, Best& best) const;
   SurfacePoint walk(const Vec3& point, const Vec3& direction, std::int32_t triangle) const;
 
   Surface surface_;
-  Eigen::Matrix3Xi neighbour_;  // of each triangle, over the edge that a corner is not on
-  double reach_, margin_;       //                                             [mm]
-  double cell_ = 0.0;           // edge of the cells                           [mm]
-  Vec3 origin_ = Vec3::Zero();  // of brick (0, 0, 0)                          [mm]
+  Eigen::Matrix3Xi neighbour_;             // of each triangle, across edges 01, 12, 20
+  double reach_, margin_;                  //                                             [mm]
+  double cell_ = 0.0;                      // edge of the cells                           [mm]
+  Vec3 origin_ = Vec3::Zero();             // of brick (0, 0, 0)                          [mm]
   std::array<int, 3> bricks_ = {0, 0, 0};  // along each axis
   std::vector<std::int32_t> brick_;        // slot of each brick, or -1: no triangle near
   std::vector<std::int32_t> start_;        // of each cell's entries, kSide^3 per slot; and the end

@@ -4,10 +4,10 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <map>
 #include <utility>
 
 #include "preprocess/surface/triangle.h"
+#include "preprocess/surface/triangle_sides.h"
 #include "simulate/wall/parallel.h"
 
 namespace wireplan::simulate {
@@ -27,26 +27,18 @@ PseudoNormals compute_pseudo_normals(const Surface& surface) {
   const Eigen::Index m = surface.triangles.cols();
   PseudoNormals normals;
   normals.face.resize(3, m);
-  normals.vertex = Eigen::Matrix3Xd::Zero(3, surface.vertices.cols());
-  std::map<std::pair<int, int>, Vec3> edges;
-  const auto key = [](int a, int b) { return std::pair(std::min(a, b), std::max(a, b)); };
+  normals.vertex = angle_weighted_normals(surface);
   for (Eigen::Index f = 0; f < m; ++f) {
-    const Eigen::Vector3i t = surface.triangles.col(f);
-    std::array<Vec3, 3> p;
-    for (int c = 0; c < 3; ++c) p[c] = surface.vertices.col(t[c]);
-    const Vec3 normal = (p[1] - p[0]).cross(p[2] - p[0]).normalized();
-    normals.face.col(f) = normal;
-    for (int c = 0; c < 3; ++c) {
-      const Vec3 u = p[(c + 1) % 3] - p[c], v = p[(c + 2) % 3] - p[c];
-      normals.vertex.col(t[c]) += std::atan2(u.cross(v).norm(), u.dot(v)) * normal;
-      auto [place, fresh] = edges.try_emplace(key(t[c], t[(c + 1) % 3]), Vec3::Zero());
-      place->second += normal;
-    }
+    normals.face.col(f) = unit_normal(surface, f);
   }
+  const Eigen::Matrix3Xi neighbours = preprocess::triangle_neighbours(surface);
   normals.edge.resize(m);
   for (Eigen::Index f = 0; f < m; ++f) {
-    const Eigen::Vector3i t = surface.triangles.col(f);
-    for (int c = 0; c < 3; ++c) normals.edge[f][c] = edges.at(key(t[c], t[(c + 1) % 3]));
+    for (int c = 0; c < 3; ++c) {
+      const int other = neighbours(c, f);
+      normals.edge[f][c] = normals.face.col(f);
+      if (other >= 0) normals.edge[f][c] += normals.face.col(other);
+    }
   }
   return normals;
 }
