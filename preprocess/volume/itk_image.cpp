@@ -1,0 +1,156 @@
+#include "preprocess/volume/itk_image.h"
+
+#include <Eigen/Eigenvalues>  // before ITK, which would bring in its own older copy
+#include <Eigen/SVD>
+#include <algorithm>
+#include <cctype>
+#include <cstdint>
+#include <iterator>
+#include <limits>
+#include <sstream>
+
+namespace wireplan::preprocess {
+namespace {
+
+namespace fs = std::filesystem;
+
+std::string to_text(const Vec3& v) {
+  std::ostringstream text;
+  text << "(" << v.x() << ", " << v.y() << ", " << v.z() << ")";
+  return text.str();
+}
+
+/// The rotation (or reflection) nearest to what the header says, so that Grid may rely on
+/// orthonormal columns. Headers round to a few digits; more than 1e-3 off is a sheared image.
+Mat3 orthonormal_direction(const Mat3& direction, const fs::path& path) {
+  const Eigen::JacobiSVD<Mat3> svd(direction, Eigen::ComputeFullU | Eigen::ComputeFullV);
+  const Mat3 nearest = svd.matrixU() * svd.matrixV().transpose();
+  if (!((direction - nearest).cwiseAbs().maxCoeff() < 1e-3)) {
+    throw Error(path.string() +
+                ": the axes of the image are not at right angles (sheared), expected an orthogonal "
+                "grid; resample it, e.g. in 3D Slicer");
+  }
+  return nearest;
+}
+
+template <typename Stored, typename Value>
+void append_as(const std::vector<char>& bytes, std::vector<Value>& values) {
+  const Stored* first = reinterpret_cast<const Stored*>(bytes.data());
+  std::transform(first, first + bytes.size() / sizeof(Stored), std::back_inserter(values),
+                 [](Stored v) { return static_cast<Value>(v); });
+}
+
+/// Reads the voxels of the file whose header `io` has read and appends them.
+template <typename Value>
+void append_all(itk::ImageIOBase& io, const fs::path& path, std::vector<Value>& values) {
+  // ImageIO objects want the region spelled out, here all of it
+  itk::ImageIORegion region(io.GetNumberOfDimensions());
+  for (unsigned axis = 0; axis < io.GetNumberOfDimensions(); ++axis) {
+    region.SetIndex(axis, 0);
+    region.SetSize(axis, io.GetDimensions(axis));
+  }
+  io.SetIORegion(region);
+  std::vector<char> bytes(static_cast<std::size_t>(io.GetImageSizeInBytes()));
+  io.Read(bytes.data());
+
+  values.reserve(values.size() + bytes.size() / io.GetComponentSize());
+  switch (io.GetComponentType()) {
+    case itk::IOComponentEnum::UCHAR:
+      return append_as<unsigned char>(bytes, values);
+    case itk::IOComponentEnum::CHAR:
+      return append_as<signed char>(bytes, values);
+    case itk::IOComponentEnum::USHORT:
+      return append_as<unsigned short>(bytes, values);
+    case itk::IOComponentEnum::SHORT:
+      return append_as<short>(bytes, values);
+    case itk::IOComponentEnum::UINT:
+      return append_as<unsigned>(bytes, values);
+    case itk::IOComponentEnum::INT:
+      return append_as<int>(bytes, values);
+    case itk::IOComponentEnum::ULONG:
+      return append_as<unsigned long>(bytes, values);
+    case itk::IOComponentEnum::LONG:
+      return append_as<long>(bytes, values);
+    case itk::IOComponentEnum::ULONGLONG:
+      return append_as<unsigned long long>(bytes, values);
+    case itk::IOComponentEnum::LONGLONG:
+      return append_as<long long>(bytes, values);
+    case itk::IOComponentEnum::FLOAT:
+      return append_as<float>(bytes, values);
+    case itk::IOComponentEnum::DOUBLE:
+      return append_as<double>(bytes, values);
+    default:
+      throw Error(path.string() + ": voxels of an unknown type, expected integers or floats");
+  }
+}
+
+}  // namespace
+
+std::string damaged(const std::string& format) {
+  return "its header reads as " + format +
+         ", but its voxels cannot be read; the file is damaged or cut short: copy or export it "
+         "again";
+}
+
+std::string lower_case(std::string text) {
+  std::transform(text.begin(), text.end(), text.begin(),
+                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  return text;
+}
+
+Grid header_grid(const itk::ImageIOBase& io, const fs::path& path) {
+  Grid grid;
+  Mat3 direction;
+  for (unsigned axis = 0; axis < 3; ++axis) {
+    const bool exists = axis < io.GetNumberOfDimensions();
+    const auto size = exists ? io.GetDimensions(axis) : 1;
+    if (size > static_cast<itk::SizeValueType>(std::numeric_limits<int>::max())) {
+      throw Error(path.string() + ": the header gives an axis of " + std::to_string(size) +
+                  " voxels; the file is damaged");
+    }
+    grid.size[axis] = static_cast<int>(size);
+    grid.spacing[axis] = exists ? io.GetSpacing(axis) : 1.0;
+    grid.origin[axis] = exists ? io.GetOrigin(axis) : 0.0;
+    const std::vector<double> column =
+        exists ? io.GetDirection(axis)
+               : std::vector<double>();  // ITK's default writes past its end
+    for (unsigned row = 0; row < 3; ++row) {
+      direction(row, axis) = row < column.size() ? column[row] : (row == axis ? 1.0 : 0.0);
+    }
+  }
+  if (!grid.spacing.allFinite() || grid.spacing.minCoeff() <= 0.0 || !grid.origin.allFinite() ||
+      !direction.allFinite()) {
+    throw Error(path.string() + ": voxel spacing " + to_text(grid.spacing) + " mm at origin " +
+                to_text(grid.origin) + " mm, expected positive and finite values; mend the header");
+  }
+  grid.direction = orthonormal_direction(direction, path);
+  return grid;
+}
+
+void require_scalar_volume(const itk::ImageIOBase& io, const Grid& grid, const fs::path& path) {
+  if (io.GetNumberOfComponents() != 1) {
+    throw Error(path.string() + ": " + std::to_string(io.GetNumberOfComponents()) +
+                " values per voxel (a colour or vector image), expected one");
+  }
+  if (*std::min_element(grid.size.begin(), grid.size.end()) < 2) {
+    throw Error(path.string() + ": " + std::to_string(grid.size[0]) + " x " +
+                std::to_string(grid.size[1]) + " x " + std::to_string(grid.size[2]) +
+                " voxels, expected a volume with at least 2 along each axis");
+  }
+  for (unsigned axis = 3; axis < io.GetNumberOfDimensions(); ++axis) {
+    if (io.GetDimensions(axis) != 1) {
+      throw Error(path.string() + ": a series of " + std::to_string(io.GetDimensions(axis)) +
+                  " volumes (4D), expected one; export the phase to plan on as a 3D image");
+    }
+  }
+}
+
+void append_voxels(itk::ImageIOBase& io, const fs::path& path, std::vector<float>& values) {
+  append_all(io, path, values);
+}
+
+void append_voxels(itk::ImageIOBase& io, const fs::path& path, std::vector<std::uint8_t>& values) {
+  append_all(io, path, values);
+}
+
+}  // namespace wireplan::preprocess

@@ -1,0 +1,48 @@
+#pragma once
+/// What the readers of volumes share about ITK's ImageIO objects; for the .cpp files here.
+#include <Eigen/Eigenvalues>  // before ITK, which would bring in its own older copy
+#include <cstdint>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "itkImageIOBase.h"
+#include "preprocess/volume/image.h"
+
+namespace wireplan::preprocess {
+
+inline constexpr const char* kFormats =
+    "expected a folder with one DICOM series, or a file .nii, .nii.gz, .nrrd, .nhdr, .mha or .mhd";
+
+/// Runs a call into ITK. Whatever it throws becomes an Error that starts with the path and says
+/// `problem`; ITK's own text is left out, since it may quote a header and with it a patient.
+template <typename Call>
+auto call_itk(const std::filesystem::path& path, const std::string& problem, Call call) {
+  try {
+    return call();
+  } catch (const Error&) {
+    throw;
+  } catch (const std::exception&) {
+    throw Error(path.string() + ": " + problem);
+  }
+}
+
+/// What is wrong where a header of this format reads but the voxels do not.
+std::string damaged(const std::string& format);
+
+std::string lower_case(std::string text);
+
+/// Size and placement from a header that has been read; axes beyond the third are ignored.
+Grid header_grid(const itk::ImageIOBase& io, const std::filesystem::path& path);
+
+/// wireplan takes one value per voxel and one volume per file.
+void require_scalar_volume(const itk::ImageIOBase& io, const Grid& grid,
+                           const std::filesystem::path& path);
+
+/// Reads the voxels of the file whose header `io` has read and appends them.
+void append_voxels(itk::ImageIOBase& io, const std::filesystem::path& path,
+                   std::vector<float>& values);
+void append_voxels(itk::ImageIOBase& io, const std::filesystem::path& path,
+                   std::vector<std::uint8_t>& values);
+
+}  // namespace wireplan::preprocess
