@@ -1,15 +1,10 @@
 #pragma once
 /// Surface <-> CGAL's half-edge mesh, for the .cpp files here that call CGAL; not for other
 /// folders.
-#include <CGAL/Exact_predicates_inexact_constructions_kernel.h>
-#include <CGAL/Surface_mesh.h>
-
+#include "preprocess/surface/cgal_mend.h"
 #include "preprocess/vessel.h"
 
 namespace wireplan::preprocess {
-
-using CgalKernel = CGAL::Exact_predicates_inexact_constructions_kernel;
-using CgalMesh = CGAL::Surface_mesh<CgalKernel::Point_3>;
 
 /// Expects a manifold, consistently oriented surface (it may be open).
 inline CgalMesh cgal_mesh_from(const Surface& surface) {

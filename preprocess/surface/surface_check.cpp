@@ -1,5 +1,3 @@
-#include <CGAL/Polygon_mesh_processing/self_intersections.h>
-
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <array>
@@ -9,7 +7,7 @@
 #include <utility>
 #include <vector>
 
-#include "preprocess/surface/cgal_mesh.h"
+#include "preprocess/surface/cgal_calls.h"
 #include "preprocess/surface/surface.h"
 #include "preprocess/surface/surface_mend.h"
 #include "preprocess/surface/triangle_sides.h"
@@ -83,18 +81,6 @@ void measure_triangles(const Surface& surface, SurfaceCheck& check) {
   }
   check.min_angle_deg = min_angle / kRadPerDeg;
   check.mean_edge_mm = edge_sum / static_cast<double>(3 * surface.triangles.cols());
-}
-
-using FacePairs = std::vector<std::pair<CgalMesh::Face_index, CgalMesh::Face_index>>;
-
-/// Pairs of triangles that cut each other.
-FacePairs cutting_pairs(const Surface& surface) {
-  const CgalMesh mesh = cgal_mesh_from(surface);
-  FacePairs pairs;
-  CGAL::Polygon_mesh_processing::self_intersections(mesh, std::back_inserter(pairs));
-  // A pair of a face with itself is a degenerate one, which has a count of its own.
-  std::erase_if(pairs, [](const auto& p) { return p.first == p.second; });
-  return pairs;
 }
 
 /// Squared distance from a point to a triangle: to the plane where the foot lies inside, else to
@@ -226,7 +212,7 @@ SurfaceCheck check_surface(const Surface& surface) {
   check.volume_mm3 = signed_volume(surface);
   check.outward = check.volume_mm3 > 0.0;
   if (check.non_manifold_edges + check.misoriented_edges + check.non_manifold_vertices == 0) {
-    const FacePairs pairs = cutting_pairs(surface);
+    const std::vector<std::pair<int, int>> pairs = cutting_pairs(surface);
     check.self_intersections = static_cast<int>(pairs.size());
     if (!pairs.empty()) {
       const auto cut = static_cast<Eigen::Index>(pairs.front().first);

@@ -1,9 +1,5 @@
-#define CGAL_EIGEN3_ENABLED  // its fairing solves sparse systems
-#include <CGAL/Eigen_solver_traits.h>
 #include <CGAL/Polygon_mesh_processing/border.h>
-#include <CGAL/Polygon_mesh_processing/repair_degeneracies.h>
-#include <CGAL/Polygon_mesh_processing/repair_self_intersections.h>
-#include <CGAL/Polygon_mesh_processing/triangulate_hole.h>
+#include <CGAL/Polygon_mesh_processing/shape_predicates.h>
 
 #include <Eigen/Geometry>
 #include <algorithm>
@@ -14,7 +10,7 @@
 #include "preprocess/surface/cgal_mesh.h"
 #include "preprocess/surface/surface.h"
 #include "preprocess/surface/surface_mend.h"
-#include "preprocess/surface/wall_rays.h"
+#include "preprocess/surface/wall_tree.h"
 
 namespace wireplan::preprocess {
 namespace {
@@ -146,8 +142,7 @@ void collapse_degenerate(CgalMesh& mesh, std::vector<Mend>& mends) {
     ++mend.count;
   }
   if (mend.count == 0) return;
-  pmp::remove_degenerate_edges(mesh);
-  pmp::remove_degenerate_faces(mesh);
+  remove_degenerate(mesh);
   mends.push_back(mend);
 }
 
@@ -159,30 +154,22 @@ Surface close_openings(const Surface& open, const std::string& origin, std::vect
   const std::vector<Loop> loops = find_loops(mesh);
   if (loops.empty()) return surface_of_copy(mesh);
 
-  const WallRays wall(open);
+  const WallTree wall(open);
   const double reach =
       (open.vertices.rowwise().maxCoeff() - open.vertices.rowwise().minCoeff()).norm();
   for (const Loop& loop : loops) {
-    std::vector<CgalMesh::Face_index> faces;
-    std::vector<CgalMesh::Vertex_index> vertices;
     const Mend mend{
         .count = static_cast<int>(loop.edges), .place = loop.middle, .size = loop.width};
     const bool few = loop.edges <= kFewEdges;
     if (!few && is_open_end(loop)) {
-      pmp::triangulate_and_refine_hole(mesh, straighten_end(mesh, loop), std::back_inserter(faces),
-                                       std::back_inserter(vertices));
+      fill_hole(mesh, straighten_end(mesh, loop), HoleFill::kFine);
       mends.push_back(mend);
       mends.back().kind = MendKind::kOpenEnd;
       continue;
     }
     const double vessel_radius = 0.5 * wall.free_way(loop.middle, -loop.wall_normal, reach);
     if (!few && loop.width > kSmallHole * vessel_radius) refuse_hole(loop, vessel_radius, origin);
-    if (few) {
-      pmp::triangulate_hole(mesh, loop.edge, std::back_inserter(faces));
-    } else {
-      pmp::triangulate_refine_and_fair_hole(mesh, loop.edge, std::back_inserter(faces),
-                                            std::back_inserter(vertices));
-    }
+    fill_hole(mesh, loop.edge, few ? HoleFill::kTriangles : HoleFill::kSmooth);
     mends.push_back(mend);
     mends.back().kind = MendKind::kHole;
   }
@@ -193,7 +180,7 @@ Surface without_intersections(const Surface& surface, std::vector<Mend>& mends) 
   const std::vector<int> cut = find_self_intersections(surface);
   if (cut.empty()) return surface;
   CgalMesh mesh = cgal_mesh_from(surface);
-  if (!pmp::experimental::remove_self_intersections(mesh)) return surface;
+  if (!remove_self_intersections(mesh)) return surface;
   const Surface result = surface_of_copy(mesh);
 
   // Taken only where nothing but those triangles changed.

@@ -1,6 +1,3 @@
-#include <CGAL/Polygon_mesh_processing/detect_features.h>
-#include <CGAL/Polygon_mesh_processing/remesh.h>
-
 #include <algorithm>
 #include <cmath>
 #include <functional>
@@ -10,11 +7,11 @@
 #include <utility>
 #include <vector>
 
-#include "preprocess/surface/cgal_mesh.h"
+#include "preprocess/surface/cgal_calls.h"
 #include "preprocess/surface/surface.h"
 #include "preprocess/surface/surface_mend.h"
 #include "preprocess/surface/vertex_graph.h"
-#include "preprocess/surface/wall_rays.h"
+#include "preprocess/surface/wall_tree.h"
 
 namespace wireplan::preprocess {
 namespace {
@@ -62,7 +59,7 @@ void grade(const Surface& surface, const Neighbours& neighbours, Eigen::VectorXd
 Eigen::VectorXd wanted_edges(const Surface& surface, double longest) {
   const Eigen::Index n = surface.vertices.cols(), m = surface.triangles.cols();
   const Neighbours neighbours = find_neighbours(surface);
-  const WallRays wall(surface);
+  const WallTree wall(surface);
   const Eigen::Index stride = std::max<Eigen::Index>(1, m / kSamples), samples = (m - 1) / stride;
   Eigen::VectorXd measured(samples + 1);
 #pragma omp parallel for schedule(dynamic, 64)
@@ -114,27 +111,10 @@ std::vector<int> classes_of(const Surface& surface, const Eigen::VectorXd& edge,
 
 /// Each part of the surface to its own edge length, the coarsest first.
 Surface remesh_once(const Surface& surface, const std::vector<int>& classes, double longest) {
-  using Face = CgalMesh::Face_index;
-  CgalMesh mesh = cgal_mesh_from(surface);
-  auto crease = mesh.add_property_map<CgalMesh::Edge_index, bool>("e:crease", false).first;
-  auto part = mesh.add_property_map<Face, int>("f:part", 0).first;
-  for (const Face f : mesh.faces()) part[f] = classes[static_cast<std::size_t>(f)];
-  CGAL::Polygon_mesh_processing::detect_sharp_edges(mesh, kCreaseDeg, crease);
-
   const int finest = *std::max_element(classes.begin(), classes.end());
-  for (int k = 0; k <= finest; ++k) {
-    std::vector<Face> faces;
-    for (const Face f : mesh.faces()) {
-      if (part[f] == k) faces.push_back(f);
-    }
-    if (faces.empty()) continue;
-    CGAL::Polygon_mesh_processing::isotropic_remeshing(
-        faces, class_edge(k, longest), mesh,
-        CGAL::parameters::number_of_iterations(kIterations)
-            .edge_is_constrained_map(crease)
-            .face_patch_map(part));
-  }
-  return surface_from(mesh);
+  std::vector<double> edges;
+  for (int k = 0; k <= finest; ++k) edges.push_back(class_edge(k, longest));
+  return remesh_parts(surface, classes, edges, kCreaseDeg, kIterations);
 }
 
 /// True where the mean edge is the wanted one within a tenth and none is over twice as long.

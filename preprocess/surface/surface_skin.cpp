@@ -1,17 +1,13 @@
-#include <CGAL/boost/graph/Alpha_expansion_MaxFlow_tag.h>
-#include <CGAL/boost/graph/Dual.h>
-#include <CGAL/boost/graph/alpha_expansion_graphcut.h>
-
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <vector>
 
-#include "preprocess/surface/cgal_mesh.h"
+#include "preprocess/surface/cgal_calls.h"
 #include "preprocess/surface/surface.h"
 #include "preprocess/surface/surface_mend.h"
-#include "preprocess/surface/wall_rays.h"
+#include "preprocess/surface/wall_tree.h"
 
 namespace wireplan::preprocess {
 namespace {
@@ -46,7 +42,7 @@ double size_of(const Surface& s) {
 }
 
 /// Thickness of the wall if the surface is one with two skins, else 0.                    [mm]
-double wall_thickness(const Surface& s, const WallRays& wall) {
+double wall_thickness(const Surface& s, const WallTree& wall) {
   const double reach = size_of(s);
   const Eigen::Index stride = std::max<Eigen::Index>(1, s.triangles.cols() / kSamples);
   double inside = 0.0, all = 0.0;
@@ -68,7 +64,7 @@ double wall_thickness(const Surface& s, const WallRays& wall) {
 }
 
 /// Part of the rays from a triangle outward that meet the surface again.
-double enclosed_part(const WallRays& wall, const Facet& facet, double reach) {
+double enclosed_part(const WallTree& wall, const Facet& facet, double reach) {
   const Vec3 u = facet.normal.unitOrthogonal(), v = facet.normal.cross(u);
   int met = 0;
   for (int k = 0; k < kRays; ++k) {
@@ -82,8 +78,7 @@ double enclosed_part(const WallRays& wall, const Facet& facet, double reach) {
 }
 
 /// Inner or outer for each triangle: as each is enclosed, with the shortest cut along rims.
-std::vector<std::size_t> label_skins(const Surface& s, const WallRays& wall, double thickness) {
-  CgalMesh mesh = cgal_mesh_from(s);
+std::vector<std::size_t> label_skins(const Surface& s, const WallTree& wall, double thickness) {
   const double reach = size_of(s);
   std::vector<double> enclosed(static_cast<std::size_t>(s.triangles.cols()));
 #pragma omp parallel for schedule(dynamic, 64)
@@ -91,38 +86,22 @@ std::vector<std::size_t> label_skins(const Surface& s, const WallRays& wall, dou
     enclosed[static_cast<std::size_t>(t)] = enclosed_part(wall, facet_of(s, t), reach);
   }
 
-  using Face = CgalMesh::Face_index;
-  using Edge = CgalMesh::Edge_index;
-  auto cost = mesh.add_property_map<Edge, double>("e:cost", 0.0).first;
-  auto label_cost = mesh.add_property_map<Face, std::vector<double>>("f:cost").first;
-  auto label = mesh.add_property_map<Face, std::size_t>("f:label", kOuter).first;
-  for (const Face f : mesh.faces()) {
-    const auto t = static_cast<std::size_t>(f);
-    const double area = facet_of(s, static_cast<Eigen::Index>(t)).area;
-    label_cost[f] = {area * (1.0 - enclosed[t]), area * enclosed[t]};
-    label[f] = enclosed[t] > 0.5 ? kInner : kOuter;
+  std::vector<LabelCost> costs;
+  for (Eigen::Index t = 0; t < s.triangles.cols(); ++t) {
+    const double area = facet_of(s, t).area, part = enclosed[static_cast<std::size_t>(t)];
+    costs.push_back({.zero = area * (1.0 - part), .one = area * part});
   }
-  for (const Edge e : mesh.edges()) {
-    const CgalMesh::Halfedge_index h = mesh.halfedge(e);
-    const Facet a = facet_of(s, static_cast<Eigen::Index>(mesh.face(h))),
-                b = facet_of(s, static_cast<Eigen::Index>(mesh.face(mesh.opposite(h))));
-    const double turn = std::acos(std::clamp(a.normal.dot(b.normal), -1.0, 1.0)) / kRadPerDeg;
-    const double length = std::sqrt(CGAL::to_double(
-        CGAL::squared_distance(mesh.point(mesh.source(h)), mesh.point(mesh.target(h)))));
-    cost[e] = kCutCost * thickness * length * std::max(kLeastCost, 1.0 - turn / kRimDeg);
-  }
-  CGAL::alpha_expansion_graphcut(CGAL::Dual<CgalMesh>(mesh), cost, label_cost, label,
-                                 CGAL::parameters::vertex_index_map(get(CGAL::face_index, mesh))
-                                     .implementation_tag(CGAL::Alpha_expansion_MaxFlow_tag()));
-  std::vector<std::size_t> labels;
-  for (const Face f : mesh.faces()) labels.push_back(label[f]);
-  return labels;
+  return cut_apart(s, costs, [&](int a, int b, double length) {
+    const double cosine = facet_of(s, a).normal.dot(facet_of(s, b).normal);
+    const double turn = std::acos(std::clamp(cosine, -1.0, 1.0)) / kRadPerDeg;
+    return kCutCost * thickness * length * std::max(kLeastCost, 1.0 - turn / kRimDeg);
+  });
 }
 
 }  // namespace
 
 Surface inner_skin(const Surface& closed, std::vector<Mend>& mends) {
-  const WallRays wall(closed);
+  const WallTree wall(closed);
   const double thickness = wall_thickness(closed, wall);
   if (thickness == 0.0) return closed;
 

@@ -1,32 +1,21 @@
 #include "preprocess/wall/wall.h"
 
-#include <CGAL/AABB_traits.h>
-#include <CGAL/AABB_tree.h>
-#include <CGAL/AABB_triangle_primitive.h>
-#include <CGAL/Exact_predicates_inexact_constructions_kernel.h>
-
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
-#include <iterator>
 #include <limits>
 #include <vector>
 
+#include "preprocess/surface/wall_tree.h"
+
 namespace wireplan::preprocess {
 namespace {
-
-using Kernel = CGAL::Exact_predicates_inexact_constructions_kernel;
-using Triangles = std::vector<Kernel::Triangle_3>;
-using Primitive = CGAL::AABB_triangle_primitive<Kernel, Triangles::const_iterator>;
-using Tree = CGAL::AABB_tree<CGAL::AABB_traits<Kernel, Primitive>>;
 
 // Default of the wall's normal stiffness per area, references B2: 25 kPa/mm           [MPa/mm]
 constexpr double kTargetStiffness = 25.0 * kMpaPerKpa;
 // Below this part of the thickness a height is not halved further: the element would be so stiff
 // that it decides the condition of the whole wall.
 constexpr double kLeastPart = 0.05;
-
-Kernel::Point_3 to_cgal(const Vec3& p) { return {p.x(), p.y(), p.z()}; }
 
 /// Centroid and outward unit normal of a triangle.
 struct Facet {
@@ -43,45 +32,25 @@ Facet facet_of(const Surface& surface, Eigen::Index k) {
 /// The surface and what is near a place of it.
 class Surroundings {
  public:
-  explicit Surroundings(const Surface& surface) : surface_(surface) {
-    for (Eigen::Index k = 0; k < surface.triangles.cols(); ++k) {
-      const Eigen::Vector3i corners = surface.triangles.col(k);
-      triangles_.emplace_back(to_cgal(surface.vertices.col(corners(0))),
-                              to_cgal(surface.vertices.col(corners(1))),
-                              to_cgal(surface.vertices.col(corners(2))));
-    }
-    tree_.rebuild(triangles_.cbegin(), triangles_.cend());
-    tree_.build();
-  }
-  Surroundings(const Surroundings&) = delete;  // the tree points into triangles_
-  Surroundings& operator=(const Surroundings&) = delete;
+  explicit Surroundings(const Surface& surface) : surface_(surface), tree_(surface, true) {}
 
   /// Way from triangle k outward along its normal to the next wall, at most `reach`; to a triangle
   /// that shares a vertex, across a crease, not below `least_in_crease`.
   double free_distance(Eigen::Index k, const Facet& facet, double reach,
                        double least_in_crease) const {
     const Vec3 end = facet.centroid + reach * facet.normal;
-    std::vector<Triangles::const_iterator> hits;
-    tree_.all_intersected_primitives(Kernel::Segment_3(to_cgal(facet.centroid), to_cgal(end)),
-                                     std::back_inserter(hits));
     double least = reach;
-    for (const Triangles::const_iterator hit : hits) {
-      const auto other = static_cast<Eigen::Index>(hit - triangles_.cbegin());
-      if (other == k) continue;
+    tree_.for_each_hit(facet.centroid, end, [&](Eigen::Index other) {
+      if (other == k) return;
       const bool neighbour = share_vertex(k, other);
       const double way = crossing(facet, other, neighbour);
       least = std::min(least, neighbour ? std::max(way, least_in_crease) : way);
-    }
+    });
     return least;
   }
 
   /// Distance of a point from the whole wall, found from triangle k.
-  double distance(const Vec3& point, Eigen::Index k) const {
-    const auto near = triangles_.cbegin() + k;
-    const Kernel::Point_3 query = to_cgal(point);
-    const auto answer = tree_.closest_point_and_primitive(query, {near->vertex(0), near});
-    return std::sqrt(CGAL::squared_distance(query, answer.first));
-  }
+  double distance(const Vec3& point, Eigen::Index k) const { return tree_.distance(point, k); }
 
  private:
   bool share_vertex(Eigen::Index a, Eigen::Index b) const {
@@ -103,8 +72,7 @@ class Surroundings {
   }
 
   const Surface& surface_;
-  Triangles triangles_;
-  Tree tree_;
+  WallTree tree_;
 };
 
 /// Height of tetrahedron k: up to half way to the next wall ahead, then halved until the apex keeps
