@@ -57,28 +57,29 @@ Vec3 down_of(Plane plane) { return plane == Plane::kAxial ? Vec3::UnitY() : Vec3
 double sample(const preprocess::Image& image, const Vec3& point) {
   const preprocess::Grid& grid = image.grid;
   const Vec3 place = grid.ijk_from_lps(point);
-  std::array<int, 3> first{};
-  std::array<double, 3> part{};
+  std::array<std::size_t, 2> at[3];  // of the voxels below and above: parts of their index
+  std::array<double, 2> weight[3];
+  std::size_t stride = 1;
   for (int axis = 0; axis < 3; ++axis) {
     const int last = grid.size[axis] - 1;
     // A point on the last voxels' centres, up to rounding, is still in the volume.
     if (place[axis] < -1e-9 || place[axis] > last + 1e-9) {
       return std::numeric_limits<double>::quiet_NaN();
     }
-    first[axis] = std::clamp(static_cast<int>(std::floor(place[axis])), 0, std::max(0, last - 1));
-    part[axis] = last == 0 ? 0.0 : place[axis] - first[axis];
+    const int first =
+        std::clamp(static_cast<int>(std::floor(place[axis])), 0, std::max(0, last - 1));
+    const double part = last == 0 ? 0.0 : place[axis] - first;
+    weight[axis] = {1.0 - part, part};
+    at[axis] = {stride * static_cast<std::size_t>(first),
+                stride * static_cast<std::size_t>(std::min(first + 1, last))};
+    stride *= static_cast<std::size_t>(grid.size[axis]);
   }
   double sum = 0.0;
-  for (int corner = 0; corner < 8; ++corner) {
-    double weight = 1.0;
-    std::array<int, 3> voxel = first;
-    for (int axis = 0; axis < 3; ++axis) {
-      const bool upper = ((corner >> axis) & 1) != 0;
-      weight *= upper ? part[axis] : 1.0 - part[axis];
-      voxel[axis] = std::min(voxel[axis] + (upper ? 1 : 0), grid.size[axis] - 1);
-    }
-    if (weight == 0.0) continue;
-    sum += weight * static_cast<double>(image.values[grid.index(voxel[0], voxel[1], voxel[2])]);
+  for (std::size_t corner = 0; corner < 8; ++corner) {
+    const std::size_t i = corner & 1, j = (corner >> 1) & 1, k = corner >> 2;
+    const double share = weight[0][i] * weight[1][j] * weight[2][k];
+    if (share == 0.0) continue;  // no voxel there, or one without a value
+    sum += share * static_cast<double>(image.values[at[0][i] + at[1][j] + at[2][k]]);
   }
   return sum;
 }
@@ -86,21 +87,26 @@ double sample(const preprocess::Image& image, const Vec3& point) {
 Eigen::Matrix4Xf cut_outline(const Surface& surface, Plane plane, const Vec3& middle,
                              double field) {
   const Vec3 right = right_of(plane), down = down_of(plane), normal = right.cross(down);
+  const auto reach = static_cast<float>(0.5 * field);
+  const Eigen::RowVectorXd heights =
+      normal.transpose() * (surface.vertices.colwise() - middle);  // (1, N)
   std::vector<Eigen::Vector4f> segments;
   for (const Eigen::Vector3i& triangle : surface.triangles.colwise()) {
     // The two of its edges that cross the plane; a corner in the plane counts as above it.
+    const int below = (heights[triangle[0]] < 0.0 ? 1 : 0) + (heights[triangle[1]] < 0.0 ? 1 : 0) +
+                      (heights[triangle[2]] < 0.0 ? 1 : 0);
+    if (below == 0 || below == 3) continue;
     Eigen::Vector4f segment;
     int ends = 0;
     for (int k = 0; k < 3; ++k) {
       const Vec3 a = surface.vertices.col(triangle[k]) - middle;
       const Vec3 b = surface.vertices.col(triangle[(k + 1) % 3]) - middle;
-      const double height_a = normal.dot(a), height_b = normal.dot(b);
+      const double height_a = heights[triangle[k]], height_b = heights[triangle[(k + 1) % 3]];
       if ((height_a < 0.0) == (height_b < 0.0)) continue;
       const Vec3 cross = a + height_a / (height_a - height_b) * (b - a);
       segment.segment<2>(2 * ends++) =
           Eigen::Vector2d(right.dot(cross), down.dot(cross)).cast<float>();
     }
-    const auto reach = static_cast<float>(0.5 * field);
     if (ends == 2 && segment.cwiseAbs().minCoeff() <= reach &&
         (segment.head<2>().cwiseAbs().maxCoeff() <= reach ||
          segment.tail<2>().cwiseAbs().maxCoeff() <= reach)) {
