@@ -8,6 +8,7 @@
 #include "pipeline/files/catalogue.h"
 #include "preprocess/volume/image.h"
 #include "tests/dicom.h"
+#include "tests/pipeline/finished_case.h"
 #include "tests/pipeline/program.h"
 
 namespace wireplan::pipeline {
@@ -78,12 +79,14 @@ TEST_F(CommandLine, RunsACaseAndTheSecondTimeDoesNothing) {
 }
 
 TEST_F(CommandLine, ExitsWithOneWhereNoPlanReaches) {
+  write_finished_tube(folder_.path(), "cache/wireplan");
   const Answer answer = call("run case.json --set insertion.length_mm=12");
   EXPECT_EQ(answer.code, 1) << answer.log;
   EXPECT_NE(answer.out.find("no plan reaches the target"), std::string::npos);
 }
 
 TEST_F(CommandLine, StatusTellsWhyStagesWouldRun) {
+  write_finished_tube(folder_.path(), "cache/wireplan");
   ASSERT_EQ(call("run case.json").code, 0);
   const Answer status = call("status case.json --set wall.thickness_mm=2");
   EXPECT_EQ(status.code, 0);

@@ -17,6 +17,7 @@
 #include "pipeline/store/cache.h"
 #include "pipeline/store/hash.h"
 #include "preprocess/volume/image.h"
+#include "tests/pipeline/finished_case.h"
 #include "tests/pipeline/program.h"
 
 namespace wireplan::pipeline {
@@ -107,6 +108,7 @@ TEST_F(Faults, AWriteThatFailsIsToldAndSpoilsNothing) {
 
 TEST_F(Faults, ARunThatFindsEverythingWritesNothing) {
   if (!can_preload()) GTEST_SKIP() << "a preloaded library comes before the sanitizer's";
+  write_finished_tube(folder_.path(), "cache/wireplan");
   ASSERT_EQ(run().code, 0);
   const Answer again = run_with("WIREPLAN_FAULT_AT=1 WIREPLAN_FAULT_STAYS=1 WIREPLAN_FAULT_ERROR=" +
                                 std::to_string(EROFS));
@@ -115,6 +117,7 @@ TEST_F(Faults, ARunThatFindsEverythingWritesNothing) {
 
 TEST_F(Faults, AClockThatRunsBackwardsChangesNothing) {
   if (!can_preload()) GTEST_SKIP() << "a preloaded library comes before the sanitizer's";
+  write_finished_tube(folder_.path(), "cache/wireplan");
   ASSERT_EQ(run().code, 0);
   const std::string expected = report_without_timing(report());
   fs::remove_all(folder_ / "cache");
@@ -168,6 +171,7 @@ std::vector<std::string> damaged_forms(const std::string& whole, const std::stri
 }
 
 TEST_F(Faults, EveryDamageToAnyFileOfTheCacheIsFound) {
+  write_finished_tube(folder_.path(), "cache/wireplan");
   const Case given = read_case(folder_ / "case.json");
   RunOptions options;
   options.cache = cache();
@@ -203,6 +207,7 @@ TEST_F(Faults, EveryDamageToAnyFileOfTheCacheIsFound) {
 }
 
 TEST_F(Faults, WhateverIsDamagedIsMadeAgainAndTheReportStaysTheSame) {
+  write_finished_tube(folder_.path(), "cache/wireplan");
   ASSERT_EQ(run().code, 0);
   const std::string expected = report_without_timing(report());
   std::vector<fs::path> files;

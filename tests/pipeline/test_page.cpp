@@ -8,7 +8,7 @@
 #include "pipeline/report/page.h"
 #include "pipeline/report/report.h"
 #include "pipeline/stages/stages.h"
-#include "tests/pipeline/small_case.h"
+#include "tests/pipeline/finished_case.h"
 
 namespace wireplan::pipeline {
 namespace {
@@ -72,7 +72,7 @@ TEST(Page, EmbedsNamesThatCannotEndTheirScriptAndReadBackTheSame) {
 TEST(Page, HoldsTheReportAndTheShapesOfItsTrials) {
   if (!page_missing().empty()) GTEST_SKIP() << page_missing();
   const TemporaryFolder folder;
-  write_tube_case(folder.path());
+  write_finished_tube(folder.path());
   const fs::path made = run_tube(folder.path(), "cache", 2);
   const std::string page = read_text(made / "report.html");
   Json report = read_json(made / "report.json", kReportSchema);
@@ -130,7 +130,7 @@ TEST(Page, IsTheSameAtAnyThreadCountOutsideItsTiming) {
 TEST(Page, NamesNothingOfTheMachineAndAsksNothingOfTheNetwork) {
   if (!page_missing().empty()) GTEST_SKIP() << page_missing();
   const TemporaryFolder folder;
-  write_tube_case(folder.path());
+  write_finished_tube(folder.path());
   const std::string page = read_text(run_tube(folder.path(), "cache", 1) / "report.html");
   EXPECT_EQ(page.find(folder.path().string()), std::string::npos);
   EXPECT_EQ(page.find(WIREPLAN_SOURCE_DIR), std::string::npos);
@@ -141,7 +141,7 @@ TEST(Page, NamesNothingOfTheMachineAndAsksNothingOfTheNetwork) {
 
 TEST(Page, OrTheReasonWhyThereIsNone) {
   const TemporaryFolder folder;
-  write_tube_case(folder.path());
+  write_finished_tube(folder.path());
   const fs::path made = run_tube(folder.path(), "cache", 1);
   const std::string report = read_text(made / "report.json");
   EXPECT_EQ(fs::exists(made / "report.html"), page_missing().empty());

@@ -8,7 +8,7 @@
 #include "pipeline/report/render.h"
 #include "pipeline/report/report.h"
 #include "pipeline/stages/stages.h"
-#include "tests/pipeline/small_case.h"
+#include "tests/pipeline/finished_case.h"
 
 namespace wireplan::pipeline {
 namespace {
@@ -16,7 +16,7 @@ namespace {
 namespace fs = std::filesystem;
 
 fs::path run_tube(const fs::path& folder) {
-  write_tube_case(folder);
+  write_finished_tube(folder);
   RunOptions options;
   options.cache = folder / "cache";
   publish(run_stages(read_case(folder / "case.json"), options).artifacts, folder / "out");

@@ -8,7 +8,7 @@
 #include "pipeline/report/report.h"
 #include "pipeline/stages/stages.h"
 #include "preprocess/files/vessel_io.h"
-#include "tests/pipeline/small_case.h"
+#include "tests/pipeline/finished_case.h"
 
 namespace wireplan::pipeline {
 namespace {
@@ -31,7 +31,7 @@ void expect_valid(const Json& report, const fs::path& folder) {
 
 TEST(Report, KeepsToItsSchemaWithPlans) {
   const TemporaryFolder folder;
-  write_tube_case(folder.path());
+  write_finished_tube(folder.path());
   const Json report = run_to_report(folder / "case.json", folder / "cache");
   ASSERT_FALSE(report.at("ranking").empty());
   EXPECT_EQ(report.at("trials").size(), 2u);
@@ -40,7 +40,7 @@ TEST(Report, KeepsToItsSchemaWithPlans) {
 
 TEST(Report, KeepsToItsSchemaInARigidVesselWithoutFrictionAndSaysSo) {
   const TemporaryFolder folder;
-  write_tube_case(folder.path());
+  write_finished_tube(folder.path());
   const Json report =
       run_to_report(folder / "case.json", folder / "cache", 0, {"wall.model=rigid", "friction=0"});
   const Json warnings = report.at("provenance").at("warnings");
@@ -63,7 +63,7 @@ TEST(Report, KeepsToItsSchemaInARigidVesselWithoutFrictionAndSaysSo) {
 TEST(Report, TellsHowTheWallMovedAndWhereTheWorkWent) {
   // A wire askew onto a wall so soft that linear theory ends.
   const TemporaryFolder folder;
-  write_tube_case(folder.path());
+  write_finished_tube(folder.path());
   const Json report =
       run_to_report(folder / "case.json", folder / "cache", 0,
                     {"wall.young_modulus_kpa=20", "access.inclination_deg=[30]", "friction=0.2"});
@@ -82,7 +82,7 @@ TEST(Report, TellsHowTheWallMovedAndWhereTheWorkWent) {
 
 TEST(Report, MapsTheForcesOnTheWall) {
   const TemporaryFolder folder;
-  write_tube_case(folder.path());
+  write_finished_tube(folder.path());
   RunOptions options;
   options.cache = folder / "cache";
   const RunResult result =
@@ -99,7 +99,7 @@ TEST(Report, MapsTheForcesOnTheWall) {
 TEST(Report, ScoutedCandidatesLeaveTheBestPlansAsTheyAre) {
   // 13 ways in; behind a narrow lean all is alike, so that the scout saves some.
   const TemporaryFolder folder;
-  write_tube_case(folder.path());
+  write_finished_tube(folder.path());
   const std::vector<std::string> ways = {"access.inclination_deg=[0, 10, 20, 30]",
                                          "access.azimuth_deg=[0, 90, 180, 270]",
                                          "robustness.repeats=0"};
@@ -133,7 +133,7 @@ TEST(Report, ScoutedCandidatesLeaveTheBestPlansAsTheyAre) {
 
 TEST(Report, TellsHowThePlansFareUnderDisturbances) {
   const TemporaryFolder folder;
-  write_tube_case(folder.path());
+  write_finished_tube(folder.path());
   const Json report =
       run_to_report(folder / "case.json", folder / "cache", 0, {"robustness.repeats=12"});
   const Json& robustness = report.at("robustness");
@@ -169,7 +169,7 @@ TEST(Report, TellsHowThePlansFareUnderDisturbances) {
 
 TEST(Report, RepeatsMoreThan32TimesWhatIsTheBestOf32) {
   const TemporaryFolder folder;
-  write_tube_case(folder.path());
+  write_finished_tube(folder.path());
   const Json report = run_to_report(
       folder / "case.json", folder / "cache", 0,
       {"robustness.repeats=36", "robustness.plans=1", "access.azimuth_deg=[0, 90, 180, 270]"});
@@ -194,7 +194,7 @@ TEST(Report, RepeatsMoreThan32TimesWhatIsTheBestOf32) {
 TEST(Report, LooksForManoeuvresWhereNoStraightPlanHolds) {
   // A bent tip and a target beside the axis: some rolls reach.
   const TemporaryFolder folder;
-  Json file = write_tube_case(folder.path());
+  Json file = write_finished_tube(folder.path());
   file["wires"][0]["sections"] =
       Json::array({{{"length_mm", 8}, {"bending_stiffness_n_mm2", 5}, {"rest_radius_mm", 10}},
                    {{"length_mm", 200}, {"bending_stiffness_n_mm2", 50}}});
@@ -218,7 +218,7 @@ TEST(Report, LooksForManoeuvresWhereNoStraightPlanHolds) {
 
 TEST(Report, RanksWithoutRepeatsWhereTheCaseAsksForNone) {
   const TemporaryFolder folder;
-  write_tube_case(folder.path());
+  write_finished_tube(folder.path());
   const Json report =
       run_to_report(folder / "case.json", folder / "cache", 0, {"robustness.repeats=0"});
   ASSERT_FALSE(report.at("ranking").empty());
@@ -230,7 +230,7 @@ TEST(Report, RanksWithoutRepeatsWhereTheCaseAsksForNone) {
 TEST(Report, KeepsToItsSchemaWithoutPlans) {
   // 12 mm of wire do not come to a target 22 mm away.
   const TemporaryFolder folder;
-  write_tube_case(folder.path());
+  write_finished_tube(folder.path());
   const Json report =
       run_to_report(folder / "case.json", folder / "cache", 0, {"insertion.length_mm=12"});
   EXPECT_TRUE(report.at("ranking").empty());
@@ -257,7 +257,7 @@ TEST(Report, IsTheSameOutsideTimingAtAnyThreadCount) {
 
 TEST(Report, NamesNoFolderOfThisMachine) {
   const TemporaryFolder folder;
-  Json file = write_tube_case(folder.path());
+  Json file = write_finished_tube(folder.path());
   file["surface"]["path"] = (folder / "tube.stl").string();  // absolute
   write_json(file, folder / "case.json");
   const Json report = run_to_report(folder / "case.json", folder / "cache");
@@ -267,7 +267,7 @@ TEST(Report, NamesNoFolderOfThisMachine) {
 
 TEST(Report, PrintsTheValuesThatStagesChose) {
   const TemporaryFolder folder;
-  write_tube_case(folder.path());
+  write_finished_tube(folder.path());
   const Json report =
       run_to_report(folder / "case.json", folder / "cache", 0, {"insertion.length_mm=0"});
   const Json& parameters = report.at("provenance").at("parameters");

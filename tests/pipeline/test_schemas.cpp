@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "pipeline/report/report.h"
+#include "tests/pipeline/finished_case.h"
 #include "tests/pipeline/program.h"
 
 namespace wireplan::pipeline {
@@ -70,7 +71,7 @@ TEST(Schemas, AReportThatIsCutOutIsRefusedWithItsRemedy) {
 
 TEST(Schemas, WhatTheProgramWritesKeepsToThem) {
   const TemporaryFolder folder;
-  write_tube_case(folder.path());
+  write_finished_tube(folder.path(), "cache/wireplan");
   ASSERT_EQ(run_program(folder.path(), "run case.json -o results").code, 0);
   ASSERT_EQ(run_program(folder.path(), "run case.json -o short --set insertion.length_mm=12").code,
             1);

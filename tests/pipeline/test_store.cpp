@@ -8,7 +8,7 @@
 #include "pipeline/stages/stages.h"
 #include "pipeline/store/hash.h"
 #include "pipeline/store/store.h"
-#include "tests/pipeline/small_case.h"
+#include "tests/pipeline/finished_case.h"
 
 namespace wireplan::pipeline {
 namespace {
@@ -189,6 +189,7 @@ TEST(Publish, ReplacesItsOwnFilesAndTouchesNoOthers) {
 class StageKeys : public testing::Test {
  protected:
   void SetUp() override { write_tube_case(folder_.path()); }
+  void start_finished() { write_finished_tube(folder_.path()); }
 
   RunResult run(const std::vector<std::string>& changes, bool dry = false) {
     const Case given = read_case(folder_ / "case.json", changes);
@@ -370,18 +371,21 @@ TEST_F(RerunMatrix, OfACaseThatStartsFromAVolume) {
 }
 
 TEST_F(StageKeys, AChangeRerunsAlsoWhatReadsWhatItChanges) {
+  start_finished();
   run({});
   EXPECT_EQ(not_cached(run({"wall.thickness_mm=2"})),
             (std::vector<std::string>{"wall", "trials", "manoeuvres", "plans", "report"}));
 }
 
 TEST_F(StageKeys, TrialsInARigidVesselDoNotReadItsWall) {
+  start_finished();
   run({"wall.model=rigid"});
   EXPECT_EQ(not_cached(run({"wall.model=rigid", "wall.thickness_mm=2"})),
             (std::vector<std::string>{"wall", "report"}));
 }
 
 TEST_F(StageKeys, AStageThatComesOutTheSameStopsTheCascade) {
+  start_finished();
   run({});
   // The same surface in another file: read anew, and nothing after it but the report, which names
   // its digest.
@@ -391,6 +395,7 @@ TEST_F(StageKeys, AStageThatComesOutTheSameStopsTheCascade) {
 }
 
 TEST_F(StageKeys, ADryRunSaysWhatWouldRunAndWhyAndRunsNothing) {
+  start_finished();
   run({});
   const RunResult dry = run({"wall.thickness_mm=2"}, /*dry=*/true);
   EXPECT_EQ(not_cached(dry),
@@ -403,6 +408,7 @@ TEST_F(StageKeys, ADryRunSaysWhatWouldRunAndWhyAndRunsNothing) {
 }
 
 TEST_F(StageKeys, ADamagedArtifactIsMadeAgainWithTheSameContents) {
+  start_finished();
   const RunResult first = run({});
   overwrite(first.artifacts[2].folder / "wall.vtu", "");
   const RunResult second = run({});
@@ -433,6 +439,7 @@ TEST_F(StageKeys, AnInterruptedRunGoesOnFromItsFinishedTrials) {
 }
 
 TEST_F(StageKeys, ANewWireAddsItsTrialsOnly) {
+  start_finished();
   const auto trials_run = [](const RunResult& result) {
     return read_json(result.artifacts[3].folder / kTimingFile, "wireplan.timing/1")
         .at("trials_run")
@@ -455,6 +462,7 @@ TEST_F(StageKeys, ANewWireAddsItsTrialsOnly) {
 }
 
 TEST_F(StageKeys, AKeptTrialThatIsDamagedIsComputedAgain) {
+  start_finished();
   const RunResult first = run({});
   // The trial of the cache and the one kept are the same bytes on the disk.
   const fs::path trial = first.artifacts[3].folder / "trials/0000.json";

@@ -10,7 +10,7 @@
 #include "pipeline/stages/stages.h"
 #include "preprocess/files/vessel_io.h"
 #include "preprocess/volume/image.h"
-#include "tests/pipeline/small_case.h"
+#include "tests/pipeline/finished_case.h"
 
 namespace wireplan::pipeline {
 namespace {
@@ -82,7 +82,7 @@ TEST(ViewerFiles, ListEveryTrialWithUnitsInTheHeader) {
 
 TEST(ViewerFiles, ComeWithEveryRankedPlanOfARun) {
   const TemporaryFolder folder;
-  write_tube_case(folder.path());
+  write_finished_tube(folder.path());
   RunOptions options;
   options.cache = folder / "cache";
   const fs::path made =
