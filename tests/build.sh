@@ -4,7 +4,7 @@
 # other ones than ours.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
-preset=${1:?usage: tests/build.sh PRESET [TARGET...] (release, dev, tsan, tidy, fuzz or surface-only)}
+preset=${1:?usage: tests/build.sh PRESET [TARGET...] (release, dev, tsan or surface-only)}
 targets=("${@:2}")
 
 if [[ "${targets[*]}" == wireplan ]]; then

@@ -1,8 +1,8 @@
 #!/usr/bin/env bash
-# The whole suite: formatting, the tests in a release build, cases end to end, the tests under address
-# and undefined behaviour sanitizers, simulate and plan under the thread sanitizer and with Clang and
-# clang-tidy, the program without ITK and Node, the parsers fuzzed, the workflow for clusters. Stops at
-# the first step that fails and names it. CI=true: see extra().
+# The whole suite: formatting, the tests in a release build, cases end to end, the tests with Clang under
+# address and undefined behaviour sanitizers, what starts threads under the thread sanitizer, clang-tidy
+# on simulate and plan, the program without ITK and Node, the parsers fuzzed, the workflow for clusters.
+# Stops at the first step that fails and names it.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 
@@ -22,18 +22,6 @@ step() {
   echo "== $name: ok, $((SECONDS - start)) s"
 }
 
-# extra SECONDS NAME COMMAND...: a step that CI, which ends after 90 minutes, leaves out where so many
-# seconds have passed: a slow machine is to fail by what is wrong, not by how slow it is.
-extra() {
-  local limit=$1
-  shift
-  if [[ "${CI:-}" == true ]] && ((SECONDS > limit)); then
-    echo "== $1: not run, $SECONDS s have passed"
-    return 0
-  fi
-  step "$@"
-}
-
 # What clang-format and clang-tidy find changes with their version; ours is Debian 12's and Ubuntu
 # 22.04's.
 is_version_14() {
@@ -50,9 +38,11 @@ check_formatting() {
     -exec clang-format --dry-run -Werror {} +
 }
 
-build_tidy() {
+# As the build with Clang compiles it.
+check_tidy() {
   is_version_14 clang-tidy || return 0
-  bash tests/build.sh tidy && run_suite tidy
+  find simulate plan -name '*.cpp' -print0 |
+    xargs -0 -n 1 -P "$(nproc)" clang-tidy -p build/dev --quiet --warnings-as-errors='*'
 }
 
 run_suite() { ctest --preset "$1" --parallel "$(nproc)" "${@:2}"; }
@@ -80,12 +70,10 @@ check_surface_only() {
 
 # Each parser gets a fixed number of executions, some 20 s; tests/fuzz/run.sh takes as many as asked.
 fuzz_parsers() {
-  if ! clang++ -fsanitize=fuzzer -x c++ - -o /dev/null 2>/dev/null \
-    <<<'extern "C" int LLVMFuzzerTestOneInput(const unsigned char*, unsigned long) { return 0; }'; then
+  if [[ ! -x build/dev/tests/fuzz/fuzz_case ]]; then
     echo "not run: this clang++ has no libFuzzer (package libclang-rt-dev)"
     return 0
   fi
-  bash tests/build.sh fuzz
   bash tests/fuzz/run.sh 20000
   bash tests/fuzz/run.sh 2000 repair
   bash tests/fuzz/run.sh 200 dicom
@@ -148,13 +136,12 @@ step "tests" run_suite release
 step "bundled case" run_bundled_case
 step "cases on real data" run_real_cases
 step "pages in a browser" check_pages
+step "without ITK and Node" check_surface_only
+step "cluster" run_cluster
+step "build with Clang and sanitizers" bash tests/build.sh dev
+step "tests under address and undefined behaviour sanitizers" run_suite dev
+step "clang-tidy on simulate and plan" check_tidy
+step "fuzz the parsers" fuzz_parsers
 step "thread sanitizer build of simulate and plan" bash tests/build.sh tsan
 step "tests under thread sanitizer" run_suite tsan
-step "sanitizer build" bash tests/build.sh dev
-step "tests under address and undefined behaviour sanitizers" run_suite dev --exclude-regex '^pipeline'
-extra 4000 "pipeline under address and undefined behaviour sanitizers" run_suite dev --tests-regex '^pipeline'
-extra 3900 "simulate and plan with Clang and clang-tidy" build_tidy
-extra 4000 "without ITK and Node" check_surface_only
-extra 4200 "cluster" run_cluster
-extra 4200 "fuzz the parsers" fuzz_parsers
 echo "== all steps ok, $SECONDS s"

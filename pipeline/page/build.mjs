@@ -61,6 +61,7 @@ writeFileSync(join(out, "template.html"), html);
 writeFileSync(
   join(out, "page_template.h"),
   `#pragma once
+#pragma GCC diagnostic ignored "-Woverlength-strings"
 inline constexpr const char* kPageTemplate = R"page(${html})page";
 inline constexpr const char* kPageMissing = "";
 `,

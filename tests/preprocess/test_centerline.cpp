@@ -64,7 +64,7 @@ void expect_well_formed(const Centerline& line, double sample) {
   EXPECT_GT(line.radius.minCoeff(), 0.0);
 }
 
-std::string message_of(const Surface& surface, const Vec3& access, const Vec3& target,
+std::string refusal_of(const Surface& surface, const Vec3& access, const Vec3& target,
                        const CenterlineOptions& options = {}) {
   try {
     find_centerline(surface, access, target, options);
@@ -140,7 +140,7 @@ TEST(Centerline, GoesRoundAHairpinWhoseLegsNearlyTouch) {
 TEST(Centerline, FlatWallsSquareToTheGridAreNotCrossed) {
   const Surface boxes =
       shapes::joined(shapes::box({0, 0, 0}, {4, 4, 4}), shapes::box({5, 0, 0}, {9, 4, 4}));
-  const std::string message = message_of(boxes, {2, 2, 2}, {7, 2, 2}, {.grid_mm = 1.0});
+  const std::string message = refusal_of(boxes, {2, 2, 2}, {7, 2, 2}, {.grid_mm = 1.0});
   EXPECT_NE(message.find("not connected"), std::string::npos) << message;
 }
 
@@ -154,7 +154,7 @@ TEST(Centerline, OfAShortWayIsAsShort) {
 
 TEST(Centerline, ErrorTellsThatAccessAndTargetAreOnePlace) {
   const Surface tube = shapes::straight_tube(5.0, 60.0, 2.0);
-  const std::string message = message_of(tube, {0.0, 0.0, 30.0}, {0.0, 0.0, 30.0});
+  const std::string message = refusal_of(tube, {0.0, 0.0, 30.0}, {0.0, 0.0, 30.0});
   EXPECT_NE(message.find("same place along the vessel"), std::string::npos) << message;
 }
 
@@ -169,10 +169,10 @@ TEST(Centerline, IsTheSameTwice) {
 
 TEST(Centerline, ErrorNamesTheEndThatLiesOutsideAndItsDistance) {
   const Surface tube = shapes::straight_tube(5.0, 60.0, 2.0);
-  const std::string access = message_of(tube, {0.0, 0.0, -7.0}, {0.0, 0.0, 50.0});
+  const std::string access = refusal_of(tube, {0.0, 0.0, -7.0}, {0.0, 0.0, 50.0});
   EXPECT_NE(access.find("access (0.0, 0.0, -7.0) mm lies outside"), std::string::npos) << access;
   EXPECT_NE(access.find("7 mm from the wall"), std::string::npos) << access;
-  const std::string target = message_of(tube, {0.0, 0.0, 5.0}, {0.0, 0.0, 64.0});
+  const std::string target = refusal_of(tube, {0.0, 0.0, 5.0}, {0.0, 0.0, 64.0});
   EXPECT_NE(target.find("target (0.0, 0.0, 64.0) mm lies outside"), std::string::npos) << target;
 }
 
@@ -180,7 +180,7 @@ TEST(Centerline, ErrorTellsHowFarTheSearchCameInSeparateTubes) {
   Surface other = shapes::straight_tube(3.0, 60.0, 2.0);
   other.vertices.row(0).array() += 12.0;
   const Surface both = shapes::joined(shapes::straight_tube(5.0, 60.0, 2.0), other);
-  const std::string message = message_of(both, {0.0, 0.0, 5.0}, {12.0, 0.0, 50.0});
+  const std::string message = refusal_of(both, {0.0, 0.0, 5.0}, {12.0, 0.0, 50.0});
   EXPECT_NE(message.find("target (12.0, 0.0, 50.0) mm is not connected to access (0.0, 0.0, 5.0)"),
             std::string::npos)
       << message;

@@ -190,7 +190,7 @@ TEST_F(SurfaceFile, TheVesselIsKeptAndCrumbsAreDropped) {
 
 TEST_F(SurfaceFile, WhatIsNoSurfaceIsRefusedWithItsName) {
   const auto refused = [](const fs::path& path) {
-    return message_of([&] { read_surface(path, "mm", "LPS").surface; });
+    return message_of([&] { read_surface(path, "mm", "LPS"); });
   };
   EXPECT_NE(refused(folder_ / "absent.stl").find("absent.stl: no such file"), std::string::npos);
   EXPECT_NE(refused(folder_).find("no such file"), std::string::npos);
@@ -219,7 +219,7 @@ TEST_F(SurfaceFile, ABinaryStlThatPromisesMoreTrianglesThanItHoldsTakesNoMemoryF
   bytes.replace(80, 4, "\xff\xff\xff\x7f");  // 2^31 - 1 triangles, 100 GB
   const fs::path file = write("promise.stl", bytes);
   EXPECT_EQ(
-      message_of([&] { read_surface(file, "mm", "LPS").surface; }),
+      message_of([&] { read_surface(file, "mm", "LPS"); }),
       file.string() +
           ": a binary STL of 134 bytes, expected 107374182434 for the 2147483647 triangles of "
           "its header; copy or export the surface again");
@@ -241,7 +241,8 @@ TEST_F(SurfaceFile, ATruncatedFileIsRefusedOrFoundUnsound) {
   const std::vector<std::pair<std::string, std::string>> files = {
       {"a.stl", ascii_stl(sphere)},  {"b.stl", binary_stl(sphere)}, {"c.ply", ascii_ply(sphere)},
       {"f.ply", binary_ply(sphere)}, {"d.obj", obj(sphere)},        {"e.vtp", vtp.str()}};
-  for (const auto& [name, content] : files) {
+  for (const auto& file : files) {
+    const std::string &name = file.first, &content = file.second;
     // Up to the last cut but the end itself, where only closing words may be missing.
     for (int part = 0; part < 10; ++part) {
       SCOPED_TRACE(name + " cut at " + std::to_string(part) + "/10");

@@ -12,12 +12,13 @@
 
 #include "simulate/insertion/scene.h"
 #include "tests/shapes.h"
+#include "tests/simulate/supports.h"
 
 namespace wireplan::simulate {
 
 // ---------------------------------------------------------------- wires in vessels
 
-inline Wire uniform_wire(double length, double radius, double EI, double EA = 0.0) {
+inline Wire round_wire(double length, double radius, double EI, double EA = 0.0) {
   return {.name = "uniform",
           .radius = radius,
           .sections = {{.length = length, .bending_stiffness = EI, .axial_stiffness = EA}}};
@@ -79,12 +80,6 @@ inline EndSupport held_across(const Vec3& axis) {
   EndSupport end;
   end.hold_across = true;
   end.axis = axis;
-  return end;
-}
-
-inline EndSupport pinned() {
-  EndSupport end;
-  end.hold_along = end.hold_across = true;
   return end;
 }
 

@@ -20,7 +20,7 @@ namespace {
 
 Scene wire_on_the_floor(const VesselModel& vessel, double friction) {
   Scene scene;
-  scene.wire = uniform_wire(40.0, 0.5, 100.0);
+  scene.wire = round_wire(40.0, 0.5, 100.0);
   scene.wire.sections[0].mass_per_length = 1e-7;
   scene.elements = 20;
   scene.supports = {{.at = WireEnd::kProximal,

@@ -80,7 +80,7 @@ class PressedWire {
   explicit PressedWire(double friction)
       : vessel_(shapes::box(Vec3(-30.0, -30.0, 0.0), Vec3(30.0, 30.0, 60.0)),
                 {.grid_spacing = 2.0, .band = 4.0}),
-        bench_(uniform_wire(kLength, kRadius, kEI), 40, vessel_,
+        bench_(round_wire(kLength, kRadius, kEI), 40, vessel_,
                {.law = {}, .spacing = 1.0, .friction = friction, .slip = kSlip},
                [](double s) { return Vec3(0.0, 0.0, kRadius + 0.01 + kLength - s); }) {
     // So that it bows toward x as soon as it may, 0.2 % of what it presses with; straight it would
@@ -174,7 +174,7 @@ TEST(HelixInATube, HasTheWallForceAndPitchOfTheory) {
   const double q = 2.0 * kPi / pitch, F = 2.0 * EI * q * q;
   const VesselModel vessel(long_tube(r + radius, 700.0, 48), {.grid_spacing = 0.5, .band = 1.0});
   const double start_q = 1.1 * q, climb = 1.0 / std::hypot(1.0, r * start_q);
-  Bench bench(uniform_wire(640.0, radius, EI), 160, vessel,
+  Bench bench(round_wire(640.0, radius, EI), 160, vessel,
               {.law = {LinearLaw{.stiffness = 20.0, .smoothing = 0.005}}, .spacing = 4.0},
               [&](double s) {
                 const double z = climb * s;
@@ -225,7 +225,7 @@ TEST(Capstan, TensionGrowsExponentiallyWithTheAngle) {
       const double azimuth = start + s / length_per_angle;
       return Vec3(path * std::cos(azimuth), path * std::sin(azimuth), climb * azimuth);
     };
-    Bench bench(uniform_wire(length, radius, 0.05, 2000.0), 128, vessel,
+    Bench bench(round_wire(length, radius, 0.05, 2000.0), 128, vessel,
                 {.law = {}, .spacing = 1.0, .friction = friction}, point_at);
     const int n = bench.rod.nodes();
     bench.problem.first = 1;  // the hand holds node 0
@@ -290,7 +290,7 @@ TEST(UniformBend, IsFeltAtTheEndsOfTheWireAlone) {
   const VesselModel vessel(shapes::tube(axis, Eigen::VectorXd::Constant(axis.cols(), lumen), 40),
                            {.grid_spacing = 0.5});
   const double start = 0.05, end = 0.8, r = lumen - radius;
-  Bench bench(uniform_wire(bend_radius * (end - start), radius, EI), 100, vessel,
+  Bench bench(round_wire(bend_radius * (end - start), radius, EI), 100, vessel,
               {.law = {LinearLaw{.stiffness = 0.5, .smoothing = 0.01}}, .spacing = 1.5},
               [&](double s) {
                 const double at = start + s / bend_radius;
@@ -342,7 +342,7 @@ TEST(SinusoidalBuckling, StartsAtTheLoadOfDawsonAndPaslay) {
   const double theory = 2.0 * std::sqrt(EI * weight / r);
   const VesselModel vessel(long_tube(r + radius, length + 20.0, 128), {.grid_spacing = 0.8});
   const auto buckled_angle = [&](double thrust) {
-    Bench bench(uniform_wire(length, radius, EI), 76, vessel,
+    Bench bench(round_wire(length, radius, EI), 76, vessel,
                 {.law = {LinearLaw{.stiffness = 20.0, .smoothing = 0.005}}, .spacing = 4.0},
                 [&](double s) {
                   const double across = 0.02 * std::sin(q * s);
@@ -384,8 +384,8 @@ TEST(Friction, ChangesWithTheNormalForceInTheUnsymmetricBandAsElsewhere) {
       return Vec3(20.0 - radius * std::cos(at), 0.0, radius * std::sin(at));
     };
   };
-  Bench bench(uniform_wire(20.0, 1.0, 50.0), 10, vessel, options, along_the_bend(0.0));
-  const Bench further(uniform_wire(20.0, 1.0, 50.0), 10, vessel, options, along_the_bend(0.01));
+  Bench bench(round_wire(20.0, 1.0, 50.0), 10, vessel, options, along_the_bend(0.0));
+  const Bench further(round_wire(20.0, 1.0, 50.0), 10, vessel, options, along_the_bend(0.01));
   const int n = bench.rod.nodes();
   bench.contact.begin(further.state.x);
   bench.contact.refresh(true);
@@ -413,7 +413,7 @@ TEST(WallContact, FindsWhatTouchesAfterManyMotions) {
   // Points far from the wall are not looked at until they could have come near. A wire that wanders
   // about, now further and now less far out of its introducer, feels what a new one there feels.
   const VesselModel vessel(shapes::straight_tube(3.0, 60.0, 0.8));
-  const Wire wire = uniform_wire(40.0, 0.4, 50.0);
+  const Wire wire = round_wire(40.0, 0.4, 50.0);
   ContactOptions options;
   Bench bench(wire, 8, vessel, options, [](double s) { return Vec3(0.0, 0.0, 10.0 + s); });
   std::mt19937_64 random(3);
@@ -463,7 +463,7 @@ TEST(Newton, GivesUpSoonWhereTheEnergyJumps) {
   // Beyond the field's band, 2 mm outside the lumen, a wire feels nothing; within it the wall's
   // whole force. A load bends a wire from out there to where that starts, and no further.
   const VesselModel vessel(shapes::straight_tube(2.0, 40.0, 0.6), {.band = 2.0});
-  Bench bench(uniform_wire(30.0, 0.5, 50.0), 30, vessel, {},
+  Bench bench(round_wire(30.0, 0.5, 50.0), 30, vessel, {},
               [](double s) { return Vec3(4.5, 0.0, 5.0 + s); });
   bench.problem.proximal = pinned();
   bench.problem.proximal.tangent = Vec3::UnitZ();
@@ -484,7 +484,7 @@ TEST(Newton, LengthensStepsOfAWireThatJumps) {
   const VesselModel vessel(shapes::straight_tube(kRadius, 60.0, 1.5), {.band = 4.0});
   int iterations = 0;
   for (const double factor : {18.0, 19.0, 20.0, 21.0, 22.0}) {
-    Bench bench(uniform_wire(kLength, 0.5, kStiffness), 40, vessel, {},
+    Bench bench(round_wire(kLength, 0.5, kStiffness), 40, vessel, {},
                 [](double s) { return Vec3(1e-4 * std::sin(kPi * s / kLength), 0.0, 10.0 + s); });
     bench.problem.proximal = pinned();
     bench.problem.distal = held_across(Vec3::UnitZ());
@@ -505,7 +505,7 @@ TEST(SafeStep, IsLengthenedNoFurtherThanItLooks) {
   // is infinitely far on.
   const Surface surface = shapes::straight_tube(2.0, 40.0, 0.6);
   const VesselModel vessel(surface, {.band = 2.0, .openings = find_openings(surface)});
-  Bench bench(uniform_wire(30.0, 0.5, 50.0), 30, vessel, {},
+  Bench bench(round_wire(30.0, 0.5, 50.0), 30, vessel, {},
               [](double s) { return Vec3(0.0, 0.0, 12.0 + s); });
   bench.problem.proximal = held_across(Vec3::UnitZ());
   bench.problem.proximal.tangent = Vec3::UnitZ();
@@ -525,7 +525,7 @@ TEST(SafeStep, IsLengthenedNoFurtherThanItLooks) {
 TEST(SafeStep, SlidesAlongTheWallButNotThroughIt) {
   constexpr double kRadius = 5.0, kOff = 4.4;
   const VesselModel vessel(shapes::straight_tube(kRadius, 100.0, 1.0));
-  Bench bench(uniform_wire(10.0, 0.5, 50.0), 10, vessel, {},
+  Bench bench(round_wire(10.0, 0.5, 50.0), 10, vessel, {},
               [&](double s) { return Vec3(kOff, 0.0, 40.0 + s); });
   bench.contact.begin(bench.state.x);
   const double distance = vessel.lumen.distance(Vec3(kOff, 0.0, 45.0));

@@ -183,7 +183,7 @@ TEST(YieldingWall, BalancesTheWireAsOneLargeSystemDoes) {
     const double at = 0.15 + s / bend_radius;
     return Vec3(bend_radius * (1.0 - std::cos(at)), 0.0, bend_radius * std::sin(at));
   };
-  const Wire wire = uniform_wire(27.0, 1.0, 50.0);
+  const Wire wire = round_wire(27.0, 1.0, 50.0);
   ContactOptions at_nodes;
   at_nodes.spacing = 2.0;  // half of it in the last 20 mm
   Bench bench(wire, 27, yielding, at_nodes, along_the_bend);
@@ -221,7 +221,7 @@ TEST(YieldingWall, KnowsHowForcesChangeAsTheWireMoves) {
   const double bend_radius = 20.0;
   const Surface surface = shapes::bend_tube(1.5, bend_radius, 0.5 * kPi, 0.0, 0.0, 0.8);
   const VesselModel vessel(surface, shapes::extruded_wall(surface, 1.0, 0.4));
-  Bench bench(uniform_wire(27.0, 1.0, 50.0), 27, vessel, {}, [&](double s) {
+  Bench bench(round_wire(27.0, 1.0, 50.0), 27, vessel, {}, [&](double s) {
     const double at = 0.15 + s / bend_radius, off = 0.52;  // presses outward everywhere
     return Vec3(bend_radius - (bend_radius + off) * std::cos(at), 0.02 * s,
                 (bend_radius + off) * std::sin(at));
@@ -265,10 +265,10 @@ TEST(YieldingWall, HeldFeetAreRefreshedOnlyWhereTheyAreFarOff) {
         return Vec3(off * std::cos(angle), off * std::sin(angle), 5.0 + s + shift);
       };
     };
-    Bench bench(uniform_wire(27.0, 1.0, 50.0), 27, vessel, {}, wire_at(0.0, 0.0));
+    Bench bench(round_wire(27.0, 1.0, 50.0), 27, vessel, {}, wire_at(0.0, 0.0));
     bench.contact.begin(bench.state.x);
     if (held) bench.contact.hold_feet();
-    const Bench moved(uniform_wire(27.0, 1.0, 50.0), 27, vessel, {}, wire_at(along, round / off));
+    const Bench moved(round_wire(27.0, 1.0, 50.0), 27, vessel, {}, wire_at(along, round / off));
     const double before = bench.contact.sample(moved.state.x).energy.total();
     return bench.contact.refresh(true).energy.total() - before;
   };

@@ -13,6 +13,7 @@
 #include "simulate/equilibrium/solver.h"
 #include "tests/simulate/analytic.h"
 #include "tests/simulate/direct_solvers.h"
+#include "tests/simulate/supports.h"
 
 namespace wireplan::simulate {
 
@@ -31,12 +32,6 @@ inline Wire uniform_wire(double length, double EI, double EA, double GJ = 0.0,
 
 inline Rod uniform_rod(double length, double EI, double EA, int elements) {
   return build_rod(uniform_wire(length, EI, EA), length, elements);
-}
-
-inline EndSupport pinned() {
-  EndSupport end;
-  end.hold_along = end.hold_across = true;
-  return end;
 }
 
 /// Free along x alone.
