@@ -115,25 +115,6 @@ Json insertion_json(const PageInsertion& insertion, const Quantiser& box) {
           {"wall_force_n", encode(forces)}};
 }
 
-Json slices_json(const std::optional<Slices>& slices) {
-  if (!slices) return nullptr;
-  Json places = Json::array();
-  for (const Place& place : slices->places) {
-    Json cuts = Json::array();
-    for (const Slice& slice : place.slices) {
-      const std::string jpeg = encode_jpeg(slice.gray, slices->size);
-      cuts.push_back({{"plane", plane_name(slice.plane)},
-                      {"jpeg", base64(jpeg.data(), jpeg.size())},
-                      {"outline_mm", encode_floats(slice.outline.reshaped())}});
-    }
-    places.push_back({{"name", place.name}, {"point_mm", to_json(place.point)}, {"cuts", cuts}});
-  }
-  return {{"size_px", slices->size},
-          {"spacing_mm", slices->spacing},
-          {"window_hu", {slices->window_low, slices->window_high}},
-          {"places", std::move(places)}};
-}
-
 Json scene_json(const PageInput& input) {
   const Quantiser box = fit_box(input);
   Json insertions = Json::array();
@@ -151,7 +132,7 @@ Json scene_json(const PageInput& input) {
   scene["path"] = box.encode_points(input.path.points);
   scene["trials"] = trials_json(input, box);
   scene["insertions"] = std::move(insertions);
-  scene["slices"] = slices_json(input.slices);
+  scene["panels"] = input.panels;
   scene["picture_png"] = base64(input.picture_png.data(), input.picture_png.size());
   return scene;
 }

@@ -5,12 +5,10 @@
 /// Outside the one block of timing the page is the same, byte for byte, for the same inputs and
 /// build.
 #include <Eigen/Core>
-#include <optional>
 #include <string>
 #include <vector>
 
 #include "pipeline/files/json_reader.h"
-#include "pipeline/report/slices.h"
 #include "preprocess/vessel.h"
 #include "simulate/insertion/trial.h"
 
@@ -41,7 +39,7 @@ struct PageInput {
   std::vector<double> wire_radius;  // in the order of the report's wires                     [mm]
   std::vector<PageTrial> trials;    // in the order of the report's trials
   std::vector<PageInsertion> insertions;
-  std::optional<Slices> slices;  // none where the case starts from a surface
+  Json panels = Json::object();  // by name what a panel shows beyond the report, as it reads it
   std::string picture_png;       // the vessel, for browsers without 3D
 };
 

@@ -11,6 +11,8 @@
 #include <limits>
 #include <utility>
 
+#include "pipeline/report/page.h"
+
 namespace wireplan::pipeline {
 namespace {
 
@@ -134,6 +136,25 @@ Slices cut_slices(const preprocess::Image& image, const Surface& surface, std::v
     }
   }
   return slices;
+}
+
+Json slices_json(const Slices& slices) {
+  Json places = Json::array();
+  for (const Place& place : slices.places) {
+    Json cuts = Json::array();
+    for (const Slice& slice : place.slices) {
+      const std::string jpeg = encode_jpeg(slice.gray, slices.size);
+      const auto bytes = static_cast<std::size_t>(slice.outline.size()) * sizeof(float);
+      cuts.push_back({{"plane", plane_name(slice.plane)},
+                      {"jpeg", base64(jpeg.data(), jpeg.size())},
+                      {"outline_mm", base64(slice.outline.data(), bytes)}});
+    }
+    places.push_back({{"name", place.name}, {"point_mm", to_json(place.point)}, {"cuts", cuts}});
+  }
+  return {{"size_px", slices.size},
+          {"spacing_mm", slices.spacing},
+          {"window_hu", {slices.window_low, slices.window_high}},
+          {"places", std::move(places)}};
 }
 
 std::string encode_jpeg(const std::vector<std::uint8_t>& gray, int size) {

@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "pipeline/files/json_reader.h"
 #include "preprocess/vessel.h"
 #include "preprocess/volume/image.h"
 
@@ -59,6 +60,10 @@ Eigen::Matrix4Xf cut_outline(const Surface& surface, Plane plane, const Vec3& mi
 /// Places with names and points -> their slices.
 Slices cut_slices(const preprocess::Image& image, const Surface& surface, std::vector<Place> places,
                   const SliceOptions& options);
+
+/// What the page's panel of slices shows: the pictures as JPEG in base64, the outlines as 32 bit
+/// floats in base64.
+Json slices_json(const Slices& slices);
 
 /// A gray picture as JPEG bytes.
 std::string encode_jpeg(const std::vector<std::uint8_t>& gray, int size);

@@ -248,9 +248,9 @@ void make_report(Workspace& work, const fs::path& folder) {
       [&] { write_ranked_markups(report, page, folder / "trials"); }};
   if (has_slices(work)) {
     jobs.insert(jobs.begin(), [&, segment = work.figures("segment")] {
-      page.slices =
+      page.panels["slices"] = slices_json(
           cut_vessel_slices(work.image(), {page.surface, page.path, page.access, page.target},
-                            segment, forces.values());
+                            segment, forces.values()));
     });
   }
   do_at_once(work, jobs);

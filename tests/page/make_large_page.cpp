@@ -8,6 +8,7 @@
 #include "pipeline/files/disk.h"
 #include "pipeline/report/page.h"
 #include "pipeline/report/report.h"
+#include "pipeline/report/slices.h"
 #include "tests/shapes.h"
 
 namespace wireplan::pipeline {
@@ -213,8 +214,8 @@ std::string make_page(const std::string& name) {
   for (int k = 0; k <= 12; ++k) {
     places.push_back({"place " + std::to_string(k), {0.0, 0.0, 5.0 + 19.0 * k}, {}});
   }
-  page.slices =
-      cut_slices(make_volume(), surface, places, {.window_low = -200.0, .window_high = 500.0});
+  page.panels["slices"] = slices_json(
+      cut_slices(make_volume(), surface, places, {.window_low = -200.0, .window_high = 500.0}));
   std::cerr << surface.triangles.cols() << " triangles, " << plan.trials.size() << " trials, "
             << page.insertions.size() << " insertions\n";
   return build_page(build_report(report), page);

@@ -9,6 +9,8 @@ const bytes = (text) => {
   return array.buffer;
 };
 
+export const floats = (text) => new Float32Array(bytes(text));
+
 /** With the way that the hand has gone so far, in and back, which never falls. */
 const alongWay = (steps) => {
   let way = 0, last = 0;
@@ -39,7 +41,6 @@ export const readPage = () => {
     for (let k = 0; k < steps.length; ++k) values[k] = low[k % 3] + (steps[k] / 65535) * size[k % 3];
     return values;
   };
-  const floats = (text) => new Float32Array(bytes(text));
   const indices = (text) => new Uint32Array(bytes(text));
 
   // Errors that refining found, and ranks, by trial.
@@ -97,17 +98,7 @@ export const readPage = () => {
       peakForce: floats(scene.surface.peak_force_n),
     },
     path: points(scene.path),
-    slices: scene.slices && {
-      ...scene.slices,
-      places: scene.slices.places.map((place) => ({
-        ...place,
-        cuts: place.cuts.map((cut) => ({
-          plane: cut.plane,
-          image: `data:image/jpeg;base64,${cut.jpeg}`,
-          outline: lazy(() => floats(cut.outline_mm)),
-        })),
-      })),
-    },
+    panels: scene.panels,  // each decodes its own
     picture: `data:image/png;base64,${scene.picture_png}`,
   };
 };

@@ -1,4 +1,5 @@
 // Slices of the volume with the outline of the lumen: does the vessel lie where the image shows it?
+import {floats} from "./data.js";
 import {el, section, svg} from "./dom.js";
 import {number} from "./format.js";
 
@@ -7,7 +8,7 @@ const kSides = {axial: "RLAP", coronal: "RLSI", sagittal: "APSI"};
 
 const drawCut = (slices, cut, place) => {
   const size = slices.size_px * slices.spacing_mm, half = size / 2;
-  const lines = cut.outline();
+  const lines = floats(cut.outline_mm);
   let path = "";
   for (let k = 0; k < lines.length; k += 4) {
     path += `M${lines[k].toFixed(2)} ${lines[k + 1].toFixed(2)}L${lines[k + 2].toFixed(2)} ${lines[k + 3].toFixed(2)}`;
@@ -17,7 +18,7 @@ const drawCut = (slices, cut, place) => {
   return el("figure", {class: "slice"},
     svg("svg", {viewBox: `${-half} ${-half} ${size} ${size}`, role: "img",
                 "aria-label": `${cut.plane} slice at the place: ${place.name}, with the outline of the lumen`},
-      svg("image", {href: cut.image, x: -half, y: -half, width: size, height: size}),
+      svg("image", {href: `data:image/jpeg;base64,${cut.jpeg}`, x: -half, y: -half, width: size, height: size}),
       svg("path", {d: path, class: "outline-under"}),
       svg("path", {d: path, class: "outline"}),
       svg("path", {d: "M-4 0H-1.5M1.5 0H4M0 -4V-1.5M0 1.5V4", class: "cross"}),
@@ -28,7 +29,7 @@ const drawCut = (slices, cut, place) => {
 };
 
 export const sliceSection = (page) => {
-  const {slices} = page;
+  const {slices} = page.panels;
   if (!slices) {
     return section("slices", "Does the vessel fit the image?",
       el("p", {class: "missing"}, "This case starts from a surface: there is no volume to check it against."));
