@@ -44,8 +44,8 @@ Vec3 unit_normal(const Surface& surface, Eigen::Index k);
 /// direction does not depend on how the wall round the vertex is cut into triangles.
 Eigen::Matrix3Xd angle_weighted_normals(const Surface& surface);
 
-/// (3, v) unit: at each vertex the direction of the sum of its triangles' areas; zero where no
-/// triangle is.
+/// (3, v) unit: at each vertex the direction of the sum of its triangles' areas; not a number where
+/// that is zero, as at a vertex of no triangle.
 Eigen::Matrix3Xd area_weighted_normals(const Surface& surface);
 
 /// Normal stiffness of the extruded wall per area, k_n = M/(3t) with M = E(1-nu)/((1+nu)(1-2nu))

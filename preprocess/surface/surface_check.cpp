@@ -225,8 +225,8 @@ SurfaceCheck check_surface(const Surface& surface) {
 std::vector<int> find_self_intersections(const Surface& surface) {
   std::vector<int> triangles;
   for (const auto& [a, b] : cutting_pairs(surface)) {
-    triangles.push_back(static_cast<int>(a));
-    triangles.push_back(static_cast<int>(b));
+    triangles.push_back(a);
+    triangles.push_back(b);
   }
   std::sort(triangles.begin(), triangles.end());
   triangles.erase(std::unique(triangles.begin(), triangles.end()), triangles.end());

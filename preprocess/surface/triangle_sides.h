@@ -46,12 +46,12 @@ void for_each_edge(const std::vector<Side>& sides, Visit visit) {
   }
 }
 
-/// (3, m) the triangle across the edge from corner k to the next, -1 where there is none. At most
-/// two triangles share an edge.
+/// (3, m) the triangle across the edge from corner k to the next, which runs along it the other
+/// way; -1 where there is none, or where more than two triangles meet.
 inline Eigen::Matrix3Xi triangle_neighbours(const Surface& surface) {
   Eigen::Matrix3Xi neighbours = Eigen::Matrix3Xi::Constant(3, surface.triangles.cols(), -1);
   for_each_edge(sorted_sides(surface), [&](auto begin, auto end) {
-    if (end - begin != 2) return;
+    if (end - begin != 2 || begin->forward == (begin + 1)->forward) return;
     const Side &a = *begin, &b = *(begin + 1);
     neighbours(a.corner, a.triangle) = b.triangle;
     neighbours(b.corner, b.triangle) = a.triangle;

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 #include <vector>
 
 #include "preprocess/surface/openings.h"
@@ -113,6 +114,15 @@ TEST(Openings, AreNotFlatPlacesOnAVesselsSide) {
     ASSERT_EQ(openings.size(), 2u);
     for (const Opening& opening : openings) EXPECT_GT(std::abs(opening.normal.z()), 0.999);
   }
+}
+
+TEST(Openings, AreNotLookedForWhereATriangleIsTurnedOrMissing) {
+  const Surface tube = shapes::straight_tube(4.0, 30.0, 1.0);
+  Surface turned = tube, open = tube;
+  std::swap(turned.triangles(0, 7), turned.triangles(1, 7));
+  EXPECT_THROW(find_openings(turned), LogicError);
+  open.triangles.conservativeResize(3, tube.triangles.cols() - 1);
+  EXPECT_THROW(find_openings(open), LogicError);
 }
 
 TEST(Openings, OfABoxAreTheEndsOfALongOneOnly) {

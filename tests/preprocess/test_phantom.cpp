@@ -168,6 +168,7 @@ TEST(Phantom, SameBytesForAnyThreads) {
 
 TEST(Phantom, OtherBytesForAnotherSeed) {
   PhantomSpec spec = make_capsule(1.0);
+  spec.blur_mm = 0.6;
   spec.noise_hu = 20.0;
   const Phantom one = make_phantom(spec);
   spec.seed = 2;
