@@ -146,9 +146,8 @@ void fill(std::string& page, const std::string& mark, const std::string& text) {
 
 }  // namespace
 
-PageTrial page_trial(const simulate::TrialResult& trial, const Vec3& direction) {
+PageTrial page_trial(const simulate::TrialResult& trial) {
   PageTrial kept;
-  kept.direction = direction;
   kept.nodes = trial.nodes.cast<float>();
   kept.push.resize(5, static_cast<Eigen::Index>(trial.pushes.size()));
   for (std::size_t k = 0; k < trial.pushes.size(); ++k) {

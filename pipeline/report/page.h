@@ -21,7 +21,7 @@ struct PageTrial {
   Eigen::Matrix<float, 5, -1> push;  // insertion [mm]; push, tip, largest contact and total contact
                                      // force [N], after each push
 };
-PageTrial page_trial(const simulate::TrialResult& trial, const Vec3& direction);
+PageTrial page_trial(const simulate::TrialResult& trial);  // all but the direction
 
 /// The insertion of one trial, to be played.
 struct PageInsertion {

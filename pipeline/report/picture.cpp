@@ -28,11 +28,19 @@ struct Panel {
   Panel(int w, int h)
       : width(w),
         height(h),
-        depth(static_cast<std::size_t>(w) * h, kFarAway),
-        solid(depth.size(), kPaper),
-        transmittance(depth.size(), 1.0F),
-        layers(depth.size(), Color::Zero()),
-        layer_weight(depth.size(), 0.0F) {}
+        depth(static_cast<std::size_t>(w) * h),
+        solid(depth.size()),
+        transmittance(depth.size()),
+        layers(depth.size()),
+        layer_weight(depth.size()) {}
+
+  void clear() {
+    std::fill(depth.begin(), depth.end(), kFarAway);
+    std::fill(solid.begin(), solid.end(), kPaper);
+    std::fill(transmittance.begin(), transmittance.end(), 1.0F);
+    std::fill(layers.begin(), layers.end(), Color::Zero());
+    std::fill(layer_weight.begin(), layer_weight.end(), 0.0F);
+  }
 };
 
 /// Samples of a panel that a box from `low` to `high` covers.
@@ -366,8 +374,9 @@ Picture draw_picture(const Surface& vessel, const std::vector<PictureWire>& wire
   }
 
   // Solid things first: the vessel's layers need to know what they cover.
+  Panel panel(width * kSamples, height * kSamples);
   for (int k = 0; k < 2; ++k) {
-    Panel panel(width * kSamples, height * kSamples);
+    panel.clear();
     const Projection project{views[k], 0.5 * (box.low + box.high), pixels_per_mm * kSamples,
                              0.5 * Vec3(panel.width, panel.height, 0.0)};
     for (const PictureWire& wire : wires) draw_wire(panel, project, wire, largest_force(wires));

@@ -3,6 +3,8 @@
 #include <array>
 #include <chrono>
 #include <functional>
+#include <optional>
+#include <string_view>
 #include <thread>
 #include <utility>
 
@@ -16,6 +18,7 @@
 #include "pipeline/stages/makers.h"
 #include "pipeline/stages/plan_artifact.h"
 #include "pipeline/stages/stored_trials.h"
+#include "pipeline/store/hash.h"
 #include "preprocess/files/vessel_io.h"
 
 namespace wireplan::pipeline {
@@ -26,6 +29,13 @@ namespace fs = std::filesystem;
 // Stages that the report tells of; `plans` makes nothing that a user opens.
 constexpr std::array kToldStages = {"volume", "segment", "surface",   "centerline",
                                     "wall",   "trials",  "manoeuvres"};
+
+// The numbers of a matrix or list, as they lie in memory.
+template <typename Numbers>
+std::string_view bytes_of(const Numbers& numbers) {
+  return {reinterpret_cast<const char*>(numbers.data()),
+          static_cast<std::size_t>(numbers.size()) * sizeof(*numbers.data())};
+}
 
 // Largest force on each triangle, over trials.
 class ForceMap {
@@ -110,9 +120,18 @@ Json timing_json(const Workspace& work) {
   return timing;
 }
 
-/// The best plan of each wire in the vessel, or its closest attempt where it has none.
-Picture draw_overview(Workspace& work, const ReportInput& report, const PageInput& page) {
+/// The best plan of each wire in the vessel, or its closest attempt where it has none: PNG bytes.
+std::string draw_overview(Workspace& work, const ReportInput& report, const PageInput& page) {
   std::vector<PictureWire> wires;
+  const PictureMarks marks{.title = report.name,
+                           .access = report.study.access,
+                           .target = report.study.goal.point,
+                           .target_radius = report.study.goal.radius};
+  std::vector<KeyLine> key = {{"piece", "overview " + std::to_string(kReportVersion)},
+                              {"surface", work.artifact("surface").contents()},
+                              {"marks", Json({marks.title, to_json(*marks.access),
+                                              to_json(*marks.target), marks.target_radius})
+                                            .dump()}};
   for (const int id :
        plan::best_of_each_wire(report.study, report.plan, report.judgement.ranking)) {
     const auto w =
@@ -121,19 +140,16 @@ Picture draw_overview(Workspace& work, const ReportInput& report, const PageInpu
     const PageTrial& trial = page.trials[static_cast<std::size_t>(id)];
     if (trial.nodes.cols() < 2) continue;
     const simulate::Outcome outcome = report.plan.trials[static_cast<std::size_t>(id)].outcome;
-    wires.push_back(
-        {.name = report.study.wires[w].name + ": " +
-                 (best ? "best plan" : "no plan, " + std::string(outcome_name(outcome))),
-         .nodes = trial.nodes.cast<double>(),
-         .contact_force = {},
-         .radius = report.study.wires[w].radius,
-         .color = wire_color(static_cast<int>(wires.size()))});
+    const PictureWire& wire = wires.emplace_back(
+        PictureWire{.name = report.study.wires[w].name + ": " +
+                            (best ? "best plan" : "no plan, " + std::string(outcome_name(outcome))),
+                    .nodes = trial.nodes.cast<double>(),
+                    .contact_force = {},
+                    .radius = report.study.wires[w].radius,
+                    .color = wire_color(static_cast<int>(wires.size()))});
+    key.push_back({"wire", Json({wire.name, wire.radius, hash_text(bytes_of(wire.nodes))}).dump()});
   }
-  return draw_picture(work.surface(), wires,
-                      {.title = report.name,
-                       .access = report.study.access,
-                       .target = report.study.goal.point,
-                       .target_radius = report.study.goal.radius});
+  return work.piece(key, [&] { return encode_png(draw_picture(work.surface(), wires, marks)); });
 }
 
 /// What the page shows of the vessel and of where to; trials and insertions are added by the
@@ -161,41 +177,112 @@ void do_at_once(const Workspace& work, const std::vector<std::function<void()>>&
   if (work.options().cancelled && work.options().cancelled()) throw Interrupted();
 }
 
-/// Reads what the page shows of every trial, and the volume. Returns the largest forces of those in
-/// full.
-std::vector<std::vector<simulate::TriangleForce>> read_inputs(Workspace& work,
-                                                              const ReportInput& report,
-                                                              PageInput& page) {
-  const std::size_t count = report.plan.candidates.size();
-  page.trials.resize(count);
-  std::vector<std::vector<simulate::TriangleForce>> peaks(count);
+/// What the report shows of every trial.
+struct ShownTrials {
+  std::vector<PageTrial> trials;                            // without their directions
+  std::vector<std::vector<simulate::TriangleForce>> peaks;  // of those in full
+};
+
+ShownTrials read_trials(const Workspace& work, const plan::Plan& plan) {
+  const std::size_t count = plan.candidates.size();
+  ShownTrials shown{std::vector<PageTrial>(count),
+                    std::vector<std::vector<simulate::TriangleForce>>(count)};
   std::vector<std::function<void()>> jobs;
-  if (has_slices(work)) jobs.push_back([&] { work.image(); });
   for (std::size_t k = 0; k < count; ++k) {
     jobs.push_back([&, k] {
-      const plan::Level level = report.plan.levels[k];
-      simulate::TrialResult trial = read_trial(work, level, static_cast<int>(k));
-      page.trials[k] = page_trial(
-          trial, plan::make_introducer(report.study, report.plan.candidates[k]).direction);
-      if (level == plan::Level::kFull) peaks[k] = std::move(trial.peak_forces);
+      simulate::TrialResult trial = read_trial(work, plan.levels[k], static_cast<int>(k));
+      shown.trials[k] = page_trial(trial);
+      if (plan.levels[k] == plan::Level::kFull) shown.peaks[k] = std::move(trial.peak_forces);
     });
   }
   do_at_once(work, jobs);
-  return peaks;
+  return shown;
 }
 
-/// The insertions that can be played, those of the first plans for viewers too.
-void add_insertions(const Workspace& work, const ReportInput& report, PageInput& page,
-                    const fs::path& folder) {
-  const plan::Ranking& ranking = report.judgement.ranking;
-  const std::size_t shown = std::min(kPlansShown, ranking.plans.size());
-  const std::vector<int> played = plan::choose_played(report.study, report.plan, ranking);
-  for (std::size_t k = 0; k < played.size(); ++k) {
-    std::optional<simulate::TrialResult> trial = find_played(work, played[k]);
-    if (!trial) continue;
-    if (k < shown) write_shapes(*trial, "plan-" + std::to_string(k + 1), folder / "trials");
-    page.insertions.push_back({played[k], std::move(trial->shapes), std::move(trial->peak_forces)});
+/// As CBOR: a tenth of the trials' files, and quick to read.
+std::string to_bytes(const ShownTrials& shown) {
+  const auto binary = [](const auto& numbers) {
+    const std::string_view bytes = bytes_of(numbers);
+    return Json::binary({bytes.begin(), bytes.end()});
+  };
+  Json rows = Json::array();
+  for (std::size_t k = 0; k < shown.trials.size(); ++k) {
+    std::vector<int> triangles;
+    std::vector<double> forces;
+    for (const auto& [triangle, force] : shown.peaks[k]) {
+      triangles.push_back(triangle);
+      forces.push_back(force);
+    }
+    rows.push_back({binary(shown.trials[k].nodes), binary(shown.trials[k].push), binary(triangles),
+                    binary(forces)});
   }
+  const std::vector<std::uint8_t> bytes = Json::to_cbor(rows);
+  return {bytes.begin(), bytes.end()};
+}
+
+ShownTrials from_bytes(const std::string& bytes) {
+  const auto fill = [](const Json& row, auto& numbers) {
+    const Json::binary_t& stored = row.get_binary();
+    expects(stored.size() == bytes_of(numbers).size());
+    std::copy(stored.begin(), stored.end(), reinterpret_cast<std::uint8_t*>(numbers.data()));
+  };
+  ShownTrials shown;
+  const Json rows = Json::from_cbor(bytes);
+  for (const Json& row : rows) {
+    const auto columns = [&](std::size_t k, std::size_t bytes_each) {
+      return static_cast<Eigen::Index>(row.at(k).get_binary().size() / bytes_each);
+    };
+    PageTrial& trial = shown.trials.emplace_back();
+    trial.nodes.resize(3, columns(0, 3 * sizeof(float)));
+    trial.push.resize(5, columns(1, 5 * sizeof(float)));
+    std::vector<int> triangles(static_cast<std::size_t>(columns(2, sizeof(int))));
+    std::vector<double> forces(triangles.size());
+    fill(row.at(0), trial.nodes);
+    fill(row.at(1), trial.push);
+    fill(row.at(2), triangles);
+    fill(row.at(3), forces);
+    std::vector<simulate::TriangleForce>& peaks = shown.peaks.emplace_back();
+    for (std::size_t k = 0; k < forces.size(); ++k) peaks.push_back({triangles[k], forces[k]});
+  }
+  return shown;
+}
+
+/// Reads it from the trials' files once: it does not depend on how they are judged.
+ShownTrials find_trials(const Workspace& work, const plan::Plan& plan) {
+  std::vector<KeyLine> key = {{"piece", "shown trials " + std::to_string(kReportVersion)}};
+  for (const char* stage : {"trials", "manoeuvres", "plans"}) {
+    key.push_back({stage, work.artifact(stage).contents()});
+  }
+  return from_bytes(work.piece(key, [&] { return to_bytes(read_trials(work, plan)); }));
+}
+
+/// The panel of slices; `forces` tell where the volume is cut.
+Json cut_slices_panel(Workspace& work, const PageInput& page, const std::vector<double>& forces) {
+  const std::vector<KeyLine> key = {
+      {"piece", "slices " + std::to_string(kReportVersion)},
+      {"volume", work.input_sha256},
+      {"segment", work.artifact("segment").contents()},
+      {"surface", work.artifact("surface").contents()},
+      {"centerline", work.artifact("centerline").contents()},
+      {"points", Json({to_json(page.access), to_json(page.target)}).dump()},
+      {"forces", hash_text(bytes_of(forces))}};
+  return Json::parse(work.piece(key, [&] {
+    const Slices slices =
+        cut_vessel_slices(work.image(), {page.surface, page.path, page.access, page.target},
+                          work.figures("segment"), forces);
+    work.drop_image();
+    return slices_json(slices).dump();
+  }));
+}
+
+/// The insertion of a trial that can be played, where it was kept; for viewers too, in a folder of
+/// that name.
+std::optional<PageInsertion> read_insertion(const Workspace& work, int id, const std::string& name,
+                                            const fs::path& folder) {
+  std::optional<simulate::TrialResult> trial = find_played(work, id);
+  if (!trial) return {};
+  if (!name.empty()) write_shapes(*trial, name, folder);
+  return PageInsertion{id, std::move(trial->shapes), std::move(trial->peak_forces)};
 }
 
 /// Every ranked plan for 3D Slicer.
@@ -230,31 +317,44 @@ void make_report(Workspace& work, const fs::path& folder) {
   ReportInput report = describe_run(work);
   warn_of_other_first(work.given(), report);
   PageInput page = start_page(work);
-  const auto peaks = read_inputs(work, report, page);
+  ShownTrials shown = find_trials(work, report.plan);
+  page.trials = std::move(shown.trials);
+  for (std::size_t k = 0; k < page.trials.size(); ++k) {
+    page.trials[k].direction =
+        plan::make_introducer(report.study, report.plan.candidates[k]).direction;
+  }
   ForceMap all_forces(page.surface.triangles.cols()), best_forces = all_forces;
-  for (const auto& trial : peaks) all_forces.add(trial);
+  for (const auto& trial : shown.peaks) all_forces.add(trial);
   const std::vector<plan::RankedPlan>& plans = report.judgement.ranking.plans;
-  if (!plans.empty()) best_forces.add(peaks[static_cast<std::size_t>(plans.front().trial)]);
+  if (!plans.empty()) best_forces.add(shown.peaks[static_cast<std::size_t>(plans.front().trial)]);
   const ForceMap& forces = plans.empty() ? all_forces : best_forces;  // where the volume is cut
   page.peak_force = all_forces.values();
 
+  // The longest first, so that none is left alone at the end.
   std::vector<std::function<void()>> jobs = {
-      [&] {
-        page.picture_png = encode_png(draw_overview(work, report, page));
-        write_whole(page.picture_png, folder / "plans.png");
-      },
-      [&] { add_insertions(work, report, page, folder); },
       [&] { write_forces(work, report, all_forces, best_forces, folder); },
-      [&] { write_ranked_markups(report, page, folder / "trials"); }};
+      [&] {
+        page.picture_png = draw_overview(work, report, page);
+        write_whole(page.picture_png, folder / "plans.png");
+      }};
   if (has_slices(work)) {
-    jobs.insert(jobs.begin(), [&, segment = work.figures("segment")] {
-      page.panels["slices"] = slices_json(
-          cut_vessel_slices(work.image(), {page.surface, page.path, page.access, page.target},
-                            segment, forces.values()));
+    jobs.push_back([&] { page.panels["slices"] = cut_slices_panel(work, page, forces.values()); });
+  }
+  const std::vector<int> played =
+      plan::choose_played(report.study, report.plan, report.judgement.ranking);
+  std::vector<std::optional<PageInsertion>> insertions(played.size());
+  for (std::size_t k = 0; k < played.size(); ++k) {
+    jobs.push_back([&, k] {
+      const bool for_viewers = k < std::min(kPlansShown, plans.size());
+      insertions[k] = read_insertion(
+          work, played[k], for_viewers ? "plan-" + std::to_string(k + 1) : "", folder / "trials");
     });
   }
+  jobs.push_back([&] { write_ranked_markups(report, page, folder / "trials"); });
   do_at_once(work, jobs);
-  work.drop_image();
+  for (std::optional<PageInsertion>& insertion : insertions) {
+    if (insertion) page.insertions.push_back(std::move(*insertion));
+  }
 
   report.timing = timing_json(work);
   report.timing["report_s"] =

@@ -8,6 +8,9 @@
 
 namespace wireplan::pipeline {
 
+/// Of what the report shows, and of the pieces that it keeps.
+inline constexpr int kReportVersion = 17;
+
 /// Each fills `folder` with the artifact of its stage. All but the report write figures.json,
 /// numbers for the report with a list of warnings.
 void make_volume(Workspace& work, const std::filesystem::path& folder);

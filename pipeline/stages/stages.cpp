@@ -191,7 +191,7 @@ std::vector<Stage> stages_of(const Case& given) {
   plans.make = make_plans;
   stages.push_back(plans);
   Stage report{.name = "report",
-               .version = 16,
+               .version = kReportVersion,
                .reads_input = true,
                .after = {},
                .parameters = {""},

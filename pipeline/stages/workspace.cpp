@@ -125,6 +125,16 @@ const simulate::VesselModel& Workspace::model() {
   return *model_;
 }
 
+std::string Workspace::piece(std::vector<KeyLine> key,
+                             const std::function<std::string()>& make) const {
+  key.push_back({"program", build_info().dump()});
+  const std::string text = key_text(key);
+  if (const std::optional<fs::path> kept = store_.find_piece(text)) return read_if_there(*kept);
+  std::string bytes = make();
+  store_.keep_piece(text, bytes);
+  return bytes;
+}
+
 const plan::Study& Workspace::study() {
   if (!study_) {
     study_ = given_.study;

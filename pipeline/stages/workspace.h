@@ -7,6 +7,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "pipeline/files/case_file.h"
 #include "pipeline/files/json_reader.h"
@@ -55,6 +56,9 @@ class Workspace {
   /// Makes the field of the vessel a piece in the store, unless another process did: for shards, so
   /// that one of them computes it. rigid_model() takes it from there.
   void share_field();
+  /// Bytes that follow from `key` and from this program: a piece of the store, made where it has
+  /// none.
+  std::string piece(std::vector<KeyLine> key, const std::function<std::string()>& make) const;
   /// The case's study with what the centerline tells: the tangent at the access, and the insertion
   /// length where the case leaves it open.
   const plan::Study& study();

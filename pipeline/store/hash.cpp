@@ -86,7 +86,7 @@ std::string hash_file(const fs::path& file) {
                 "), expected a readable file; check the path and its permissions");
   }
   Sha256 sum;
-  std::vector<char> buffer(std::size_t{1} << 20U);
+  std::array<char, std::size_t{1} << 16U> buffer{};
   while (stream.read(buffer.data(), static_cast<std::streamsize>(buffer.size())) ||
          stream.gcount() > 0) {
     sum.add(std::string_view(buffer.data(), static_cast<std::size_t>(stream.gcount())));

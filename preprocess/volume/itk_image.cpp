@@ -36,7 +36,9 @@ Mat3 orthonormal_direction(const Mat3& direction, const fs::path& path) {
 template <typename Stored, typename Value>
 void append_as(const std::vector<char>& bytes, std::vector<Value>& values) {
   const Stored* first = reinterpret_cast<const Stored*>(bytes.data());
-  std::transform(first, first + bytes.size() / sizeof(Stored), std::back_inserter(values),
+  const std::size_t count = bytes.size() / sizeof(Stored), before = values.size();
+  values.resize(before + count);
+  std::transform(first, first + count, values.begin() + static_cast<std::ptrdiff_t>(before),
                  [](Stored v) { return static_cast<Value>(v); });
 }
 
@@ -53,7 +55,6 @@ void append_all(itk::ImageIOBase& io, const fs::path& path, std::vector<Value>& 
   std::vector<char> bytes(static_cast<std::size_t>(io.GetImageSizeInBytes()));
   io.Read(bytes.data());
 
-  values.reserve(values.size() + bytes.size() / io.GetComponentSize());
   switch (io.GetComponentType()) {
     case itk::IOComponentEnum::UCHAR:
       return append_as<unsigned char>(bytes, values);

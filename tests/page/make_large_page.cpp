@@ -198,8 +198,9 @@ std::string make_page(const std::string& name) {
   for (std::size_t id = 0; id < plan.candidates.size(); ++id) {
     const simulate::TrialResult trial = make_trial(surface, random);
     plan.trials.push_back(plan::measure(trial, report.study, path));
-    page.trials.push_back(
-        page_trial(trial, plan::make_introducer(report.study, plan.candidates[id]).direction));
+    page.trials.push_back(page_trial(trial));
+    page.trials.back().direction =
+        plan::make_introducer(report.study, plan.candidates[id]).direction;
     if (id < kInsertions) {
       page.insertions.push_back({static_cast<int>(id), trial.shapes, trial.peak_forces});
     }
