@@ -150,6 +150,10 @@ void make_volume(Workspace& work, const fs::path& folder) {
   figures["min_hu"] = *low;
   figures["mean_hu"] = sum / static_cast<double>(image.values.size());
   figures["max_hu"] = *high;
+  if (!image.modality.empty() && image.modality != "CT") {
+    figures["warnings"].push_back("volume: its modality is " + image.modality +
+                                  ", not CT: values are no Hounsfield units");
+  }
   write_figures(figures, folder);
 }
 
@@ -157,6 +161,12 @@ void make_segment(Workspace& work, const fs::path& folder) {
   preprocess::SegmentOptions options = work.given().segmentation;
   options.seeds.insert(options.seeds.begin(), work.given().study.access);
   options.target = work.given().study.goal.point;
+  const std::string& modality = work.image().modality;
+  if (!options.lower_hu && !modality.empty() && modality != "CT") {
+    throw Error("the volume's modality is " + modality +
+                ", and only in a CT is a band chosen; give segmentation.lower_hu and upper_hu in "
+                "the volume's own values");
+  }
   const preprocess::Segmentation segmentation = preprocess::segment(work.image(), options);
   preprocess::write_mask(segmentation.mask, folder / "mask.nrrd");
 

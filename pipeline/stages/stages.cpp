@@ -129,21 +129,21 @@ std::vector<Stage> stages_of(const Case& given) {
   const bool from_volume = given.volume.has_value();
   std::vector<Stage> stages;
   if (from_volume) {
-    stages.push_back({.name = "volume", .reads_input = true, .make = make_volume});
+    stages.push_back({.name = "volume", .version = 2, .reads_input = true, .make = make_volume});
     stages.push_back({.name = "segment",
-                      .version = 2,
+                      .version = 3,
                       .reads_input = true,
                       .parameters = {"/segmentation", "/access/point_mm", "/target/point_mm"},
                       .make = make_segment});
     stages.push_back({.name = "surface",
-                      .version = 5,
+                      .version = 6,
                       .reads_input = true,
                       .after = {"segment"},
                       .parameters = {"/surface/edge_length_mm"},
                       .make = make_surface});
   } else {
     stages.push_back({.name = "surface",
-                      .version = 4,
+                      .version = 5,
                       .reads_input = true,
                       .parameters = {"/surface/unit", "/surface/frame", "/surface/edge_length_mm"},
                       .make = make_surface});

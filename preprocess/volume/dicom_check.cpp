@@ -23,20 +23,37 @@ class Walker {
  public:
   explicit Walker(std::string_view bytes) : bytes_(bytes) {}
 
-  bool check() {
+  DicomForm check() {
     at_ = kPreamble + 4;
     std::string syntax;
     while (at_ + 4 <= bytes_.size() && number(at_, 2) == 2) {
       Element element;
-      if (!read_head(/*explicit_vr=*/true, element) || element.length > left()) return false;
+      if (!read_head(/*explicit_vr=*/true, element) || element.length > left()) {
+        return DicomForm::kDamaged;
+      }
       if (element.tag == kTransferSyntax) syntax = bytes_.substr(at_, element.length);
       at_ += element.length;
     }
     syntax = syntax.substr(0, syntax.find_last_not_of(std::string_view("\0 ", 2)) + 1);
-    if (syntax.empty()) return false;
-    if (syntax == "1.2.840.10008.1.2.2" || syntax == "1.2.840.10008.1.2.1.99") return true;
-    return walk(syntax != "1.2.840.10008.1.2", bytes_.size(), 0, 0);
+    if (syntax.empty()) return DicomForm::kDamaged;
+    if (syntax == "1.2.840.10008.1.2.2" || syntax == "1.2.840.10008.1.2.1.99") {
+      return DicomForm::kSound;
+    }
+    if (walk(syntax != "1.2.840.10008.1.2", bytes_.size(), 0, 0)) return DicomForm::kSound;
+    return pixels_end_ > 0 ? DicomForm::kPadded : DicomForm::kDamaged;
   }
+
+  // Whether it is a data set with pixels without the head of a file, as old archives write them:
+  // group 8 first, little endian, with or without value representations.
+  bool is_bare() {
+    if (bytes_.size() < 8 || number(0, 2) != 8) return false;
+    const auto is_capital = [&](std::size_t at) { return bytes_[at] >= 'A' && bytes_[at] <= 'Z'; };
+    at_ = 0;
+    walk(is_capital(4) && is_capital(5), bytes_.size(), 0, 0);
+    return pixels_end_ > 0;
+  }
+
+  std::size_t pixels_end() const { return pixels_end_; }
 
  private:
   struct Element {
@@ -116,6 +133,7 @@ class Walker {
         if (element.length > end - at_ || !is_sound_value(element)) return false;
         at_ += element.length;
       }
+      if (depth == 0 && element.tag == kPixelData) pixels_end_ = at_;
     }
     return last == 0 && at_ == end;
   }
@@ -145,20 +163,25 @@ class Walker {
   }
 
   std::string_view bytes_;
-  std::size_t at_ = 0;
+  std::size_t at_ = 0, pixels_end_ = 0;  // of the data set's own pixels
 };
 
 }  // namespace
 
-DicomForm check_dicom(const std::filesystem::path& path) {
+DicomForm check_dicom(const std::filesystem::path& path, std::size_t* end) {
   std::ifstream stream(path, std::ios::binary);
   std::string head(kPreamble + 4, '\0');
   if (!stream.read(head.data(), static_cast<std::streamsize>(head.size())) ||
-      head.substr(kPreamble) != "DICM") {
+      (head.substr(kPreamble) != "DICM" && (head[0] != 8 || head[1] != 0))) {
     return DicomForm::kNone;
   }
-  std::string bytes = head + std::string(std::istreambuf_iterator<char>(stream), {});
-  return Walker(bytes).check() ? DicomForm::kSound : DicomForm::kDamaged;
+  const std::string bytes = head + std::string(std::istreambuf_iterator<char>(stream), {});
+  Walker walker(bytes);
+  const DicomForm form = head.substr(kPreamble) == "DICM" ? walker.check()
+                         : walker.is_bare()               ? DicomForm::kBare
+                                                          : DicomForm::kNone;
+  if (end != nullptr) *end = walker.pixels_end();
+  return form;
 }
 
 }  // namespace wireplan::preprocess

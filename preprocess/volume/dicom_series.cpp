@@ -1,11 +1,17 @@
 #include "preprocess/volume/dicom_series.h"
 
+#include <sys/mman.h>
+#include <unistd.h>
+
 #include <Eigen/Eigenvalues>  // before ITK, which would bring in its own older copy
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdlib>
 #include <fstream>
+#include <iterator>
+#include <memory>
+#include <numeric>
 #include <sstream>
 #include <string>
 #include <utility>
@@ -15,6 +21,7 @@
 #include "itkGDCMImageIO.h"
 #include "preprocess/volume/apart.h"
 #include "preprocess/volume/dicom_check.h"
+#include "preprocess/volume/dicom_frames.h"
 #include "preprocess/volume/itk_image.h"
 #include "preprocess/volume/volume_file.h"
 
@@ -24,13 +31,19 @@ namespace {
 namespace fs = std::filesystem;
 
 struct Slice {
+  fs::path file;
+  DicomForm form = DicomForm::kSound;
+  std::size_t end = 0;           // of its pixels, where it is padded or bare
   itk::GDCMImageIO::Pointer io;  // header read
   std::string series_uid;        // to compare with, never shown
-  std::string series_number;
+  std::string series_number, description, modality;
+  std::string unit;  // of its values; empty where the file does not tell
   Grid grid;
 };
 
 using Series = std::vector<Slice>;
+
+constexpr std::size_t kModality = 16;  // characters: a code string (PS3.5 section 6.2)
 
 std::string dicom_value(itk::GDCMImageIO& io, const std::string& tag) {
   std::string value;
@@ -52,6 +65,78 @@ constexpr const char* kDamagedDicom =
     "a DICOM file that is damaged or cut short; copy or export the series again, or take the file "
     "out if it is no slice";
 
+/// A padded or bare file in memory as GDCM reads it: without what lies behind the pixels, with the
+/// head that tells the representation.
+class CleanCopy {
+ public:
+  CleanCopy(const fs::path& file, DicomForm form, std::size_t end)
+      : file_(::memfd_create("slice", MFD_CLOEXEC)) {
+    std::ifstream stream(file, std::ios::binary);
+    std::string data(end, '\0');
+    stream.read(data.data(), static_cast<std::streamsize>(end));
+    std::ofstream(path(), std::ios::binary)
+        << (form == DicomForm::kBare ? head_of(data) : "") << data;
+  }
+  ~CleanCopy() { ::close(file_); }
+  CleanCopy(const CleanCopy&) = delete;
+  CleanCopy& operator=(const CleanCopy&) = delete;
+  std::string path() const { return "/proc/self/fd/" + std::to_string(file_); }
+
+ private:
+  static std::string head_of(const std::string& data) {
+    // A data set with value representations has the two letters of one behind its first tag.
+    const bool explicit_vr = data.size() > 5 && data[4] >= 'A' && data[4] <= 'Z';
+    std::string syntax = explicit_vr ? "1.2.840.10008.1.2.1" : "1.2.840.10008.1.2";
+    if (syntax.size() % 2 == 1) syntax += '\0';
+    const auto size = static_cast<char>(syntax.size());
+    const std::string element = std::string("\x02\0\x10\0UI", 6) + size + '\0' + syntax;
+    return std::string(128, '\0') + "DICM" + std::string("\x02\0\0\0UL\x04\0", 8) +
+           static_cast<char>(element.size()) + std::string(3, '\0') + element;
+  }
+
+  int file_;
+};
+
+/// Nothing where GDCM reads the file as it is.
+std::unique_ptr<CleanCopy> copy_of(const Slice& slice) {
+  if (slice.form == DicomForm::kSound) return nullptr;
+  return std::make_unique<CleanCopy>(slice.file, slice.form, slice.end);
+}
+
+/// Refuses an image that GDCM does not open; what has no pixels, as a DICOMDIR or a report, is
+/// passed over.
+void require_no_pixels(const fs::path& file) {
+  const gdcm::Tag pixels(0x7fe0, 0x0010);
+  gdcm::Reader reader;
+  reader.SetFileName(file.c_str());
+  if (!reader.ReadUpToTag(pixels, {}) || !reader.GetFile().GetDataSet().FindDataElement(pixels)) {
+    return;
+  }
+  throw Error(file.string() + ": an image that GDCM does not read (transfer syntax " +
+              reader.GetFile().GetHeader().GetDataSetTransferSyntax().GetString() +
+              "); export the series again, uncompressed");
+}
+
+/// Reads the header of a file; false where it holds no image.
+bool read_header(Slice& slice, const fs::path& folder) {
+  const auto copy = copy_of(slice);
+  const std::string path = copy ? copy->path() : slice.file.string();
+  slice.io = itk::GDCMImageIO::New();
+  if (!slice.io->CanReadFile(path.c_str())) {
+    require_no_pixels(slice.file);
+    return false;
+  }
+  slice.io->SetFileName(path);
+  slice.io->ReadImageInformation();
+  slice.series_uid = dicom_value(*slice.io, "0020|000e");
+  slice.series_number = dicom_value(*slice.io, "0020|0011");
+  slice.description = dicom_value(*slice.io, "0008|103e");
+  slice.modality = dicom_value(*slice.io, "0008|0060");
+  slice.unit = dicom_value(*slice.io, "0028|1054");
+  slice.grid = header_grid(*slice.io, folder);
+  return true;
+}
+
 /// Headers of all DICOM images in the folder, by series, in the order of their file names.
 std::vector<Series> find_series(const fs::path& folder, const At& at) {
   std::vector<fs::path> files;
@@ -64,21 +149,13 @@ std::vector<Series> find_series(const fs::path& folder, const At& at) {
 
   std::vector<Series> all;
   for (const fs::path& file : files) {
-    const DicomForm form = check_dicom(file);
-    if (form == DicomForm::kNone) continue;  // folders also hold notes and pictures
-    if (form == DicomForm::kDamaged) {
-      throw Error(file.string() + ": " + kDamagedDicom);
-    }
+    Slice slice;
+    slice.file = file;
+    slice.form = check_dicom(file, &slice.end);
+    if (slice.form == DicomForm::kNone) continue;  // folders also hold notes and pictures
+    if (slice.form == DicomForm::kDamaged) throw Error(file.string() + ": " + kDamagedDicom);
     at(file.string());
-    Slice slice{.io = itk::GDCMImageIO::New(), .series_uid = {}, .series_number = {}, .grid = {}};
-    if (!slice.io->CanReadFile(file.c_str())) {
-      continue;  // such as DICOMDIR and reports
-    }
-    slice.io->SetFileName(file.string());
-    slice.io->ReadImageInformation();
-    slice.series_uid = dicom_value(*slice.io, "0020|000e");
-    slice.series_number = dicom_value(*slice.io, "0020|0011");
-    slice.grid = header_grid(*slice.io, folder);
+    if (!read_header(slice, folder)) continue;
     const auto home = std::find_if(all.begin(), all.end(), [&](const Series& series) {
       return same_series(series.front(), slice);
     });
@@ -91,24 +168,9 @@ std::vector<Series> find_series(const fs::path& folder, const At& at) {
   return all;
 }
 
-Error several_series(const fs::path& folder, std::vector<Series> all) {
-  std::stable_sort(all.begin(), all.end(),
-                   [](const Series& a, const Series& b) { return a.size() > b.size(); });
-  std::ostringstream text;
-  text << folder.string() << ": " << all.size() << " DICOM series, expected one:";
-  for (const Series& series : all) {
-    const Slice& first = series.front();
-    text << " number " << (first.series_number.empty() ? "unknown" : first.series_number) << " has "
-         << series.size() << (series.size() == 1 ? " image of " : " images of ")
-         << first.grid.size[0] << " x " << first.grid.size[1] << " pixels;";
-  }
-  text << " put the one to plan on into a folder of its own";
-  return Error(text.str());
-}
-
-/// Checks that the sorted positions [mm] along the normal form a regular stack. Scanners round
-/// positions, so a slice may lie a tenth of the step away from its place.
-void require_even(const std::vector<double>& positions, const fs::path& folder) {
+/// What is wrong with the places [mm, sorted] of slices along their normal; empty where they form a
+/// regular stack. Scanners round positions, so a slice may lie a tenth of the step from its place.
+std::string find_uneven(const std::vector<double>& positions) {
   const std::size_t gaps = positions.size() - 1;
   const double step = (positions.back() - positions.front()) / static_cast<double>(gaps);
   bool even = step > 0.0;
@@ -116,60 +178,137 @@ void require_even(const std::vector<double>& positions, const fs::path& folder) 
     const double place = positions.front() + static_cast<double>(k) * step;
     even = even && std::abs(positions[k] - place) <= 0.1 * step;
   }
-  if (even) {
-    return;
-  }
+  if (even) return {};
 
-  // name the gap that differs most from the usual one
   std::vector<double> sizes(gaps);
-  for (std::size_t k = 0; k < gaps; ++k) {
-    sizes[k] = positions[k + 1] - positions[k];
-  }
+  for (std::size_t k = 0; k < gaps; ++k) sizes[k] = positions[k + 1] - positions[k];
   std::vector<double> sorted = sizes;
   std::nth_element(sorted.begin(), sorted.begin() + gaps / 2, sorted.end());
   const double usual = sorted[gaps / 2];
-  const auto odd = std::max_element(sizes.begin(), sizes.end(), [&](double a, double b) {
-    return std::abs(a - usual) < std::abs(b - usual);
-  });
-  const std::size_t k = static_cast<std::size_t>(odd - sizes.begin());
   std::ostringstream text;
-  text << folder.string() << ": uneven slices: the ones at " << positions[k] << " and "
-       << positions[k + 1] << " mm along the normal are " << *odd << " mm apart, the others "
-       << usual << " mm; ";
-  if (*odd < 0.5 * usual || usual <= 0.0) {
-    text << "images lie at the same place: keep one phase or reconstruction in the folder";
-  } else {
-    text << "export the series again, with all its slices, or resample it";
+  constexpr double kSamePlace = 0.01;  // [mm]
+  const auto same =
+      std::count_if(sizes.begin(), sizes.end(), [&](double size) { return size <= kSamePlace; });
+  if (2 * static_cast<std::size_t>(same) >= gaps) {
+    text << "images lie at the same place (" << positions.size() << " images at "
+         << gaps + 1 - static_cast<std::size_t>(same)
+         << " places: contrast tracking, or several phases), expected one at each; keep one phase "
+            "or "
+            "reconstruction in the folder";
+    return text.str();
   }
-  throw Error(text.str());
+
+  // Name the gap that differs most from the usual one.
+  const auto differs = [&](double size) { return std::abs(size - usual); };
+  const auto odd = std::max_element(sizes.begin(), sizes.end(),
+                                    [&](double a, double b) { return differs(a) < differs(b); });
+  const std::size_t k = static_cast<std::size_t>(odd - sizes.begin());
+  const auto count = std::count_if(sizes.begin(), sizes.end(),
+                                   [&](double size) { return differs(size) > 0.1 * usual; });
+  text << "uneven slices: the ones at " << positions[k] << " and " << positions[k + 1]
+       << " mm along the normal are " << *odd << " mm apart, the others " << usual << " mm";
+  if (count > 1) text << " (" << count << " of " << gaps << " gaps differ)";
+  if (*odd < 0.5 * usual) {
+    text << "; images lie at the same place: keep one phase or reconstruction in the folder";
+  } else {
+    text << "; export the series again, with all its slices and one spacing, or resample it";
+  }
+  return text.str();
 }
 
-/// Sorts the slices along their normal and gives the grid that they form.
-Grid stack(Series& slices, const fs::path& folder) {
-  if (slices.size() < 2) {
-    throw Error(folder.string() + ": one DICOM slice, expected a series of at least 2");
-  }
-  const Vec3 normal = slices.front().grid.direction.col(2);
-  const auto position = [&](const Slice& slice) { return normal.dot(slice.grid.origin); };
-  std::stable_sort(slices.begin(), slices.end(),
-                   [&](const Slice& a, const Slice& b) { return position(a) < position(b); });
-  std::vector<double> positions(slices.size());
-  std::transform(slices.begin(), slices.end(), positions.begin(), position);
-  require_even(positions, folder);
+struct Stack {
+  std::vector<std::size_t> order;  // of the images, along their normal
+  Grid grid;
+  std::string problem;  // why they form no volume; empty where they do
+};
 
-  Grid grid = slices.front().grid;
-  const Vec3 rise = slices.back().grid.origin - grid.origin;
-  const double drift = (rise - normal * normal.dot(rise)).norm();
-  if (drift > 0.5 * grid.spacing.head<2>().minCoeff()) {
-    std::ostringstream text;
-    text << folder.string() << ": the slices are shifted by " << drift
-         << " mm in their plane from first to last (tilted gantry); resample the series to an "
-            "upright grid";
-    throw Error(text.str());
+/// The grid of images that lie at `origins` and are else as `first`, which is one of them.
+Stack stack(const std::vector<Vec3>& origins, const Grid& first) {
+  Stack stack{.order = std::vector<std::size_t>(origins.size()), .grid = first, .problem = {}};
+  if (origins.size() < 2) {
+    stack.problem = "one DICOM slice, expected a series of at least 2";
+    return stack;
   }
-  grid.size[2] = static_cast<int>(slices.size());
-  grid.spacing[2] = normal.dot(rise) / static_cast<double>(slices.size() - 1);
-  return grid;
+  const Vec3 normal = first.direction.col(2);
+  std::iota(stack.order.begin(), stack.order.end(), std::size_t{0});
+  std::stable_sort(stack.order.begin(), stack.order.end(), [&](std::size_t a, std::size_t b) {
+    return normal.dot(origins[a]) < normal.dot(origins[b]);
+  });
+  std::vector<double> positions;
+  for (const std::size_t k : stack.order) positions.push_back(normal.dot(origins[k]));
+  stack.problem = find_uneven(positions);
+
+  Grid& grid = stack.grid;
+  grid.origin = origins[stack.order.front()];
+  const Vec3 rise = origins[stack.order.back()] - grid.origin;
+  const double along = normal.dot(rise), drift = (rise - normal * along).norm();
+  if (stack.problem.empty() && drift > 0.5 * grid.spacing.head<2>().minCoeff()) {
+    stack.problem = "the slices are shifted by " + one_decimal(drift) +
+                    " mm in their plane from first to last (tilted gantry, " +
+                    one_decimal(std::atan2(drift, along) / kRadPerDeg) +
+                    " degrees); resample the series to an upright grid";
+  }
+  grid.size[2] = static_cast<int>(origins.size());
+  grid.spacing[2] = along / static_cast<double>(origins.size() - 1);
+  return stack;
+}
+
+std::vector<Vec3> origins_of(const Series& series) {
+  std::vector<Vec3> origins;
+  for (const Slice& slice : series) origins.push_back(slice.grid.origin);
+  return origins;
+}
+
+/// Not a scout of one to three images.
+bool has_volume_shape(const Series& series) {
+  constexpr std::size_t kLeast = 5;
+  if (series.size() == 1) return series.front().grid.size[2] >= static_cast<int>(kLeast);
+  return series.size() >= kLeast && stack(origins_of(series), series.front().grid).problem.empty();
+}
+
+Error several_series(const fs::path& folder, std::vector<Series> all) {
+  std::stable_sort(all.begin(), all.end(),
+                   [](const Series& a, const Series& b) { return a.size() > b.size(); });
+  std::ostringstream text;
+  text << folder.string() << ": " << all.size() << " DICOM series, expected one:";
+  for (const Series& series : all) {
+    const Slice& first = series.front();
+    text << " number " << (first.series_number.empty() ? "unknown" : first.series_number);
+    if (!first.description.empty()) text << " (" << first.description << ")";
+    text << " has " << series.size() << (series.size() == 1 ? " image of " : " images of ")
+         << first.grid.size[0] << " x " << first.grid.size[1] << " pixels";
+    if (series.size() > 1) {
+      const Stack stacked = stack(origins_of(series), first.grid);
+      text << ", " << stacked.grid.spacing[2] << " mm apart";
+    }
+    text << ";";
+  }
+  text << " put the one to plan on into a folder of its own";
+  return Error(text.str());
+}
+
+/// The series to read: the only one, or the one that alone has a volume's shape.
+Series choose_series(const fs::path& folder, std::vector<Series> all) {
+  if (all.empty()) {
+    throw Error(folder.string() +
+                ": a folder without DICOM images (folders inside it are not searched); " +
+                kFormats);
+  }
+  if (all.size() == 1) return std::move(all.front());
+  const auto found = std::find_if(all.begin(), all.end(), has_volume_shape);
+  if (found == all.end() || std::count_if(all.begin(), all.end(), has_volume_shape) != 1) {
+    throw several_series(folder, std::move(all));
+  }
+  return std::move(*found);
+}
+
+/// Values of a CT are Hounsfield units; a scanner may say that these are not, as those of two
+/// energies. "US" is unspecified (PS3.3 section C.11.1.1.2).
+void require_hounsfield(const std::string& unit, const std::string& modality,
+                        const fs::path& folder) {
+  if (modality != "CT" || unit.empty() || unit == "HU" || unit == "HU_MOD" || unit == "US") return;
+  throw Error(folder.string() + ": a CT whose values are not in HU but, by its rescale type, " +
+              unit + "; expected HU; export the series of ordinary CT numbers");
 }
 
 /// True where the fragments of compressed pixels that start at `at` are all there (DICOM part 5,
@@ -188,7 +327,7 @@ bool fragments_are_whole(std::ifstream& file, std::uintmax_t at, std::uintmax_t 
 }
 
 /// GDCM fills up pixels that are cut short with zeros, so their size is compared with the file's.
-void require_whole_dicom(itk::GDCMImageIO& io) {
+void require_whole_dicom(itk::GDCMImageIO& io, const fs::path& file) {
   const fs::path path = io.GetFileName();
   const gdcm::Tag pixels(0x7fe0, 0x0010);
   gdcm::Reader reader;
@@ -203,16 +342,24 @@ void require_whole_dicom(itk::GDCMImageIO& io) {
   const std::uintmax_t at = reader.GetStreamCurrentPosition(), size = fs::file_size(path);
   bool whole = found && at >= 4 && at <= size;
   if (whole && syntax.IsEncapsulated()) {
-    std::ifstream file(path, std::ios::binary);
-    whole = fragments_are_whole(file, at, size);
+    std::ifstream stream(path, std::ios::binary);
+    whole = fragments_are_whole(stream, at, size);
   } else if (whole) {
     const double bits = std::strtod(dicom_value(io, "0028|0100").c_str(), nullptr);
     whole = static_cast<double>(size - at) >=
             bits / 8.0 * static_cast<double>(io.GetImageSizeInPixels());
   }
   if (!whole) {
-    throw Error(path.string() + ": " + damaged("DICOM"));
+    throw Error(file.string() + ": " + damaged("DICOM"));
   }
+}
+
+/// Reads the pixels of a slice, or of all its frames, and appends their values.
+void append_slice(const Slice& slice, const fs::path& folder, std::vector<float>& values) {
+  const auto copy = copy_of(slice);
+  if (copy) slice.io->SetFileName(copy->path());
+  require_whole_dicom(*slice.io, slice.file);
+  append_voxels(*slice.io, folder, values);
 }
 
 void send_grid(const Send& send, const Grid& grid) {
@@ -231,36 +378,88 @@ Grid receive_grid(const Receive& receive) {
   return grid;
 }
 
-/// Sends the grid of the folder's series, then its values slice by slice.
+/// All frames of an enhanced file, in the order of their places, each with its own scale.
+Image read_frames(Slice& slice, const fs::path& folder) {
+  const std::vector<DicomFrame> frames = read_dicom_frames(slice.file);
+  const auto is_placed = [](const DicomFrame& frame) { return frame.placed; };
+  if (frames.size() != static_cast<std::size_t>(slice.grid.size[2]) ||
+      !std::all_of(frames.begin(), frames.end(), is_placed)) {
+    throw Error(folder.string() + ": a DICOM file of " + std::to_string(slice.grid.size[2]) +
+                " frames that does not tell where each lies, expected an enhanced CT with place, "
+                "orientation and spacing of every frame; export the series as one file per slice");
+  }
+  const DicomFrame& first = frames.front();
+  std::vector<Vec3> origins;
+  for (const DicomFrame& frame : frames) {
+    const bool like_first = (frame.right - first.right).norm() < 1e-3 &&
+                            (frame.down - first.down).norm() < 1e-3 &&
+                            std::abs(frame.along_row / first.along_row - 1.0) < 1e-3 &&
+                            std::abs(frame.along_column / first.along_column - 1.0) < 1e-3;
+    if (!like_first) {
+      throw Error(folder.string() +
+                  ": frames of several orientations or spacings in one DICOM file, expected one "
+                  "stack; export them as series of their own");
+    }
+    require_hounsfield(frame.unit, slice.modality, folder);
+    origins.push_back(frame.position);
+  }
+  Grid grid = slice.grid;
+  grid.spacing = Vec3(first.along_row, first.along_column, 1.0);
+  Mat3 axes;
+  axes << first.right, first.down, first.right.cross(first.down);
+  grid.direction = orthonormal_direction(axes, folder);
+  const Stack stacked = stack(origins, grid);
+  if (!stacked.problem.empty()) throw Error(folder.string() + ": " + stacked.problem);
+
+  // GDCM scales all frames as the first; what is stored are integers.
+  require_scalar_volume(*slice.io, stacked.grid, folder);
+  std::vector<float> values;
+  append_slice(slice, folder, values);
+  const double slope = slice.io->GetRescaleSlope(), intercept = slice.io->GetRescaleIntercept();
+  const std::size_t size = values.size() / frames.size();
+  Image image{.grid = stacked.grid, .values = {}, .modality = slice.modality};
+  image.values.reserve(values.size());
+  for (const std::size_t k : stacked.order) {
+    const DicomFrame& frame = frames[k];
+    const bool scaled_so = frame.slope == slope && frame.intercept == intercept;
+    for (std::size_t n = k * size; n < (k + 1) * size; ++n) {
+      const double stored = std::round((static_cast<double>(values[n]) - intercept) / slope);
+      image.values.push_back(
+          scaled_so ? values[n] : static_cast<float>(frame.slope * stored + frame.intercept));
+    }
+  }
+  return image;
+}
+
+void send_header(const Send& send, const Grid& grid, std::string modality) {
+  send_grid(send, grid);
+  modality.resize(kModality);
+  send(modality.data(), modality.size());
+}
+
+/// Sends the grid of the folder's series and what made it, then its values slice by slice.
 void send_dicom_folder(const fs::path& folder, const Send& send, const At& at) {
   at(folder.string());
-  std::vector<Series> all = find_series(folder, at);
-  if (all.empty()) {
-    throw Error(folder.string() +
-                ": a folder without DICOM images (folders inside it are not searched); " +
-                kFormats);
-  }
-  if (all.size() > 1) {
-    throw several_series(folder, std::move(all));
-  }
-  Series& slices = all.front();
-  at(slices.front().io->GetFileName());
-  if (slices.size() == 1 && slices.front().grid.size[2] > 1) {  // all frames in one file
-    require_whole_dicom(*slices.front().io);
-    const Image image = read_volume(*slices.front().io, folder);
-    send_grid(send, image.grid);
+  Series slices = choose_series(folder, find_series(folder, at));
+  Slice& first = slices.front();
+  at(first.file.string());
+  require_hounsfield(first.unit, first.modality, folder);
+  if (slices.size() == 1 && first.grid.size[2] > 1) {  // all frames in one file
+    const Image image = read_frames(first, folder);
+    send_header(send, image.grid, image.modality);
     return send(image.values.data(), image.values.size() * sizeof(float));
   }
-  const Grid grid = stack(slices, folder);
-  require_scalar_volume(*slices.front().io, grid, folder);
-  send_grid(send, grid);
+  const Stack stacked = stack(origins_of(slices), first.grid);
+  if (!stacked.problem.empty()) throw Error(folder.string() + ": " + stacked.problem);
+  require_scalar_volume(*first.io, stacked.grid, folder);
+  send_header(send, stacked.grid, first.modality);
   std::vector<float> values;
-  for (const Slice& slice : slices) {
-    at(slice.io->GetFileName());
-    require_whole_dicom(*slice.io);
+  for (const std::size_t k : stacked.order) {
+    const Slice& slice = slices[k];
+    at(slice.file.string());
     values.clear();
-    append_voxels(*slice.io, folder, values);
-    if (values.size() * slices.size() != grid.voxels()) {
+    append_slice(slice, folder, values);
+    if (values.size() * slices.size() != stacked.grid.voxels()) {
       throw Error(folder.string() + ": files of several frames each, expected one slice per file");
     }
     send(values.data(), values.size() * sizeof(float));
@@ -279,6 +478,9 @@ Image read_dicom_folder(const fs::path& folder) {
       },
       [&](const Receive& receive) {
         image.grid = receive_grid(receive);
+        std::array<char, kModality + 1> modality{};
+        receive(modality.data(), kModality);
+        image.modality = modality.data();
         image.values.reserve(image.grid.voxels());
         const std::size_t slice =
             image.grid.voxels() / static_cast<std::size_t>(image.grid.size[2]);

@@ -80,8 +80,7 @@ Image read_image(const fs::path& path) {
   if (fs::is_directory(path, unknown)) {
     image = call_itk(path, damaged("DICOM"), [&] { return read_dicom_folder(path); });
   } else {
-    const FileFormat format = open_file(path);
-    image = call_itk(path, damaged(format.name), [&] { return read_volume(*format.io, path); });
+    image = read_file(path);
   }
   require_finite(image, path);
   return image;
@@ -108,17 +107,11 @@ Mask read_mask(const fs::path& path) {
     throw Error(path.string() + ": no such file, expected a mask (8 bit image of 0 and 1)");
   }
   silence_libraries();
-  const FileFormat format = open_file(path);
-  Mask mask;
-  mask.grid = header_grid(*format.io, path);
-  require_scalar_volume(*format.io, mask.grid, path);
-  if (format.io->GetComponentType() == itk::IOComponentEnum::UCHAR) {
-    call_itk(path, damaged(format.name), [&] { append_voxels(*format.io, path, mask.labels); });
-  }
-  if (mask.labels.empty() || *std::max_element(mask.labels.begin(), mask.labels.end()) > 1) {
-    throw Error(path.string() + ": not a mask, expected an 8 bit image of 0 and 1");
-  }
-  return mask;
+  const Image image = read_file(path);
+  const bool is_mask = std::all_of(image.values.begin(), image.values.end(),
+                                   [](float value) { return value == 0.0F || value == 1.0F; });
+  if (!is_mask) throw Error(path.string() + ": not a mask, expected an image of 0 and 1");
+  return {image.grid, {image.values.begin(), image.values.end()}};
 }
 
 }  // namespace wireplan::preprocess

@@ -4,6 +4,7 @@
 #include <array>
 #include <cstdint>
 #include <filesystem>
+#include <string>
 #include <vector>
 
 #include "preprocess/base.h"
@@ -38,6 +39,7 @@ struct Grid {
 struct Image {
   Grid grid;
   std::vector<float> values;  // HU (or plain intensity where the file has no HU), grid.index order
+  std::string modality = {};  // "CT", "MR", ...: what made it; empty where the file does not tell
 };
 
 struct Mask {
@@ -51,10 +53,11 @@ bool reads_volumes();
 
 /// Reads a folder of DICOM files (one series, sorted by position), .nii, .nii.gz, .nrrd, .nhdr,
 /// .mha or .mhd, with the header's direction, spacing, slope and intercept honoured. One value per
-/// voxel, one volume (4D with a single volume is fine). Throws `Error` for a missing file, one that
-/// is no image or cut short, values that are not finite, a sheared grid, and a folder with several
-/// series (listed by number of slices), missing or uneven slices (with the place) or a tilted
-/// gantry. Messages never quote a patient's data.
+/// voxel, one volume (4D with a single volume is fine). Of several DICOM series the one that alone
+/// has a volume's shape is read. Throws `Error` for a missing file, one that is no image or cut
+/// short, values that are not finite, a sheared grid, and a folder with several volumes (listed
+/// with number, description, slices and spacing), missing or uneven slices (with the place), slices
+/// of one place, or a tilted gantry (with the angle). Messages never quote a patient's data.
 Image read_image(const std::filesystem::path& path);
 
 /// Writes NRRD (space LPS, gzip) of 16 bit integers, values rounded and kept in -32768..32767. The

@@ -4,8 +4,9 @@
 #include <Eigen/SVD>
 #include <algorithm>
 #include <cctype>
+#include <cmath>
 #include <cstdint>
-#include <iterator>
+#include <iomanip>
 #include <limits>
 #include <sstream>
 
@@ -20,31 +21,116 @@ std::string to_text(const Vec3& v) {
   return text.str();
 }
 
-/// The rotation (or reflection) nearest to what the header says, so that Grid may rely on
-/// orthonormal columns. Headers round to a few digits; more than 1e-3 off is a sheared image.
-Mat3 orthonormal_direction(const Mat3& direction, const fs::path& path) {
-  const Eigen::JacobiSVD<Mat3> svd(direction, Eigen::ComputeFullU | Eigen::ComputeFullV);
-  const Mat3 nearest = svd.matrixU() * svd.matrixV().transpose();
-  if (!((direction - nearest).cwiseAbs().maxCoeff() < 1e-3)) {
-    throw Error(path.string() +
-                ": the axes of the image are not at right angles (sheared), expected an orthogonal "
-                "grid; resample it, e.g. in 3D Slicer");
-  }
-  return nearest;
-}
-
-template <typename Stored, typename Value>
-void append_as(const std::vector<char>& bytes, std::vector<Value>& values) {
+template <typename Stored>
+void append_as(const std::vector<char>& bytes, std::vector<float>& values) {
   const Stored* first = reinterpret_cast<const Stored*>(bytes.data());
   const std::size_t count = bytes.size() / sizeof(Stored), before = values.size();
   values.resize(before + count);
   std::transform(first, first + count, values.begin() + static_cast<std::ptrdiff_t>(before),
-                 [](Stored v) { return static_cast<Value>(v); });
+                 [](Stored v) { return static_cast<float>(v); });
 }
 
-/// Reads the voxels of the file whose header `io` has read and appends them.
-template <typename Value>
-void append_all(itk::ImageIOBase& io, const fs::path& path, std::vector<Value>& values) {
+}  // namespace
+
+std::string damaged(const std::string& format) {
+  return "its header reads as " + format +
+         ", but its voxels cannot be read; the file is damaged or cut short: copy or export it "
+         "again";
+}
+
+std::string lower_case(std::string text) {
+  std::transform(text.begin(), text.end(), text.begin(),
+                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  return text;
+}
+
+std::string one_decimal(double value) {
+  std::ostringstream text;
+  text << std::fixed << std::setprecision(1) << value;
+  return text.str();
+}
+
+double shear_degrees(const Mat3& axes) {
+  double largest = 0.0;
+  for (int k = 0; k < 3; ++k) {
+    const double cosine = axes.col(k).normalized().dot(axes.col((k + 1) % 3).normalized());
+    largest = std::max(largest, std::asin(std::min(1.0, std::abs(cosine))) / kRadPerDeg);
+  }
+  return largest;
+}
+
+Mat3 orthonormal_direction(const Mat3& direction, const fs::path& path) {
+  const Eigen::JacobiSVD<Mat3> svd(direction, Eigen::ComputeFullU | Eigen::ComputeFullV);
+  const Mat3 nearest = svd.matrixU() * svd.matrixV().transpose();
+  if (!((direction - nearest).cwiseAbs().maxCoeff() < 1e-3)) {
+    throw Error(path.string() + ": the axes of the image are not at right angles (sheared by " +
+                one_decimal(shear_degrees(direction)) +
+                " degrees), expected an orthogonal grid; resample it, e.g. in 3D Slicer");
+  }
+  return nearest;
+}
+
+Grid header_grid(const itk::ImageIOBase& io, const fs::path& path) {
+  Grid grid;
+  Mat3 direction;
+  for (unsigned axis = 0; axis < 3; ++axis) {
+    const bool exists = axis < io.GetNumberOfDimensions();
+    const auto size = exists ? io.GetDimensions(axis) : 1;
+    if (size > static_cast<itk::SizeValueType>(std::numeric_limits<int>::max())) {
+      throw Error(path.string() + ": the header gives an axis of " + std::to_string(size) +
+                  " voxels; the file is damaged");
+    }
+    grid.size[axis] = static_cast<int>(size);
+    grid.spacing[axis] = exists ? io.GetSpacing(axis) : 1.0;
+    grid.origin[axis] = exists ? io.GetOrigin(axis) : 0.0;
+    const std::vector<double> column =
+        exists ? io.GetDirection(axis)
+               : std::vector<double>();  // ITK's default writes past its end
+    for (unsigned row = 0; row < 3; ++row) {
+      direction(row, axis) = row < column.size() ? column[row] : (row == axis ? 1.0 : 0.0);
+    }
+  }
+  if (!grid.spacing.allFinite() || grid.spacing.minCoeff() <= 0.0 || !grid.origin.allFinite() ||
+      !direction.allFinite()) {
+    throw Error(path.string() + ": voxel spacing " + to_text(grid.spacing) + " mm at origin " +
+                to_text(grid.origin) + " mm, expected positive and finite values; mend the header");
+  }
+  grid.direction = orthonormal_direction(direction, path);
+  return grid;
+}
+
+void require_volume(const Grid& grid, const fs::path& path) {
+  if (*std::min_element(grid.size.begin(), grid.size.end()) < 2) {
+    throw Error(path.string() + ": " + std::to_string(grid.size[0]) + " x " +
+                std::to_string(grid.size[1]) + " x " + std::to_string(grid.size[2]) +
+                " voxels, expected a volume with at least 2 along each axis");
+  }
+}
+
+Error several_values(unsigned count, const fs::path& path) {
+  return Error(path.string() + ": " + std::to_string(count) +
+               " values per voxel (a colour or vector image), expected one");
+}
+
+Error several_volumes(std::int64_t count, const fs::path& path) {
+  return Error(path.string() + ": a series of " + std::to_string(count) +
+               " volumes (4D), expected one; export the phase to plan on as a 3D image");
+}
+
+Error unknown_values(const fs::path& path) {
+  return Error(path.string() + ": voxels of an unknown type, expected integers or floats");
+}
+
+void require_scalar_volume(const itk::ImageIOBase& io, const Grid& grid, const fs::path& path) {
+  if (io.GetNumberOfComponents() != 1) throw several_values(io.GetNumberOfComponents(), path);
+  require_volume(grid, path);
+  for (unsigned axis = 3; axis < io.GetNumberOfDimensions(); ++axis) {
+    const auto count = static_cast<std::int64_t>(io.GetDimensions(axis));
+    if (count != 1) throw several_volumes(count, path);
+  }
+}
+
+void append_voxels(itk::ImageIOBase& io, const fs::path& path, std::vector<float>& values) {
   // ImageIO objects want the region spelled out, here all of it
   itk::ImageIORegion region(io.GetNumberOfDimensions());
   for (unsigned axis = 0; axis < io.GetNumberOfDimensions(); ++axis) {
@@ -81,77 +167,8 @@ void append_all(itk::ImageIOBase& io, const fs::path& path, std::vector<Value>& 
     case itk::IOComponentEnum::DOUBLE:
       return append_as<double>(bytes, values);
     default:
-      throw Error(path.string() + ": voxels of an unknown type, expected integers or floats");
+      throw unknown_values(path);
   }
-}
-
-}  // namespace
-
-std::string damaged(const std::string& format) {
-  return "its header reads as " + format +
-         ", but its voxels cannot be read; the file is damaged or cut short: copy or export it "
-         "again";
-}
-
-std::string lower_case(std::string text) {
-  std::transform(text.begin(), text.end(), text.begin(),
-                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  return text;
-}
-
-Grid header_grid(const itk::ImageIOBase& io, const fs::path& path) {
-  Grid grid;
-  Mat3 direction;
-  for (unsigned axis = 0; axis < 3; ++axis) {
-    const bool exists = axis < io.GetNumberOfDimensions();
-    const auto size = exists ? io.GetDimensions(axis) : 1;
-    if (size > static_cast<itk::SizeValueType>(std::numeric_limits<int>::max())) {
-      throw Error(path.string() + ": the header gives an axis of " + std::to_string(size) +
-                  " voxels; the file is damaged");
-    }
-    grid.size[axis] = static_cast<int>(size);
-    grid.spacing[axis] = exists ? io.GetSpacing(axis) : 1.0;
-    grid.origin[axis] = exists ? io.GetOrigin(axis) : 0.0;
-    const std::vector<double> column =
-        exists ? io.GetDirection(axis)
-               : std::vector<double>();  // ITK's default writes past its end
-    for (unsigned row = 0; row < 3; ++row) {
-      direction(row, axis) = row < column.size() ? column[row] : (row == axis ? 1.0 : 0.0);
-    }
-  }
-  if (!grid.spacing.allFinite() || grid.spacing.minCoeff() <= 0.0 || !grid.origin.allFinite() ||
-      !direction.allFinite()) {
-    throw Error(path.string() + ": voxel spacing " + to_text(grid.spacing) + " mm at origin " +
-                to_text(grid.origin) + " mm, expected positive and finite values; mend the header");
-  }
-  grid.direction = orthonormal_direction(direction, path);
-  return grid;
-}
-
-void require_scalar_volume(const itk::ImageIOBase& io, const Grid& grid, const fs::path& path) {
-  if (io.GetNumberOfComponents() != 1) {
-    throw Error(path.string() + ": " + std::to_string(io.GetNumberOfComponents()) +
-                " values per voxel (a colour or vector image), expected one");
-  }
-  if (*std::min_element(grid.size.begin(), grid.size.end()) < 2) {
-    throw Error(path.string() + ": " + std::to_string(grid.size[0]) + " x " +
-                std::to_string(grid.size[1]) + " x " + std::to_string(grid.size[2]) +
-                " voxels, expected a volume with at least 2 along each axis");
-  }
-  for (unsigned axis = 3; axis < io.GetNumberOfDimensions(); ++axis) {
-    if (io.GetDimensions(axis) != 1) {
-      throw Error(path.string() + ": a series of " + std::to_string(io.GetDimensions(axis)) +
-                  " volumes (4D), expected one; export the phase to plan on as a 3D image");
-    }
-  }
-}
-
-void append_voxels(itk::ImageIOBase& io, const fs::path& path, std::vector<float>& values) {
-  append_all(io, path, values);
-}
-
-void append_voxels(itk::ImageIOBase& io, const fs::path& path, std::vector<std::uint8_t>& values) {
-  append_all(io, path, values);
 }
 
 }  // namespace wireplan::preprocess

@@ -32,6 +32,21 @@ std::string damaged(const std::string& format);
 
 std::string lower_case(std::string text);
 
+std::string one_decimal(double value);  // with one digit behind the point
+
+/// How far the axes are from right angles, at most.
+double shear_degrees(const Mat3& axes);
+
+/// The rotation (or reflection) nearest to what the header says, so that Grid may rely on
+/// orthonormal columns. Headers round to a few digits; more than 1e-3 off is a sheared image.
+Mat3 orthonormal_direction(const Mat3& direction, const std::filesystem::path& path);
+
+/// What no volume of one value per voxel has.
+void require_volume(const Grid& grid, const std::filesystem::path& path);
+Error several_values(unsigned count, const std::filesystem::path& path);
+Error several_volumes(std::int64_t count, const std::filesystem::path& path);
+Error unknown_values(const std::filesystem::path& path);
+
 /// Size and placement from a header that has been read; axes beyond the third are ignored.
 Grid header_grid(const itk::ImageIOBase& io, const std::filesystem::path& path);
 
@@ -42,7 +57,5 @@ void require_scalar_volume(const itk::ImageIOBase& io, const Grid& grid,
 /// Reads the voxels of the file whose header `io` has read and appends them.
 void append_voxels(itk::ImageIOBase& io, const std::filesystem::path& path,
                    std::vector<float>& values);
-void append_voxels(itk::ImageIOBase& io, const std::filesystem::path& path,
-                   std::vector<std::uint8_t>& values);
 
 }  // namespace wireplan::preprocess

@@ -1,127 +1,29 @@
 #include "preprocess/volume/volume_file.h"
 
-#include <zlib.h>
+#include <unistd.h>
 
 #include <Eigen/Eigenvalues>  // before ITK, which would bring in its own older copy
 #include <algorithm>
-#include <array>
-#include <bit>
 #include <cctype>
 #include <cmath>
 #include <cstdlib>
 #include <fstream>
+#include <iomanip>
 #include <limits>
+#include <map>
+#include <optional>
 #include <set>
 #include <sstream>
 
-#include "itkMetaDataObject.h"
 #include "itkMetaImageIO.h"
-#include "itkNiftiImageIO.h"
 #include "itkNrrdImageIO.h"
 #include "preprocess/volume/dicom_check.h"
+#include "preprocess/volume/nifti_file.h"
 
 namespace wireplan::preprocess {
 namespace {
 
 namespace fs = std::filesystem;
-
-FileFormat format_of(const fs::path& path) {
-  const std::string name = lower_case(path.filename().string());
-  if (name.ends_with(".nii") || name.ends_with(".nii.gz")) {
-    return {"NIfTI", itk::NiftiImageIO::New().GetPointer()};
-  }
-  if (name.ends_with(".nrrd") || name.ends_with(".nhdr")) {
-    return {"NRRD", itk::NrrdImageIO::New().GetPointer()};
-  }
-  if (name.ends_with(".mha") || name.ends_with(".mhd")) {
-    return {"MetaImage", itk::MetaImageIO::New().GetPointer()};
-  }
-  return {};
-}
-
-/// A number of a NIfTI header, which ITK hands on as text.
-double nifti_value(const itk::ImageIOBase& io, const std::string& key) {
-  std::string text;
-  itk::ExposeMetaData<std::string>(io.GetMetaDataDictionary(), key, text);
-  return std::strtod(text.c_str(), nullptr);
-}
-
-/// Corrects what ITK makes of scales in headers: that of a MetaImage is not applied, and of a NIfTI
-/// slope of 0, which means no scaling, the intercept is.
-void correct_scale(itk::ImageIOBase& io, Image& image) {
-  double slope = 1.0, offset = 0.0;
-  if (auto* meta = dynamic_cast<itk::MetaImageIO*>(&io)) {
-    slope = meta->GetMetaImagePointer()->ElementToIntensityFunctionSlope();
-    offset = meta->GetMetaImagePointer()->ElementToIntensityFunctionOffset();
-  } else if (dynamic_cast<itk::NiftiImageIO*>(&io) != nullptr &&
-             nifti_value(io, "scl_slope") == 0.0) {
-    offset = -nifti_value(io, "scl_inter");
-  }
-  if (slope != 1.0 || offset != 0.0) {
-    for (float& value : image.values) {
-      value = static_cast<float>(slope * value + offset);
-    }
-  }
-}
-
-/// niftilib fills up a file that is cut short with zeros, so its size [bytes] is compared with what
-/// the header promises. A compressed file ends with its size before compression, modulo 2^32 (RFC
-/// 1952); 0 there is the mark of a file in several blocks, which is let pass.
-void require_whole_nifti(const itk::ImageIOBase& io, const fs::path& path) {
-  const double needed = std::max(0.0, nifti_value(io, "vox_offset")) +
-                        std::max(1.0, nifti_value(io, "bitpix") / 8.0) *
-                            static_cast<double>(io.GetImageSizeInPixels());
-  double stored = static_cast<double>(fs::file_size(path));
-  double most = std::numeric_limits<double>::infinity();
-  if (lower_case(path.extension().string()) == ".gz") {
-    std::array<unsigned char, 4> size{};
-    std::ifstream file(path, std::ios::binary);
-    file.seekg(-4, std::ios::end);
-    file.read(reinterpret_cast<char*>(size.data()), size.size());
-    stored = size[0] + 256.0 * (size[1] + 256.0 * (size[2] + 256.0 * size[3]));
-    if (stored == 0.0 || needed >= 4294967296.0) {
-      return;
-    }
-    most = needed + 1e6;  // beyond a little padding it is no size but the middle of the data
-  }
-  if (!(stored >= needed && stored <= most)) {
-    throw Error(path.string() + ": " + damaged("NIfTI"));
-  }
-}
-
-/// ITK takes what lacks the mark of a NIfTI-1 file for Analyze, whose header promises nothing, and
-/// its matrices end the program, or never, on what is not finite or far too small; so the mark, the
-/// spacing and the two transforms are looked at first (offsets: nifti1.h).
-void require_nifti_header(const fs::path& path, const std::string& no_image) {
-  std::array<unsigned char, 348> header{};
-  const gzFile file = gzopen(path.c_str(), "rb");  // reads what is not compressed too
-  const int count = file == nullptr ? 0 : gzread(file, header.data(), header.size());
-  if (file != nullptr) gzclose(file);
-  const bool is_nifti = header[344] == 'n' && header[345] == '+' && header[346] == '1';
-  if (count != static_cast<int>(header.size()) || !is_nifti) {
-    throw Error(path.string() + ": " + no_image);
-  }
-  // In which order the bytes are, nifticlib tells by the number of dimensions, 1 to 7.
-  const bool swapped = header[41] != 0 || header[40] < 1 || header[40] > 7;
-  // Distances and places are below a kilometre, steps of time and the like below any unit's.
-  struct Floats {
-    std::size_t begin, end;
-    float largest;
-  };
-  constexpr float kSmallest = 1e-30F;  // but 0: no rounding leaves less
-  constexpr std::array<Floats, 3> kFloats = {{{76, 92, 1e6F}, {92, 108, 1e12F}, {256, 328, 1e6F}}};
-  for (const auto& [begin, end, largest] : kFloats) {
-    for (std::size_t at = begin; at < end; at += sizeof(float)) {
-      std::array<unsigned char, sizeof(float)> bytes{};
-      for (std::size_t k = 0; k < bytes.size(); ++k) {
-        bytes[k] = header[at + (swapped ? bytes.size() - 1 - k : k)];
-      }
-      const float size = std::abs(std::bit_cast<float>(bytes));
-      if (size == 0.0F || (size >= kSmallest && size <= largest)) continue;
-      throw Error(path.string() + ": " + damaged("NIfTI"));
-    }
-  }
-}
 
 /// How many numbers stand behind a key of a MetaImage's header (metaImage.cxx, metaObject.cxx); -1
 /// where it is text, or a key of somebody's own.
@@ -159,16 +61,46 @@ bool holds_numbers(const std::string& text, int count) {
   return found == count;
 }
 
+/// The header of a MetaImage, line by line.
+struct MetaHeader {
+  std::string lines;       // all that MetaIO is to see
+  bool has_more = false;   // lines that it is not to see
+  std::string data_file;   // "LOCAL", or where the voxels are
+  std::streamoff end = 0;  // where voxels of this file begin
+  double packed = 0.0;     // bytes, where the voxels are compressed
+  double mm = 1.0;         // of a unit of length
+};
+
+std::string trimmed(const std::string& text) {
+  const std::size_t first = text.find_first_not_of(" \t\r"), last = text.find_last_not_of(" \t\r");
+  return first == std::string::npos ? "" : text.substr(first, last - first + 1);
+}
+
+double meta_unit(const std::string& unit, const fs::path& path) {
+  const std::string name = lower_case(unit);
+  if (name == "mm" || name == "?" || name.empty()) return 1.0;
+  if (name == "um") return 1e-3;
+  if (name == "cm") return 10.0;
+  throw Error(path.string() + ": DistanceUnits is " + unit +
+              ", expected um, mm or cm; mend the header");
+}
+
 /// MetaIO writes past its arrays where a header is not what it expects, and frees what it read
-/// twice where it breaks off, so the lines are looked through first: "Key = value" of plain text
-/// that fits into its buffers, no key twice, to ElementDataFile; 2 to 4 dimensions, told before
-/// what has as many numbers; as many numbers as there should be; no list of files.
-void require_meta_header(const fs::path& path, const std::string& no_image) {
-  constexpr std::size_t kLongest = 250;  // of a line: MetaIO keeps names in 255 characters
+/// twice where it breaks off, so the lines are looked through first: "Key = value", no key twice,
+/// to ElementDataFile; 2 to 4 dimensions, told before what has as many numbers; as many numbers as
+/// there should be; no list of files. Lines of other keys may hold any text; MetaIO, which keeps
+/// names in 255 characters, sees those of them that are short and plain.
+MetaHeader read_meta_header(const fs::path& path, const std::string& no_image) {
+  static const std::set<std::string> kNeeded = {
+      "ObjectType",          "BinaryData",     "BinaryDataByteOrderMSB",
+      "ElementByteOrderMSB", "CompressedData", "ElementType",
+      "ElementDataFile",     "DistanceUnits",  "AnatomicalOrientation"};
+  constexpr std::size_t kLongest = 250;
   const auto require = [&](bool sound) {
     if (!sound) throw Error(path.string() + ": " + no_image);
   };
   std::ifstream file(path, std::ios::binary);
+  MetaHeader header;
   std::set<std::string> keys;
   int dimensions = 0;
   for (std::string line; keys.count("ElementDataFile") == 0 && std::getline(file, line);) {
@@ -177,53 +109,173 @@ void require_meta_header(const fs::path& path, const std::string& no_image) {
     const bool plain = std::all_of(line.begin(), line.end(), [](char c) {
       return (c >= ' ' && c <= '~') || c == '\t' || c == '\r';
     });
-    require(plain && line.size() <= kLongest && equals != std::string::npos &&
-            equals <= line.find_first_not_of(' ', end) && keys.insert(key).second);
-    const std::string value = line.substr(equals + 1);
+    require(equals != std::string::npos && equals <= line.find_first_not_of(' ', end));
+    const std::string value = trimmed(line.substr(equals + 1));
     if (key == "NDims") dimensions = std::atoi(value.c_str());
     require(dimensions >= 0 && dimensions <= 4);
     const int numbers = count_meta_numbers(key, dimensions);
-    require(numbers != 0 && (numbers < 0 || holds_numbers(value, numbers)));
-    const std::size_t name = std::min(value.find_first_not_of(" \t"), value.size());
-    if (key == "ElementDataFile" &&
-        (value.compare(name, 4, "LIST") == 0 || value.find('%') != std::string::npos)) {
-      throw Error(path.string() + ": its voxels lie in a list of files, expected them in one; " +
-                  "save the volume as one .mha file");
+    const bool needed = numbers >= 0 || kNeeded.count(key) > 0;
+    const bool first = keys.insert(key).second;
+    if (!needed && !(plain && first && line.size() <= kLongest)) {
+      header.has_more = true;
+      continue;
     }
+    require(plain && first && line.size() <= kLongest && numbers != 0 &&
+            (numbers < 0 || holds_numbers(value, numbers)));
+    if (key == "ElementDataFile") {
+      header.data_file = value;
+      if (value.starts_with("LIST") || value.find('%') != std::string::npos) {
+        throw Error(path.string() + ": its voxels lie in a list of files, expected them in one; " +
+                    "save the volume as one .mha file");
+      }
+      const fs::path elsewhere = fs::absolute(path).parent_path() / value;
+      line = key + " = " + (value == "LOCAL" ? value : elsewhere.string());
+    }
+    if (key == "CompressedDataSize") header.packed = std::strtod(value.c_str(), nullptr);
+    if (key == "DistanceUnits") header.mm = meta_unit(value, path);
+    header.lines += line + "\n";
   }
   require(dimensions >= 2);
   for (const char* key : {"DimSize", "ElementType", "ElementDataFile"})
     require(keys.count(key) > 0);
+  header.end = static_cast<std::streamoff>(file.tellg());
+  return header;
 }
 
-/// The same for MetaImage, where MetaIO only prints a line when a file is cut short.
-void require_whole_meta(const itk::ImageIOBase& io, const fs::path& path) {
-  double needed = static_cast<double>(io.GetImageSizeInBytes());
-  std::ifstream file(path, std::ios::binary);
-  std::string line, data_file;
-  while (data_file.empty() && std::getline(file, line)) {
-    std::istringstream words(line);
-    std::string key, equals;
-    words >> key >> equals;
-    if (key == "CompressedDataSize") {
-      words >> needed;
-    } else if (key == "ElementDataFile") {
-      std::getline(words >> std::ws, data_file);
-    }
-  }
-  while (!data_file.empty() && std::isspace(static_cast<unsigned char>(data_file.back())) != 0) {
-    data_file.pop_back();
-  }
-
+/// MetaIO only prints a line when a file is cut short.
+void require_whole_meta(const itk::ImageIOBase& io, const MetaHeader& header,
+                        const fs::path& path) {
+  const double needed =
+      header.packed > 0.0 ? header.packed : static_cast<double>(io.GetImageSizeInBytes());
+  const fs::path elsewhere = path.parent_path() / header.data_file;
   double stored = std::numeric_limits<double>::infinity();  // no such file: ITK says so
-  if (data_file == "LOCAL") {
-    stored = static_cast<double>(fs::file_size(path)) - static_cast<double>(file.tellg());
-  } else if (fs::is_regular_file(path.parent_path() / data_file)) {
-    stored = static_cast<double>(fs::file_size(path.parent_path() / data_file));
+  if (header.data_file == "LOCAL") {
+    stored = static_cast<double>(fs::file_size(path)) - static_cast<double>(header.end);
+  } else if (fs::is_regular_file(elsewhere)) {
+    stored = static_cast<double>(fs::file_size(elsewhere));
   }
   if (stored < needed && io.GetFileType() == itk::IOFileEnum::Binary) {
     throw Error(path.string() + ": " + damaged("MetaImage"));
   }
+}
+
+/// A file of a name that nobody else has, gone at the end.
+class TemporaryFile {
+ public:
+  explicit TemporaryFile(const std::string& ending) {
+    std::string name = (fs::temp_directory_path() / "wireplan-XXXXXX").string() + ending;
+    const int file = ::mkstemps(name.data(), static_cast<int>(ending.size()));
+    if (file < 0) throw DiskError(name + ": cannot be written; make room there or set TMPDIR");
+    ::close(file);
+    path_ = name;
+  }
+  ~TemporaryFile() {
+    std::error_code ignored;
+    fs::remove(path_, ignored);
+  }
+  TemporaryFile(const TemporaryFile&) = delete;
+  TemporaryFile& operator=(const TemporaryFile&) = delete;
+  const fs::path& path() const { return path_; }
+
+ private:
+  fs::path path_;
+};
+
+Image read_meta(const fs::path& path) {
+  const std::string no_image = std::string("not a MetaImage image, or damaged; ") + kFormats;
+  const MetaHeader header =
+      call_itk(path, no_image, [&] { return read_meta_header(path, no_image); });
+  std::optional<TemporaryFile> copy;  // without the lines that MetaIO is not to see
+  if (header.has_more) {
+    copy.emplace(path.extension().string());
+    std::ifstream from(path, std::ios::binary);
+    from.seekg(header.end);
+    std::ofstream to(copy->path(), std::ios::binary);
+    to << header.lines;
+    if (header.data_file == "LOCAL") to << from.rdbuf();
+    if (!to.flush()) {
+      throw DiskError(copy->path().string() + ": cannot be written; make room there or set TMPDIR");
+    }
+  }
+  const itk::MetaImageIO::Pointer io = itk::MetaImageIO::New();
+  const fs::path& file = copy ? copy->path() : path;
+  call_itk(path, no_image, [&] {
+    io->SetFileName(file.string());
+    if (!io->CanReadFile(file.c_str())) throw Error(path.string() + ": " + no_image);
+    io->ReadImageInformation();
+    require_whole_meta(*io, header, path);
+  });
+  Image image = call_itk(path, damaged("MetaImage"), [&] { return read_volume(*io, path); });
+  image.grid.spacing *= header.mm;
+  image.grid.origin *= header.mm;
+
+  // ITK does not apply the scale.
+  const double slope = io->GetMetaImagePointer()->ElementToIntensityFunctionSlope();
+  const double offset = io->GetMetaImagePointer()->ElementToIntensityFunctionOffset();
+  if (slope != 1.0 || offset != 0.0) {
+    for (float& value : image.values) value = static_cast<float>(slope * value + offset);
+  }
+  return image;
+}
+
+/// The fields of an NRRD's header, "name: value", in small letters; none where it is no NRRD.
+std::map<std::string, std::string> nrrd_fields(const fs::path& path) {
+  std::map<std::string, std::string> fields;
+  std::ifstream file(path, std::ios::binary);
+  std::string line;
+  if (!std::getline(file, line) || !line.starts_with("NRRD")) return fields;
+  constexpr std::size_t kMost = 10000;  // lines
+  while (fields.size() < kMost && std::getline(file, line) && !trimmed(line).empty()) {
+    const std::size_t colon = line.find(": ");
+    if (line.front() == '#' || colon == std::string::npos) continue;
+    fields[lower_case(trimmed(line.substr(0, colon)))] =
+        lower_case(trimmed(line.substr(colon + 2)));
+  }
+  return fields;
+}
+
+/// Of the unit that all axes of space have; mm where none is told.
+double nrrd_unit(const std::map<std::string, std::string>& fields, const fs::path& path) {
+  const auto found = fields.find("space units");
+  if (found == fields.end()) return 1.0;
+  static const std::map<std::string, double> kUnits = {
+      {"", 1.0},    {"mm", 1.0},          {"millimeter", 1.0},  {"millimeters", 1.0},
+      {"cm", 10.0}, {"centimeter", 10.0}, {"m", 1000.0},        {"meter", 1000.0},
+      {"um", 1e-3}, {"micron", 1e-3},     {"micrometer", 1e-3}, {"\xc2\xb5m", 1e-3}};
+  std::set<double> scales;
+  std::istringstream text(found->second);
+  for (std::string unit; text >> std::quoted(unit);) {
+    const auto known = kUnits.find(trimmed(unit));
+    scales.insert(known == kUnits.end() ? 0.0 : known->second);
+  }
+  if (scales.size() != 1 || *scales.begin() == 0.0) {
+    throw Error(path.string() + ": space units " + found->second +
+                ", expected one of mm, cm, m, um for all axes; mend the header");
+  }
+  return *scales.begin();
+}
+
+Image read_nrrd(const fs::path& path) {
+  const std::string no_image = std::string("not a NRRD image, or damaged; ") + kFormats;
+  const std::map<std::string, std::string> fields = nrrd_fields(path);
+  static const std::set<std::string> kEncodings = {"raw",  "gzip", "gz", "ascii",
+                                                   "text", "txt",  "hex"};
+  const auto encoding = fields.find("encoding");
+  if (encoding != fields.end() && kEncodings.count(encoding->second) == 0) {
+    throw Error(path.string() + ": its voxels are packed with \"" + encoding->second +
+                "\", expected raw or gzip; save it again with gzip, as 3D Slicer does");
+  }
+  const double mm = nrrd_unit(fields, path);
+  const itk::NrrdImageIO::Pointer io = itk::NrrdImageIO::New();
+  call_itk(path, no_image, [&] {
+    io->SetFileName(path.string());
+    if (!io->CanReadFile(path.c_str())) throw Error(path.string() + ": " + no_image);
+    io->ReadImageInformation();
+  });
+  Image image = call_itk(path, damaged("NRRD"), [&] { return read_volume(*io, path); });
+  image.grid.spacing *= mm;
+  image.grid.origin *= mm;
+  return image;
 }
 
 }  // namespace
@@ -233,35 +285,22 @@ Image read_volume(itk::ImageIOBase& io, const fs::path& path) {
   image.grid = header_grid(io, path);
   require_scalar_volume(io, image.grid, path);
   append_voxels(io, path, image.values);
-  correct_scale(io, image);
   return image;
 }
 
-FileFormat open_file(const fs::path& path) {
-  FileFormat format = format_of(path);
-  if (!format.io) {
-    if (check_dicom(path) != DicomForm::kNone) {
-      throw Error(path.string() +
-                  ": a single DICOM file; give the folder that holds the whole series");
-    }
-    throw Error(path.string() + ": not an image that wireplan reads; " + kFormats);
+Image read_file(const fs::path& path) {
+  const std::string name = lower_case(path.filename().string());
+  const auto ends_with = [&](const char* one, const char* other) {
+    return name.ends_with(one) || name.ends_with(other);
+  };
+  if (ends_with(".nii", ".nii.gz")) return read_nifti(path);
+  if (ends_with(".nrrd", ".nhdr")) return read_nrrd(path);
+  if (ends_with(".mha", ".mhd")) return read_meta(path);
+  if (check_dicom(path) != DicomForm::kNone) {
+    throw Error(path.string() +
+                ": a single DICOM file; give the folder that holds the whole series");
   }
-  const std::string no_image = "not a " + format.name + " image, or damaged; " + kFormats;
-  call_itk(path, no_image, [&] {
-    if (format.name == "MetaImage") require_meta_header(path, no_image);
-    if (format.name == "NIfTI") require_nifti_header(path, no_image);
-    format.io->SetFileName(path.string());
-    if (!format.io->CanReadFile(path.c_str())) {
-      throw Error(path.string() + ": " + no_image);
-    }
-    format.io->ReadImageInformation();
-    if (format.name == "NIfTI") {
-      require_whole_nifti(*format.io, path);
-    } else if (format.name == "MetaImage") {
-      require_whole_meta(*format.io, path);
-    }
-  });
-  return format;
+  throw Error(path.string() + ": not an image that wireplan reads; " + kFormats);
 }
 
 }  // namespace wireplan::preprocess

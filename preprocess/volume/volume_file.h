@@ -7,13 +7,8 @@
 
 namespace wireplan::preprocess {
 
-struct FileFormat {
-  std::string name;
-  itk::ImageIOBase::Pointer io;  // none: no known extension
-};
-
-/// Opens a file by its extension and reads the header; checks that it is what it is called.
-FileFormat open_file(const std::filesystem::path& path);
+/// Reads a volume by the extension of its file, after looking whether it is what it is called.
+Image read_file(const std::filesystem::path& path);
 
 /// Reads header and voxels of a file that holds the whole volume.
 Image read_volume(itk::ImageIOBase& io, const std::filesystem::path& path);

@@ -76,7 +76,8 @@ std::vector<Value> crop_values(const Grid& grid, const Box& box, const std::vect
   return crop;
 }
 
-/// Voxels whose centre lies within `radius` [mm] of the point, in index order.
+/// Voxels whose centre lies within `radius` [mm] of the point, in index order; where there is none,
+/// as between thick slices, those that the ball touches. Empty where the point is in no voxel.
 std::vector<std::size_t> voxels_in_ball(const Grid& grid, const Vec3& point, double radius);
 
 /// Voxels within `reach` steps along each axis, the voxel itself included.

@@ -7,6 +7,8 @@
 #include <iterator>
 #include <string>
 
+#include "preprocess/volume/image.h"
+
 namespace wireplan::preprocess {
 
 namespace fs = std::filesystem;
@@ -33,6 +35,26 @@ class ImageFile : public ::testing::Test {
 inline std::string bytes_of(const fs::path& path) {
   std::ifstream file(path, std::ios::binary);
   return {std::istreambuf_iterator<char>(file), {}};
+}
+
+/// The message of the Error that reading throws; a failure where it throws none.
+template <typename Read>
+std::string error_of(Read read) {
+  try {
+    read();
+  } catch (const Error& error) {
+    return error.what();
+  }
+  ADD_FAILURE() << "no Error was thrown";
+  return {};
+}
+
+inline std::string read_error(const fs::path& path) {
+  return error_of([&] { read_image(path); });
+}
+
+inline bool has(const std::string& text, const std::string& part) {
+  return text.find(part) != std::string::npos;
 }
 
 }  // namespace wireplan::preprocess

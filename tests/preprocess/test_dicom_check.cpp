@@ -48,6 +48,24 @@ TEST_F(DicomCheck, AWholeSliceIsSoundAndACutOneIsNot) {
   EXPECT_EQ(between_elements, 21);  // before each element after its head
 }
 
+TEST_F(DicomCheck, APaddedFileAndABareDataSetAreKnownAndWhereTheirPixelsEnd) {
+  std::size_t end = 0;
+  const auto look = [&](const std::string& bytes) {
+    std::ofstream(file_, std::ios::binary) << bytes;
+    return check_dicom(file_, &end);
+  };
+  for (const std::size_t padding : {1, 8, 37, 400}) {
+    EXPECT_EQ(look(slice_ + std::string(padding, '\0')), DicomForm::kPadded) << padding;
+    EXPECT_EQ(end, slice_.size());
+  }
+  const std::size_t data_set = slice_.find("1.2.840.10008.1.2.1") + 20;
+  const std::string bare = slice_.substr(data_set);
+  EXPECT_EQ(look(bare), DicomForm::kBare);
+  EXPECT_EQ(end, bare.size());
+  EXPECT_EQ(look(bare.substr(0, bare.size() - 1)), DicomForm::kNone);
+  EXPECT_EQ(look(std::string("\x08\x00", 2) + std::string(500, 'x')), DicomForm::kNone);
+}
+
 TEST_F(DicomCheck, LengthsBeyondTheEndAndUnknownRepresentationsAreDamage) {
   const std::size_t rows = slice_.find(std::string("\x28\x00\x10\x00US", 6));
   ASSERT_NE(rows, std::string::npos);

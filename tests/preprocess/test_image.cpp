@@ -16,32 +16,13 @@
 #include "preprocess/volume/image.h"
 #include "tests/dicom.h"
 #include "tests/preprocess/image_file.h"
+#include "tests/preprocess/nifti_bytes.h"
 
 namespace wireplan::preprocess {
 namespace {
 
 using dicom_files::dicom;
 using dicom_files::DicomSlice;
-
-/// The message of the Error that reading throws; a failure where it throws none.
-template <typename Read>
-std::string error_of(Read read) {
-  try {
-    read();
-  } catch (const Error& error) {
-    return error.what();
-  }
-  ADD_FAILURE() << "no Error was thrown";
-  return {};
-}
-
-std::string read_error(const fs::path& path) {
-  return error_of([&] { read_image(path); });
-}
-
-bool has(const std::string& text, const std::string& part) {
-  return text.find(part) != std::string::npos;
-}
 
 /// Values that tell every voxel from every other.
 Image numbered_image(const Grid& grid) {
@@ -108,7 +89,7 @@ TEST_F(ImageFile, MaskRoundTripAndItsBytesDependOnTheMaskAlone) {
 TEST_F(ImageFile, MaskOfOtherValuesIsRefused) {
   write_image(numbered_image({.size = {3, 3, 3}}), folder_ / "image.nrrd");
   const std::string error = error_of([&] { read_mask(folder_ / "image.nrrd"); });
-  EXPECT_TRUE(has(error, "image.nrrd") && has(error, "8 bit image of 0 and 1")) << error;
+  EXPECT_TRUE(has(error, "image.nrrd") && has(error, "image of 0 and 1")) << error;
 }
 
 TEST_F(ImageFile, WritingIntoNoFolderIsAnErrorThatNamesThePath) {
@@ -179,47 +160,12 @@ TEST_F(ImageFile, MetaImageHonoursTransformMatrixAndOffset) {
 
 // ---- NIfTI --------------------------------------------------------------------------------------
 
-struct NiftiHeader {
-  std::array<std::int16_t, 8> dim = {3, 2, 3, 4, 1, 1, 1, 1};
-  float slope = 0.0F, intercept = 0.0F;
-  // rows of the affine, voxel -> RAS: x decreases along i
-  std::array<float, 12> rows = {-2, 0, 0, 70, 0, 3, 0, -40, 0, 0, 4, 500};
-};
-
-/// NIfTI-1 of 16 bit values 0, 1, 2, ... with the affine as sform. Offsets are those of nifti1.h.
-std::string nifti(const NiftiHeader& header) {
-  std::string bytes(352, '\0');
-  const auto put = [&](std::size_t at, auto value) {
-    std::memcpy(bytes.data() + at, &value, sizeof value);
-  };
-  put(0, std::int32_t{348});
-  put(40, header.dim);
-  put(70, std::int16_t{4});   // datatype: 16 bit signed
-  put(72, std::int16_t{16});  // bits per voxel
-  put(76, std::array<float, 8>{1, 2, 3, 4, 1, 1, 1, 1});
-  put(108, 352.0F);  // where the voxels start
-  put(112, header.slope);
-  put(116, header.intercept);
-  put(123, char{2});          // millimetres
-  put(254, std::int16_t{1});  // sform: scanner coordinates
-  put(280, header.rows);
-  put(344, std::array<char, 4>{'n', '+', '1', '\0'});
-  std::int16_t count = 1;
-  for (int axis = 1; axis <= header.dim[0]; ++axis) {
-    count = static_cast<std::int16_t>(count * header.dim[static_cast<std::size_t>(axis)]);
-  }
-  for (std::int16_t value = 0; value < count; ++value) {
-    bytes.append(reinterpret_cast<const char*>(&value), sizeof value);
-  }
-  return bytes;
-}
-
 TEST_F(ImageFile, AMetaImageWhoseHeaderBreaksOffIsRefusedBeforeItsLibraryReadsIt) {
   const std::string head = "ObjectType = Image\nNDims = 3\n";
   const std::string tail =
       "DimSize = 2 2 2\nElementType = MET_CHAR\nElementDataFile = LOCAL\n12345678";
   read_image(write("sound.mha", head + tail));
-  for (const std::string middle : {"sizes: 2 2 2\n", "\n", "Off\xff = 0 0 0\n", "NDims = 3\n"}) {
+  for (const std::string middle : {"sizes: 2 2 2\n", "\n", "Offset = \xff 0 0\n", "NDims = 3\n"}) {
     EXPECT_TRUE(has(read_error(write("broken.mha", head + middle + tail)), "broken.mha: "));
   }
   for (const std::string dimensions : {"= 0", "= -1", "= 9", "= many", ""}) {
@@ -249,7 +195,7 @@ TEST_F(ImageFile, NiftiWithoutItsMarkOrWithPlacesBeyondAnyRoomIsRefusedAtOnce) {
   std::string bytes = nifti({});
   bytes[344] = '\0';  // Analyze, which promises no voxels
   EXPECT_TRUE(has(read_error(write("mark.nii", bytes)), "mark.nii: not a NIfTI image"));
-  for (const float place : {2e8F, 1e-40F}) {
+  for (const float place : {2e8F, 1e30F}) {
     std::array<float, 12> rows = NiftiHeader{}.rows;
     rows[1] = place;
     EXPECT_TRUE(has(read_error(write("far.nii", nifti({.rows = rows}))), "far.nii: its header"));
@@ -340,9 +286,10 @@ TEST_F(DicomFolder, SeveralSeriesAreListedByNumberOfSlices) {
   write_series({0.0, 1.5}, {.series = "1.2.3.1", .number = "1"});
   write_series({0.0, 1.5, 3.0}, {.series = "1.2.3.2", .number = "2"});
   const std::string error = read_error(folder_);
-  EXPECT_TRUE(has(error,
-                  "2 DICOM series, expected one: number 2 has 3 images of 3 x 2 pixels; "
-                  "number 1 has 2 images"))
+  EXPECT_TRUE(
+      has(error,
+          "2 DICOM series, expected one: number 2 has 3 images of 3 x 2 pixels, 1.5 mm apart; "
+          "number 1 has 2 images"))
       << error;
   EXPECT_FALSE(has(error, "LOVELACE") || has(error, "1.2.3.")) << error;
 }

@@ -1,0 +1,25 @@
+#pragma once
+/// The frames of an enhanced DICOM file (PS3.3 section C.7.6.16), which lie in any order and each
+/// have a place and a scale of their own; for the .cpp files here.
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "preprocess/base.h"
+
+namespace wireplan::preprocess {
+
+struct DicomFrame {
+  bool placed = false;           // whether the file tells where it lies
+  Vec3 position = Vec3::Zero();  // centre of its first pixel, LPS                        [mm]
+  Vec3 right = Vec3::UnitX(), down = Vec3::UnitY();  // unit vectors of a row and a column
+  double along_row = 1.0, along_column = 1.0;        // spacing of pixels                  [mm]
+  double slope = 1.0, intercept = 0.0;               // stored value -> value
+  std::string unit;                                  // of the value, "HU"; empty where not told
+};
+
+/// In the order of the file, from its functional groups; empty where it has none. Whatever GDCM
+/// throws passes through.
+std::vector<DicomFrame> read_dicom_frames(const std::filesystem::path& path);
+
+}  // namespace wireplan::preprocess

@@ -1,0 +1,372 @@
+#include "preprocess/volume/nifti_file.h"
+
+#include <zlib.h>
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cmath>
+#include <cstdint>
+#include <fstream>
+#include <vector>
+
+#include "preprocess/volume/volume_file.h"
+
+namespace wireplan::preprocess {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// The bytes of a file one after another, inflated where it is compressed (RFC 1952, members behind
+/// one another). zlib's gzread does not tell a file whose last bytes are missing from a whole one.
+class ByteStream {
+ public:
+  explicit ByteStream(const fs::path& path) : file_(path, std::ios::binary) {
+    packed_ = file_.get() == 0x1F && file_.get() == 0x8B;
+    file_.clear();
+    file_.seekg(0);
+    constexpr int kGzip = 16 + MAX_WBITS;
+    expects(inflateInit2(&inflater_, kGzip) == Z_OK);
+  }
+  ~ByteStream() { inflateEnd(&inflater_); }
+  ByteStream(const ByteStream&) = delete;
+  ByteStream& operator=(const ByteStream&) = delete;
+
+  /// False where fewer bytes are left, or they are damaged.
+  bool read(void* bytes, std::size_t count) {
+    if (!packed_) {
+      file_.read(static_cast<char*>(bytes), static_cast<std::streamsize>(count));
+      return static_cast<std::size_t>(file_.gcount()) == count;
+    }
+    inflater_.next_out = static_cast<unsigned char*>(bytes);
+    inflater_.avail_out = static_cast<unsigned>(count);
+    while (inflater_.avail_out > 0) {
+      if (!inflate_more()) return false;
+    }
+    return true;
+  }
+
+  /// Whether what was compressed ends as it should; what lies behind is not looked at.
+  bool ends_whole() {
+    std::array<unsigned char, 4096> rest{};
+    while (packed_ && !at_end_) {
+      inflater_.next_out = rest.data();
+      inflater_.avail_out = static_cast<unsigned>(rest.size());
+      if (!inflate_more()) return false;
+    }
+    return true;
+  }
+
+ private:
+  bool inflate_more() {
+    if (inflater_.avail_in == 0) {
+      file_.read(reinterpret_cast<char*>(buffer_.data()),
+                 static_cast<std::streamsize>(buffer_.size()));
+      inflater_.next_in = buffer_.data();
+      inflater_.avail_in = static_cast<unsigned>(file_.gcount());
+      if (inflater_.avail_in == 0) return false;
+    }
+    if (at_end_ && inflateReset(&inflater_) != Z_OK) return false;  // the next member
+    const int result = inflate(&inflater_, Z_NO_FLUSH);
+    at_end_ = result == Z_STREAM_END;
+    return result == Z_OK || at_end_;
+  }
+
+  std::ifstream file_;
+  bool packed_ = false, at_end_ = false;
+  z_stream inflater_{};
+  std::array<unsigned char, std::size_t{1} << 16U> buffer_{};
+};
+
+/// Where a version of the format keeps what a volume needs, and how wide it is (nifti1.h,
+/// nifti2.h).
+struct Layout {
+  int header;  // bytes
+  std::size_t magic, dimensions, type, spacing, offset, slope, units, qform_code, quaternion, sform;
+  bool wide;  // dimensions and offset in 64 bits, other numbers in double or 32 bits
+};
+constexpr Layout kFirst{348, 344, 40, 70, 76, 108, 112, 123, 252, 256, 280, false};
+constexpr Layout kSecond{540, 4, 16, 12, 104, 168, 176, 500, 344, 352, 400, true};
+
+/// The numbers of a header, in the order of bytes that its first one tells.
+class Header {
+ public:
+  Header(std::vector<unsigned char> bytes, const Layout& layout, bool swapped)
+      : bytes_(std::move(bytes)), layout_(layout), swapped_(swapped) {}
+
+  const Layout& layout() const { return layout_; }
+  bool swapped() const { return swapped_; }
+  unsigned char byte(std::size_t at) const { return bytes_.at(at); }
+
+  template <typename Number>
+  Number get(std::size_t at) const {
+    std::array<unsigned char, sizeof(Number)> bytes{};
+    for (std::size_t k = 0; k < bytes.size(); ++k) {
+      bytes[k] = bytes_.at(at + (swapped_ ? bytes.size() - 1 - k : k));
+    }
+    return std::bit_cast<Number>(bytes);
+  }
+  double real(std::size_t at, std::size_t k = 0) const {
+    return layout_.wide ? get<double>(at + 8 * k) : static_cast<double>(get<float>(at + 4 * k));
+  }
+  std::int64_t dimension(std::size_t k) const {
+    return layout_.wide ? get<std::int64_t>(layout_.dimensions + 8 * k)
+                        : get<std::int16_t>(layout_.dimensions + 2 * k);
+  }
+  int code(std::size_t at, std::size_t k = 0) const {
+    return layout_.wide ? get<std::int32_t>(at + 4 * k) : get<std::int16_t>(at + 2 * k);
+  }
+
+ private:
+  std::vector<unsigned char> bytes_;
+  Layout layout_;
+  bool swapped_;
+};
+
+Error not_nifti(const fs::path& path) {
+  return Error(path.string() + ": not a NIfTI image, or damaged; " + kFormats);
+}
+
+Error damaged_nifti(const fs::path& path) { return Error(path.string() + ": " + damaged("NIfTI")); }
+
+Header read_header(ByteStream& file, const fs::path& path) {
+  std::vector<unsigned char> bytes(static_cast<std::size_t>(kFirst.header));
+  if (!file.read(bytes.data(), bytes.size())) throw not_nifti(path);
+  // The first number is the header's size, which tells the version and the order of bytes too.
+  for (const Layout& layout : {kFirst, kSecond}) {
+    for (const bool swapped : {false, true}) {
+      Header header(bytes, layout, swapped);
+      if (header.get<std::int32_t>(0) != layout.header) continue;
+      const std::size_t more = static_cast<std::size_t>(layout.header) - bytes.size();
+      bytes.resize(static_cast<std::size_t>(layout.header));
+      if (!file.read(bytes.data() + kFirst.header, more)) throw not_nifti(path);
+      header = Header(bytes, layout, swapped);
+      const std::size_t m = layout.magic;
+      const bool named = header.byte(m) == 'n' && header.byte(m + 2) == (layout.wide ? '2' : '1');
+      if (named && header.byte(m + 1) == 'i') {
+        throw Error(path.string() +
+                    ": the header of a NIfTI pair (.hdr and .img), expected header and voxels in "
+                    "one file; save it as .nii.gz");
+      }
+      if (named && header.byte(m + 1) == '+') return header;
+    }
+  }
+  throw not_nifti(path);
+}
+
+double mm_per_unit(const Header& header, const fs::path& path) {
+  const std::size_t at = header.layout().units;
+  const int unit = (header.layout().wide ? header.code(at) : header.byte(at)) & 7;
+  switch (unit) {
+    case 0:  // not told: mm, as all readers take it
+    case 2:
+      return 1.0;
+    case 1:
+      return 1000.0;
+    case 3:
+      return 1e-3;
+    default:
+      throw Error(path.string() + ": its spatial unit has code " + std::to_string(unit) +
+                  ", expected 1 (m), 2 (mm), 3 (micrometres) or 0; mend the header's xyzt_units");
+  }
+}
+
+/// From voxel to place in RAS mm.
+struct Form {
+  Mat3 axes;  // columns: a step along i, j, k
+  Vec3 origin;
+};
+
+Form sform_of(const Header& header, double unit) {
+  Form form;
+  for (int row = 0; row < 3; ++row) {
+    for (int column = 0; column < 3; ++column) {
+      form.axes(row, column) =
+          unit * header.real(header.layout().sform, static_cast<std::size_t>(4 * row + column));
+    }
+    form.origin[row] =
+        unit * header.real(header.layout().sform, static_cast<std::size_t>(4 * row + 3));
+  }
+  return form;
+}
+
+Form qform_of(const Header& header, const Vec3& spacing, double unit) {
+  const auto number = [&](std::size_t k) { return header.real(header.layout().quaternion, k); };
+  const Vec3 imaginary(number(0), number(1), number(2));
+  const double real = std::sqrt(std::max(0.0, 1.0 - imaginary.squaredNorm()));
+  Eigen::Quaterniond turn(real, imaginary.x(), imaginary.y(), imaginary.z());
+  turn.normalize();
+  const double handed = header.real(header.layout().spacing) < 0.0 ? -1.0 : 1.0;
+  return {
+      turn.toRotationMatrix() * Vec3(spacing.x(), spacing.y(), handed * spacing.z()).asDiagonal(),
+      unit * Vec3(number(3), number(4), number(5))};
+}
+
+double largest_distance(const Form& a, const Form& b, const std::array<int, 3>& size) {
+  double largest = 0.0;
+  for (int corner = 0; corner < 8; ++corner) {
+    const Vec3 ijk((corner & 1) * (size[0] - 1), (corner >> 1 & 1) * (size[1] - 1),
+                   (corner >> 2) * (size[2] - 1));
+    largest = std::max(largest, ((a.axes - b.axes) * ijk + a.origin - b.origin).norm());
+  }
+  return largest;
+}
+
+/// The transform to go by. Both forms of a file may differ by rounding, not by a place.
+Form choose_form(const Header& header, const Grid& grid, double unit, const fs::path& path) {
+  const bool has_qform = header.code(header.layout().qform_code) > 0;
+  const bool has_sform = header.code(header.layout().qform_code, 1) > 0;
+  if (!has_qform && !has_sform) return {grid.spacing.asDiagonal(), Vec3::Zero()};
+  const Form qform = qform_of(header, grid.spacing, unit), sform = sform_of(header, unit);
+  if (has_qform && has_sform) {
+    const double apart = largest_distance(qform, sform, grid.size);
+    if (!(apart <= 0.5 * grid.spacing.minCoeff())) {
+      throw Error(path.string() + ": its two transforms place a corner of the volume " +
+                  one_decimal(apart) + " mm apart (shear of qform " +
+                  one_decimal(shear_degrees(qform.axes)) + ", of sform " +
+                  one_decimal(shear_degrees(sform.axes)) +
+                  " degrees), expected the same place by qform and sform; save it again from the "
+                  "program in "
+                  "which the points were picked, or set the code of the wrong one to 0");
+    }
+  }
+  return has_sform ? sform : qform;
+}
+
+Grid grid_of(const Header& header, const fs::path& path) {
+  const double unit = mm_per_unit(header, path);
+  Grid grid;
+  const std::int64_t axes = header.dimension(0);
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const std::int64_t size =
+        static_cast<std::int64_t>(axis) < axes ? header.dimension(axis + 1) : 1;
+    if (size < 1 || size > 100000) throw damaged_nifti(path);
+    grid.size[axis] = static_cast<int>(size);
+    const double step = std::abs(header.real(header.layout().spacing, axis + 1));
+    grid.spacing[static_cast<Eigen::Index>(axis)] = unit * (step == 0.0 ? 1.0 : step);
+  }
+  require_volume(grid, path);
+  for (std::size_t axis = 4; axis <= static_cast<std::size_t>(std::min<std::int64_t>(axes, 7));
+       ++axis) {
+    if (header.dimension(axis) > 1) throw several_volumes(header.dimension(axis), path);
+  }
+
+  const Form form = choose_form(header, grid, unit, path);
+  constexpr double kFar = 1e6;  // a kilometre
+  if (!form.axes.allFinite() || !form.origin.allFinite() || !(grid.spacing.maxCoeff() < kFar) ||
+      form.axes.cwiseAbs().maxCoeff() > kFar || form.origin.cwiseAbs().maxCoeff() > kFar ||
+      form.axes.colwise().norm().minCoeff() < 1e-6) {
+    throw damaged_nifti(path);
+  }
+  const Vec3 lps(-1.0, -1.0, 1.0);  // of RAS
+  const Mat3 steps = lps.asDiagonal() * form.axes;
+  grid.spacing = steps.colwise().norm().transpose();
+  grid.direction = orthonormal_direction(steps * grid.spacing.cwiseInverse().asDiagonal(), path);
+  grid.origin = lps.cwiseProduct(form.origin);
+  return grid;
+}
+
+/// Reads all voxels of a type as floats; false where there are not as many.
+template <typename Stored>
+bool read_as(ByteStream& file, bool swapped, std::vector<float>& values) {
+  constexpr std::size_t kAtOnce = std::size_t{1} << 16U;
+  std::vector<unsigned char> bytes(kAtOnce * sizeof(Stored));
+  for (std::size_t done = 0; done < values.size();) {
+    const std::size_t count = std::min(kAtOnce, values.size() - done);
+    if (!file.read(bytes.data(), count * sizeof(Stored))) return false;
+    for (std::size_t k = 0; k < count; ++k) {
+      std::array<unsigned char, sizeof(Stored)> one{};
+      const unsigned char* from = bytes.data() + k * sizeof(Stored);
+      if (swapped) {
+        std::reverse_copy(from, from + sizeof(Stored), one.begin());
+      } else {
+        std::copy(from, from + sizeof(Stored), one.begin());
+      }
+      values[done + k] = static_cast<float>(std::bit_cast<Stored>(one));
+    }
+    done += count;
+  }
+  return true;
+}
+
+/// By the codes of nifti1.h.
+bool read_values(const Header& header, ByteStream& file, const fs::path& path,
+                 std::vector<float>& values) {
+  switch (header.get<std::int16_t>(header.layout().type)) {
+    case 2:
+      return read_as<std::uint8_t>(file, header.swapped(), values);
+    case 4:
+      return read_as<std::int16_t>(file, header.swapped(), values);
+    case 8:
+      return read_as<std::int32_t>(file, header.swapped(), values);
+    case 16:
+      return read_as<float>(file, header.swapped(), values);
+    case 64:
+      return read_as<double>(file, header.swapped(), values);
+    case 256:
+      return read_as<std::int8_t>(file, header.swapped(), values);
+    case 512:
+      return read_as<std::uint16_t>(file, header.swapped(), values);
+    case 768:
+      return read_as<std::uint32_t>(file, header.swapped(), values);
+    case 1024:
+      return read_as<std::int64_t>(file, header.swapped(), values);
+    case 1280:
+      return read_as<std::uint64_t>(file, header.swapped(), values);
+    case 32:
+    case 1792:
+      throw several_values(2, path);
+    case 128:
+      throw several_values(3, path);
+    case 2304:
+      throw several_values(4, path);
+    default:
+      throw unknown_values(path);
+  }
+}
+
+}  // namespace
+
+Image read_nifti(const fs::path& path) {
+  ByteStream file(path);
+  const Header header = read_header(file, path);
+  Image image;
+  image.grid = grid_of(header, path);
+  const double offset = header.layout().wide
+                            ? static_cast<double>(header.get<std::int64_t>(header.layout().offset))
+                            : static_cast<double>(header.get<float>(header.layout().offset));
+  // What lies between the header and the voxels are extensions; the header may leave the place
+  // open.
+  const double start = std::max(offset, static_cast<double>(header.layout().header + 4));
+  constexpr double kFarthest = 1e8;
+  std::vector<unsigned char> extensions;
+  if (start < kFarthest) {
+    extensions.resize(static_cast<std::size_t>(start) -
+                      static_cast<std::size_t>(header.layout().header));
+  }
+  if (extensions.empty() || !file.read(extensions.data(), extensions.size())) {
+    throw damaged_nifti(path);
+  }
+  // No room is taken for more than such a file can hold: deflate packs 1032 to 1 at most.
+  constexpr double kMostPacked = 1040.0;
+  if (static_cast<double>(image.grid.voxels()) >
+      kMostPacked * static_cast<double>(fs::file_size(path))) {
+    throw damaged_nifti(path);
+  }
+  image.values.resize(image.grid.voxels());
+  if (!read_values(header, file, path, image.values) || !file.ends_whole()) {
+    throw damaged_nifti(path);
+  }
+
+  // A slope of 0 means none.
+  const double slope = header.real(header.layout().slope),
+               shift = header.real(header.layout().slope, 1);
+  if (slope != 0.0 && (slope != 1.0 || shift != 0.0)) {
+    if (!std::isfinite(slope) || !std::isfinite(shift)) throw damaged_nifti(path);
+    for (float& value : image.values) value = static_cast<float>(slope * value + shift);
+  }
+  return image;
+}
+
+}  // namespace wireplan::preprocess

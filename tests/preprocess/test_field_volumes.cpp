@@ -1,0 +1,348 @@
+// Volumes as scanners, archives and programs write them, beside what the standards' first pages
+// say.
+#include <gtest/gtest.h>
+#include <zlib.h>
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <fstream>
+
+#include "preprocess/volume/dicom_check.h"
+#include "preprocess/volume/image.h"
+#include "preprocess/volume/voxels.h"
+#include "tests/dicom.h"
+#include "tests/preprocess/image_file.h"
+#include "tests/preprocess/nifti_bytes.h"
+
+namespace wireplan::preprocess {
+namespace {
+
+using dicom_files::dicom;
+using dicom_files::DicomSlice;
+using dicom_files::element;
+
+/// The same bytes in gzip members of so many bytes each.
+std::string gzip(const std::string& bytes, std::size_t member) {
+  std::string packed;
+  for (std::size_t at = 0; at < bytes.size(); at += member) {
+    std::string part(bytes.size() + 100, '\0');
+    z_stream stream{};
+    deflateInit2(&stream, 6, Z_DEFLATED, 16 + MAX_WBITS, 8, Z_DEFAULT_STRATEGY);
+    std::string input = bytes.substr(at, member);
+    stream.next_in = reinterpret_cast<unsigned char*>(input.data());
+    stream.avail_in = static_cast<unsigned>(input.size());
+    stream.next_out = reinterpret_cast<unsigned char*>(part.data());
+    stream.avail_out = static_cast<unsigned>(part.size());
+    EXPECT_EQ(deflate(&stream, Z_FINISH), Z_STREAM_END);
+    packed += part.substr(0, stream.total_out);
+    deflateEnd(&stream);
+  }
+  return packed;
+}
+
+class FieldVolume : public ImageFile {};
+
+// ---- NIfTI --------------------------------------------------------------------------------------
+
+TEST_F(FieldVolume, NiftiUnitsScaleSpacingAndPlace) {
+  const Image mm = read_image(write("mm.nii", nifti({})));
+  for (const auto& [code, factor] : {std::pair(char{1}, 1000.0), std::pair(char{3}, 1e-3)}) {
+    const Image image = read_image(write("other.nii", nifti({.units = code})));
+    EXPECT_LT((image.grid.spacing - factor * mm.grid.spacing).norm(), 1e-9 * factor);
+    EXPECT_LT((image.grid.origin - factor * mm.grid.origin).norm(), 1e-9 * factor);
+    EXPECT_EQ(image.values, mm.values);
+  }
+  EXPECT_TRUE(has(read_error(write("odd.nii", nifti({.units = 7}))), "spatial unit has code 7"));
+}
+
+TEST_F(FieldVolume, NiftiOfARoundingShearIsReadAndOfALargerOneRefusedWithTheAngle) {
+  std::array<float, 12> rows = NiftiHeader{}.rows;
+  rows[1] = 3e-3F;  // of 3 mm along j: 1e-3
+  EXPECT_EQ(read_image(write("small.nii", nifti({.rows = rows}))).values.size(), 24U);
+  rows[1] = 1.0F;
+  const std::string error = read_error(write("large.nii", nifti({.rows = rows})));
+  EXPECT_TRUE(has(error, "large.nii") && has(error, "sheared by 18.4 degrees")) << error;
+}
+
+TEST_F(FieldVolume, NiftiGoesByItsQformWhereItHasNoOther) {
+  // Half a turn about z, as RAS (-, -, +).
+  const Image image =
+      read_image(write("q.nii", nifti({.codes = {1, 0}, .quaternion = {0, 0, 1, 10, 20, 30}})));
+  EXPECT_LT((image.grid.lps_from_ijk(Vec3(1, 2, 3)) - Vec3(-10 + 2, -20 + 6, 30 + 12)).norm(),
+            1e-5);
+}
+
+TEST_F(FieldVolume, NiftiWhoseTwoFormsDifferIsRefusedAndWhoseFormsAgreeIsRead) {
+  const std::array<float, 12> rows = {-2, 0, 0, 70, 0, -3, 0, -40, 0, 0, 4, 500};
+  NiftiHeader header{.codes = {1, 1}, .quaternion = {0, 0, 1, 70, -40, 500}, .rows = rows};
+  EXPECT_EQ(read_image(write("same.nii", nifti(header))).values.size(), 24U);
+  header.quaternion[3] = 75.0F;
+  const std::string error = read_error(write("other.nii", nifti(header)));
+  EXPECT_TRUE(has(error, "5.0 mm apart") && has(error, "qform and sform")) << error;
+}
+
+TEST_F(FieldVolume, NiftiIsReadBesideATwinOfTheOtherExtension) {
+  const std::string wanted = nifti({.slope = 2.0F});
+  write("ct.nii", nifti({}));
+  const Image image = read_image(write("ct.nii.gz", gzip(wanted, wanted.size())));
+  EXPECT_EQ(image.values[5], 10.0F);
+  EXPECT_EQ(read_image(folder_ / "ct.nii").values[5], 5.0F);
+}
+
+TEST_F(FieldVolume, NiftiInSeveralMembersIsWholeAndWithoutItsLastByteIsNot) {
+  const std::string packed = gzip(nifti({}), 100);
+  EXPECT_EQ(read_image(write("members.nii.gz", packed)).values[23], 23.0F);
+  EXPECT_TRUE(
+      has(read_error(write("cut.nii.gz", packed.substr(0, packed.size() - 1))), "cut short"));
+}
+
+TEST_F(FieldVolume, NiftiThatPromisesMoreThanAFileCanHoldTakesNoMemoryForIt) {
+  std::string bytes = nifti({});
+  const std::array<std::int16_t, 4> dim = {3, 32000, 32000, 32000};
+  std::memcpy(bytes.data() + 40, dim.data(), sizeof dim);
+  EXPECT_TRUE(has(read_error(write("huge.nii", bytes)), "cut short"));
+}
+
+TEST_F(FieldVolume, NiftiOfTheOtherOrderOfBytesAndOfTheSecondVersionAreRead) {
+  const std::string first = nifti({.slope = 2.0F, .intercept = 1.0F});
+  const Image expected = read_image(write("first.nii", first));
+
+  std::string swapped = first;  // by the sizes of the header's fields that matter
+  const auto swap = [&](std::size_t at, std::size_t size, std::size_t count) {
+    for (std::size_t k = 0; k < count; ++k) {
+      std::reverse(swapped.begin() + static_cast<std::ptrdiff_t>(at + k * size),
+                   swapped.begin() + static_cast<std::ptrdiff_t>(at + (k + 1) * size));
+    }
+  };
+  swap(0, 4, 1);
+  swap(40, 2, 8);
+  swap(70, 2, 2);
+  swap(76, 4, 8);
+  swap(108, 4, 3);
+  swap(252, 2, 2);
+  swap(256, 4, 18);
+  swap(352, 2, 24);
+  const Image big_endian = read_image(write("swapped.nii", swapped));
+  EXPECT_EQ(big_endian.values, expected.values);
+  EXPECT_EQ(big_endian.grid.origin, expected.grid.origin);
+
+  std::string second(544, '\0');  // offsets of nifti2.h
+  const auto put = [&](std::size_t at, auto value) {
+    std::memcpy(second.data() + at, &value, sizeof value);
+  };
+  put(0, std::int32_t{540});
+  put(4, std::array<char, 8>{'n', '+', '2', '\0', '\r', '\n', '\032', '\n'});
+  put(12, std::int16_t{4});
+  put(16, std::array<std::int64_t, 8>{3, 2, 3, 4, 1, 1, 1, 1});
+  put(104, std::array<double, 8>{1, 2, 3, 4, 1, 1, 1, 1});
+  put(168, std::int64_t{544});
+  put(176, std::array<double, 2>{2.0, 1.0});
+  put(348, std::int32_t{1});
+  put(400, std::array<double, 12>{-2, 0, 0, 70, 0, 3, 0, -40, 0, 0, 4, 500});
+  put(500, std::int32_t{2});
+  const Image wide = read_image(write("second.nii", second + first.substr(352)));
+  EXPECT_EQ(wide.values, expected.values);
+  EXPECT_EQ(wide.grid.spacing, expected.grid.spacing);
+  EXPECT_EQ(wide.grid.origin, expected.grid.origin);
+}
+
+// ---- NRRD and MetaImage -------------------------------------------------------------------------
+
+TEST_F(FieldVolume, NrrdUnitsAreHonouredAndAnUnknownPackingNamed) {
+  const auto nrrd = [](const std::string& more, const std::string& encoding) {
+    return "NRRD0004\ntype: uint8\ndimension: 3\nspace: LPS\nsizes: 2 2 2\n"
+           "space directions: (0.1,0,0) (0,0.2,0) (0,0,0.3)\nspace origin: (1,2,3)\nencoding: " +
+           encoding + "\n" + more + "\nabcdefgh";
+  };
+  const Image image =
+      read_image(write("cm.nrrd", nrrd("space units: \"cm\" \"cm\" \"cm\"\n", "raw")));
+  EXPECT_LT((image.grid.spacing - Vec3(1, 2, 3)).norm(), 1e-12);
+  EXPECT_LT((image.grid.origin - Vec3(10, 20, 30)).norm(), 1e-12);
+  const std::string mixed =
+      read_error(write("mixed.nrrd", nrrd("space units: \"cm\" \"mm\" \"cm\"\n", "raw")));
+  EXPECT_TRUE(has(mixed, "mixed.nrrd: space units \"cm\" \"mm\" \"cm\"")) << mixed;
+  const std::string packed = read_error(write("b.nrrd", nrrd("", "bzip2")));
+  EXPECT_TRUE(has(packed, "packed with \"bzip2\"") && !has(packed, "damaged")) << packed;
+}
+
+TEST_F(FieldVolume, MetaImageMayHoldAnyTextAndItsUnitsAreHonoured) {
+  const auto meta = [](const std::string& more) {
+    return "ObjectType = Image\nNDims = 3\n" + more +
+           "DimSize = 2 2 2\nElementSpacing = 1 2 3\nOffset = 4 5 6\nElementType = MET_UCHAR\n"
+           "ElementDataFile = LOCAL\nabcdefgh";
+  };
+  for (const std::string& text :
+       {std::string("Comment = J\xc3\xbcrgen, \xe5\xb7\xa6\n"),
+        "Reason = " + std::string(5000, 'x') + "\n", std::string("\xc3\xbc = 1\n")}) {
+    const Image image = read_image(write("text.mha", meta(text)));
+    EXPECT_EQ(image.values[7], static_cast<float>('h'));
+    EXPECT_EQ(image.grid.spacing, Vec3(1, 2, 3));
+  }
+  const Image cm = read_image(write("cm.mha", meta("DistanceUnits = cm\n")));
+  EXPECT_EQ(cm.grid.spacing, Vec3(10, 20, 30));
+  EXPECT_EQ(cm.grid.origin, Vec3(40, 50, 60));
+  EXPECT_TRUE(
+      has(read_error(write("ft.mha", meta("DistanceUnits = ft\n"))), "DistanceUnits is ft"));
+}
+
+// ---- DICOM --------------------------------------------------------------------------------------
+
+/// A sequence of items, each of whose elements are given as bytes.
+std::string sequence(std::uint16_t group, std::uint16_t number,
+                     const std::vector<std::string>& items) {
+  std::string inside;
+  for (const std::string& item : items) {
+    dicom_files::append(inside, std::uint16_t{0xfffe});
+    dicom_files::append(inside, std::uint16_t{0xe000});
+    dicom_files::append(inside, static_cast<std::uint32_t>(item.size()));
+    inside += item;
+  }
+  std::string bytes;
+  dicom_files::append(bytes, group);
+  dicom_files::append(bytes, number);
+  bytes += "SQ";
+  dicom_files::append(bytes, std::uint16_t{0});
+  dicom_files::append(bytes, static_cast<std::uint32_t>(inside.size()));
+  return bytes + inside;
+}
+
+std::string of(std::uint16_t group, std::uint16_t number, const std::string& vr,
+               const std::string& value) {
+  std::string bytes;
+  element(bytes, group, number, vr, value);
+  return bytes;
+}
+
+struct Frame {
+  double place = 0.0;  // along z                                                          [mm]
+  std::string slope = "1", intercept = "0";
+  std::string unit = "HU";
+};
+
+/// An enhanced CT of frames of 3 x 2 pixels, of values 10 k, 10 k + 1, ... in frame k.
+std::string enhanced(const std::vector<Frame>& frames, bool placed = true) {
+  const std::string ct = "1.2.840.10008.5.1.4.1.1.2.1";
+  std::string meta = of(2, 0x01, "OB", std::string("\0\1", 2)) + of(2, 0x02, "UI", ct) +
+                     of(2, 0x03, "UI", "1.2.3.9") + of(2, 0x10, "UI", "1.2.840.10008.1.2.1");
+  std::string length;
+  dicom_files::append(length, static_cast<std::uint32_t>(meta.size()));
+  std::string voxels;
+  std::vector<std::string> groups;
+  for (std::size_t k = 0; k < frames.size(); ++k) {
+    const Frame& frame = frames[k];
+    std::string group;
+    if (placed) {
+      group +=
+          sequence(0x20, 0x9113,
+                   {of(0x20, 0x32, "DS", "5\\6\\" + std::to_string(frame.place).substr(0, 6))});
+    }
+    group += sequence(0x28, 0x9145,
+                      {of(0x28, 0x1052, "DS", frame.intercept) +
+                       of(0x28, 0x1053, "DS", frame.slope) + of(0x28, 0x1054, "LO", frame.unit)});
+    groups.push_back(group);
+    for (int n = 0; n < 6; ++n) {
+      dicom_files::append(voxels, static_cast<std::int16_t>(10 * static_cast<int>(k) + n));
+    }
+  }
+  const std::string shared =
+      sequence(0x20, 0x9116, {of(0x20, 0x37, "DS", "1\\0\\0\\0\\1\\0")}) +
+      sequence(0x28, 0x9110, {of(0x18, 0x50, "DS", "9") + of(0x28, 0x30, "DS", "0.8\\0.6")});
+  using dicom_files::short_value;
+  return std::string(128, '\0') + "DICM" + of(2, 0, "UL", length) + meta +
+         of(0x08, 0x16, "UI", ct) + of(0x08, 0x18, "UI", "1.2.3.9") + of(0x08, 0x60, "CS", "CT") +
+         of(0x20, 0x0d, "UI", "1.2.3") + of(0x20, 0x0e, "UI", "1.2.4") + of(0x20, 0x11, "IS", "7") +
+         of(0x28, 0x02, "US", short_value(1)) + of(0x28, 0x04, "CS", "MONOCHROME2") +
+         of(0x28, 0x08, "IS", std::to_string(frames.size())) +
+         of(0x28, 0x10, "US", short_value(2)) + of(0x28, 0x11, "US", short_value(3)) +
+         of(0x28, 0x100, "US", short_value(16)) + of(0x28, 0x101, "US", short_value(16)) +
+         of(0x28, 0x102, "US", short_value(15)) + of(0x28, 0x103, "US", short_value(1)) +
+         sequence(0x5200, 0x9229, {shared}) + sequence(0x5200, 0x9230, groups) +
+         of(0x7fe0, 0x10, "OW", voxels);
+}
+
+TEST_F(FieldVolume, FramesOfAnEnhancedCtAreSortedAndEachScaledByItsOwnSlope) {
+  write("ct.dcm", enhanced({{.place = 4.5, .slope = "0.5"},
+                            {.place = 0.0, .intercept = "-1000"},
+                            {.place = 1.5},
+                            {.place = 3.0, .slope = "2"}}));
+  const Image image = read_image(folder_);
+  ASSERT_EQ(image.grid.size, (std::array<int, 3>{3, 2, 4}));
+  EXPECT_LT((image.grid.spacing - Vec3(0.6, 0.8, 1.5)).norm(), 1e-6);
+  EXPECT_LT((image.grid.origin - Vec3(5, 6, 0)).norm(), 1e-6);
+  EXPECT_EQ(image.modality, "CT");
+  for (int n = 0; n < 6; ++n) {
+    EXPECT_EQ(image.values[static_cast<std::size_t>(n)], 10.0F + static_cast<float>(n) - 1000.0F);
+    EXPECT_EQ(image.values[static_cast<std::size_t>(6 + n)], 20.0F + static_cast<float>(n));
+    EXPECT_EQ(image.values[static_cast<std::size_t>(12 + n)],
+              2.0F * (30.0F + static_cast<float>(n)));
+    EXPECT_EQ(image.values[static_cast<std::size_t>(18 + n)], 0.5F * static_cast<float>(n));
+  }
+}
+
+TEST_F(FieldVolume, FramesWithoutPlacesUnevenOrNotInHounsfieldUnitsAreRefused) {
+  write("ct.dcm", enhanced({{.place = 0}, {.place = 1}, {.place = 2}}, /*placed=*/false));
+  EXPECT_TRUE(has(read_error(folder_), "3 frames that does not tell where each lies"));
+  write("ct.dcm", enhanced({{.place = 0}, {.place = 1}, {.place = 3}}));
+  EXPECT_TRUE(has(read_error(folder_), "uneven slices")) << read_error(folder_);
+  write("ct.dcm", enhanced({{.place = 0}, {.place = 1, .unit = "Z_EFF"}, {.place = 2}}));
+  EXPECT_TRUE(has(read_error(folder_), "not in HU but, by its rescale type, Z_EFF"));
+}
+
+TEST_F(FieldVolume, SlicesWithoutTheHeadOfAFileAndWithBytesBehindThePixelsAreRead) {
+  for (int k = 0; k < 4; ++k) {
+    std::string bytes =
+        dicom({.position = Vec3(0, 0, 1.5 * k), .first_value = static_cast<std::int16_t>(10 * k)});
+    // The data set begins with group 8.
+    const std::size_t data_set = bytes.find(std::string("\x08\x00\x16\x00UI", 6));
+    ASSERT_NE(data_set, std::string::npos);
+    if (k % 2 == 1) bytes = bytes.substr(data_set);
+    if (k >= 2) bytes += std::string(37, '\0');
+    write("slice" + std::to_string(k), bytes);
+  }
+  const Image image = read_image(folder_);
+  ASSERT_EQ(image.grid.size, (std::array<int, 3>{3, 2, 4}));
+  for (std::size_t k = 0; k < 4; ++k) {
+    EXPECT_EQ(image.values[6 * k + 5], 10.0F * static_cast<float>(k) + 5.0F);
+  }
+}
+
+TEST_F(FieldVolume, TheSeriesThatAloneIsAVolumeIsReadAmongScouts) {
+  const auto write_slice = [&](const std::string& series, int k, double place) {
+    write(series + "_" + std::to_string(k),
+          dicom({.series = "1.2." + series, .number = series, .position = Vec3(0, 0, place)}));
+  };
+  for (int k = 0; k < 6; ++k) write_slice("3", k, 2.0 * k);
+  for (int k = 0; k < 2; ++k) write_slice("1", k, 100.0 * k);
+  EXPECT_EQ(read_image(folder_).grid.size[2], 6);
+  for (int k = 0; k < 5; ++k) write_slice("4", k, 2.0 * k);
+  const std::string error = read_error(folder_);
+  EXPECT_TRUE(has(error, "3 DICOM series") && has(error, "number 4 has 5 images of 3 x 2 pixels"))
+      << error;
+}
+
+TEST_F(FieldVolume, ManyImagesOfOnePlaceAreNoVolume) {
+  for (int k = 0; k < 5; ++k) {
+    write("slice" + std::to_string(k), dicom({.position = Vec3(0, 0, k == 4 ? 1.0 : 0.0)}));
+  }
+  const std::string error = read_error(folder_);
+  EXPECT_TRUE(has(error, "at the same place (5 images at 2 places")) << error;
+}
+
+// ---- Voxels between thick slices ----------------------------------------------------------------
+
+TEST(ThickSlices, ABallBetweenTwoHoldsTheVoxelsThatItTouches) {
+  const Grid grid{.size = {9, 9, 4}, .spacing = Vec3(1, 1, 5)};
+  const std::vector<std::size_t> between = voxels_in_ball(grid, Vec3(4, 4, 7.5), 1.0);
+  ASSERT_EQ(between.size(), 2U * 9U);
+  for (const std::size_t n : between) {
+    const Voxel v = voxel_at(grid, n);
+    EXPECT_TRUE(v[2] == 1 || v[2] == 2);
+    EXPECT_LE(std::max(std::abs(v[0] - 4), std::abs(v[1] - 4)), 1);
+  }
+  EXPECT_EQ(voxels_in_ball(grid, Vec3(4, 4, 5), 1.0).size(), 5U);  // a slice's own
+  EXPECT_TRUE(voxels_in_ball(grid, Vec3(4, 4, 30), 1.0).empty());
+}
+
+}  // namespace
+}  // namespace wireplan::preprocess
