@@ -435,11 +435,20 @@ SurfaceInput read_surface_input(JsonReader& reader, const std::filesystem::path&
                           "a name that ends in .stl, .ply, .obj or .vtp");
   }
 
-  // An STL, PLY or OBJ carries neither.
+  // No file tells its unit, and few their frame.
   const bool is_vtp = extension == ".vtp";
   using Fallback = std::optional<std::string>;
   surface.unit = reader.choice("unit", is_vtp ? Fallback("mm") : std::nullopt, {"mm", "cm", "m"});
-  surface.frame = reader.choice("frame", is_vtp ? Fallback("LPS") : std::nullopt, {"LPS", "RAS"});
+  const std::string told = preprocess::told_frame(surface.path);
+  const Fallback fallback = !told.empty() ? Fallback(told)
+                            : is_vtp      ? Fallback("LPS")
+                                          : std::nullopt;
+  surface.frame = reader.choice("frame", fallback, {"LPS", "RAS"});
+  if (!told.empty() && !surface.frame.empty() && surface.frame != told) {
+    reader.problems().add(reader.path_of("frame"), "\"" + surface.frame + "\"",
+                          "\"" + told + "\", as the file itself says",
+                          "delete the key, or mend the file");
+  }
   return surface;
 }
 

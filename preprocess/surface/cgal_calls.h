@@ -3,6 +3,7 @@
 /// take two minutes of compiling and sanitizers leave them out. For the .cpp files here, not for
 /// other folders.
 #include <functional>
+#include <optional>
 #include <utility>
 #include <vector>
 
@@ -19,6 +20,10 @@ std::vector<std::pair<int, int>> cutting_pairs(const Surface& surface);
 /// than an angle.
 Surface remesh_parts(const Surface& surface, const std::vector<int>& part_of_triangle,
                      const std::vector<double>& edge_length, double crease_deg, int iterations);
+
+/// What at least one of two closed surfaces encloses; empty where CGAL finds no manifold one, as
+/// where a surface cuts itself.
+std::optional<Surface> union_of(const Surface& a, const Surface& b);
 
 /// What it costs to give a triangle the label 0 and 1.
 struct LabelCost {

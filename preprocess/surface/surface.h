@@ -47,6 +47,11 @@ Surface surface_from_mask(const Mask& mask, const SurfaceOptions& options);
 Surface surface_from_image(const Image& image, const Mask& mask, const SurfaceOptions& options,
                            FitStatistics* statistics = nullptr);
 
+/// "LPS" or "RAS" where the file says in which frame it is, as 3D Slicer writes it: in the header
+/// of an STL, a comment of a PLY or OBJ, the field SPACE of a VTP. Empty where it does not, or is
+/// not there.
+std::string told_frame(const std::filesystem::path& path);
+
 /// Reads the triangles of an STL, PLY, OBJ or VTP file as they stand there, with two changes:
 /// points that are equal to 1e-7 of the size are merged, and polygons are cut into triangles.
 /// `unit` is "mm", "cm" or "m"; `frame` is "LPS" or "RAS" (x, y flipped). Throws `Error` where the

@@ -1,6 +1,8 @@
 #include <vtkCellArray.h>
+#include <vtkFieldData.h>
 #include <vtkPointLocator.h>
 #include <vtkSTLReader.h>
+#include <vtkStringArray.h>
 #include <vtkTriangleFilter.h>
 #include <vtkXMLPolyDataReader.h>
 
@@ -13,6 +15,7 @@
 #include <fstream>
 #include <optional>
 #include <sstream>
+#include <string_view>
 #include <vector>
 
 #include "preprocess/surface/surface.h"
@@ -36,29 +39,85 @@ vtkSmartPointer<vtkPolyData> read_with(const std::filesystem::path& path) {
   return reader->GetOutput();
 }
 
-/// VTK takes room for as many triangles as the header of a binary STL promises, whatever the file
-/// holds. It takes for binary what has 5 % of other bytes than text in its first 256.
-void require_whole_stl(const std::filesystem::path& path) {
+// ---- STL: VTK tells text from binary by how much of the first 256 bytes is ASCII, which a name
+// need not be
+// ----------------------------------------------------------------------------------------
+
+enum class StlForm { kText, kBinary };
+
+/// By the number of triangles in the header of a binary file, which its size must fit; what does
+/// not and begins as text is text. VTK takes room for as many as the header promises, whatever the
+/// file holds.
+StlForm stl_form(const std::filesystem::path& path) {
   constexpr std::size_t kHead = 84, kTriangle = 50;
   std::ifstream stream(path, std::ios::binary);
-  std::array<char, 256> head{};
+  std::array<char, kHead> head{};
   stream.read(head.data(), head.size());
-  const auto length = static_cast<std::size_t>(stream.gcount());
-  const auto text = std::count_if(head.begin(), head.begin() + length, [](char c) {
-    const auto byte = static_cast<unsigned char>(c);
-    return (byte >= 0x20 && byte <= 0x7F) || c == '\n' || c == '\r' || c == '\t';
-  });
-  if (20 * (length - static_cast<std::size_t>(text)) < length) return;
+  const std::string_view text(head.data(), static_cast<std::size_t>(stream.gcount()));
   std::uint32_t triangles = 0;
   for (std::size_t k = 4; k-- > 0;) {
     triangles = triangles << 8U | static_cast<unsigned char>(head[kHead - 4 + k]);
   }
-  const std::uintmax_t bytes = std::filesystem::file_size(path);
-  if (length >= kHead && kHead + kTriangle * std::uintmax_t{triangles} <= bytes) return;
+  const std::uintmax_t bytes = std::filesystem::file_size(path),
+                       expected = kHead + kTriangle * std::uintmax_t{triangles};
+  const std::size_t first = text.find_first_not_of(" \t\r\n");
+  const bool solid = first != std::string_view::npos && text.substr(first).starts_with("solid");
+  if (text.size() == kHead && (solid ? expected == bytes : expected <= bytes)) {
+    return StlForm::kBinary;
+  }
+  const bool is_text = std::all_of(text.begin(), text.end(), [](char c) {
+    return static_cast<unsigned char>(c) >= 0x20 || c == '\n' || c == '\r' || c == '\t';
+  });
+  if (solid || is_text) return StlForm::kText;
   throw Error(path.string() + ": a binary STL of " + std::to_string(bytes) + " bytes, expected " +
-              std::to_string(kHead + kTriangle * std::uintmax_t{triangles}) + " for the " +
-              std::to_string(triangles) +
+              std::to_string(expected) + " for the " + std::to_string(triangles) +
               " triangles of its header; copy or export the surface again");
+}
+
+/// Three lines "vertex x y z" for each facet, in a file that begins with "solid" and any name.
+vtkSmartPointer<vtkPolyData> read_text_stl(const std::filesystem::path& path) {
+  vtkNew<vtkPoints> points;
+  points->SetDataTypeToFloat();  // as VTK has it
+  vtkNew<vtkCellArray> triangles;
+  std::ifstream stream(path, std::ios::binary);
+  std::string line, word;
+  int number = 0;
+  const auto require = [&](bool sound, const char* what) {
+    if (sound) return;
+    throw Error(path.string() + ": cannot be read as a surface (line " + std::to_string(number) +
+                ": " + what + "); expected STL, PLY, OBJ or VTP as the file's ending says");
+  };
+  vtkIdType corners = 0;  // of the facet so far
+  bool solid = false, ended = false;
+  while (std::getline(stream, line)) {
+    ++number;
+    std::istringstream words(line);
+    if (!(words >> word)) continue;
+    std::transform(word.begin(), word.end(), word.begin(),
+                   [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+    require(solid || word == "solid", "no \"solid\" at its begin");
+    if (word == "solid") solid = true;
+    ended = ended || word == "endsolid";
+    if (word == "vertex") {
+      Vec3 p;
+      require(static_cast<bool>(words >> p.x() >> p.y() >> p.z()),
+              "a vertex without three numbers");
+      points->InsertNextPoint(p.data());
+      ++corners;
+    } else if (word == "endfacet") {
+      require(corners == 3, "a facet that has not three vertices");
+      const vtkIdType last = points->GetNumberOfPoints();
+      const std::array<vtkIdType, 3> ids = {last - 3, last - 2, last - 1};
+      triangles->InsertNextCell(3, ids.data());
+      corners = 0;
+    }
+  }
+  require(solid, "no \"solid\" at its begin");
+  require(ended && corners == 0, "the file breaks off");
+  vtkNew<vtkPolyData> result;
+  result->SetPoints(points);
+  result->SetPolys(triangles);
+  return result;
 }
 
 // ---- PLY by hand: VTK's reader ends the program where a file is cut short ---------------------
@@ -297,8 +356,7 @@ vtkSmartPointer<vtkPolyData> read_any(const std::filesystem::path& path) {
   std::transform(ending.begin(), ending.end(), ending.begin(),
                  [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
   if (ending == ".stl") {
-    require_whole_stl(path);
-    return read_with<vtkSTLReader>(path);
+    return stl_form(path) == StlForm::kText ? read_text_stl(path) : read_with<vtkSTLReader>(path);
   }
   if (ending == ".ply") return read_ply(path);
   if (ending == ".obj") return read_obj(path);
@@ -356,7 +414,31 @@ Vec3 lps_signs(const std::string& frame, const std::string& place) {
   throw Error(place + ": frame \"" + frame + "\" is not known; expected LPS or RAS");
 }
 
+/// The text of the field SPACE, where the beginning of a VTP names one.
+std::string space_of_vtp(const std::filesystem::path& path, const std::string& beginning) {
+  if (beginning.find("Name=\"SPACE\"") == std::string::npos) return {};
+  const vtkSmartPointer<vtkPolyData> data = read_with<vtkXMLPolyDataReader>(path);
+  auto* space = vtkStringArray::SafeDownCast(data->GetFieldData()->GetAbstractArray("SPACE"));
+  return space != nullptr && space->GetNumberOfValues() > 0 ? space->GetValue(0) : std::string();
+}
+
 }  // namespace
+
+std::string told_frame(const std::filesystem::path& path) try {
+  std::ifstream stream(path, std::ios::binary);
+  std::string text(std::size_t{1} << 16U, '\0');
+  stream.read(text.data(), static_cast<std::streamsize>(text.size()));
+  text.resize(static_cast<std::size_t>(std::max<std::streamsize>(0, stream.gcount())));
+  std::string space = space_of_vtp(path, text);
+  if (space.empty()) {
+    // 3D Slicer's mark in the header of an STL or a comment of a PLY or OBJ.
+    const std::size_t mark = text.find("SPACE=");
+    if (mark != std::string::npos) space = text.substr(mark + 6, 3);
+  }
+  return space == "RAS" || space == "LPS" ? space : "";
+} catch (const Error&) {
+  return {};  // told where it is read
+}
 
 Surface read_triangles(const std::filesystem::path& path, const std::string& unit,
                        const std::string& frame) {

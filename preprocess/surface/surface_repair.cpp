@@ -4,8 +4,10 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <optional>
 #include <utility>
 
+#include "preprocess/surface/cgal_calls.h"
 #include "preprocess/surface/surface.h"
 #include "preprocess/surface/surface_mend.h"
 #include "preprocess/surface/triangle_sides.h"
@@ -82,8 +84,59 @@ void require_area(const Surface& s, const std::string& origin) {
               " mm enclose nothing, expected the wall of a vessel; export the surface again");
 }
 
-/// The vessel among closed or open pieces: the largest, closed; or a piece within it that is the
-/// inner skin of its wall.
+/// The triangles whose boxes come near the box of another surface.
+Surface part_near(const Surface& surface, const Surface& other) {
+  const Vec3 low = other.vertices.rowwise().minCoeff(), high = other.vertices.rowwise().maxCoeff();
+  Surface part{.vertices = surface.vertices, .triangles = {}};
+  std::vector<Eigen::Index> near;
+  for (Eigen::Index m = 0; m < surface.triangles.cols(); ++m) {
+    const Eigen::Matrix3d corners = surface.vertices(Eigen::all, surface.triangles.col(m));
+    if ((corners.rowwise().maxCoeff().array() >= low.array()).all() &&
+        (corners.rowwise().minCoeff().array() <= high.array()).all()) {
+      near.push_back(m);
+    }
+  }
+  part.triangles = surface.triangles(Eigen::all, near);
+  return part;
+}
+
+/// Whether a triangle of one cuts a triangle of the other.
+bool cut_each_other(const Surface& a, const Surface& b) {
+  const Surface near = part_near(a, b);
+  const Eigen::Index first = near.triangles.cols(), shift = near.vertices.cols();
+  if (first == 0) return false;
+  Surface both;
+  both.vertices.resize(3, shift + b.vertices.cols());
+  both.vertices << near.vertices, b.vertices;
+  both.triangles.resize(3, first + b.triangles.cols());
+  both.triangles << near.triangles, (b.triangles.array() + static_cast<int>(shift)).matrix();
+  for (const auto& [one, other] : cutting_pairs(both)) {
+    if ((one < first) != (other < first)) return true;
+  }
+  return false;
+}
+
+/// The vessel with a closed piece that overlaps it; empty where it does not.
+std::optional<Surface> unite(const Surface& vessel, const Piece& piece, const std::string& origin,
+                             std::vector<Mend>& mends) {
+  const Surface& closed = piece.surface;
+  if (check_surface(closed).open_edges > 0 || !cut_each_other(vessel, closed)) return {};
+  std::optional<Surface> united = union_of(largest_piece(vessel), closed);
+  if (!united) {
+    throw Error(origin + ": a closed piece of the surface, " + number_text(length_of(closed)) +
+                " mm long round " + place_text(middle_of(closed)) +
+                " mm, overlaps the vessel, and the two cannot be united here; unite them in the "
+                "program that made them, and export one surface");
+  }
+  mends.push_back({.kind = MendKind::kUnited,
+                   .count = static_cast<int>(closed.triangles.cols()),
+                   .place = middle_of(closed),
+                   .size = length_of(closed)});
+  return united;
+}
+
+/// The vessel among closed or open pieces: the largest, closed, with what overlaps it; or a piece
+/// within it that is the inner skin of its wall.
 Surface choose_piece(const std::vector<Piece>& pieces, const std::string& origin,
                      std::vector<Mend>& mends) {
   const Surface& first = pieces.front().surface;
@@ -96,7 +149,11 @@ Surface choose_piece(const std::vector<Piece>& pieces, const std::string& origin
     const InsideAnswer there =
         area_of(piece) < kCrumb * largest ? InsideAnswer{} : locate_piece(piece, vessel);
     if (!there.inside) {
-      mends.push_back(dropped_piece(piece));
+      if (std::optional<Surface> united = unite(vessel, pieces[k], origin, mends)) {
+        vessel = std::move(*united);
+      } else {
+        mends.push_back(dropped_piece(piece));
+      }
       continue;
     }
     std::vector<Mend> of_piece;
@@ -120,7 +177,7 @@ struct Wording {
 };
 
 /// In the order of MendKind.
-constexpr std::array<Wording, 12> kWordings = {{
+constexpr std::array<Wording, 13> kWordings = {{
     {"duplicate triangles", "triangle that was there twice dropped",
      "triangles that were there twice dropped", "wide"},
     {"degenerate triangles", "triangle without area dropped", "triangles without area dropped",
@@ -138,6 +195,8 @@ constexpr std::array<Wording, 12> kWordings = {{
     {"hole", "hole closed", "holes closed", "wide"},
     {"open end", "open end capped", "open ends capped", "wide"},
     {"other piece", "other piece dropped", "other pieces dropped", "long"},
+    {"overlapping piece", "closed piece that overlaps the vessel united with it",
+     "closed pieces that overlap the vessel united with it", "long"},
     {"outer skin",
      "wall with two skins found: its inner skin is taken as the lumen, the outer one dropped",
      "walls with two skins found: the inner skin is taken as the lumen, the outer ones dropped",

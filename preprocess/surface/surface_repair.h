@@ -20,6 +20,7 @@ enum class MendKind {
   kHole,          // small holes: closed
   kOpenEnd,       // ends at which the vessel was cut: capped
   kPiece,         // other pieces: dropped
+  kUnited,        // closed pieces that overlap the vessel: united with it
   kOuterSkin,     // outside of a wall with two skins: dropped, so that the inner skin is the lumen
   kIntersection,  // triangles that cut each other: made anew
 };
@@ -38,10 +39,10 @@ struct RepairedSurface {
 };
 
 /// Repairs triangles as a file holds them (equal points merged). One vessel is kept: the piece of
-/// the largest volume, or the inner skin of a wall that has two. Throws `Error`, naming `origin`,
-/// the place [mm] and a remedy, where a repair would be a guess: one side only, a hole too wide, a
-/// wall of two skins that cannot be told apart. The result may still be unsound in ways that are
-/// not mended here: pass it to `require_sound`.
+/// the largest volume with those that overlap it, or the inner skin of a wall that has two. Throws
+/// `Error`, naming `origin`, the place [mm] and a remedy, where a repair would be a guess: one side
+/// only, a hole too wide, a wall of two skins that cannot be told apart. The result may still be
+/// unsound in ways that are not mended here: pass it to `require_sound`.
 RepairedSurface repair_surface(const Surface& triangles, const std::string& origin);
 
 /// Reads a file as `read_triangles` does, and repairs it.

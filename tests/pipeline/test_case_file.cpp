@@ -167,6 +167,15 @@ TEST_F(CaseFile, AsksForUnitAndFrameWhereTheFileHasNone) {
   expect_mentions(problem(json, {"surface.path=ct.nrrd"}), {"ends in .stl, .ply, .obj or .vtp"});
 }
 
+TEST_F(CaseFile, TakesTheFrameThatTheSurfaceTellsAndNamesAContradiction) {
+  Json json = surface_case();
+  write("ras.stl", "solid 3D Slicer output. SPACE=RAS\nendsolid\n");
+  json["surface"] = {{"path", "ras.stl"}, {"unit", "mm"}};
+  EXPECT_EQ(read(json).surface_input->frame, "RAS");
+  json["surface"]["frame"] = "LPS";
+  expect_mentions(problem(json), {"surface.frame is \"LPS\"", "\"RAS\", as the file itself says"});
+}
+
 TEST_F(CaseFile, TellsWhereBrokenJsonBreaks) {
   const auto told = [&](const std::string& text) -> std::string {
     try {

@@ -225,6 +225,52 @@ TEST_F(SurfaceFile, ABinaryStlThatPromisesMoreTrianglesThanItHoldsTakesNoMemoryF
           "its header; copy or export the surface again");
 }
 
+TEST_F(SurfaceFile, AnStlIsReadWhateverItsHeaderHolds) {
+  const Surface box = shapes::box({0, 0, 0}, {1, 2, 4});
+  std::string text = ascii_stl(box), binary = binary_stl(box);
+  text.replace(
+      0, 10,
+      "solid \xe5\xb7\xa6\xe9\xa2\x88\xe5\x86\x85\xe5\x8a\xa8\xe8\x84\x89\xe8\xa1\x80\xe7\xae\xa1");
+  binary.replace(0, 10, "solid test");
+  for (const fs::path& path : {write("name.stl", text), write("solid.stl", binary),
+                               write("behind.stl", binary_stl(box) + "more")}) {
+    const Surface read = read_triangles(path, "mm", "LPS");
+    EXPECT_EQ(read.triangles.cols(), box.triangles.cols()) << path;
+    EXPECT_NEAR(signed_volume(read), 8.0, 1e-12) << path;
+  }
+  const std::string cut = text.substr(0, text.size() / 2);
+  EXPECT_NE(
+      message_of([&] { read_triangles(write("cut.stl", cut), "mm", "LPS"); }).find("breaks off"),
+      std::string::npos);
+}
+
+TEST_F(SurfaceFile, TheFrameThatAFileTellsIsFound) {
+  EXPECT_EQ(told_frame(write("a.stl", "solid 3D Slicer output. SPACE=RAS\n")), "RAS");
+  EXPECT_EQ(told_frame(write("a.ply", "ply\nformat ascii 1.0\ncomment SPACE=LPS\n")), "LPS");
+  for (const std::string& frame : {std::string("RAS"), std::string("LPS")}) {
+    std::string codes;
+    for (const char c : frame) codes += std::to_string(int{c}) + " ";
+    const auto array = [](const std::string& name, const std::string& type,
+                          const std::string& values) {
+      return "<DataArray type=\"" + type + "\" Name=\"" + name + "\" NumberOfComponents=\"" +
+             (name == "Points" ? "3" : "1") + "\" format=\"ascii\">" + values + "</DataArray>";
+    };
+    const std::string text =
+        "<VTKFile type=\"PolyData\" version=\"0.1\" byte_order=\"LittleEndian\"><PolyData>"
+        "<FieldData><Array type=\"String\" Name=\"SPACE\" NumberOfTuples=\"1\" format=\"ascii\">" +
+        codes +
+        "0</Array></FieldData><Piece NumberOfPoints=\"3\" NumberOfVerts=\"0\" NumberOfLines=\"0\" "
+        "NumberOfStrips=\"0\" NumberOfPolys=\"1\"><Points>" +
+        array("Points", "Float64", "0 0 0 1 0 0 0 1 0") + "</Points><Polys>" +
+        array("connectivity", "Int64", "0 1 2") + array("offsets", "Int64", "3") +
+        "</Polys></Piece></PolyData></VTKFile>";
+    EXPECT_EQ(told_frame(write("a.vtp", text)), frame);
+  }
+  EXPECT_EQ(told_frame(write("b.vtp", "<VTKFile/>")), "");
+  EXPECT_EQ(told_frame(write("b.obj", "# SPACE=MARS\nv 0 0 0\n")), "");
+  EXPECT_EQ(told_frame(folder_ / "absent.stl"), "");
+}
+
 TEST_F(SurfaceFile, UnknownUnitAndFrameAreRefused) {
   const fs::path path = write("box.stl", ascii_stl(shapes::box({0, 0, 0}, {1, 1, 1})));
   EXPECT_NE(message_of([&] { read_surface(path, "inch", "LPS"); }).find("expected mm, cm or m"),

@@ -234,6 +234,24 @@ TEST(SurfaceRepair, PartsWhatTouchesInAnEdgeOrAPoint) {
   }
 }
 
+TEST(SurfaceRepair, UnitesClosedPiecesThatOverlap) {
+  // A branch whose root stands in the trunk, one tenth of its area; and a crumb beside them.
+  const Surface trunk = shapes::straight_tube(5.0, 60.0, 1.5);
+  Surface branch = shapes::straight_tube(1.5, 20.0, 0.8);
+  for (auto p : branch.vertices.colwise()) p = Vec3(p.z(), p.x(), p.y() + 30.0);
+  const Surface crumb = shapes::box({20, 20, 20}, {21, 21, 21});
+  const RepairedSurface repaired =
+      repair_surface(shapes::joined(shapes::joined(branch, crumb), trunk), "x");
+  EXPECT_TRUE(is_sound(check_surface(repaired.surface)));
+  EXPECT_EQ(count_of(repaired, MendKind::kUnited), 1);
+  EXPECT_EQ(count_of(repaired, MendKind::kPiece), 1);
+  // What of the branch lies outside: its axis leaves the trunk at 5 mm.
+  const double trunk_volume = signed_volume(trunk), branch_volume = signed_volume(branch);
+  EXPECT_NEAR(signed_volume(repaired.surface), trunk_volume + 0.75 * branch_volume,
+              0.02 * branch_volume);
+  EXPECT_TRUE(locate_point(repaired.surface, Vec3(18, 0, 30)).inside);
+}
+
 TEST(SurfaceRepair, TakesTheInnerSkinOfAWallWhoseSkinsHangTogether) {
   RingTube inner = ring_tube(3.0, 30), outer = ring_tube(4.0, 30);
   Surface wall = shapes::joined(shapes::inside_out(inner.surface), outer.surface);
