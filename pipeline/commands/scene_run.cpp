@@ -187,11 +187,33 @@ SceneAnswer run_insertion_scene(const SceneFile& file, const LoadedVessel& vesse
           line};
 }
 
+void require_entry_inside(const SceneFile& scene, const Surface& surface) {
+  const Vec3& entry = scene.insertion->introducer.point;
+  const preprocess::InsideAnswer answer = preprocess::locate_point(surface, entry);
+  if (answer.inside) return;
+  Problems problems(scene.file.string());
+  problems.add("insertion.point_mm", to_json(entry).dump(),
+               format("a point inside the vessel; it lies %.1f mm outside", answer.distance),
+               "move it, or correct the surface's unit or frame");
+  problems.throw_if_any();
+}
+
 }  // namespace
+
+std::vector<std::string> check_scene_vessel(const SceneFile& scene) {
+  if (!scene.vessel) return {};
+  const SurfaceInput& file = scene.vessel->surface;
+  const preprocess::RepairedSurface repaired =
+      preprocess::read_surface(file.path, file.unit, file.frame);
+  preprocess::require_sound(preprocess::check_surface(repaired.surface), file.path.string());
+  if (scene.insertion) require_entry_inside(scene, repaired.surface);
+  return preprocess::tell_mends(repaired.mends);
+}
 
 SceneAnswer run_scene_file(const SceneFile& scene, const fs::path& folder) {
   std::optional<LoadedVessel> vessel;
   if (scene.vessel) vessel = load_vessel(*scene.vessel);
+  if (scene.insertion) require_entry_inside(scene, vessel->surface);
   fs::create_directories(folder);
   return scene.bench ? run_bench_scene(scene, vessel ? &*vessel : nullptr, folder)
                      : run_insertion_scene(scene, *vessel, folder);

@@ -2,6 +2,7 @@
 /// `wireplan simulate`: runs a scene and writes what a user reads and looks at.
 #include <filesystem>
 #include <string>
+#include <vector>
 
 #include "pipeline/files/scene_file.h"
 
@@ -12,9 +13,13 @@ struct SceneAnswer {
   std::string line;     // what came out, in one line
 };
 
+/// Throws Error where the scene's vessel is not sound or its wire would enter outside of it;
+/// returns what was mended, in sentences.
+std::vector<std::string> check_scene_vessel(const SceneFile& scene);
+
 /// Writes into `folder`: result.json, wire.vtp and wire.png; of an insertion also the shapes on the
 /// way, shapes.pvd; in a vessel also forces.vtu, the wall with the force that each triangle took
-/// (`peak_force_n`). Throws Error where the vessel is not sound or a file cannot be written.
+/// (`peak_force_n`). Throws Error where check_scene_vessel() does or a file cannot be written.
 SceneAnswer run_scene_file(const SceneFile& scene, const std::filesystem::path& folder);
 
 }  // namespace wireplan::pipeline

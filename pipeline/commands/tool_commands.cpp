@@ -70,8 +70,9 @@ std::string schema_of(const fs::path& path) {
 int check_file(const std::string& path, const std::vector<std::string>& overrides) {
   const std::string schema = schema_of(path);
   if (schema.rfind("wireplan.scene/", 0) == 0) {
-    read_scene(path);
+    const std::vector<std::string> mended = check_scene_vessel(read_scene(path));
     std::cout << path << ": the scene is in order\n";
+    for (const std::string& line : mended) std::cout << "  mended: " << line << "\n";
   } else if (schema.rfind("wireplan.phantom/", 0) == 0) {
     read_phantom_spec(path);
     std::cout << path << ": the description is in order\n";

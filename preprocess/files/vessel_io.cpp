@@ -49,12 +49,13 @@ void add_arrays(vtkFieldData* fields, const std::vector<NamedArray>& arrays, Eig
 }
 
 vtkSmartPointer<vtkPolyData> vtk_polyline(const Eigen::Matrix3Xd& points) {
-  vtkNew<vtkCellArray> cells;
-  cells->InsertNextCell(static_cast<int>(points.cols()));
-  for (Eigen::Index k = 0; k < points.cols(); ++k) cells->InsertCellPoint(k);
   vtkNew<vtkPolyData> data;
   data->SetPoints(vtk_points(points));
+  vtkNew<vtkCellArray> cells;
   data->SetLines(cells);
+  if (points.cols() < 2) return data;  // no line: VTK ends the process on one of a point
+  cells->InsertNextCell(static_cast<int>(points.cols()));
+  for (Eigen::Index k = 0; k < points.cols(); ++k) cells->InsertCellPoint(k);
   return data;
 }
 

@@ -186,6 +186,18 @@ TEST_F(CommandLine, SimulatesAnInsertionIntoAYieldingVessel) {
   EXPECT_EQ(last.at("push_work_n_mm"), result.at("push_work_n_mm"));
 }
 
+TEST_F(CommandLine, RefusesASceneWhoseWireEntersOutsideOfTheVessel) {
+  Json scene = tube_scene();
+  scene["insertion"]["point_mm"] = {30, 0, 6};
+  write_json(scene, folder_ / "scene.json");
+  for (const char* command : {"check scene.json", "simulate scene.json -o pushed"}) {
+    const Answer answer = call(command);
+    EXPECT_EQ(answer.code, 2) << command;
+    EXPECT_NE(answer.log.find("insertion.point_mm is [30.0,0.0,6.0]"), std::string::npos);
+    EXPECT_NE(answer.log.find("26.0 mm outside"), std::string::npos) << answer.log;
+  }
+}
+
 TEST_F(CommandLine, SimulatesABenchWithinAVessel) {
   // Clamped on the tube's axis and pressed sideways against its wall, 4 mm away.
   Json scene = tube_scene();
