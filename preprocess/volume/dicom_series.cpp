@@ -18,6 +18,7 @@
 #include <vector>
 
 #include "gdcmReader.h"
+#include "gdcmUIDs.h"
 #include "itkGDCMImageIO.h"
 #include "preprocess/volume/apart.h"
 #include "preprocess/volume/dicom_check.h"
@@ -64,6 +65,11 @@ bool same_series(const Slice& a, const Slice& b) {
 constexpr const char* kDamagedDicom =
     "a DICOM file that is damaged or cut short; copy or export the series again, or take the file "
     "out if it is no slice";
+
+constexpr const char* kEndsLibrary =
+    "ends the library that reads DICOM: the file is damaged, or of a kind that GDCM does not "
+    "expect; "
+    "export the series again, uncompressed, or take the file out if it is no slice";
 
 /// A padded or bare file in memory as GDCM reads it: without what lies behind the pixels, with the
 /// head that tells the representation.
@@ -190,9 +196,9 @@ std::string find_uneven(const std::vector<double>& positions) {
   const auto same =
       std::count_if(sizes.begin(), sizes.end(), [&](double size) { return size <= kSamePlace; });
   if (2 * static_cast<std::size_t>(same) >= gaps) {
-    text << "images lie at the same place (" << positions.size() << " images at "
-         << gaps + 1 - static_cast<std::size_t>(same)
-         << " places: contrast tracking, or several phases), expected one at each; keep one phase "
+    text << "images lie at the same place (" << positions.size()
+         << " images, places: " << gaps + 1 - static_cast<std::size_t>(same)
+         << "; contrast tracking, or several phases), expected one at each; keep one phase "
             "or "
             "reconstruction in the folder";
     return text.str();
@@ -354,12 +360,36 @@ void require_whole_dicom(itk::GDCMImageIO& io, const fs::path& file) {
   }
 }
 
+/// How the pixels of a file are packed; empty where they are not.
+std::string packing_of(const fs::path& file) {
+  const gdcm::Tag pixels(0x7fe0, 0x0010);
+  gdcm::Reader reader;
+  reader.SetFileName(file.c_str());
+  if (!reader.ReadUpToTag(pixels, {pixels})) return {};
+  const gdcm::TransferSyntax syntax = reader.GetFile().GetHeader().GetDataSetTransferSyntax();
+  if (!syntax.IsEncapsulated()) return {};
+  gdcm::UIDs names;
+  const bool known = names.SetFromUID(syntax.GetString());
+  return std::string(known ? names.GetName() : "an unknown syntax") + " (" + syntax.GetString() +
+         ")";
+}
+
 /// Reads the pixels of a slice, or of all its frames, and appends their values.
 void append_slice(const Slice& slice, const fs::path& folder, std::vector<float>& values) {
   const auto copy = copy_of(slice);
   if (copy) slice.io->SetFileName(copy->path());
   require_whole_dicom(*slice.io, slice.file);
-  append_voxels(*slice.io, folder, values);
+  try {
+    append_voxels(*slice.io, folder, values);
+  } catch (const Error&) {
+    throw;
+  } catch (const std::exception&) {
+    const std::string packing = packing_of(slice.io->GetFileName());
+    if (packing.empty()) throw;
+    throw Error(slice.file.string() + ": its pixels are packed as " + packing +
+                " and are all there, but GDCM does not unpack them; export the series again, "
+                "uncompressed");
+  }
 }
 
 void send_grid(const Send& send, const Grid& grid) {
@@ -490,7 +520,7 @@ Image read_dicom_folder(const fs::path& folder) {
           receive(image.values.data() + before, slice * sizeof(float));
         }
       },
-      kDamagedDicom);
+      kEndsLibrary);
   return image;
 }
 

@@ -326,7 +326,7 @@ TEST_F(FieldVolume, ManyImagesOfOnePlaceAreNoVolume) {
     write("slice" + std::to_string(k), dicom({.position = Vec3(0, 0, k == 4 ? 1.0 : 0.0)}));
   }
   const std::string error = read_error(folder_);
-  EXPECT_TRUE(has(error, "at the same place (5 images at 2 places")) << error;
+  EXPECT_TRUE(has(error, "at the same place (5 images, places: 2;")) << error;
 }
 
 // ---- Voxels between thick slices ----------------------------------------------------------------

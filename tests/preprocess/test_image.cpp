@@ -319,6 +319,22 @@ TEST_F(DicomFolder, SliceCutShortIsAnErrorThatNamesIt) {
   }
 }
 
+/// Packs the pixels of a file anew.
+void pack(const fs::path& path, gdcm::TransferSyntax::TSType syntax) {
+  gdcm::ImageReader reader;
+  reader.SetFileName(path.c_str());
+  ASSERT_TRUE(reader.Read());
+  gdcm::ImageChangeTransferSyntax change;
+  change.SetTransferSyntax(syntax);
+  change.SetInput(reader.GetImage());
+  ASSERT_TRUE(change.Change());
+  gdcm::ImageWriter writer;
+  writer.SetFile(reader.GetFile());
+  writer.SetImage(change.GetOutput());
+  writer.SetFileName(path.c_str());
+  ASSERT_TRUE(writer.Write());
+}
+
 TEST_F(DicomFolder, CompressedSlicesHoldTheSameValues) {
   // a slice of 24 x 16 pixels, smooth and with a step, below and above zero
   std::vector<std::int16_t> values;
@@ -334,18 +350,7 @@ TEST_F(DicomFolder, CompressedSlicesHoldTheSameValues) {
       const fs::path path = write(
           "slice" + std::to_string(k),
           dicom({.position = Vec3(0, 0, 2.0 * k), .columns = 24, .rows = 16, .values = values}));
-      gdcm::ImageReader reader;
-      reader.SetFileName(path.c_str());
-      ASSERT_TRUE(reader.Read());
-      gdcm::ImageChangeTransferSyntax change;
-      change.SetTransferSyntax(syntax);
-      change.SetInput(reader.GetImage());
-      ASSERT_TRUE(change.Change());
-      gdcm::ImageWriter writer;
-      writer.SetFile(reader.GetFile());
-      writer.SetImage(change.GetOutput());
-      writer.SetFileName(path.c_str());
-      ASSERT_TRUE(writer.Write());
+      pack(path, syntax);
     }
     const Image image = read_image(folder_);
     ASSERT_EQ(image.grid.size, (std::array<int, 3>{24, 16, 3}));
@@ -353,6 +358,26 @@ TEST_F(DicomFolder, CompressedSlicesHoldTheSameValues) {
       ASSERT_EQ(image.values[n], values[n % values.size()]) << n;
     }
   }
+}
+
+TEST_F(DicomFolder, PixelsThatTheDecoderRefusesAreToldWithTheirPacking) {
+  for (const int k : {0, 1, 2}) {
+    const fs::path path = write("slice" + std::to_string(k),
+                                dicom({.position = Vec3(0, 0, 2.0 * k),
+                                       .columns = 24,
+                                       .rows = 16,
+                                       .values = std::vector<std::int16_t>(24 * 16, 7)}));
+    pack(path, gdcm::TransferSyntax::JPEG2000Lossless);
+    std::string bytes = bytes_of(path);
+    const std::size_t tile =
+        bytes.find("\xff\x90");  // start of tile: length, index, length of tile
+    ASSERT_NE(tile, std::string::npos);
+    bytes.replace(tile + 6, 4, "\x7f\xff\xff\xff");
+    write("slice" + std::to_string(k), bytes);
+  }
+  const std::string error = read_error(folder_);
+  EXPECT_TRUE(has(error, "slice0: its pixels are packed as JPEG 2000")) << error;
+  EXPECT_FALSE(has(error, "damaged")) << error;
 }
 
 TEST_F(DicomFolder, ASliceThatEndsTheProcessOfItsLibraryIsNamed) {
@@ -363,9 +388,11 @@ TEST_F(DicomFolder, ASliceThatEndsTheProcessOfItsLibraryIsNamed) {
   bytes.replace(rows + 4, 2, "UL");  // well formed, but no number of rows
   const fs::path file = write("slice", bytes);
   ASSERT_EQ(check_dicom(file), DicomForm::kSound);
-  EXPECT_EQ(read_error(folder_), file.string() +
-                                     ": a DICOM file that is damaged or cut short; copy or export "
-                                     "the series again, or take the file out if it is no slice");
+  EXPECT_EQ(read_error(folder_),
+            file.string() +
+                ": ends the library that reads DICOM: the file is damaged, or "
+                "of a kind that GDCM does not expect; export the series again, "
+                "uncompressed, or take the file out if it is no slice");
 }
 
 TEST_F(DicomFolder, SingleFileOrSliceAsksForTheSeries) {
