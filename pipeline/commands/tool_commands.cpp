@@ -192,10 +192,28 @@ void add_check(CLI::App& app, int& code) {
   check->callback([&code, arguments] { code = check_file(arguments->path, arguments->overrides); });
 }
 
+/// As a case's "wires" takes them, with where the values come from.
+int print_wires_json() {
+  Json file = {{"schema", "wireplan.wires/1"}, {"wires", Json::array()}};
+  for (const CatalogueWire& entry : catalogue()) {
+    Json wire = wire_json(entry.wire);
+    wire["title"] = entry.title;
+    wire["source"] = entry.source;
+    for (std::size_t k = 0; k < entry.section_sources.size(); ++k) {
+      wire["sections"][k]["source"] = entry.section_sources[k];
+    }
+    file["wires"].push_back(std::move(wire));
+  }
+  std::cout << file.dump(2) << "\n";
+  return kDone;
+}
+
 void add_wires(CLI::App& app, int& code) {
+  const auto as_json = std::make_shared<bool>(false);
   CLI::App* wires = app.add_subcommand("wires", "The wire catalogue with its sources");
-  wires->footer("Example: wireplan wires");
-  wires->callback([&code] { code = print_wires(); });
+  wires->add_flag("--json", *as_json, "As JSON, each wire as a case file takes it");
+  wires->footer("Example: wireplan wires --json");
+  wires->callback([&code, as_json] { code = *as_json ? print_wires_json() : print_wires(); });
 }
 
 void add_compare(CLI::App& app, int& code) {

@@ -130,6 +130,23 @@ TEST_F(CommandLine, ListsEveryWireOfTheCatalogue) {
   }
 }
 
+TEST_F(CommandLine, ListsTheCatalogueAsACaseTakesIt) {
+  const Answer answer = call("wires --json");
+  ASSERT_EQ(answer.code, 0);
+  const Json file = parse_json(answer.out, "wires", "wireplan.wires/1");
+  const std::vector<CatalogueWire> wires = catalogue();
+  ASSERT_EQ(file.at("wires").size(), wires.size());
+  for (std::size_t k = 0; k < wires.size(); ++k) {
+    Problems problems("wires");
+    JsonReader reader(file.at("wires")[k], "", problems);
+    const CatalogueWire read = read_wire(reader);
+    EXPECT_TRUE(problems.empty());
+    EXPECT_EQ(wire_json(read.wire), wire_json(wires[k].wire));
+    EXPECT_EQ(read.title, wires[k].title);
+    EXPECT_EQ(read.section_sources, wires[k].section_sources);
+  }
+}
+
 TEST_F(CommandLine, ChecksACaseWithoutRunningIt) {
   EXPECT_EQ(call("check .").code, 0);
   const Answer good = call("check case.json");
