@@ -38,11 +38,7 @@ std::string read_text(const gdcm::DataSet& data, const gdcm::Tag& tag) {
   if (!data.FindDataElement(tag)) return {};
   const gdcm::ByteValue* bytes = data.GetDataElement(tag).GetByteValue();
   if (bytes == nullptr) return {};
-  std::string text(bytes->GetPointer(), bytes->GetLength());
-  text.erase(
-      std::find_if(text.rbegin(), text.rend(), [](char c) { return c != ' ' && c != '\0'; }).base(),
-      text.end());
-  return text;
+  return without_padding({bytes->GetPointer(), bytes->GetLength()});
 }
 
 /// What one functional group, shared or of the frame, tells.
@@ -79,6 +75,11 @@ void read_groups(const gdcm::DataSet& groups, DicomFrame& frame, Told& told) {
 }
 
 }  // namespace
+
+std::string without_padding(std::string text) {
+  while (!text.empty() && (text.back() == ' ' || text.back() == '\0')) text.pop_back();
+  return text;
+}
 
 std::vector<DicomFrame> read_dicom_frames(const std::filesystem::path& path) {
   const gdcm::Tag pixels(0x7fe0, 0x0010), shared(0x5200, 0x9229), each(0x5200, 0x9230);

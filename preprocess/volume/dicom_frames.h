@@ -18,6 +18,9 @@ struct DicomFrame {
   std::string unit;                                  // of the value, "HU"; empty where not told
 };
 
+/// A text without the blanks and zeros that fill it up (PS3.5 section 6.2).
+std::string without_padding(std::string text);
+
 /// In the order of the file, from its functional groups; empty where it has none. Whatever GDCM
 /// throws passes through.
 std::vector<DicomFrame> read_dicom_frames(const std::filesystem::path& path);

@@ -49,10 +49,7 @@ constexpr std::size_t kModality = 16;  // characters: a code string (PS3.5 secti
 std::string dicom_value(itk::GDCMImageIO& io, const std::string& tag) {
   std::string value;
   io.GetValueFromTag(tag, value);
-  while (!value.empty() && (value.back() == ' ' || value.back() == '\0')) {
-    value.pop_back();
-  }
-  return value;
+  return without_padding(std::move(value));
 }
 
 /// True where two images can be slices of one volume.

@@ -171,4 +171,9 @@ void append_voxels(itk::ImageIOBase& io, const fs::path& path, std::vector<float
   }
 }
 
+void scale_values(double slope, double intercept, std::vector<float>& values) {
+  if (slope == 1.0 && intercept == 0.0) return;
+  for (float& value : values) value = static_cast<float>(slope * value + intercept);
+}
+
 }  // namespace wireplan::preprocess

@@ -58,4 +58,7 @@ void require_scalar_volume(const itk::ImageIOBase& io, const Grid& grid,
 void append_voxels(itk::ImageIOBase& io, const std::filesystem::path& path,
                    std::vector<float>& values);
 
+/// Each value times the slope plus the intercept.
+void scale_values(double slope, double intercept, std::vector<float>& values);
+
 }  // namespace wireplan::preprocess

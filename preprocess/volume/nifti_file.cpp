@@ -364,7 +364,7 @@ Image read_nifti(const fs::path& path) {
                shift = header.real(header.layout().slope, 1);
   if (slope != 0.0 && (slope != 1.0 || shift != 0.0)) {
     if (!std::isfinite(slope) || !std::isfinite(shift)) throw damaged_nifti(path);
-    for (float& value : image.values) value = static_cast<float>(slope * value + shift);
+    scale_values(slope, shift, image.values);
   }
   return image;
 }

@@ -210,11 +210,9 @@ Image read_meta(const fs::path& path) {
   image.grid.origin *= header.mm;
 
   // ITK does not apply the scale.
-  const double slope = io->GetMetaImagePointer()->ElementToIntensityFunctionSlope();
-  const double offset = io->GetMetaImagePointer()->ElementToIntensityFunctionOffset();
-  if (slope != 1.0 || offset != 0.0) {
-    for (float& value : image.values) value = static_cast<float>(slope * value + offset);
-  }
+  const auto* header_of_io = io->GetMetaImagePointer();
+  scale_values(header_of_io->ElementToIntensityFunctionSlope(),
+               header_of_io->ElementToIntensityFunctionOffset(), image.values);
   return image;
 }
 

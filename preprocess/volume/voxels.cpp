@@ -183,25 +183,23 @@ std::vector<std::size_t> voxels_in_ball(const Grid& grid, const Vec3& point, dou
   if (!center) {
     return found;
   }
-  // How far the point is from what counts of a voxel: its centre, or all of it.
-  const Vec3 place = grid.ijk_from_lps(point);
-  const auto collect = [&](Box box, double half) {
+  const auto collect = [&](const Box& box, const auto& is_near) {
     for_each_row(grid, box, [&](std::size_t start) {
       for (int i = 0; i <= box.last[0] - box.first[0]; ++i) {
         const std::size_t n = start + static_cast<std::size_t>(i);
-        const Voxel v = voxel_at(grid, n);
-        const Vec3 off = (place - Vec3(v[0], v[1], v[2])).cwiseAbs().array() - half;
-        const bool near = half == 0.0
-                              ? (center_of(grid, n) - point).norm() <= radius
-                              : off.cwiseMax(0.0).cwiseProduct(grid.spacing).norm() <= radius;
-        if (near) found.push_back(n);
+        if (is_near(n)) found.push_back(n);
       }
     });
   };
-  collect(grown({*center, *center}, radius, grid), 0.0);
-  if (found.empty()) {
-    collect(grown(grown({*center, *center}, radius, grid), Voxel{1, 1, 1}, grid), 0.5);
-  }
+  const Box box = grown({*center, *center}, radius, grid);
+  collect(box, [&](std::size_t n) { return (center_of(grid, n) - point).norm() <= radius; });
+  if (!found.empty()) return found;
+  const Vec3 place = grid.ijk_from_lps(point);
+  collect(grown(box, Voxel{1, 1, 1}, grid), [&](std::size_t n) {
+    const Voxel v = voxel_at(grid, n);
+    const Vec3 beyond = (place - Vec3(v[0], v[1], v[2])).cwiseAbs().array() - 0.5;
+    return beyond.cwiseMax(0.0).cwiseProduct(grid.spacing).norm() <= radius;
+  });
   return found;
 }
 
