@@ -27,13 +27,33 @@ struct LoadedVessel {
   std::unique_ptr<const simulate::VesselModel> model;
 };
 
-LoadedVessel load_vessel(const SceneVessel& given) {
+void require_entry_inside(const SceneFile& scene, const Surface& surface) {
+  if (!scene.insertion) return;
+  const Vec3& entry = scene.insertion->introducer.point;
+  const preprocess::InsideAnswer answer = preprocess::locate_point(surface, entry);
+  if (answer.inside) return;
+  Problems problems(scene.file.string());
+  problems.add("insertion.point_mm", to_json(entry).dump(),
+               format("a point inside the vessel; it lies %.1f mm outside", answer.distance),
+               "move it, or correct the surface's unit or frame");
+  problems.throw_if_any();
+}
+
+/// The surface of a scene's vessel, sound and with the wire's entry in it.
+preprocess::RepairedSurface read_scene_surface(const SceneFile& scene) {
+  const SurfaceInput& file = scene.vessel->surface;
+  preprocess::RepairedSurface repaired =
+      preprocess::read_sound_surface(file.path, file.unit, file.frame);
+  require_entry_inside(scene, repaired.surface);
+  return repaired;
+}
+
+LoadedVessel load_vessel(const SceneFile& scene) {
+  const SceneVessel& given = *scene.vessel;
   LoadedVessel vessel;
-  const SurfaceInput& file = given.surface;
-  preprocess::RepairedSurface repaired = preprocess::read_surface(file.path, file.unit, file.frame);
+  preprocess::RepairedSurface repaired = read_scene_surface(scene);
   vessel.surface = std::move(repaired.surface);
   vessel.mended = preprocess::tell_mends(repaired.mends);
-  preprocess::require_sound(preprocess::check_surface(vessel.surface), file.path.string());
   vessel.wall = preprocess::extrude_wall(vessel.surface, given.wall.extrusion).wall;
   const simulate::LumenOptions options = simulate::follow(vessel.surface);
   vessel.model = given.wall.elastic
@@ -187,33 +207,16 @@ SceneAnswer run_insertion_scene(const SceneFile& file, const LoadedVessel& vesse
           line};
 }
 
-void require_entry_inside(const SceneFile& scene, const Surface& surface) {
-  const Vec3& entry = scene.insertion->introducer.point;
-  const preprocess::InsideAnswer answer = preprocess::locate_point(surface, entry);
-  if (answer.inside) return;
-  Problems problems(scene.file.string());
-  problems.add("insertion.point_mm", to_json(entry).dump(),
-               format("a point inside the vessel; it lies %.1f mm outside", answer.distance),
-               "move it, or correct the surface's unit or frame");
-  problems.throw_if_any();
-}
-
 }  // namespace
 
 std::vector<std::string> check_scene_vessel(const SceneFile& scene) {
   if (!scene.vessel) return {};
-  const SurfaceInput& file = scene.vessel->surface;
-  const preprocess::RepairedSurface repaired =
-      preprocess::read_surface(file.path, file.unit, file.frame);
-  preprocess::require_sound(preprocess::check_surface(repaired.surface), file.path.string());
-  if (scene.insertion) require_entry_inside(scene, repaired.surface);
-  return preprocess::tell_mends(repaired.mends);
+  return preprocess::tell_mends(read_scene_surface(scene).mends);
 }
 
 SceneAnswer run_scene_file(const SceneFile& scene, const fs::path& folder) {
   std::optional<LoadedVessel> vessel;
-  if (scene.vessel) vessel = load_vessel(*scene.vessel);
-  if (scene.insertion) require_entry_inside(scene, vessel->surface);
+  if (scene.vessel) vessel = load_vessel(scene);
   fs::create_directories(folder);
   return scene.bench ? run_bench_scene(scene, vessel ? &*vessel : nullptr, folder)
                      : run_insertion_scene(scene, *vessel, folder);

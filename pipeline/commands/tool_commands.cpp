@@ -69,10 +69,13 @@ std::string schema_of(const fs::path& path) {
 
 int check_file(const std::string& path, const std::vector<std::string>& overrides) {
   const std::string schema = schema_of(path);
+  const auto print_mended = [](const std::vector<std::string>& lines) {
+    for (const std::string& line : lines) std::cout << "  mended: " << line << "\n";
+  };
   if (schema.rfind("wireplan.scene/", 0) == 0) {
     const std::vector<std::string> mended = check_scene_vessel(read_scene(path));
     std::cout << path << ": the scene is in order\n";
-    for (const std::string& line : mended) std::cout << "  mended: " << line << "\n";
+    print_mended(mended);
   } else if (schema.rfind("wireplan.phantom/", 0) == 0) {
     read_phantom_spec(path);
     std::cout << path << ": the description is in order\n";
@@ -81,8 +84,24 @@ int check_file(const std::string& path, const std::vector<std::string>& override
     const std::vector<std::string> mended = check_input(given);
     std::cout << given.file.string() << ": the case is in order, "
               << plan::list_candidates(given.study).size() << " trials\n";
-    for (const std::string& line : mended) std::cout << "  mended: " << line << "\n";
+    print_mended(mended);
   }
+  return kDone;
+}
+
+/// As a case's "wires" takes them, with where the values come from.
+int print_wires_json() {
+  Json file = {{"schema", "wireplan.wires/1"}, {"wires", Json::array()}};
+  for (const CatalogueWire& entry : catalogue()) {
+    Json wire = wire_json(entry.wire);
+    wire["title"] = entry.title;
+    wire["source"] = entry.source;
+    for (std::size_t k = 0; k < entry.section_sources.size(); ++k) {
+      wire["sections"][k]["source"] = entry.section_sources[k];
+    }
+    file["wires"].push_back(std::move(wire));
+  }
+  std::cout << file.dump(2) << "\n";
   return kDone;
 }
 
@@ -190,22 +209,6 @@ void add_check(CLI::App& app, int& code) {
       ->allow_extra_args(false);
   check->footer("Tells all that is wrong at once. Example: wireplan check cases/abdomen");
   check->callback([&code, arguments] { code = check_file(arguments->path, arguments->overrides); });
-}
-
-/// As a case's "wires" takes them, with where the values come from.
-int print_wires_json() {
-  Json file = {{"schema", "wireplan.wires/1"}, {"wires", Json::array()}};
-  for (const CatalogueWire& entry : catalogue()) {
-    Json wire = wire_json(entry.wire);
-    wire["title"] = entry.title;
-    wire["source"] = entry.source;
-    for (std::size_t k = 0; k < entry.section_sources.size(); ++k) {
-      wire["sections"][k]["source"] = entry.section_sources[k];
-    }
-    file["wires"].push_back(std::move(wire));
-  }
-  std::cout << file.dump(2) << "\n";
-  return kDone;
 }
 
 void add_wires(CLI::App& app, int& code) {

@@ -444,7 +444,7 @@ SurfaceInput read_surface_input(JsonReader& reader, const std::filesystem::path&
                             : is_vtp      ? Fallback("LPS")
                                           : std::nullopt;
   surface.frame = reader.choice("frame", fallback, {"LPS", "RAS"});
-  if (!told.empty() && !surface.frame.empty() && surface.frame != told) {
+  if (!told.empty() && surface.frame != told) {
     reader.problems().add(reader.path_of("frame"), "\"" + surface.frame + "\"",
                           "\"" + told + "\", as the file itself says",
                           "delete the key, or mend the file");

@@ -187,11 +187,10 @@ void make_surface(Workspace& work, const fs::path& folder) {
   std::vector<preprocess::Mend> mends;
   preprocess::FitStatistics fit;
   if (given.surface_input) {
-    preprocess::RepairedSurface repaired =
-        preprocess::read_surface(work.input, given.surface_input->unit, given.surface_input->frame);
+    preprocess::RepairedSurface repaired = preprocess::read_sound_surface(
+        work.input, given.surface_input->unit, given.surface_input->frame);
     surface = std::move(repaired.surface);
     mends = std::move(repaired.mends);
-    preprocess::require_sound(preprocess::check_surface(surface), work.input.string());
     surface = preprocess::remesh(surface, given.surface.edge_length_mm);
   } else {
     surface = preprocess::surface_from_image(

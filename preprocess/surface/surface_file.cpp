@@ -39,9 +39,7 @@ vtkSmartPointer<vtkPolyData> read_with(const std::filesystem::path& path) {
   return reader->GetOutput();
 }
 
-// ---- STL: VTK tells text from binary by how much of the first 256 bytes is ASCII, which a name
-// need not be
-// ----------------------------------------------------------------------------------------
+// ---- STL: VTK tells text from binary by its first 256 bytes, which a name may spoil -------------
 
 enum class StlForm { kText, kBinary };
 

@@ -120,7 +120,7 @@ bool cut_each_other(const Surface& a, const Surface& b) {
 std::optional<Surface> unite(const Surface& vessel, const Piece& piece, const std::string& origin,
                              std::vector<Mend>& mends) {
   const Surface& closed = piece.surface;
-  if (check_surface(closed).open_edges > 0 || !cut_each_other(vessel, closed)) return {};
+  if (!cut_each_other(vessel, closed) || check_surface(closed).open_edges > 0) return {};
   std::optional<Surface> united = union_of(largest_piece(vessel), closed);
   if (!united) {
     throw Error(origin + ": a closed piece of the surface, " + number_text(length_of(closed)) +
@@ -244,6 +244,13 @@ std::vector<std::string> tell_mends(const std::vector<Mend>& mends) {
 RepairedSurface read_surface(const std::filesystem::path& path, const std::string& unit,
                              const std::string& frame) {
   return repair_surface(read_triangles(path, unit, frame), path.string());
+}
+
+RepairedSurface read_sound_surface(const std::filesystem::path& path, const std::string& unit,
+                                   const std::string& frame) {
+  RepairedSurface repaired = read_surface(path, unit, frame);
+  require_sound(check_surface(repaired.surface), path.string());
+  return repaired;
 }
 
 RepairedSurface repair_surface(const Surface& triangles, const std::string& origin) {

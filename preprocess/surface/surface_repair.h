@@ -49,6 +49,10 @@ RepairedSurface repair_surface(const Surface& triangles, const std::string& orig
 RepairedSurface read_surface(const std::filesystem::path& path, const std::string& unit,
                              const std::string& frame);
 
+/// The same; throws `Error` too where the result is not sound.
+RepairedSurface read_sound_surface(const std::filesystem::path& path, const std::string& unit,
+                                   const std::string& frame);
+
 /// What was mended, one sentence per kind, with numbers, sizes and places [mm] for a person.
 std::vector<std::string> tell_mends(const std::vector<Mend>& mends);
 
