@@ -1,5 +1,6 @@
 #include "pipeline/files/plan_file.h"
 
+#include <algorithm>
 #include <utility>
 
 #include "pipeline/files/trial_file.h"
@@ -35,6 +36,12 @@ Json metrics_to_json(const plan::Metrics& metrics) {
                          {"radius_mm", number_or_null(motion.radius)},
                          {"point_mm", point(motion.point)}};
   return json;
+}
+
+// Another program may have kept it, to which a metric was added since.
+bool has_all_metrics(const Json& json) {
+  return std::all_of(plan::kMetricFields.begin(), plan::kMetricFields.end(),
+                     [&](const plan::MetricField& field) { return json.contains(field.name); });
 }
 
 plan::Metrics metrics_of(const Json& json) {
@@ -152,6 +159,7 @@ std::string measured_text(const plan::Measured& measured, bool with_shape) {
 std::optional<plan::Measured> measured_from_text(const std::string& text) {
   const Json json = Json::parse(text, nullptr, /*allow_exceptions=*/false);
   if (!json.is_object() || json.value("schema", "") != kMeasuredSchema) return {};
+  if (!has_all_metrics(json.at("metrics"))) return {};
   plan::Measured measured = measured_of(json);
   measured.cpu_seconds = json.at("cpu_s");
   if (!json.contains("nodes_mm")) return measured;

@@ -53,6 +53,11 @@ std::string stage_key_text(const Stage& stage, const Workspace& work) {
   for (const std::string& pointer : stage.parameters) {
     add_parameter(dotted(pointer), work.parameters.at(Json::json_pointer(pointer)), lines);
   }
+  if (stage.name == "plans") {  // keeps metrics: a result without one that was added since is old
+    Json names;
+    for (const plan::MetricField& field : plan::kMetricFields) names.push_back(field.name);
+    lines.push_back({"metrics", names.dump()});
+  }
   if (stage.names_program) lines.push_back({"program", build_info().dump()});
   return key_text(lines);
 }
