@@ -98,7 +98,7 @@ class Planner {
     for (int id = 0; id < std::ssize(plan_.trials); ++id) {
       const auto k = static_cast<std::size_t>(id);
       const Repeat as_assumed = judge_repeat(plan_.trials[k], study_, by.limits, by.weights);
-      if (plan_.levels[k] == Level::kFull && as_assumed.success) {
+      if (plan_.levels[k] == Level::kFull && as_assumed.safe) {
         plans.emplace_back(as_assumed.score, id);
       }
     }
@@ -108,7 +108,7 @@ class Planner {
 
     const std::vector<Disturbance> tries = draw_disturbances(unknowns(kTries));
     const auto works = [&](const Measured& trial) {
-      return judge_repeat(trial, study_, by.limits, by.weights).success;
+      return judge_repeat(trial, study_, by.limits, by.weights).safe;
     };
     return std::any_of(plans.begin(), plans.end(), [&](const auto& plan) {
       const std::vector<Measured> trials = find_or_run(

@@ -6,7 +6,7 @@
 #include <optional>
 #include <utility>
 
-#include "plan/path_place.h"
+#include "preprocess/centerline/path_place.h"
 
 namespace wireplan::plan {
 namespace {
@@ -116,7 +116,7 @@ class Search {
 
   double progress_here() const {
     if (trial_.result().pushes.empty()) return 0.0;
-    return find_progress(trial_.result().pushes.back().tip, path_);
+    return preprocess::find_progress(trial_.result().pushes.back().tip, path_);
   }
 
   /// Tries turns, and pulls after them, round where the branch left the path. Keeps what came

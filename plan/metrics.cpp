@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "plan/path_place.h"
+#include "preprocess/centerline/path_place.h"
 
 namespace wireplan::plan {
 namespace {
@@ -18,7 +18,7 @@ WallMotion find_wall_motion(const std::vector<simulate::Push>& pushes, const Cen
   WallMotion worst;
   for (const simulate::Push& push : pushes) {
     if (push.wall_displacement <= 0.0) continue;
-    const double radius = find_place(push.wall_displacement_point, path).radius;
+    const double radius = preprocess::find_place(push.wall_displacement_point, path).radius;
     if (worst.displacement > 0.0 &&
         push.wall_displacement * worst.radius <= worst.displacement * radius) {
       continue;
@@ -73,7 +73,7 @@ Metrics compute_metrics(const simulate::TrialResult& trial, const Study& study,
   }
   metrics.wall_motion = find_wall_motion(trial.pushes, path);
   for (Eigen::Index k = 0; k < trial.nodes.cols(); ++k) {
-    const PathPlace place = find_place(trial.nodes.col(k), path);
+    const preprocess::PathPlace place = preprocess::find_place(trial.nodes.col(k), path);
     metrics.centerline_deviation += place.from_axis / static_cast<double>(trial.nodes.cols());
     metrics.off_path = std::max(metrics.off_path, place.from_lumen);
   }
@@ -83,7 +83,7 @@ Metrics compute_metrics(const simulate::TrialResult& trial, const Study& study,
 double find_progress(const simulate::TrialResult& trial, const Centerline& path) {
   double progress = 0.0;
   for (const simulate::Push& push : trial.pushes) {
-    progress = std::max(progress, find_progress(push.tip, path));
+    progress = std::max(progress, preprocess::find_progress(push.tip, path));
   }
   return progress;
 }

@@ -216,7 +216,7 @@ std::string compare_with_first(const RankedPlan& plan, const RankedPlan& first,
 std::string warnings_of(const RankedPlan& plan, const Metrics& m, const simulate::Goal& goal,
                         const Limits& limits) {
   std::string text;
-  if (plan.tip_error && m.tip_to_target + *plan.tip_error >= goal.radius) {
+  if (!goal.at_section && plan.tip_error && m.tip_to_target + *plan.tip_error >= goal.radius) {
     text += "; warning: the tip's numerical error of " + two_digits(*plan.tip_error) +
             " mm may put it outside the target (radius " + two_digits(goal.radius) + " mm)";
   }
@@ -241,11 +241,20 @@ std::string scouted_reason(const Score& score, const std::string& failure) {
          ", behind the best plan by more than the scout was found to be off";
 }
 
-std::string success_of(const RepeatedPlan& plan) {
-  const auto successes = std::count_if(plan.repeats.begin(), plan.repeats.end(),
-                                       [](const Repeat& repeat) { return repeat.success; });
-  return "; works in " + std::to_string(successes) + " of " + std::to_string(plan.repeats.size()) +
-         " perturbed repeats";
+std::string safety_of(const RepeatedPlan& plan) {
+  const auto count = [&](bool Repeat::*what) {
+    return std::count_if(plan.repeats.begin(), plan.repeats.end(),
+                         [&](const Repeat& repeat) { return repeat.*what; });
+  };
+  const auto safe = count(&Repeat::safe), reached = count(&Repeat::reached);
+  std::string text =
+      "; safe in " + std::to_string(safe) + " of " + std::to_string(plan.repeats.size());
+  if (reached > safe) {
+    text += " perturbed repeats, though it reaches in " + std::to_string(reached);
+  } else {
+    text += " perturbed repeats";
+  }
+  return text;
 }
 
 void write_sentences(Ranking& ranking, const Study& study, const std::vector<Candidate>& candidates,
@@ -254,14 +263,15 @@ void write_sentences(Ranking& ranking, const Study& study, const std::vector<Can
   for (RankedPlan& plan : ranking.plans) {
     const Metrics& m = metrics[plan.trial];
     const RankedPlan& first = ranking.plans.front();
-    plan.sentence = "reaches the target " + one_decimal(m.tip_to_target) +
-                    " mm from its centre with at most " + two_digits(m.peak_contact_force) +
-                    " N on the wall";
+    plan.sentence = (study.goal.at_section ? std::string("reaches the target with at most ")
+                                           : "reaches the target " + one_decimal(m.tip_to_target) +
+                                                 " mm from its centre with at most ") +
+                    two_digits(m.peak_contact_force) + " N on the wall";
     plan.sentence += plan.trial == first.trial
                          ? compare_with_next_wire(ranking.plans, study, candidates, metrics)
                          : compare_with_first(plan, first, metrics, weights);
     const RepeatedPlan* repeats = find_repeated(repeated, plan.trial);
-    if (repeats != nullptr) plan.sentence += success_of(*repeats);
+    if (repeats != nullptr) plan.sentence += safety_of(*repeats);
     plan.sentence += warnings_of(plan, m, study.goal, limits);
   }
 }
@@ -290,6 +300,10 @@ std::vector<WireSummary> summarise_wires(const Study& study,
       return candidates[plan.trial].wire == wire;
     });
     if (best != plans.end()) summary.best_trial = best->trial;
+    summary.safe =
+        static_cast<int>(std::count_if(plans.begin(), plans.end(), [&](const RankedPlan& plan) {
+          return candidates[plan.trial].wire == wire;
+        }));
   }
   return wires;
 }
@@ -338,7 +352,8 @@ Score compute_score(const Metrics& metrics, const simulate::Goal& goal, const Li
   expects(goal.radius > 0.0);
   const double scale = limits.tip_force_warn;
   Score score;
-  score.reach = std::min(metrics.tip_to_target / goal.radius, 1.0);
+  score.reach = goal.at_section ? (metrics.reached ? 0.0 : 1.0)
+                                : std::min(metrics.tip_to_target / goal.radius, 1.0);
   score.peak_force = saturating(metrics.peak_contact_force, scale);
   score.mean_force = saturating(metrics.mean_contact_force, scale);
   score.margin = std::min(metrics.peak_tip_force / limits.tip_force_fail, 1.0);
@@ -353,7 +368,7 @@ double compute_score_error(const Metrics& metrics, const NumericalError& error,
   expects(goal.radius > 0.0);
   const double scale = limits.tip_force_warn;
   Score change;
-  change.reach = std::min(error.tip / goal.radius, 1.0);
+  change.reach = goal.at_section ? 0.0 : std::min(error.tip / goal.radius, 1.0);
   change.peak_force = saturating_slope(metrics.peak_contact_force, scale) * error.peak_force;
   change.mean_force = saturating_slope(metrics.mean_contact_force, scale) * error.mean_force;
   change.margin = std::min(error.tip_force / limits.tip_force_fail, 1.0);
@@ -371,14 +386,19 @@ std::string exclusion_reason(const Measured& trial, const Study& study, const Li
     case Outcome::kMissed:
       return "missed: tip ended " + one_decimal(metrics.tip_to_target) +
              " mm from the target and came no nearer than " +
-             one_decimal(metrics.nearest_to_target) + " mm, expected within " +
-             four_digits(study.goal.radius) + " mm";
+             one_decimal(metrics.nearest_to_target) + " mm, expected " +
+             (study.goal.at_section ? std::string("past the vessel's cross-section there")
+                                    : "within " + four_digits(study.goal.radius) + " mm");
+    case Outcome::kPassedBy:
+      return with_reason("passed by the branch " + place, trial);
+    case Outcome::kWrongBranch:
+      return with_reason("took the wrong branch " + place, trial);
+    case Outcome::kLeftImage:
+      return with_reason("left the imaged vessel " + place, trial);
     case Outcome::kStuck:
       return with_reason("stuck " + place, trial);
     case Outcome::kProlapsed:
-      return with_reason("prolapsed " + place, trial);
-    case Outcome::kLeftOpening:
-      return with_reason("left the vessel " + place, trial);
+      return with_reason("folded back " + place, trial);
     case Outcome::kLeftLumen:
       return with_reason("left the lumen " + place, trial);
     case Outcome::kNotConverged:

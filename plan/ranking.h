@@ -27,8 +27,8 @@ struct Weights {
 /// absolute, so that a score does not depend on which other plans were tried. With the scale of
 /// force s = Limits::tip_force_warn (references B3), so that forces on the wall weigh as soon as
 /// they are felt:
-///   reach       tip_to_target / goal radius                         metric: references C1, success
-///   peak_force  f / (f + s), f = peak_contact_force                 C1, contact force, max
+///   reach       tip_to_target / goal radius; of a cross-section 0    metric: references C1,
+///   success peak_force  f / (f + s), f = peak_contact_force                 C1, contact force, max
 ///   mean_force  f / (f + s), f = mean_contact_force                 C1, contact force, mean
 ///   margin      peak_tip_force / Limits::tip_force_fail: what is used up of it   C1, tip force
 /// f / (f + s) is 1/2 at f = s and never reaches 1, since no limit of side-wall forces is agreed
@@ -65,8 +65,9 @@ double compute_score_error(const Metrics& metrics, const NumericalError& error,
 
 /// A trial of a plan under a disturbance (robustness.h).
 struct Repeat {
-  bool success = false;  // it is a plan under the disturbance too
-  double score = 1.0;    // its total; 1, the worst there is, where it is no plan
+  bool reached = false;
+  bool safe = false;   // it reached and broke no limit: it is a plan under the disturbance too
+  double score = 1.0;  // its total; 1, the worst there is, where it is no plan
   double peak_contact_force = 0.0, mean_contact_force = 0.0, peak_tip_force = 0.0;  //       [N]
   std::string reason = {};  // why it is no plan; else empty
 };
@@ -99,13 +100,13 @@ struct ExcludedTrial {
 /// Forces are medians and maxima of peak_contact_force over the trials that reached the target,
 /// also those that broke a limit; 0 if none did.
 struct WireSummary {
-  int wire = 0, trials = 0, reached = 0;
+  int wire = 0, trials = 0, reached = 0, safe = 0;         // safe: ranked plans
   std::optional<int> best_trial;                           // of the ranked plans
   double median_peak_force = 0.0, worst_peak_force = 0.0;  //                               [N]
 };
 
 struct Ranking {
-  std::vector<RankedPlan> plans;        // best first: reached, within limits, converged
+  std::vector<RankedPlan> plans;        // best first: safe ones, which reached and broke no limit
   std::vector<ExcludedTrial> excluded;  // the rest, each with its reason, in order of trial
   std::vector<WireSummary> wires;       // in order of the study's wires
   /// Ranked plans that no other beats in both peak contact force and reach margin (goal radius -
@@ -122,10 +123,10 @@ struct Findings {
 
 /// Orders the plans, and says which of them are tied.
 ///
-/// Order: by the mean score over all repeats, in which a failure costs 1; equals by index of the
-/// candidate. A plan with fewer repeats than others, or none, stands by what this mean is expected
-/// to be: the mean over the repeats it has (its own score without any) plus what the repeats that
-/// it lacks typically add, which is the median over the plans that have them.
+/// Order: by the mean score over all repeats, in which one that is not safe costs 1; equals by
+/// index of the candidate. A plan with fewer repeats than others, or none, stands by what this mean
+/// is expected to be: the mean over the repeats it has (its own score without any) plus what the
+/// repeats that it lacks typically add, which is the median over the plans that have them.
 ///
 /// Ties: two plans are tied
 ///   - if their scores differ by no more than the sum of their errors; or

@@ -90,7 +90,7 @@ Study refined_study(const Study& study, double factor, double insertion) {
   changed.insertion.length = insertion;
   changed.insertion.record_every = insertion;  // no shapes on the way
   changed.insertion.map_forces = false;
-  changed.goal.radius = 1e-9;  // no push ends that near, so none ends the trial
+  changed.goal = {.point = study.goal.point, .radius = 1e-9};  // no push ends that near
   return changed;
 }
 

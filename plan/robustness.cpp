@@ -181,8 +181,9 @@ Repeat judge_repeat(const Measured& trial, const Study& study, const Limits& lim
   const Metrics& metrics = trial.metrics;
   Repeat repeat;
   repeat.reason = exclusion_reason(trial, study, limits);
-  repeat.success = repeat.reason.empty();
-  if (repeat.success) repeat.score = compute_score(metrics, study.goal, limits, weights).total;
+  repeat.reached = metrics.reached;
+  repeat.safe = repeat.reason.empty();
+  if (repeat.safe) repeat.score = compute_score(metrics, study.goal, limits, weights).total;
   repeat.peak_contact_force = metrics.peak_contact_force;
   repeat.mean_contact_force = metrics.mean_contact_force;
   repeat.peak_tip_force = metrics.peak_tip_force;

@@ -68,8 +68,8 @@ simulate::TrialResult run_disturbed(const Study& study, const Candidate& candida
 double largest_lumen_offset(const Study& study);
 double largest_entry_shift(const Study& study, const simulate::VesselModel& vessel);
 
-/// What is kept of a repeat: whether it is a plan by the rules of the ranking, its score, its
-/// forces.
+/// What is kept of a repeat: whether it reached and is a plan by the rules of the ranking, its
+/// score, its forces.
 Repeat judge_repeat(const Measured& trial, const Study& study, const Limits& limits,
                     const Weights& weights);
 

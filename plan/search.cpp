@@ -8,8 +8,8 @@
 #include <tuple>
 
 #include "plan/batch.h"
-#include "plan/path_place.h"
 #include "plan/statistics.h"
+#include "preprocess/centerline/path_place.h"
 
 namespace wireplan::plan {
 namespace {
@@ -25,9 +25,6 @@ constexpr std::size_t kAtOnce = 8;        // while no plan is found ...
 constexpr std::size_t kGiveUpAfter = 8;   // ... until so many were run in full, ...
 constexpr std::size_t kGiveUpPart = 12;   // ... or one in so many, and none is left that reached
 constexpr std::size_t kCheckedPart = 16;  // of those that failed, one in so many is looked at
-
-constexpr double kPatience = 40.0;        // a scout's push without progress ...       [mm]
-constexpr double kPatienceBeyond = 10.0;  // ... where it has come as far as the target
 
 /// Whether the level itself may be why the candidate did not reach.
 bool is_doubtful(const Sighting& seen, double goal_radius) {
@@ -105,27 +102,6 @@ Study scout_study(const Study& study) {
   return scout;
 }
 
-simulate::TrialResult run_scout(const Study& scout, const Candidate& candidate,
-                                const simulate::VesselModel& vessel, const Centerline& path) {
-  expects(candidate.moves.empty());
-  return run_guarded([&] {
-    simulate::Trial trial(scout.wires[static_cast<std::size_t>(candidate.wire)],
-                          make_introducer(scout, candidate), scout.goal, vessel, scout.insertion);
-    const double target = path.arc_length[path.arc_length.size() - 1] - scout.goal.radius;
-    double furthest = 0.0, depth_there = 0.0;
-    while (trial.step({.push = scout.insertion.step})) {
-      const double progress = find_progress(trial.result().pushes.back().tip, path);
-      if (progress > furthest) {
-        furthest = progress;
-        depth_there = trial.depth();
-      } else if (trial.depth() - depth_there > (furthest < target ? kPatience : kPatienceBeyond)) {
-        break;
-      }
-    }
-    return trial.finish();
-  });
-}
-
 Sighting look_at(const Measured& trial, const Study& study, const Limits& limits,
                  const Weights& weights) {
   using simulate::Outcome;
@@ -142,7 +118,7 @@ Sighting look_at(const Measured& trial, const Study& study, const Limits& limits
 bool is_pinched(const Measured& trial, double wire_radius, const Centerline& path) {
   constexpr double kNear = 10.0;  // wire radii
   if (trial.outcome != simulate::Outcome::kStuck) return false;
-  const PathPlace tip = find_place(trial.last_tip, path);
+  const preprocess::PathPlace tip = preprocess::find_place(trial.last_tip, path);
   for (Eigen::Index k = 0; k < path.radius.size(); ++k) {
     const bool near = std::abs(path.arc_length[k] - tip.arc) <= kNear * wire_radius;
     if (near && path.radius[k] < 2.0 * wire_radius) return true;

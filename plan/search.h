@@ -16,17 +16,11 @@ bool needs_search(const Study& study, bool exhaustive);
 /// The study at the scout's level:
 ///   - elements four times as long, but in curved sections none turns by over 1/3 rad at rest;
 ///   - pushes four times as long, but at most 2 mm, where the trial cuts them anyway, and at most
-///     half the goal's radius, so that none steps over the goal;
+///     half the goal's radius, so that none steps over a sphere, and thin vessels are followed;
 ///   - contact points up to twice as far apart, residuals up to 1e-4 N, no forces per triangle.
 /// Scouts are run on a rigid wall: one that yields costs several times as much (MEASUREMENTS.md),
 /// and its compliance is then never computed where no good plan goes.
 Study scout_study(const Study& study);
-
-/// A candidate at the scout's or the probe's level. It is given up as `missed` when its tip has not
-/// come further along the path for 40 mm of push, or for 10 mm once it was as far as the target. In
-/// the trials of five cases none of those given up would have reached (MEASUREMENTS.md).
-simulate::TrialResult run_scout(const Study& scout, const Candidate& candidate,
-                                const simulate::VesselModel& vessel, const Centerline& path);
 
 /// What a level says of a candidate.
 struct Sighting {
@@ -46,8 +40,8 @@ Sighting look_at(const Measured& trial, const Study& study, const Limits& limits
 bool is_pinched(const Measured& trial, double wire_radius, const Centerline& path);
 
 /// What is known of the candidates, one entry each: of all from scouts, of some from probes, of
-/// some from full runs. A probe is the study's own trial, but on a rigid wall and given up as a
-/// scout is; it takes a fraction of the time of a full run on a wall that yields.
+/// some from full runs. A probe is the study's own trial, but on a rigid wall; it takes a fraction
+/// of the time of a full run on a wall that yields.
 struct Sightings {
   std::vector<Sighting> scouts;
   std::vector<std::optional<Sighting>> probes, full;

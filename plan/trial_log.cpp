@@ -9,15 +9,13 @@ namespace wireplan::plan {
 namespace {
 
 simulate::TrialResult simulate_run(const Study& study, const Run& run,
-                                   const simulate::VesselModel& vessel, const Centerline& path) {
+                                   const simulate::VesselModel& vessel) {
   if (run.disturbance) return run_disturbed(study, run.candidate, vessel, *run.disturbance);
   if (run.elements) {
     return run_candidate(refined_study(study, run.elements->factor, run.elements->insertion),
                          run.candidate, vessel);
   }
-  simulate::TrialResult trial = run.level == Level::kFull
-                                    ? run_candidate(study, run.candidate, vessel)
-                                    : run_scout(study, run.candidate, vessel, path);
+  simulate::TrialResult trial = run_candidate(study, run.candidate, vessel);
   const bool may_be_played = trial.outcome == simulate::Outcome::kReached || run.shapes;
   if (run.level != Level::kFull || !may_be_played) trial.shapes.clear();
   return trial;
@@ -72,7 +70,7 @@ std::vector<Measured> find_or_run(const Study& study, const PlanVessel& vessel,
         const std::size_t k = missing[static_cast<std::size_t>(slot)];
         expects(runs[k].level == level);
         const double start = thread_cpu_seconds();
-        const simulate::TrialResult trial = simulate_run(own, runs[k], model, vessel.path);
+        const simulate::TrialResult trial = simulate_run(own, runs[k], model);
         all[k] = measure(trial, own, vessel.path);
         all[k].cpu_seconds = thread_cpu_seconds() - start;
         log.keep(runs[k], trial, all[k]);

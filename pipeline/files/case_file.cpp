@@ -168,7 +168,8 @@ std::vector<double> read_angles(JsonReader& reader, const std::string& key,
   return angles;
 }
 
-void read_access_and_target(JsonReader& root, plan::Study& study) {
+void read_access_and_target(JsonReader& root, Case& input) {
+  plan::Study& study = input.study;
   const std::size_t problems_before = root.problems().count();
   const Range turn{.min = -360.0, .max = 360.0};
   JsonReader access = root.object("access", true);
@@ -180,14 +181,26 @@ void read_access_and_target(JsonReader& root, plan::Study& study) {
 
   JsonReader target = root.object("target", true);
   study.goal.point = target.point("point_mm", std::nullopt);
-  study.goal.radius =
-      target.number("radius_mm", study.goal.radius, {.min = 0.1, .max = 50.0}, "given in m?");
+  study.goal.at_section = !target.has("radius_mm");
+  if (!study.goal.at_section) {
+    study.goal.radius =
+        target.number("radius_mm", std::nullopt, {.min = 0.1, .max = 50.0}, "given in m?");
+  }
+  input.target_beyond_mm =
+      target.number("beyond_mm", 0.0, {.min = 0.0, .max = 500.0}, "given in m?");
+  if (input.target_beyond_mm > 0.0 && !study.goal.at_section) {
+    root.problems().add("target.beyond_mm", "given beside target.radius_mm", "one of the two",
+                        "beyond_mm moves the cross-section on along the vessel; a sphere has none");
+  }
   target.finish();
   study.rolls = read_angles(root, "tip_roll_deg", {0.0, 90.0, 180.0, 270.0}, turn);
+  const double nearest = study.goal.at_section ? 0.0 : study.goal.radius;
   if (root.problems().count() == problems_before &&
-      (study.goal.point - study.access).norm() <= study.goal.radius) {
+      (study.goal.point - study.access).norm() <= nearest) {
     root.problems().add("target.point_mm", to_json(study.goal.point).dump(),
-                        "a point further than target.radius_mm from access.point_mm",
+                        study.goal.at_section
+                            ? "another point than access.point_mm"
+                            : "a point further than target.radius_mm from access.point_mm",
                         "a wire would be there before it is pushed");
   }
 }
@@ -487,7 +500,7 @@ Case read_case(const std::filesystem::path& path, const std::vector<std::string>
   JsonReader root(file, "", problems);
   root.text("schema", std::nullopt);
   input.name = read_name(root, input.file);
-  read_access_and_target(root, input.study);
+  read_access_and_target(root, input);
   read_inputs(root, input);
   read_segmentation(root, input);
   JsonReader wall = root.object("wall", false);
@@ -519,7 +532,12 @@ Json case_parameters(const Case& input) {
   json["access"] = {{"point_mm", to_json(study.access)},
                     {"inclination_deg", degrees(study.inclinations)},
                     {"azimuth_deg", degrees(study.azimuths)}};
-  json["target"] = {{"point_mm", to_json(study.goal.point)}, {"radius_mm", study.goal.radius}};
+  json["target"] = {{"point_mm", to_json(study.goal.point)}};
+  if (study.goal.at_section) {
+    json["target"]["beyond_mm"] = input.target_beyond_mm;
+  } else {
+    json["target"]["radius_mm"] = study.goal.radius;
+  }
   json["wires"] = Json::array();
   for (const simulate::Wire& wire : study.wires) json["wires"].push_back(wire_json(wire));
   json["tip_roll_deg"] = degrees(study.rolls);

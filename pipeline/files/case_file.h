@@ -45,9 +45,10 @@ struct Case {
   preprocess::SegmentOptions segmentation;  // of a volume; seeds besides the access point
   preprocess::SurfaceOptions surface;
   WallInput wall;
-  /// Its tangent is found later, from the centerline. Where insertion.length is 0 the trials stage
-  /// takes 1.25 times the path's length and 20 mm more.
+  /// Its tangent and the goal's way are found later, from the centerline. Where insertion.length is
+  /// 0 the trials stage takes 1.25 times the path's length and 20 mm more.
   plan::Study study;
+  double target_beyond_mm = 0.0;  // the cross-section is so much further along the vessel
   Manoeuvring manoeuvres = Manoeuvring::kWhenNeeded;
   plan::Limits limits;
   plan::Weights weights;

@@ -232,13 +232,16 @@ std::string nearest_name(const std::string& name, const std::vector<std::string>
   return nearest;
 }
 
-Json parse_json(const std::string& text, const std::string& file, const std::string& schema) {
+Json parse_json(const std::string& text, const std::string& file, const std::string& schema,
+                const std::string& older) {
   Json value = parse(text, file);
   if (!value.is_object()) {
     throw Error(file + ": holds " + shown(value) + ", expected a JSON object {...}");
   }
   const auto found = value.find("schema");
-  if (found == value.end() || *found != schema) {
+  const bool read =
+      found != value.end() && (*found == schema || (!older.empty() && *found == older));
+  if (!read) {
     Problems problems(file);
     problems.add("schema", found == value.end() ? "missing" : shown(*found), "\"" + schema + "\"",
                  who_reads(value, schema));
@@ -247,8 +250,9 @@ Json parse_json(const std::string& text, const std::string& file, const std::str
   return value;
 }
 
-Json read_json(const std::filesystem::path& path, const std::string& schema) {
-  return parse_json(read_text(path), path.string(), schema);
+Json read_json(const std::filesystem::path& path, const std::string& schema,
+               const std::string& older) {
+  return parse_json(read_text(path), path.string(), schema, older);
 }
 
 void write_json(const Json& value, const std::filesystem::path& path) {

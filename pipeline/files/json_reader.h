@@ -16,12 +16,14 @@ namespace wireplan::pipeline {
 using Json = nlohmann::ordered_json;
 
 /// Parses a file. Throws Error for a missing file (naming it), for broken JSON (with line and
-/// column), for a key given twice in one object, and unless `schema` stands under "schema" (naming
-/// the version that this program reads).
-Json read_json(const std::filesystem::path& path, const std::string& schema);
+/// column), for a key given twice in one object, and unless `schema`, or an `older` one that is
+/// still read, stands under "schema" (naming the version that this program reads).
+Json read_json(const std::filesystem::path& path, const std::string& schema,
+               const std::string& older = {});
 
 /// The same for a text; `file` names it in messages.
-Json parse_json(const std::string& text, const std::string& file, const std::string& schema);
+Json parse_json(const std::string& text, const std::string& file, const std::string& schema,
+                const std::string& older = {});
 
 /// Writes UTF-8, two spaces of indent, numbers with as few digits as read back the same, whole or
 /// not at all (disk.h). Throws LogicError where a number is not finite, DiskError where the disk

@@ -143,7 +143,9 @@ std::string list_best_plans(const std::vector<Json>& reports) {
 std::string compare_reports(const std::vector<std::filesystem::path>& files) {
   expects(files.size() >= 2);
   std::vector<Json> reports;
-  for (const std::filesystem::path& file : files) reports.push_back(read_json(file, kReportSchema));
+  for (const std::filesystem::path& file : files) {
+    reports.push_back(read_json(file, kReportSchema, kOlderReportSchema));
+  }
 
   const bool one_patient = same_patient(reports);
   std::string text = list_reports(reports) +

@@ -30,12 +30,19 @@ std::string plan_name(const Json& trial) {
          degrees(trial.at("azimuth_deg")) + " / " + degrees(trial.at("roll_deg")) + " deg";
 }
 
+// Of the sphere, or of the vessel where its cross-section is the target.
+double target_radius(const Json& report, const Json& target) {
+  return (target.contains("radius_mm") ? target.at("radius_mm")
+                                       : report.at("vessel").at("target_lumen_radius_mm"))
+      .get<double>();
+}
+
 PictureMarks marks_of(const Json& report, const std::string& title) {
   const Json& asked = report.at("provenance").at("parameters");
   return {.title = report.at("name").get<std::string>() + ": " + title,
           .access = point_of(asked.at("access").at("point_mm")),
           .target = point_of(asked.at("target").at("point_mm")),
-          .target_radius = asked.at("target").at("radius_mm")};
+          .target_radius = target_radius(report, asked.at("target"))};
 }
 
 double radius_of(const Json& report, const std::string& wire) {
@@ -86,8 +93,9 @@ struct Cell {
 
 // Letters for how a trial ended, as on the page.
 const std::vector<std::pair<std::string, std::string>> kLetters = {
-    {"missed", "M"},     {"stuck", "S"},         {"prolapsed", "P"}, {"left_opening", "O"},
-    {"left_lumen", "L"}, {"not_converged", "N"}, {"failed", "F"}};
+    {"missed", "M"}, {"passed_by", "B"},   {"wrong_branch", "W"}, {"left_image", "E"},
+    {"stuck", "S"},  {"prolapsed", "P"},   {"left_lumen", "L"},   {"not_converged", "N"},
+    {"failed", "F"}, {"left_opening", "O"}};  // the last of reports before version 2
 
 std::string letter_of(const std::string& outcome) {
   for (const auto& [name, letter] : kLetters) {
@@ -212,7 +220,7 @@ Picture draw_angles(const Json& report) {
 }
 
 std::vector<std::string> render_report(const fs::path& file, const fs::path& folder) {
-  const Json report = read_json(file, kReportSchema);
+  const Json report = read_json(file, kReportSchema, kOlderReportSchema);
   const fs::path beside = file.parent_path();
   const Surface vessel = preprocess::read_surface_artifact(beside / "surface.vtp");
   fs::create_directories(folder);

@@ -1,5 +1,6 @@
 #include "pipeline/report/repeats_json.h"
 
+#include <algorithm>
 #include <utility>
 
 #include "plan/statistics.h"
@@ -21,13 +22,15 @@ Json plan_json(const plan::RepeatedPlan& plan) {
     const plan::Repeat& repeat = plan.repeats[k];
     sum += repeat.score;
     scores.push_back(repeat.score);
-    if (!repeat.success) failures.push_back({{"repeat", k}, {"reason", repeat.reason}});
+    if (!repeat.safe) failures.push_back({{"repeat", k}, {"reason", repeat.reason}});
   }
   const int count = static_cast<int>(plan.repeats.size());
   const int successes = count - static_cast<int>(failures.size());
   Json json;
   json["trial"] = plan.trial;
   json["repeats"] = count;
+  json["reached"] = std::count_if(plan.repeats.begin(), plan.repeats.end(),
+                                  [](const plan::Repeat& repeat) { return repeat.reached; });
   json["successes"] = successes;
   json["success_rate"] = static_cast<double>(successes) / count;
   json["success_rate_interval"] = plan::wilson_interval(successes, count);

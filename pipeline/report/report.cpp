@@ -168,6 +168,7 @@ Json vessel_json(const ReportInput& input) {
   row.put("wall_stiffness_kpa_per_mm", wall.at("normal_stiffness_kpa_per_mm"));
   put_figures(row, "image", input.figures, "volume");
   put_figures(row, "segmentation", input.figures, "segment");
+  row.put("target_lumen_radius_mm", line.at("target_lumen_radius_mm"));
   row.put("branches", std::move(branches));
   return row.finish();
 }
@@ -191,6 +192,21 @@ void put_wall_motion(Row& row, const ReportInput& input, const plan::Metrics& m,
   }
 }
 
+/// Whether it reached and broke no limit; of scouts that reached it is not known.
+void put_safe(Row& row, const ReportInput& input, std::size_t k) {
+  const auto& plans = input.judgement.ranking.plans;
+  const bool known =
+      input.plan.levels[k] == plan::Level::kFull || !input.plan.trials[k].metrics.reached;
+  const bool safe = std::any_of(plans.begin(), plans.end(), [&](const plan::RankedPlan& plan) {
+    return plan.trial == static_cast<int>(k);
+  });
+  if (known) {
+    row.put("safe", safe);
+  } else {
+    row.put_optional("safe", {}, "reached against a rigid wall, not run in full");
+  }
+}
+
 Json trial_json(const ReportInput& input, std::size_t k) {
   const plan::Measured& trial = input.plan.trials[k];
   const plan::Metrics& m = trial.metrics;
@@ -203,6 +219,7 @@ Json trial_json(const ReportInput& input, std::size_t k) {
   row.put("outcome", outcome_name(trial.outcome));
   row.put("reason", trial.reason);
   row.put("reached", m.reached);
+  put_safe(row, input, k);
   for (const plan::MetricField& field : plan::kMetricFields) {
     if (field.value == &plan::Metrics::peak_wall_displacement) {
       put_wall_motion(row, input, m, input.plan.levels[k] != plan::Level::kFull, ended);
@@ -262,6 +279,7 @@ Json wire_summary_json(const ReportInput& input, const plan::WireSummary& summar
   row.put("wire", input.study.wires[static_cast<std::size_t>(summary.wire)].name);
   row.put("trials", summary.trials);
   row.put("reached", summary.reached);
+  row.put("safe", summary.safe);
   if (summary.best_trial) {
     row.put("best_trial", *summary.best_trial);
   } else {
@@ -409,7 +427,7 @@ Json build_info() {
 }
 
 Json read_report(const std::filesystem::path& path) {
-  Json report = read_json(path, kReportSchema);
+  Json report = read_json(path, kReportSchema, kOlderReportSchema);
   try {
     describe_best(report);
   } catch (const Json::exception&) {
@@ -436,10 +454,15 @@ std::string describe_best(const Json& report) {
   }
   const Json& best = ranking.front();
   const std::string script = best.value("script", "");
-  return "best plan of " + std::to_string(ranking.size()) + " that reach, out of " +
-         std::to_string(trials.size()) + " tried: " + best.at("wire").get<std::string>() +
-         ", inclination " + best.at("inclination_deg").dump() + " deg, azimuth " +
-         best.at("azimuth_deg").dump() + " deg, roll " + best.at("roll_deg").dump() + " deg, " +
+  const auto reached = std::count_if(trials.begin(), trials.end(), [](const Json& trial) {
+    return trial.at("reached").get<bool>();
+  });
+  return "best of " + std::to_string(ranking.size()) +
+         (ranking.size() == 1 ? " safe plan" : " safe plans") + " (reach, no limit broken); " +
+         std::to_string(reached) + " of " + std::to_string(trials.size()) +
+         " tried reach: " + best.at("wire").get<std::string>() + ", inclination " +
+         best.at("inclination_deg").dump() + " deg, azimuth " + best.at("azimuth_deg").dump() +
+         " deg, roll " + best.at("roll_deg").dump() + " deg, " +
          (script.empty() ? "" : script + ", ") + best.at("sentence").get<std::string>();
 }
 

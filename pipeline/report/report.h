@@ -11,7 +11,9 @@
 
 namespace wireplan::pipeline {
 
-inline constexpr const char* kReportSchema = "wireplan.report/1";
+inline constexpr const char* kReportSchema = "wireplan.report/2";
+/// The version before, which `compare`, `render` and `batch` read too.
+inline constexpr const char* kOlderReportSchema = "wireplan.report/1";
 
 /// The best so many plans are written as files for viewers too.
 inline constexpr std::size_t kPlansShown = 5;

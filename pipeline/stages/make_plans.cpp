@@ -52,6 +52,14 @@ plan::Plan plan_until(Workspace& work, Until until, StoredTrials& log) {
   return plan::make_plan(work.study(), plan_vessel(work), plan_options(work, until), log);
 }
 
+std::string small_sphere_warning(double radius, double lumen_radius) {
+  return "target: radius_mm " + Json(clean(radius)).dump() +
+         " is less than the lumen's radius there, " +
+         Json(std::round(lumen_radius * 10.0) / 10.0).dump() +
+         " mm: a wire that passes beside the sphere counts as missed; delete radius_mm to count "
+         "every wire that passes the vessel's cross-section";
+}
+
 // What the report tells of the scouts; null where there are none.
 Json scouting_json(const std::optional<plan::ScoutSummary>& scouting) {
   if (!scouting) return nullptr;
@@ -110,6 +118,10 @@ void make_trials(Workspace& work, const fs::path& folder) {
   }
   if (!work.given().wall.elastic) {
     figures["warnings"].push_back("trials: rigid wall: contact forces are upper bounds");
+  }
+  const double lumen_radius = study.goal.way->section().radius;
+  if (!study.goal.at_section && study.goal.radius < lumen_radius) {
+    figures["warnings"].push_back(small_sphere_warning(study.goal.radius, lumen_radius));
   }
   write_figures(figures, folder);
   write_json({{"schema", kTimingSchema},

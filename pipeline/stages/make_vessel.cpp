@@ -236,12 +236,14 @@ void make_centerline(Workspace& work, const fs::path& folder) {
   require_inside(surface, "access.point_mm", study.access);
   require_inside(surface, "target.point_mm", study.goal.point);
 
-  const Centerline line = preprocess::find_centerline(surface, study.access, study.goal.point);
+  const Centerline line = preprocess::find_centerline(surface, study.access, study.goal.point,
+                                                      {.beyond_mm = work.given().target_beyond_mm});
   preprocess::write_centerline(line, folder / "centerline.vtp");
   write_curve_markups(line.points, "centerline", folder / "centerline.mrk.json");
 
   Json figures = figures_of("centerline");
   figures.update(line_figures(line));
+  figures["target_lumen_radius_mm"] = line.radius(line.radius.size() - 1);
   figures["branches"] = write_tree(preprocess::find_tree(surface, study.access), folder);
   write_figures(figures, folder);
 }

@@ -154,10 +154,11 @@ std::vector<Stage> stages_of(const Case& given) {
                       .make = make_surface});
   }
   stages.push_back({.name = "centerline",
-                    .version = 3,
+                    .version = 4,
                     .after = {"surface"},
                     .parameters = {"/access/point_mm", "/target/point_mm"},
                     .make = make_centerline});
+  if (given.study.goal.at_section) read_too(stages.back(), {"/target/beyond_mm"});
   stages.push_back(
       {.name = "wall",
        .version = 2,
@@ -165,7 +166,7 @@ std::vector<Stage> stages_of(const Case& given) {
        .parameters = {"/wall/thickness_mm", "/wall/young_modulus_kpa", "/wall/poisson_ratio"},
        .make = make_wall});
   Stage trials{.name = "trials",
-               .version = 22,
+               .version = 23,
                .after = {"surface", "centerline"},
                .parameters = {"/access", "/target", "/wires", "/tip_roll_deg", "/friction",
                               "/wall/model", "/insertion"},
@@ -175,7 +176,7 @@ std::vector<Stage> stages_of(const Case& given) {
   stages.push_back(trials);
   Stage manoeuvres = trials;
   manoeuvres.name = "manoeuvres";
-  manoeuvres.version = 17;
+  manoeuvres.version = 18;
   manoeuvres.after.push_back("trials");
   read_too(manoeuvres, {"/manoeuvres"});
   if (given.manoeuvres == Manoeuvring::kWhenNeeded) {
@@ -189,7 +190,7 @@ std::vector<Stage> stages_of(const Case& given) {
   stages.push_back(manoeuvres);
   Stage plans = trials;
   plans.name = "plans";
-  plans.version = 1;
+  plans.version = 2;
   plans.after.insert(plans.after.end(), {"trials", "manoeuvres"});
   if (from_volume) plans.after.push_back("volume");
   read_too(plans, {"/manoeuvres", "/robustness"});

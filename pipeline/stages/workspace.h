@@ -13,6 +13,7 @@
 #include "pipeline/files/json_reader.h"
 #include "pipeline/store/store.h"
 #include "plan/trial_log.h"
+#include "preprocess/centerline/centerline.h"
 #include "preprocess/surface/openings.h"
 #include "preprocess/volume/image.h"
 #include "simulate/wall/vessel_model.h"
@@ -59,8 +60,8 @@ class Workspace {
   /// Bytes that follow from `key` and from this program: a piece of the store, made where it has
   /// none.
   std::string piece(std::vector<KeyLine> key, const std::function<std::string()>& make) const;
-  /// The case's study with what the centerline tells: the tangent at the access, and the insertion
-  /// length where the case leaves it open.
+  /// The case's study with what the centerline tells: the tangent at the access, the goal's way,
+  /// and the insertion length where the case leaves it open.
   const plan::Study& study();
 
   std::filesystem::path input;  // the volume or surface that the case names
@@ -85,6 +86,7 @@ class Workspace {
   std::unique_ptr<const simulate::WallCompliance> compliance_aside_;  // while it is the rigid one
 
   std::string field_key_text() const;
+  std::vector<preprocess::Branch> read_tree() const;
   bool find_field();  // whether the store has it; model_ then
 };
 

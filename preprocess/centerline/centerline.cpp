@@ -198,23 +198,44 @@ Points without_tip(const NearestWall& wall, const Points& line) {
   return {line.begin(), line.begin() + static_cast<std::ptrdiff_t>(last) + 1};
 }
 
-/// Continues the line along the ridge beyond its last point until it has passed `end`, or the wall
-/// is ahead. Where the nearest wall is a cap ahead, the distance says nothing about the middle, and
-/// the line goes straight on.
-void extend(const NearestWall& wall, Points& line, const Vec3& end, double sample) {
+/// Continues the line along the ridge beyond its last point, in steps of `sample`, until
+/// done(direction) or the wall is ahead. Where the nearest wall is a cap ahead, the distance says
+/// nothing about the middle, and the line goes straight on.
+template <class Done>
+void extend_until(const NearestWall& wall, Points& line, double sample, int most_steps,
+                  const Done& done) {
   constexpr std::size_t kSpan = 8;    // points whose chord is the direction
   constexpr double kCapAhead = -0.5;  // slope of the distance along the line, -1 before a flat cap
   Nearest near = wall.find(line.back());
-  const int most_steps = 10 + static_cast<int>(2.0 * (end - line.back()).norm() / sample);
   for (int i = 0; i < most_steps; ++i) {
     const std::size_t back = line.size() - 1 - std::min(kSpan, line.size() - 1);
     const Vec3 tangent = (line.back() - line[back]).normalized();
-    if ((end - line.back()).dot(tangent) <= 0.0 || near.distance <= sample) return;
+    if (done(tangent) || near.distance <= sample) return;
     const Vec3 next = line.back() + sample * tangent;
     near = wall.find(next, near);
     const bool cap_ahead = (next - near.foot).dot(tangent) < kCapAhead * near.distance;
     line.push_back(cap_ahead ? next : climb(wall, next, tangent, near));
   }
+}
+
+/// Until it has passed `end`.
+void extend(const NearestWall& wall, Points& line, const Vec3& end, double sample) {
+  extend_until(wall, line, sample, 10 + static_cast<int>(2.0 * (end - line.back()).norm() / sample),
+               [&](const Vec3& tangent) { return (end - line.back()).dot(tangent) <= 0.0; });
+}
+
+/// By a length. Throws Error where the vessel ends before.
+void extend_beyond(const NearestWall& wall, Points& line, double length, double sample) {
+  double gone = 0.0;
+  std::size_t last = line.size() - 1;
+  extend_until(wall, line, sample, 10 + static_cast<int>(2.0 * length / sample), [&](const Vec3&) {
+    for (; last + 1 < line.size(); ++last) gone += (line[last + 1] - line[last]).norm();
+    return gone >= length;
+  });
+  if (gone >= length) return;
+  throw Error("the vessel ends " + number_text(std::floor(gone)) +
+              " mm beyond the target, expected target.beyond_mm, " + number_text(length) +
+              " mm, or more; give a smaller one");
 }
 
 /// The same straight on to the wall ahead: for an end that lies in a corner of a cap, to which the
@@ -256,6 +277,26 @@ void cut_after(Points& line, const Vec3& end, double sample) {
   line.push_back(foot);
 }
 
+/// Radii near the line's ends, where the nearest wall is a cap across it: those of the next point
+/// that is nearer to the side. `inward` is 1 from the first point on, -1 from the last.
+void mend_radii_at_cap(const NearestWall& wall, Centerline& line, int inward) {
+  constexpr double kAcross = 0.5;    // cosine between the line and the way to the wall
+  constexpr Eigen::Index kSpan = 8;  // points whose chord is the line's direction
+  const Eigen::Index n = line.points.cols(), first = inward > 0 ? 0 : n - 1;
+  const Vec3 end = line.points.col(first);
+  const Vec3 outward =
+      (end - line.points.col(first + inward * std::min(kSpan, n - 1))).normalized();
+  Nearest near = wall.find(end);
+  Eigen::Index i = first;
+  for (; i >= 0 && i < n; i += inward) {
+    const Vec3 p = line.points.col(i);
+    near = wall.find(p, near);
+    if ((near.foot - p).dot(outward) < kAcross * near.distance) break;
+  }
+  if (i < 0 || i >= n) return;  // all of it: a line shorter than the lumen is wide
+  for (Eigen::Index k = first; k != i; k += inward) line.radius(k) = line.radius(i);
+}
+
 /// Arc length and inscribed radius of a line.
 Centerline measured(const NearestWall& wall, const Points& line) {
   const auto n = static_cast<Eigen::Index>(line.size());
@@ -268,6 +309,10 @@ Centerline measured(const NearestWall& wall, const Points& line) {
     result.points.col(i) = line[static_cast<std::size_t>(i)];
     near = wall.find(result.points.col(i), near);
     result.radius(i) = near.distance;
+  }
+  if (n > 1) {
+    mend_radii_at_cap(wall, result, 1);
+    mend_radii_at_cap(wall, result, -1);
   }
   return result;
 }
@@ -433,9 +478,12 @@ Centerline find_centerline(const Surface& surface, const Vec3& access, const Vec
   }
 
   // Both ends: along the ridge to the places nearest to target and access.
-  for (const Vec3& end : {target, access}) {
+  const Vec3 ends[] = {target, access};
+  for (const Vec3& end : ends) {
     extend(wall, line, end, sample);
     cut_after(line, end, sample);
+    if (&end == ends && options.beyond_mm > 0.0)
+      extend_beyond(wall, line, options.beyond_mm, sample);
     std::reverse(line.begin(), line.end());
   }
   if (arc_length(line).back() < sample) {

@@ -11,6 +11,7 @@ struct CenterlineOptions {
   double grid_mm = 0.0;    // first spacing of the search grid, which is halved where the lumen
                            // is too thin for it; 0: chosen from the surface            [mm]
   double sample_mm = 0.5;  // spacing of the points handed on                           [mm]
+  double beyond_mm = 0.0;  // the line goes on behind the target, along the ridge       [mm]
 };
 
 /// Finds the line in three steps (R is the inscribed radius):
@@ -21,9 +22,10 @@ struct CenterlineOptions {
 /// Without step 1, the path of step 2 takes wide detours: in a real tree it ran through the
 /// vertebral artery and the circle of Willis and not through the carotid.
 /// The line starts at the point of the ridge nearest to `access` and ends at the one nearest to
-/// `target`. Expects a closed surface. Throws `Error` when access or target lies outside the
-/// surface (with its distance) or the two are not connected (with the place nearest to the target
-/// that is reached).
+/// `target`, or so much further on. Near a cap ahead or behind, which is nearer than the side, the
+/// radius is that of the last point before. Expects a closed surface. Throws `Error` when access or
+/// target lies outside the surface (with its distance), the two are not connected (with the place
+/// nearest to the target that is reached) or the vessel ends before `beyond_mm` (with its length).
 Centerline find_centerline(const Surface& surface, const Vec3& access, const Vec3& target,
                            const CenterlineOptions& options = {});
 

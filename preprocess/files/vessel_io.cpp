@@ -225,6 +225,26 @@ Centerline read_centerline(const std::filesystem::path& path) {
   return line;
 }
 
+std::vector<Centerline> read_centerlines(const std::filesystem::path& path) {
+  const vtkSmartPointer<vtkPolyData> data = read_with<vtkXMLPolyDataReader>(path);
+  const Eigen::Matrix3Xd points = points_of(data);
+  const auto values = [&](const char* name) {
+    return values_of(data->GetPointData(), name, points.cols(), path);
+  };
+  const Eigen::VectorXd radius = values("radius_mm"), arc = values("arc_length_mm");
+  std::vector<Centerline> lines;
+  Eigen::Index at = 0;  // lines follow one another, each with points of its own
+  for (vtkIdType k = 0; k < data->GetNumberOfLines(); ++k) {
+    const auto n = static_cast<Eigen::Index>(data->GetLines()->GetCellSize(k));
+    expects(at + n <= points.cols());
+    lines.push_back({.points = points.middleCols(at, n),
+                     .radius = radius.segment(at, n),
+                     .arc_length = arc.segment(at, n)});
+    at += n;
+  }
+  return lines;
+}
+
 void write_wall(const Surface& surface, const Wall& wall, const std::filesystem::path& path,
                 const std::vector<NamedArray>& arrays) {
   const Eigen::Index vertices = surface.vertices.cols(), count = surface.triangles.cols();

@@ -20,6 +20,7 @@ Centerline read_centerline(const std::filesystem::path& path);
 
 /// Several lines in one .vtp, with the same arrays and the cell array `branch`, their number.
 void write_centerlines(const std::vector<Centerline>& lines, const std::filesystem::path& path);
+std::vector<Centerline> read_centerlines(const std::filesystem::path& path);
 
 /// Values that a viewer shows on the points or cells of a file, under a name.
 struct NamedArray {

@@ -2,24 +2,33 @@
 /// One insertion of one wire into one vessel and its outcome: run_trial(wire, introducer, goal,
 /// vessel, options, moves) -> TrialResult. Serial and deterministic; shares the vessel read-only
 /// with other trials.
+#include <memory>
 #include <string>
 #include <vector>
 
 #include "simulate/insertion/insertion.h"
+#include "simulate/insertion/way.h"
 
 namespace wireplan::simulate {
 
+/// Where to. Of a place in a vessel the way is known, and the tip reaches it when it passes the
+/// vessel's cross-section at the way's end, and the rest of the wire came along the way. Of a point
+/// or a sac, or without a way, it reaches it within a radius.
 struct Goal {
-  Vec3 point = Vec3::Zero();  //                                                  [mm]
-  double radius = 4.0;        // the tip within this distance has reached it      [mm]
+  Vec3 point = Vec3::Zero();                 //                                           [mm]
+  double radius = 4.0;                       // of the sphere; of a cross-section the lumen's [mm]
+  bool at_section = false;                   // whether it is a place in a vessel; needs a way
+  std::shared_ptr<const Way> way = nullptr;  // shared by all trials of a study
 };
 
 enum class Outcome {
-  kReached,       // the tip came within the goal's radius; ends where it was nearest
-  kMissed,        // all wire was pushed in, the goal not reached
+  kReached,       // the tip passed the goal's cross-section, or came within its radius
+  kMissed,        // all wire was pushed in, or the tip went by a sphere; the goal not reached
+  kPassedBy,      // the tip went on in a vessel that the way leaves: it overshot the branch
+  kWrongBranch,   // the tip took a branch that is not on the way
+  kLeftImage,     // the tip came to an end of the imaged vessel, which goes on in the patient
   kStuck,         // pushing no longer advances the tip
   kProlapsed,     // the wire folded back on itself instead of advancing its tip
-  kLeftOpening,   // the tip left the vessel through an inlet or outlet
   kLeftLumen,     // the wire went further through the wall than contact explains
   kNotConverged,  // a push had no equilibrium to the tolerance, also when cut smaller
   kFailed,        // our fault; the reason holds the message
@@ -52,6 +61,9 @@ struct Move {
 };
 
 /// An insertion step by step, to its outcome. Never throws for what the physics does.
+///
+/// Where the goal has a way, a trial ends too when pushing does not bring the tip further along it:
+/// for 40 mm, or for 10 mm where it is as far as the sphere of a goal.
 class Trial {
  public:
   /// Keeps a reference to the vessel. Expects a unit direction and positive lengths.
@@ -76,14 +88,17 @@ class Trial {
   struct Mark {
     Insertion::Snapshot insertion;
     std::size_t pushes = 0, shapes = 0, pushing_since = 0;
-    double best_distance = 0.0, since_shape = 0.0;
+    double best_distance = 0.0, since_shape = 0.0, furthest = 0.0, since_furthest = 0.0;
   };
   void save(Mark& mark) const;
   void restore(const Mark& mark);
 
  private:
   bool end(Outcome outcome, const std::string& reason);
-  bool check_progress();
+  bool end_where_it_is(Outcome outcome, const std::string& reason);
+  bool check_place();
+  bool check_advance(double distance);
+  bool check_motion();
   std::string reached_reason() const;
   std::string place_of(int opening) const;
   void record_shape();
@@ -96,6 +111,8 @@ class Trial {
   double best_distance_;           // of the tip from the goal, in the last step          [mm]
   double since_shape_ = 0.0;       // way of the hand since a shape was recorded          [mm]
   std::size_t pushing_since_ = 0;  // all records from here on are pushes
+  double furthest_ = 0.0;          // of the tip along the way, since the last other move   [mm]
+  double since_furthest_ = 0.0;    // pushed since then                                     [mm]
   bool ended_ = false;
 };
 

@@ -27,6 +27,7 @@ TEST_F(CaseFile, GivesEveryMissingKeyItsDefault) {
   EXPECT_EQ(input.name, folder_.filename().string());
   EXPECT_EQ(input.volume->path, folder_ / "ct.nrrd");
   EXPECT_FALSE(input.surface_input);
+  EXPECT_TRUE(input.study.goal.at_section) << "a radius alone makes the target a sphere";
   EXPECT_TRUE(input.segmentation.seeds.empty()) << "access and target are enough";
   EXPECT_FALSE(input.segmentation.smoothing_mm || input.segmentation.neck_opening_mm);
   EXPECT_EQ(input.study.inclinations.size(), 3u);
@@ -97,7 +98,9 @@ TEST_F(CaseFile, NamesEachMistakeWithItsRemedy) {
       {"access.point_mm=[1, 2]", {"access.point_mm is [1,2]", "three numbers [x, y, z]"}},
       {"access.inclination_deg=[0, 95]", {"access.inclination_deg[1] is 95", "from 0 to 80"}},
       {"access.inclination_deg=15", {"access.inclination_deg is 15", "a list"}},
-      {"target.point_mm=[1, 2, 4]", {"target.point_mm is [1.0,2.0,4.0]", "further than"}},
+      {"target={\"point_mm\": [1, 2, 4], \"radius_mm\": 4}",
+       {"target.point_mm is [1.0,2.0,4.0]", "further than"}},
+      {"target.point_mm=[1, 2, 3]", {"target.point_mm is [1.0,2.0,3.0]", "another point"}},
       {"target=3", {"target is 3, expected an object"}},
       {"segmentation.lower_hu=700", {"segmentation.lower_hu is 700", "less than", "600"}},
       {"segmentation.lower_hu=high", {"segmentation.lower_hu is \"high\", expected a number"}},
@@ -340,7 +343,10 @@ TEST_F(CaseFile, CodeAndSchemaAgreeOnKeysLimitsAndRequirements) {
   const Json schema = read_schema("case.schema.json");
   const auto told = [this](const Json& json) { return problem(json); };
   SchemaWalk of_volume(schema, full_case(volume_case()), told);
-  SchemaWalk of_surface(schema, full_case(surface_case()), told);
+  Json section = full_case(surface_case());
+  section["target"].erase("radius_mm");
+  section["target"]["beyond_mm"] = 10;
+  SchemaWalk of_surface(schema, section, told);
   of_volume.visit(schema, "", "");
   of_surface.visit(schema, "", "");
   EXPECT_GE(of_volume.limits, 50) << "limits held against the code";

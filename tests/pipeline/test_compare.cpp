@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include "pipeline/report/compare.h"
+#include "pipeline/report/report.h"
 #include "tests/pipeline/small_case.h"
 
 namespace wireplan::pipeline {
@@ -10,7 +11,7 @@ namespace {
 /// A report of one wire with one plan.
 Json report_of(const std::string& wire, double score, const std::string& sha = "a") {
   Json report;
-  report["schema"] = "wireplan.report/1";
+  report["schema"] = kReportSchema;
   report["name"] = "case-" + wire;
   report["provenance"] = {{"inputs", {{{"name", "ct"}, {"sha256", sha}}}},
                           {"parameters",
@@ -55,6 +56,14 @@ class Compare : public ::testing::Test {
 
 bool has(const std::string& text, const std::string& part) {
   return text.find(part) != std::string::npos;
+}
+
+TEST_F(Compare, ReadsReportsOfTheVersionBefore) {
+  Json older = report_of("amplatz", 0.2);
+  const Json newer = report_of("glidewire", 0.3);
+  const std::string same = compared({older, newer});
+  older["schema"] = "wireplan.report/1";
+  EXPECT_EQ(compared({older, newer}), same);
 }
 
 TEST_F(Compare, PutsThePlansOfOnePatientInOneOrder) {

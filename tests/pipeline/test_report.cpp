@@ -38,6 +38,31 @@ TEST(Report, KeepsToItsSchemaWithPlans) {
   expect_valid(report, folder.path());
 }
 
+TEST(Report, ATargetWithoutARadiusIsTheVesselsCrossSection) {
+  // Both wires run along the wall, 3.5 mm off a target that is 4 mm further on than its point.
+  const TemporaryFolder folder;
+  write_finished_tube(folder.path());
+  const std::string target = R"(target={"point_mm": [0, 0, 24], "beyond_mm": 4})";
+  const Json report = run_to_report(folder / "case.json", folder / "cache", 0, {target});
+  EXPECT_EQ(report.at("ranking").size(), 2u);
+  EXPECT_NEAR(report.at("vessel").at("target_lumen_radius_mm"), 4.0, 0.2);
+  for (const Json& trial : report.at("trials")) {
+    EXPECT_TRUE(trial.at("reached")) << trial.at("reason");
+    EXPECT_TRUE(trial.at("safe"));
+    EXPECT_NEAR(trial.at("insertion_mm"), 22.0, 3.0);
+    EXPECT_GT(trial.at("tip_to_target_mm"), 4.0) << "of the point";
+  }
+  for (const Json& plan : report.at("ranking")) {
+    EXPECT_EQ(plan.at("score_components").at("reach"), 0.0);
+    EXPECT_NE(plan.at("sentence").get<std::string>().find("safe in "), std::string::npos);
+  }
+  expect_valid(report, folder.path());
+
+  const Json sphere = run_to_report(folder / "case.json", folder / "cache", 0,
+                                    {R"(target={"point_mm": [0, 0, 28], "radius_mm": 1})"});
+  EXPECT_NE(sphere.dump().find("less than the lumen's radius"), std::string::npos);
+}
+
 TEST(Report, KeepsToItsSchemaInARigidVesselWithoutFrictionAndSaysSo) {
   const TemporaryFolder folder;
   write_finished_tube(folder.path());

@@ -40,7 +40,7 @@ TEST(Schemas, AReportTellsItselfWhichVersionWroteIt) {
   Json report = {{"schema", "wireplan.report/7"}};
   report["provenance"]["program"]["version"] = "9.1.0";
   EXPECT_EQ(refusal(report, kReportSchema),
-            "FILE: schema is \"wireplan.report/7\", expected \"wireplan.report/1\" (wireplan 9.1.0 "
+            "FILE: schema is \"wireplan.report/7\", expected \"wireplan.report/2\" (wireplan 9.1.0 "
             "wrote it and reads it, wireplan " +
                 build_info().at("version").get<std::string>() + " does not)");
   report["provenance"] = "none";

@@ -47,7 +47,7 @@ class Shards : public testing::Test {
   // How many trials of each level the process that made `trials` ran itself.
   std::vector<int> run_at_the_end() const {
     std::vector<int> counts;
-    const Json report = read_json(folder_ / "out" / "report.json", "wireplan.report/1");
+    const Json report = read_json(folder_ / "out" / "report.json", "wireplan.report/2");
     for (const Json& level : report.at("timing").at("trials").at("levels")) {
       counts.push_back(level.at("trials_run"));
     }

@@ -331,11 +331,15 @@ Json case_with_every_list_of_one(const fs::path& folder) {
 }
 
 TEST_F(RerunMatrix, OfACaseThatStartsFromASurface) {
-  const Json file = case_with_every_list_of_one(folder_.path());
+  Json file = case_with_every_list_of_one(folder_.path());
   fs::copy(folder_ / "tube.stl", folder_ / "other.stl");
   auto table = common_table();
   table["/surface/path"] = {"report"};  // its contents count, not where it lies
   table["/surface/unit"] = table["/surface/frame"] = {"surface", "report"};
+  // A cross-section is where the centerline ends.
+  file["target"].erase("radius_mm");
+  table.erase("/target/radius_mm");
+  table["/target/beyond_mm"] = {"centerline", "trials", "manoeuvres", "plans", "report"};
   Json changes = common_changes();
   changes["/surface/path"] = "other.stl";
   changes["/surface/unit"] = "cm";
@@ -518,7 +522,7 @@ TEST_F(StageKeys, AnInterruptedRunKeepsItsRepeats) {
   const auto report_of = [&](const std::string& cache) {
     options.cache = folder_ / cache;
     const fs::path folder = run_stages(given, options).artifacts.back().folder;
-    Json report = read_json(folder / "report.json", "wireplan.report/1");
+    Json report = read_json(folder / "report.json", "wireplan.report/2");
     report.erase("timing");
     return report.dump();
   };

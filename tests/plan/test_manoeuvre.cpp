@@ -3,7 +3,7 @@
 #include <cmath>
 
 #include "plan/manoeuvre.h"
-#include "plan/path_place.h"
+#include "preprocess/centerline/path_place.h"
 #include "tests/shapes.h"
 
 namespace wireplan::plan {
@@ -160,12 +160,12 @@ TEST(Manoeuvres, AreToldAsTheHandDoesThem) {
 
 TEST(PathPlace, TellsArcRadiusAndDistances) {
   const Centerline path = path_into_the_branch();
-  const PathPlace beside = find_place(Vec3(12.0, 4.0, kOstium), path);
+  const preprocess::PathPlace beside = preprocess::find_place(Vec3(12.0, 4.0, kOstium), path);
   EXPECT_DOUBLE_EQ(beside.arc, 57.0);
   EXPECT_DOUBLE_EQ(beside.radius, 2.5);
   EXPECT_DOUBLE_EQ(beside.from_axis, 4.0);
   EXPECT_DOUBLE_EQ(beside.from_lumen, 1.5);
-  const PathPlace before = find_place(Vec3(0.0, 3.0, 1.0), path);
+  const preprocess::PathPlace before = preprocess::find_place(Vec3(0.0, 3.0, 1.0), path);
   EXPECT_DOUBLE_EQ(before.arc, 0.0);
   EXPECT_DOUBLE_EQ(before.from_axis, 5.0);
   EXPECT_DOUBLE_EQ(before.from_lumen, 0.0);

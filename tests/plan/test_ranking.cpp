@@ -145,7 +145,7 @@ TEST(Rank, ExcludesEveryTrialThatIsNoPlanWithItsReason) {
   bench.add(0, 60.0, 0.2, Outcome::kLeftLumen);
   bench.add(0, 61.0, 0.2, Outcome::kProlapsed);
   bench.trials.back().reason = "it folded back at (1, 2, 3) mm";
-  bench.add(0, 62.0, 0.2, Outcome::kLeftOpening);
+  bench.add(0, 62.0, 0.2, Outcome::kLeftImage);
   bench.trials.back().reason = "the wire left the vessel through the opening at (1, 2, 3) mm";
   bench.add(0, 70.0, 0.2, Outcome::kNotConverged);
   bench.trials.back().reason = "no equilibrium after 200 iterations";
@@ -163,8 +163,9 @@ TEST(Rank, ExcludesEveryTrialThatIsNoPlanWithItsReason) {
       "4 mm",
       "stuck at 120.0 mm of wire, tip 50.0 mm from the target",
       "left the lumen at 120.0 mm of wire, tip 60.0 mm from the target",
-      "prolapsed at 120.0 mm of wire, tip 61.0 mm from the target: it folded back at (1, 2, 3) mm",
-      "left the vessel at 120.0 mm of wire, tip 62.0 mm from the target: "
+      "folded back at 120.0 mm of wire, tip 61.0 mm from the target: it folded back at (1, 2, 3) "
+      "mm",
+      "left the imaged vessel at 120.0 mm of wire, tip 62.0 mm from the target: "
       "the wire left the vessel through the opening at (1, 2, 3) mm",
       "did not converge at 120.0 mm of wire, tip 70.0 mm from the target: "
       "no equilibrium after 200 iterations",

@@ -214,12 +214,12 @@ TEST(JudgeRepeat, AFailureCostsOneAndSaysWhy) {
     return judge_repeat({.outcome = Outcome::kReached, .metrics = metrics}, study, {}, {});
   };
   const Repeat good = judged(reached(0.3));
-  EXPECT_TRUE(good.success);
+  EXPECT_TRUE(good.safe);
   EXPECT_EQ(good.score, compute_score(reached(0.3), study.goal, {}, {}).total);
   Metrics hard = reached(0.3);
   hard.peak_tip_force = 2.0;
   const Repeat broken = judged(hard);
-  EXPECT_FALSE(broken.success);
+  EXPECT_FALSE(broken.safe);
   EXPECT_EQ(broken.score, 1.0);
   EXPECT_NE(broken.reason.find("over the limit"), std::string::npos);
   EXPECT_EQ(broken.peak_tip_force, 2.0);
@@ -245,7 +245,7 @@ struct Plans {
     plan.trial = trial;
     for (const double score : scores) {
       Repeat& repeat = plan.repeats.emplace_back();
-      repeat.success = score < 1.0;
+      repeat.safe = score < 1.0;
       repeat.score = score;
     }
   }
@@ -264,7 +264,7 @@ TEST(Rank, PlansThatStaySafeUnderDisturbancesComeFirst) {
   EXPECT_EQ(first.expected_score, first.robust_score);
   EXPECT_EQ(last.trial, 0);
   EXPECT_DOUBLE_EQ(last.robust_score.value(), 0.6);
-  EXPECT_NE(last.sentence.find("works in 2 of 4 perturbed repeats"), std::string::npos)
+  EXPECT_NE(last.sentence.find("safe in 2 of 4 perturbed repeats"), std::string::npos)
       << last.sentence;
   EXPECT_NE(last.sentence.find("behind it under the perturbations alone"), std::string::npos)
       << last.sentence;
@@ -310,7 +310,7 @@ TEST(Rank, APlanWithFewerRepeatsGetsWhatTheFurtherOnesTypicallyAdd) {
   EXPECT_NEAR(ranking.plans[2].expected_score, 0.28 + 0.1, 1e-12);
   // Pairs are compared over the repeats that both have: 2 is worse in one of two, better in one.
   EXPECT_EQ(ranking.plans[2].tied_with, (std::vector<int>{0, 1}));
-  EXPECT_NE(ranking.plans[2].sentence.find("works in 2 of 2"), std::string::npos);
+  EXPECT_NE(ranking.plans[2].sentence.find("safe in 2 of 2"), std::string::npos);
 }
 
 TEST(Rank, APlanWithoutRepeatsMayMoveAsFarAsThoseWithThem) {
@@ -356,8 +356,8 @@ TEST(Sensitivity, FindsTheUnknownThatMovesThePlansAgainstEachOther) {
   for (const Disturbance& d : disturbances) {
     // Friction moves both alike and so no order; the wall moves them apart, a lean a little.
     const double both = 0.2 * std::log(d.friction_factor);
-    a.repeats.push_back({.success = true, .score = 0.4 + both + 0.05 * std::log(d.wall_factor)});
-    b.repeats.push_back({.success = true, .score = 0.4 + both + 0.05 * d.tilt[0]});
+    a.repeats.push_back({.safe = true, .score = 0.4 + both + 0.05 * std::log(d.wall_factor)});
+    b.repeats.push_back({.safe = true, .score = 0.4 + both + 0.05 * d.tilt[0]});
   }
   const Sensitivity found = find_sensitivity(disturbances, {a, b});
   ASSERT_EQ(found.shares.size(), 5u);
@@ -369,7 +369,7 @@ TEST(Sensitivity, FindsTheUnknownThatMovesThePlansAgainstEachOther) {
   EXPECT_NEAR(sum, 1.0, 1e-12);
 
   // A plan with fewer repeats says nothing.
-  const RepeatedPlan few{.trial = 2, .repeats = {{.success = true, .score = 0.9}}};
+  const RepeatedPlan few{.trial = 2, .repeats = {{.safe = true, .score = 0.9}}};
   const Sensitivity again = find_sensitivity(disturbances, {a, few, b});
   EXPECT_EQ(again.explained.value(), found.explained.value());
   EXPECT_EQ(again.shares[0].of_all, found.shares[0].of_all);
@@ -382,7 +382,7 @@ TEST(Sensitivity, ExplainsNothingOfNoise) {
   for (RepeatedPlan& plan : plans) {
     for (int k = 0; k < 64; ++k) {
       state = state * 6364136223846793005ULL + 1442695040888963407ULL;
-      plan.repeats.push_back({.success = true, .score = double(state >> 40) / double(1 << 24)});
+      plan.repeats.push_back({.safe = true, .score = double(state >> 40) / double(1 << 24)});
     }
   }
   // 7 coefficients explain 11 % of 64 values by chance, which is corrected for; with a deviation of

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <numeric>
 
+#include "plan/batch.h"
 #include "plan/search.h"
 #include "tests/shapes.h"
 
@@ -69,7 +70,14 @@ TEST(ScoutStudy, IsCoarserButResolvesTheTip) {
   EXPECT_EQ(scout_study(study).insertion.step, 3.0) << "never finer than the study";
 }
 
-TEST(RunScout, GivesUpWhereTheTipComesNoFurtherAlongThePath) {
+/// A straight push in the way of a path.
+simulate::TrialResult scouted(Study study, const Centerline& path,
+                              const simulate::VesselModel& vessel) {
+  study.goal.way = std::make_shared<simulate::Way>(path);
+  return run_candidate(study, {}, vessel);
+}
+
+TEST(Way, ATrialEndsWhereTheTipComesNoFurtherAlongIt) {
   // Straight on in a tube whose path leaves it after 30 mm.
   const simulate::VesselModel tube(shapes::straight_tube(4.0, 120.0, 2.0));
   Study study;
@@ -85,11 +93,12 @@ TEST(RunScout, GivesUpWhereTheTipComesNoFurtherAlongThePath) {
   path.points << 0.0, 0.0, 30.0, 0.0, 0.0, 0.0, 5.0, 35.0, 35.0;
   path.arc_length = Eigen::Vector3d(0.0, 30.0, 60.0);
   path.radius.setConstant(3, 2.0);
-  const simulate::TrialResult scout = run_scout(study, {}, tube, path);
+  const simulate::TrialResult scout = scouted(study, path, tube);
   EXPECT_EQ(scout.outcome, Outcome::kMissed);
   // In the lumen of 2 mm and 1 mm beside until 33 mm on, then 40 mm more.
   EXPECT_NEAR(scout.pushes.back().insertion, 72.0, 3.0);
-  EXPECT_NE(scout.reason.find("of wire went in, tip ended"), std::string::npos) << scout.reason;
+  EXPECT_NE(scout.reason.find("came no further than 30.0 mm along the way"), std::string::npos)
+      << scout.reason;
 
   // A path that ends in the tube, with the goal at its end but too small for a tip that the lean
   // keeps off the axis: 10 mm on from there.
@@ -100,14 +109,14 @@ TEST(RunScout, GivesUpWhereTheTipComesNoFurtherAlongThePath) {
   straight.points << 0.0, 0.0, 0.0, 0.0, 5.0, 50.0;
   straight.arc_length = Eigen::Vector2d(0.0, 45.0);
   straight.radius.setConstant(2, 4.0);
-  const simulate::TrialResult passed = run_scout(passing, {}, tube, straight);
+  const simulate::TrialResult passed = scouted(passing, straight, tube);
   EXPECT_EQ(passed.outcome, Outcome::kMissed);
   EXPECT_NEAR(passed.pushes.back().insertion, 57.0, 2.0);
 
   // Where the path goes on with the tube the goal is reached, and until then nothing is given up.
   study.goal.point = Vec3(0.0, 0.0, 100.0);
   path.points.col(2) = Vec3(0.0, 0.0, 110.0);
-  EXPECT_EQ(run_scout(study, {}, tube, path).outcome, Outcome::kReached);
+  EXPECT_EQ(scouted(study, path, tube).outcome, Outcome::kReached);
 }
 
 TEST(ChooseNext, FindsTheBestPlanThoughTheScoutHasItSixth) {

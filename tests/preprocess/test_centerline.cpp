@@ -74,6 +74,34 @@ std::string refusal_of(const Surface& surface, const Vec3& access, const Vec3& t
   return "no error";
 }
 
+TEST(Centerline, GoesOnBeyondTheTargetAsFarAsAsked) {
+  // A bend of 90 degrees round 30 mm behind the target; the vessel ends 20 + 47 + 25 mm on.
+  const Surface bend = shapes::bend_tube(4.0, 30.0, 0.5 * kPi, 60.0, 25.0, 1.5);
+  const Vec3 access(0.0, 0.0, 10.0), target(0.0, 0.0, 40.0);
+  const double to_target = length_of(find_centerline(bend, access, target));
+  EXPECT_NEAR(to_target, 30.0, 0.3);
+  for (const double beyond : {10.0, 40.0, 80.0}) {
+    const Centerline line = find_centerline(bend, access, target, {.beyond_mm = beyond});
+    EXPECT_NEAR(length_of(line), to_target + beyond, 0.7) << beyond;
+    EXPECT_NEAR(line.radius(line.radius.size() - 1), 4.0, 0.15) << beyond;
+  }
+  try {
+    find_centerline(bend, access, target, {.beyond_mm = 120.0});
+    FAIL() << "the vessel is not that long";
+  } catch (const Error& error) {
+    EXPECT_NE(std::string(error.what()).find("the vessel ends 9"), std::string::npos)
+        << error.what();
+  }
+}
+
+TEST(Centerline, HasTheLumensRadiusNearCaps) {
+  const Surface tube = shapes::straight_tube(12.0, 100.0, 3.0);
+  const Centerline line = find_centerline(tube, Vec3(0.0, 0.0, 3.5), Vec3(0.0, 2.0, 95.0));
+  for (Eigen::Index i = 0; i < line.radius.size(); ++i) {
+    EXPECT_NEAR(line.radius(i), 12.0, 0.4) << line.points.col(i).transpose();
+  }
+}
+
 TEST(Centerline, OfAStraightTubeIsItsAxisFromFootToFoot) {
   const Surface tube = shapes::straight_tube(5.0, 100.0, 1.5);
   const Centerline line = find_centerline(tube, {1.0, 2.0, 5.0}, {0.0, -3.0, 95.0});

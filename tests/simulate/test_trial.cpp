@@ -178,7 +178,7 @@ TEST(Trial, WireThatLeavesThroughAnOpenEndIsNamedSo) {
   const TrialResult trial =
       run_trial(straight_wire(520.0), along_z(), {.point = Vec3(0.0, 0.0, 1e3)},
                 straight_lumen(4.0, 60.0, true), options());
-  EXPECT_EQ(trial.outcome, Outcome::kLeftOpening) << outcome_name(trial.outcome) << trial.reason;
+  EXPECT_EQ(trial.outcome, Outcome::kLeftImage) << outcome_name(trial.outcome) << trial.reason;
   EXPECT_GT(trial.pushes.back().tip.z(), 60.0);
   EXPECT_LT(trial.pushes.back().tip.z(), 68.0);
   EXPECT_NE(trial.reason.find(" mm"), std::string::npos) << trial.reason;
@@ -196,7 +196,7 @@ TEST(Trial, ATipThatTurnsAsideBeyondAnOpenEndHasLeftThroughIt) {
     some.step = step;
     const TrialResult trial = run_trial(hook, along_z(), {.point = Vec3(0.0, 0.0, 1e3)},
                                         straight_lumen(2.0, 60.0, true), some);
-    EXPECT_EQ(trial.outcome, Outcome::kLeftOpening)
+    EXPECT_EQ(trial.outcome, Outcome::kLeftImage)
         << step << " " << outcome_name(trial.outcome) << ": " << trial.reason;
   }
 }

@@ -140,14 +140,14 @@ const successFigure = (page) => {
     .map((p) => ({rank: `plan ${p.rank}`, rate: p.success_rate, low: p.success_rate_interval[0], high: p.success_rate_interval[1], trial: page.trials[p.trial]}));
   if (!rows.length) {
     return el("figure", {}, el("p", {class: "missing"},
-      el("b", {}, "Success rates: "),
+      el("b", {}, "Safe share: "),
       `none. No plan was repeated with disturbed angles, friction and wall, so how robust they are is not known. A case asks for repeats with robustness.repeats.`));
   }
-  const make = (width) => chart("Success rate of each repeated plan with its interval", {
+  const make = (width) => chart("Share of safe repeats of each repeated plan with its interval", {
     width,
     height: 60 + 26 * rows.length,
     marginLeft: 76,
-    x: {label: "success rate [%] \u2192", domain: [0, 100]},
+    x: {label: "safe repeats [%] \u2192", domain: [0, 100]},
     y: {label: null, domain: rows.map((r) => r.rank)},
     marks: [
       gridX(), frame({stroke: "#bbb"}),
@@ -156,9 +156,9 @@ const successFigure = (page) => {
     ],
   });
   return figure(
-    el("span", {}, el("b", {}, "Success rates"), " over repeats with disturbed angles, friction and wall; bars are their intervals."),
+    el("span", {}, el("b", {}, "Safe share"), " over repeats with disturbed angles, friction and wall; bars are their intervals."),
     make,
-    numbersOf("Success rates", ["Plan", "Success rate", "Interval"],
+    numbersOf("Safe share", ["Plan", "Safe share", "Interval"],
       rows.map((r) => [`${r.rank}: ${planName(r.trial)}`, percent(r.rate), `${percent(r.low)} to ${percent(r.high)}`]))).node;
 };
 

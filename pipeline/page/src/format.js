@@ -38,9 +38,11 @@ export const plural = (count, noun) => `${count} ${noun}${count === 1 ? "" : "s"
 const kOutcomes = {
   reached: {word: "reached the target", mark: "\u2713"},
   missed: {word: "missed the target", mark: "M"},
+  passed_by: {word: "passed by the branch", mark: "B"},
+  wrong_branch: {word: "took the wrong branch", mark: "W"},
+  left_image: {word: "came to the end of the imaged vessel", mark: "E"},
   stuck: {word: "got stuck", mark: "S"},
   prolapsed: {word: "folded back on itself", mark: "P"},
-  left_opening: {word: "left through an opening", mark: "O"},
   left_lumen: {word: "left the lumen", mark: "L"},
   not_converged: {word: "no equilibrium found", mark: "N"},
   failed: {word: "failed in the program", mark: "F"},

@@ -25,7 +25,7 @@ const kColumns = [
   ["Mean contact [N]", (t) => t.mean_contact_force_n, (t) => told(t, t.mean_contact_force_n, t.errors.mean_contact_force_error_n)],
   ["Tip force [N]", (t) => t.peak_tip_force_n, (t) => told(t, t.peak_tip_force_n, t.errors.peak_tip_force_error_n)],
   ["Score, 0 best", (t) => t.plan?.score ?? Infinity, (t) => (t.plan ? withError(t.plan.score, t.plan.score_error) : "\u2013")],
-  ["Success rate", (t) => t.plan?.success_rate ?? -1, success],
+  ["Safe share", (t) => t.plan?.success_rate ?? -1, success],
   ["Why", (t) => t.plan?.sentence ?? t.excluded ?? "", (t) => shown(t.plan ? t.plan.sentence : t.excluded ?? outcomeWord(t.outcome))],
 ];
 

@@ -44,11 +44,11 @@ export const answerSection = (page) => {
   const t = trials[best.trial], errors = t.errors;
   const ties = best.tied_with.length;
   const rate = best.success_rate === null || best.success_rate === undefined
-    ? "How often it succeeds when angles, friction and wall differ was not asked."
-    : `With angles, friction and wall disturbed it succeeds in ${percent(best.success_rate)} of repeats (${percent(best.success_rate_interval[0])} to ${percent(best.success_rate_interval[1])}).`;
+    ? "How often it is safe when angles, friction and wall differ was not asked."
+    : `With angles, friction and wall disturbed it is safe (reaches, and breaks no limit) in ${percent(best.success_rate)} of repeats (${percent(best.success_rate_interval[0])} to ${percent(best.success_rate_interval[1])}).`;
   return section("answer", "The answer",
     el("p", {class: "answer"},
-      "Best of ", plural(report.ranking.length, "plan"), ` that reach, out of ${trials.length} tried: `,
+      "Best of ", plural(report.ranking.length, "safe plan"), `, which reach and break no limit; ${trials.filter((x) => x.reached).length} of ${trials.length} tried reach: `,
       el("strong", {}, el("bdi", {}, planName(t))),
       `. Its tip ends ${withError(t.tip_to_target_mm, errors.position_error_mm)}\u00a0mm from the target's middle, with at most ` +
       `${withError(t.peak_contact_force_n, errors.peak_contact_force_error_n)}\u00a0N at one contact and ${withError(t.peak_tip_force_n, errors.peak_tip_force_error_n)}\u00a0N at the tip.`),
@@ -90,7 +90,7 @@ const spreadRow = (robustness, trial, first) => {
   if (!row) return null;
   const {low, median, high} = row.peak_contact_force_n;
   return ["All of these together, best plan",
-    `succeeds in ${row.successes} of ${row.repeats}: ${percent(first.success_rate)}, interval ${first.success_rate_interval.map(percent).join(" to ")}`,
+    `safe in ${row.successes} of ${row.repeats}, reaches in ${row.reached ?? row.successes}: ${percent(first.success_rate)}, interval ${first.success_rate_interval.map(percent).join(" to ")}`,
     `largest contact ${number(median)}\u00a0N in the middle, ${number(low)} to ${number(high)}\u00a0N in 90\u00a0% of repeats` +
       (row.failures.length ? `; fails because: ${[...new Set(row.failures.map((f) => shown(f.reason)))].slice(0, 3).join("; ")}` : "")];
 };

@@ -2,7 +2,7 @@
 /// Where a point is along and beside the path from access to target.
 #include "preprocess/vessel.h"
 
-namespace wireplan::plan {
+namespace wireplan::preprocess {
 
 struct PathPlace {
   double arc = 0.0;         // of the nearest point of the path's axis, from the access     [mm]
@@ -14,7 +14,11 @@ struct PathPlace {
 /// Expects a path of at least one point.
 PathPlace find_place(const Vec3& p, const Centerline& path);
 
-/// How far along the path a tip is; 0 more than a millimetre outside of the path's lumen [mm].
+/// Whether a place is in the path's lumen, which the balls fill but for what is oval: at most half
+/// their radius beside them, and a millimetre at least.
+bool is_on_path(const PathPlace& place);
+
+/// How far along the path a tip is; 0 where it is not on the path [mm].
 double find_progress(const Vec3& tip, const Centerline& path);
 
-}  // namespace wireplan::plan
+}  // namespace wireplan::preprocess

@@ -1,9 +1,9 @@
-#include "plan/path_place.h"
+#include "preprocess/centerline/path_place.h"
 
 #include <algorithm>
 #include <cmath>
 
-namespace wireplan::plan {
+namespace wireplan::preprocess {
 
 PathPlace find_place(const Vec3& p, const Centerline& path) {
   expects(path.points.cols() > 0 && path.radius.size() == path.points.cols());
@@ -27,10 +27,14 @@ PathPlace find_place(const Vec3& p, const Centerline& path) {
   return place;
 }
 
-double find_progress(const Vec3& tip, const Centerline& path) {
-  constexpr double kOffPath = 1.0;  // [mm]
-  const PathPlace place = find_place(tip, path);
-  return place.from_lumen <= kOffPath ? place.arc : 0.0;
+bool is_on_path(const PathPlace& place) {
+  constexpr double kBeside = 1.0, kBesidePart = 0.5;  // [mm], of the radius
+  return place.from_lumen <= std::max(kBeside, kBesidePart * place.radius);
 }
 
-}  // namespace wireplan::plan
+double find_progress(const Vec3& tip, const Centerline& path) {
+  const PathPlace place = find_place(tip, path);
+  return is_on_path(place) ? place.arc : 0.0;
+}
+
+}  // namespace wireplan::preprocess

@@ -1,0 +1,80 @@
+#pragma once
+/// The way from access to target through the vessels: whether a wire that passes the target came
+/// along it, and where a tip is that did not.
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "preprocess/centerline/centerline.h"
+#include "simulate/wall/lumen.h"
+
+namespace wireplan::simulate {
+
+/// The vessel's cross-section at the end of the way: a plane across it, and the lumen round its
+/// middle.
+struct CrossSection {
+  Vec3 center = Vec3::Zero();   // on the vessel's axis                                   [mm]
+  Vec3 normal = Vec3::UnitZ();  // unit, onward along the way
+  double radius = 0.0;          // inscribed                                              [mm]
+};
+
+/// A tip that is in another vessel than the way.
+struct Astray {
+  bool passed_by = false;  // it stayed in a vessel that the way leaves, the wider one at a fork, or
+                           // went on from there; else it took a branch before that
+  std::string text;        // which vessel, and how far beyond the place where the way leaves
+};
+
+/// Immutable. Branches are named by their numbers in the tree: "branch 1" is the first.
+class Way {
+ public:
+  /// Expects a path of two points or more from access to target. `tree` has all branches of the
+  /// lumen, with the access as root; it may be empty, then no vessel is told from another.
+  explicit Way(Centerline path, std::vector<preprocess::Branch> tree = {});
+
+  const Centerline& path() const { return path_; }
+  const CrossSection& section() const { return section_; }
+
+  /// Where the wire, nodes (3, n) that end with the tip, passes the cross-section onward, inside
+  /// the lumen round its middle: in a straight line from there no wall is between. The last 20 mm
+  /// are looked at.
+  std::optional<Vec3> find_arrival(const Eigen::Ref<const Eigen::Matrix3Xd>& wire,
+                                   const Lumen& lumen) const;
+
+  /// Why a wire did not come along the way, if so: part of it lies outside of the way's lumen by
+  /// more than the way's radius there (5 mm at least), or runs back along it by more than four
+  /// radii (20 mm at least).
+  std::optional<std::string> find_detour(const Eigen::Ref<const Eigen::Matrix3Xd>& wire) const;
+
+  /// Where a tip is that is not on the way; empty for one that is.
+  std::optional<Astray> find_astray(const Vec3& tip) const;
+
+  /// The end of the image that a tip has come to: within half a radius of where a branch ends with
+  /// nothing but wall ahead. An artery goes on there in the patient, whether the model ends flat or
+  /// round. Ends within two diameters of their parent are none (sacs of aneurysms, stumps), nor is
+  /// what lies before the target.
+  std::optional<int> find_image_end(const Vec3& tip, const Lumen& lumen) const;
+
+  /// "branch 3", of the vessel that a point is in; empty without a tree.
+  std::string name_at(const Vec3& point) const;
+
+ private:
+  struct Place {
+    int branch = 0;
+    double arc = 0.0;  // along its line                                                  [mm]
+  };
+  Place find_branch(const Vec3& point) const;
+  /// Whether a branch that leaves the way is wider than the vessel of the way there: a tree's first
+  /// branch may well end in the smaller one.
+  bool is_wider(int branch, const Place& fork) const;
+
+  Centerline path_;
+  CrossSection section_;
+  std::vector<preprocess::Branch> tree_;
+  /// Per branch: where the way leaves it, for the target's branch the target's place; negative for
+  /// branches that the way does not use [mm].
+  std::vector<double> leaves_;
+  int target_branch_ = -1;
+};
+
+}  // namespace wireplan::simulate

@@ -1,0 +1,220 @@
+// A target is a place in a vessel: what counts as having reached it, and how trials end that do
+// not.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "simulate/insertion/trial.h"
+#include "tests/shapes.h"
+
+namespace wireplan::simulate {
+namespace {
+
+using preprocess::Branch;
+
+/// A line through points [mm] with samples every half millimetre.
+Centerline line_through(const std::vector<Vec3>& corners, double radius) {
+  std::vector<Vec3> points;
+  for (std::size_t k = 0; k + 1 < corners.size(); ++k) {
+    const Vec3 edge = corners[k + 1] - corners[k];
+    const int steps = static_cast<int>(std::lround(edge.norm() / 0.5));
+    for (int i = 0; i < steps; ++i) points.push_back(corners[k] + edge * i / steps);
+  }
+  points.push_back(corners.back());
+  const auto n = static_cast<Eigen::Index>(points.size());
+  Centerline line{Eigen::Matrix3Xd(3, n), Eigen::VectorXd::Constant(n, radius),
+                  Eigen::VectorXd::Zero(n)};
+  for (Eigen::Index i = 0; i < n; ++i) {
+    line.points.col(i) = points[static_cast<std::size_t>(i)];
+    if (i > 0) {
+      line.arc_length(i) =
+          line.arc_length(i - 1) + (line.points.col(i) - line.points.col(i - 1)).norm();
+    }
+  }
+  return line;
+}
+
+Goal goal_of(Centerline path, std::vector<Branch> tree = {}) {
+  const auto way = std::make_shared<Way>(std::move(path), std::move(tree));
+  return {.point = way->section().center,
+          .radius = way->section().radius,
+          .at_section = true,
+          .way = way};
+}
+
+Wire wire_of(double EI) {
+  return {.name = "wire", .radius = 0.4, .sections = {{.length = 300.0, .bending_stiffness = EI}}};
+}
+
+// A trunk along z of 5 mm radius from 0 to 90 mm, with branches of 3 mm toward +x at 25 and 50 mm;
+// all ends are flat and closed.
+constexpr double kFirst = 25.0, kSecond = 50.0, kTrunk = 5.0, kSide = 3.0;
+
+const VesselModel& fork() {
+  static const VesselModel vessel(
+      shapes::level_set(
+          [](const Vec3& p) {
+            const auto side = [&](double z) {
+              return shapes::depth_in_tube(p, Vec3(0.0, 0.0, z), Vec3(40.0, 0.0, z), kSide);
+            };
+            const double trunk =
+                shapes::depth_in_tube(p, Vec3(0.0, 0.0, 0.0), Vec3(0.0, 0.0, 90.0), kTrunk);
+            const auto soft = [](double depth) { return std::exp(depth / 0.5); };
+            return 0.5 * std::log(soft(trunk) + soft(side(kFirst)) + soft(side(kSecond)));
+          },
+          Vec3(-6.6, -6.6, -1.6), Vec3(41.6, 6.6, 91.6), 1.1),
+      LumenOptions{.grid_spacing = 0.6});
+  return vessel;
+}
+
+Centerline into_branch(double z, double x) {
+  Centerline path = line_through({{0.0, 0.0, 5.0}, {0.0, 0.0, z}, {x, 0.0, z}}, kTrunk);
+  for (Eigen::Index i = 0; i < path.points.cols(); ++i) {
+    if (path.points(0, i) > kTrunk) path.radius(i) = kSide;
+  }
+  return path;
+}
+
+std::vector<Branch> tree_of_fork() {
+  const auto side = [](double z) {
+    Branch branch{line_through({{0.0, 0.0, z}, {39.4, 0.0, z}}, kSide), 0, z - 5.0};
+    for (Eigen::Index i = 0; branch.line.points(0, i) <= kTrunk; ++i)
+      branch.line.radius(i) = kTrunk;
+    return branch;
+  };
+  return {{line_through({{0.0, 0.0, 5.0}, {0.0, 0.0, 89.0}}, kTrunk), -1, 0.0},
+          side(kFirst),
+          side(kSecond)};
+}
+
+InsertionOptions options(double step = 1.0) {
+  return {.length = 140.0, .step = step, .element_length = step, .friction = 0.05};
+}
+
+TEST(Way, EveryWireThatPassesTheSectionOfATubeReachesWhereverItRuns) {
+  const VesselModel tube(shapes::straight_tube(6.0, 80.0, 2.0));
+  const Goal goal = goal_of(line_through({{0.0, 0.0, 5.0}, {0.0, 0.0, 60.0}}, 6.0));
+  for (const double slant : {0.0, 10.0, 25.0}) {
+    for (const double shift : {-4.0, 0.0, 4.0}) {
+      for (const double step : {1.0, 2.0}) {
+        const double a = slant * kRadPerDeg;
+        const Introducer introducer{.point = Vec3(shift, 0.0, 5.0),
+                                    .direction = Vec3(std::sin(a), 0.0, std::cos(a))};
+        const TrialResult trial = run_trial(wire_of(60.0), introducer, goal, tube, options(step));
+        EXPECT_EQ(trial.outcome, Outcome::kReached)
+            << slant << " " << shift << ": " << outcome_name(trial.outcome) << trial.reason;
+        EXPECT_GE(trial.pushes.back().tip.z(), 60.0) << "it goes on to the section ...";
+        EXPECT_LT(trial.pushes.back().tip.z(), 60.0 + step + 0.1) << "... and ends there";
+      }
+    }
+  }
+}
+
+TEST(Way, AWireThatStaysInTheTrunkPassedByTheBranch) {
+  const Goal goal = goal_of(into_branch(kSecond, 25.0), tree_of_fork());
+  const Introducer along{.point = Vec3(0.0, 0.0, 5.0), .direction = Vec3::UnitZ()};
+  for (const double step : {1.0, 2.0}) {  // scouts and full runs name it alike
+    const TrialResult trial = run_trial(wire_of(60.0), along, goal, fork(), options(step));
+    EXPECT_EQ(trial.outcome, Outcome::kPassedBy) << outcome_name(trial.outcome) << trial.reason;
+    EXPECT_NE(trial.reason.find("in branch 1"), std::string::npos) << trial.reason;
+  }
+}
+
+TEST(Way, AWireThatTakesAnEarlierBranchIsInTheWrongOneByName) {
+  const Goal goal = goal_of(into_branch(kSecond, 25.0), tree_of_fork());
+  const Introducer aslant{.point = Vec3(-1.0, 0.0, kFirst - 4.0),
+                          .direction = Vec3(0.95, 0.0, 0.3122).normalized()};
+  const TrialResult trial = run_trial(wire_of(20.0), aslant, goal, fork(), options());
+  EXPECT_EQ(trial.outcome, Outcome::kWrongBranch) << outcome_name(trial.outcome) << trial.reason;
+  EXPECT_NE(trial.reason.find("in branch 2"), std::string::npos) << trial.reason;
+  EXPECT_GT(trial.pushes.back().tip.x(), 10.0);
+
+  // The same push, asked for the first branch, reaches it.
+  const TrialResult right = run_trial(
+      wire_of(20.0), aslant, goal_of(into_branch(kFirst, 25.0), tree_of_fork()), fork(), options());
+  EXPECT_EQ(right.outcome, Outcome::kReached) << outcome_name(right.outcome) << right.reason;
+}
+
+TEST(Way, WhatIsPassedByDoesNotDependOnWhichVesselTheTreeFollowsFirst) {
+  // As if the second branch's end were the farthest: the tree's first line turns into it, and the
+  // trunk beyond is a branch of that.
+  std::vector<Branch> tree = tree_of_fork();
+  Centerline first = into_branch(kSecond, 39.5);
+  Branch beyond{line_through({{0.0, 0.0, kSecond}, {0.0, 0.0, 89.0}}, kTrunk), 0, kSecond - 5.0};
+  tree = {{first, -1, 0.0}, tree[1], beyond};
+  const Way way(into_branch(kSecond, 25.0), tree);
+  const auto on = way.find_astray(Vec3(0.0, 0.0, 75.0));
+  ASSERT_TRUE(on);
+  EXPECT_TRUE(on->passed_by) << on->text;
+  EXPECT_NE(on->text.find("branch 3"), std::string::npos) << on->text;
+  const auto aside = way.find_astray(Vec3(20.0, 0.0, kFirst));
+  ASSERT_TRUE(aside);
+  EXPECT_FALSE(aside->passed_by) << aside->text;
+  EXPECT_FALSE(way.find_astray(Vec3(15.0, 1.0, kSecond)));
+}
+
+TEST(Way, TheEndOfTheImageIsOpenThoughItsModelIsClosed) {
+  // A target in a branch; the wire runs to the closed end of the trunk, and is not pressed there.
+  const Goal goal = goal_of(into_branch(kFirst, 25.0), tree_of_fork());
+  const Introducer along{.point = Vec3(0.0, 0.0, 60.0), .direction = Vec3::UnitZ()};
+  InsertionOptions still = options();
+  still.friction = 0.0;
+  const TrialResult trial = run_trial(wire_of(60.0), along, goal, fork(), still);
+  EXPECT_EQ(trial.outcome, Outcome::kPassedBy) << outcome_name(trial.outcome) << trial.reason;
+  EXPECT_NE(trial.reason.find("end of the imaged vessel"), std::string::npos) << trial.reason;
+  EXPECT_EQ(trial.pushes.back().tip_force, 0.0);
+
+  // A tube whose end is a dome: only the target's own branch, past the target.
+  const Way way(line_through({{0.0, 0.0, 5.0}, {0.0, 0.0, 40.0}}, 5.0),
+                {{line_through({{0.0, 0.0, 5.0}, {0.0, 0.0, 78.0}}, 5.0), -1, 0.0}});
+  const Lumen dome(shapes::straight_tube(5.0, 80.0, 2.0));
+  EXPECT_EQ(way.find_image_end(Vec3(0.0, 1.0, 76.0), dome), 0);
+  EXPECT_FALSE(way.find_image_end(Vec3(0.0, 1.0, 60.0), dome));
+  const Lumen goes_on(shapes::straight_tube(5.0, 120.0, 2.0));
+  EXPECT_FALSE(way.find_image_end(Vec3(0.0, 1.0, 76.0), goes_on)) << "a loop was cut there";
+}
+
+TEST(Way, ThePlaneOfTheSectionCountsInItsOwnLumenAlone) {
+  // Two tubes side by side, their walls 2 mm apart: the section of one does not reach the other.
+  const Lumen both(shapes::joined(shapes::straight_tube(4.0, 60.0, 1.5), [] {
+    Surface other = shapes::straight_tube(4.0, 60.0, 1.5);
+    other.vertices.row(0).array() += 10.0;
+    return other;
+  }()));
+  const Way way(line_through({{0.0, 0.0, 5.0}, {0.0, 0.0, 40.0}}, 4.0));
+  const auto wire_at = [](double x) {
+    Eigen::Matrix3Xd wire(3, 12);
+    for (int i = 0; i < 12; ++i) wire.col(i) = Vec3(x, 0.0, 20.0 + 2.0 * i);
+    return wire;
+  };
+  for (const double x : {-3.5, 0.0, 3.5}) EXPECT_TRUE(way.find_arrival(wire_at(x), both)) << x;
+  for (const double x : {6.5, 9.0}) EXPECT_FALSE(way.find_arrival(wire_at(x), both)) << x;
+  Eigen::Matrix3Xd backward = wire_at(0.0).rowwise().reverse();
+  EXPECT_FALSE(way.find_arrival(backward, both)) << "it comes from beyond";
+  EXPECT_FALSE(way.find_arrival(wire_at(0.0).leftCols(10), both)) << "not there yet";
+}
+
+TEST(Way, AWireThatCameAnotherWayIsTold) {
+  const Way way(into_branch(kSecond, 25.0), tree_of_fork());
+  const auto nodes_along = [](const std::vector<Vec3>& corners) {
+    return line_through(corners, 1.0).points;
+  };
+  EXPECT_FALSE(way.find_detour(
+      nodes_along({{0.0, 3.0, 5.0}, {0.0, 3.0, 50.0}, {0.0, 0.0, 51.0}, {25.0, 0.0, 50.0}})));
+  const auto bow = way.find_detour(
+      nodes_along({{0.0, 0.0, 5.0}, {0.0, 0.0, 85.0}, {2.0, 0.0, 50.0}, {25.0, 0.0, 50.0}}));
+  ASSERT_TRUE(bow);
+  EXPECT_NE(bow->find("30 mm outside of the way"), std::string::npos) << *bow;
+  EXPECT_NE(bow->find("in branch 1"), std::string::npos) << *bow;
+  const auto fold = way.find_detour(nodes_along(
+      {{0.0, 0.0, 5.0}, {0.0, 0.0, 48.0}, {3.0, 0.0, 20.0}, {2.0, 0.0, 48.0}, {25.0, 0.0, 50.0}}));
+  ASSERT_TRUE(fold);
+  EXPECT_NE(fold->find("runs back along the way"), std::string::npos) << *fold;
+}
+
+}  // namespace
+}  // namespace wireplan::simulate
