@@ -1,0 +1,186 @@
+#include "plan/anatomy/way.h"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "preprocess/centerline/path_place.h"
+
+namespace wireplan::plan {
+namespace {
+
+using preprocess::Branch;
+
+double length_of(const Centerline& line) { return line.arc_length(line.arc_length.size() - 1); }
+
+/// The index of the last point at or before an arc length, with a point behind it.
+Eigen::Index segment_at(const Centerline& line, double arc) {
+  const auto* begin = line.arc_length.data();
+  const auto* found = std::upper_bound(begin, begin + line.arc_length.size(), arc);
+  return std::clamp<Eigen::Index>(found - begin - 1, 0, line.arc_length.size() - 2);
+}
+
+double radius_at(const Centerline& line, double arc) {
+  return preprocess::find_place(point_at(line, arc), line).radius;
+}
+
+/// The branches that lead to the point, from the root.
+std::vector<int> branches_to(const Vec3& point, const std::vector<Branch>& tree) {
+  int nearest = -1;
+  double least = std::numeric_limits<double>::infinity();
+  for (std::size_t k = 0; k < tree.size(); ++k) {
+    const double distance = preprocess::find_place(point, tree[k].line).from_axis;
+    if (distance >= least) continue;
+    least = distance;
+    nearest = static_cast<int>(k);
+  }
+  std::vector<int> chain;
+  for (int k = nearest; k >= 0; k = tree[static_cast<std::size_t>(k)].parent) chain.push_back(k);
+  std::reverse(chain.begin(), chain.end());
+  return chain;
+}
+
+/// The way up to the point before an arc length, then another line to its end.
+Centerline joined(const Centerline& way, double arc, const Centerline& after) {
+  const Eigen::Index before = std::max<Eigen::Index>(segment_at(way, arc), 1),
+                     more = after.points.cols();
+  Centerline line{.points = Eigen::Matrix3Xd(3, before + more),
+                  .radius = Eigen::VectorXd(before + more),
+                  .arc_length = Eigen::VectorXd(before + more)};
+  line.points << way.points.leftCols(before), after.points;
+  line.radius << way.radius.head(before), after.radius;
+  const double gap = (after.points.col(0) - way.points.col(before - 1)).norm();
+  line.arc_length << way.arc_length.head(before),
+      (after.arc_length.array() + way.arc_length(before - 1) + gap).matrix();
+  return line;
+}
+
+/// Where the way, from an arc length on, leaves the trunk's spheres; `arc` where it never does.
+double find_ostium(const Centerline& way, double arc, const Centerline& trunk) {
+  for (Eigen::Index k = segment_at(way, arc); k < way.points.cols(); ++k) {
+    const preprocess::PathPlace place = preprocess::find_place(way.points.col(k), trunk);
+    if (place.from_axis > place.radius) return way.arc_length(k);
+  }
+  return arc;
+}
+
+Vec3 chord(const Centerline& line, double from, double to) {
+  return (point_at(line, to) - point_at(line, from)).normalized();
+}
+
+/// Direction of a line beyond an arc length where it is an ostium.
+Vec3 direction_beyond(const Centerline& line, double ostium) {
+  constexpr double kLeast = 1.0;  // a stub shorter than that tells no direction           [mm]
+  const double length = length_of(line);
+  const double reach = std::max(6.0, 3.0 * radius_at(line, ostium));
+  const double end = std::min(ostium + reach, length);
+  return chord(line, end - ostium < kLeast ? std::max(0.0, length - reach) : ostium, end);
+}
+
+/// The junction where the way leaves `trunk` at `arc` of the way.
+Junction taken_junction(const Centerline& way, double arc, const Centerline& trunk) {
+  Junction junction{.taken = true};
+  const preprocess::PathPlace place = preprocess::find_place(point_at(way, arc), trunk);
+  const double reach = 2.0 * place.radius;
+  junction.arc = find_ostium(way, arc, trunk);
+  junction.point = point_at(way, junction.arc);
+  junction.trunk_direction = chord(trunk, place.arc - reach, place.arc + reach);
+  junction.branch_direction = direction_beyond(way, junction.arc);
+  return junction;
+}
+
+/// The junction at `arc` of the way where `side` leaves the branch that the way stays in.
+Junction side_junction(const Centerline& way, double arc, const Branch& side) {
+  const double reach = 2.0 * radius_at(way, arc);
+  const auto width_beyond = [&](const Centerline& line, double from) {
+    return radius_at(line, std::min(from + reach, length_of(line)));
+  };
+  if (width_beyond(side.line, 0.0) > width_beyond(way, arc)) {
+    return taken_junction(way, arc, joined(way, arc, side.line));
+  }
+  Junction junction;
+  junction.arc = arc;
+  junction.point = point_at(way, arc);
+  junction.trunk_direction = chord(way, arc - reach, arc + reach);
+  junction.branch_direction = direction_beyond(side.line, find_ostium(side.line, 0.0, way));
+  return junction;
+}
+
+}  // namespace
+
+Vec3 point_at(const Centerline& line, double arc) {
+  expects(line.points.cols() >= 2);
+  const Eigen::Index k = segment_at(line, arc);
+  const double step = line.arc_length(k + 1) - line.arc_length(k);
+  const double part = step > 0.0 ? std::clamp((arc - line.arc_length(k)) / step, 0.0, 1.0) : 0.0;
+  return (1.0 - part) * line.points.col(k) + part * line.points.col(k + 1);
+}
+
+Narrowest find_narrowest(const Centerline& way, double length) {
+  const double end = length_of(way);
+  Eigen::Index narrowest = -1;
+  for (const bool ends_too : {false, true}) {
+    for (Eigen::Index k = 0; k < way.points.cols(); ++k) {
+      const double arc = way.arc_length(k), radius = way.radius(k);
+      if (arc > length || (!ends_too && (arc < radius || end - arc < radius))) continue;
+      if (narrowest < 0 || radius < way.radius(narrowest)) narrowest = k;
+    }
+    if (narrowest >= 0) break;
+  }
+  expects(narrowest >= 0);
+  return {2.0 * way.radius(narrowest), way.arc_length(narrowest), way.points.col(narrowest)};
+}
+
+double tortuosity(const Centerline& way) {
+  const Vec3 start = way.points.col(0), end = way.points.col(way.points.cols() - 1);
+  return std::max(1.0, length_of(way) / (end - start).norm());  // rounding of a straight line
+}
+
+Corner find_sharpest_bend(const Centerline& way, double arm) {
+  const double length = length_of(way);
+  Corner sharpest{.angle = kPi, .arm = std::min(arm, length / 3.0)};
+  for (Eigen::Index k = 0; k < way.points.cols(); ++k) {
+    const double arc = way.arc_length(k);
+    if (arc < sharpest.arm || arc > length - sharpest.arm) continue;
+    const Vec3 before = chord(way, arc, arc - sharpest.arm),
+               behind = chord(way, arc, arc + sharpest.arm);
+    const double angle = std::atan2(before.cross(behind).norm(), before.dot(behind));
+    if (angle > sharpest.angle) continue;
+    sharpest.angle = angle;
+    sharpest.arc = arc;
+    sharpest.point = way.points.col(k);
+  }
+  return sharpest;
+}
+
+std::vector<Junction> find_junctions(const Centerline& way, const std::vector<Branch>& tree) {
+  const Vec3 end = way.points.col(way.points.cols() - 1);
+  const std::vector<int> chain = branches_to(end, tree);
+  std::vector<Junction> junctions;
+  for (std::size_t k = 0; k < chain.size(); ++k) {
+    // The stretch of the branch that the way goes along.
+    const int own = chain[k];
+    const int next = k + 1 < chain.size() ? chain[k + 1] : -1;
+    const Centerline& line = tree[static_cast<std::size_t>(own)].line;
+    const double left_at = next >= 0 ? tree[static_cast<std::size_t>(next)].parent_arc
+                                     : preprocess::find_place(end, line).arc;
+
+    for (std::size_t b = 0; b < tree.size(); ++b) {
+      if (tree[b].parent != own || tree[b].parent_arc > left_at) continue;
+      const double arc = preprocess::find_place(point_at(line, tree[b].parent_arc), way).arc;
+      const bool changes = static_cast<int>(b) == next;
+      Junction junction =
+          changes ? taken_junction(way, arc, line) : side_junction(way, arc, tree[b]);
+      const bool stays = junction.taken && !changes;  // in the narrower one
+      junction.trunk = stays ? static_cast<int>(b) : own;
+      junction.branch = stays ? own : static_cast<int>(b);
+      junctions.push_back(junction);
+    }
+  }
+  std::stable_sort(junctions.begin(), junctions.end(),
+                   [](const Junction& a, const Junction& b) { return a.arc < b.arc; });
+  return junctions;
+}
+
+}  // namespace wireplan::plan

@@ -1,0 +1,61 @@
+#pragma once
+/// What the way from access to target is like, by its centerline alone: how narrow, how tortuous,
+/// where vessels leave it and how far in that is. No wire is simulated for it.
+#include <vector>
+
+#include "preprocess/centerline/centerline.h"
+#include "preprocess/vessel.h"
+
+namespace wireplan::plan {
+
+/// The point of a line at an arc length [mm], between its points; the end where it is beyond one.
+Vec3 point_at(const Centerline& line, double arc);
+
+struct Narrowest {
+  double diameter = 0.0;      // of the inscribed sphere                                   [mm]
+  double arc = 0.0;           //                                                           [mm]
+  Vec3 point = Vec3::Zero();  //                                                           [mm]
+};
+
+/// Where the first `length` mm of the way are narrowest. A sphere at an end of the line touches the
+/// vessel's cap and not its side, so points within their own radius of an end do not count, where
+/// others are left.
+Narrowest find_narrowest(const Centerline& way, double length);
+
+/// Length of the line over the distance between its ends; infinite where the line is closed.
+double tortuosity(const Centerline& way);
+
+struct Corner {
+  double angle = 0.0;         // between the arms, pi where the way is straight            [rad]
+  double arc = 0.0;           // of the corner                                             [mm]
+  Vec3 point = Vec3::Zero();  //                                                           [mm]
+  double arm = 0.0;           // length of both, along the way                             [mm]
+};
+
+/// Where the chords to the points `arm` before and behind make the smallest angle. Of a circle of
+/// radius R that is pi - arm/R. The arm is at most a third of the way.
+Corner find_sharpest_bend(const Centerline& way, double arm = 20.0);
+
+/// Where another vessel leaves the way or the way leaves a vessel.
+struct Junction {
+  int trunk = -1;             // branch of the tree that goes on ...
+  int branch = -1;            // ... and the one that leaves it there
+  bool taken = false;         // the way leaves the trunk for the branch; else it passes the branch
+  double arc = 0.0;           // of the ostium, along the way                              [mm]
+  Vec3 point = Vec3::Zero();  // there                                                     [mm]
+  /// Unit vectors from the ostium: where the trunk goes on, and where the branch goes.
+  Vec3 trunk_direction = Vec3::UnitZ(), branch_direction = Vec3::UnitX();
+};
+
+/// All along the way, nearest first. The way is in the branch whose line is nearest to its end, and
+/// came there through that branch's parents. It leaves a trunk where it changes from one branch of
+/// the tree to another, and where the branch that it stays in is narrower there than the one beside
+/// it: a tree's first branch may well end in a small artery. Of a branch that the way takes, the
+/// ostium is where the way leaves the trunk's inscribed spheres; of one that it passes, the nearest
+/// point of the way. The trunk's direction is that of a chord of two of its diameters round the
+/// ostium, the branch's that of its first three radii, at least 6 mm, beyond it.
+/// Expects a tree that starts where the way does, as find_tree() makes it.
+std::vector<Junction> find_junctions(const Centerline& way,
+                                     const std::vector<preprocess::Branch>& tree);
+
+}  // namespace wireplan::plan

@@ -1,0 +1,219 @@
+// The way's narrowness, bends and junctions, and the C-arm's angles, against answers by hand.
+#include <gtest/gtest.h>
+
+#include <Eigen/Geometry>
+#include <cmath>
+#include <limits>
+
+#include "plan/anatomy/access_limits.h"
+#include "plan/anatomy/projection.h"
+#include "plan/anatomy/way.h"
+
+namespace wireplan::plan {
+namespace {
+
+using preprocess::Branch;
+
+/// Through the corners, a point every half millimetre.
+Centerline line_through(const std::vector<Vec3>& corners, double radius) {
+  std::vector<Vec3> points = {corners.front()};
+  for (std::size_t k = 1; k < corners.size(); ++k) {
+    const Vec3 step = corners[k] - corners[k - 1];
+    const int parts = static_cast<int>(std::ceil(step.norm() / 0.5));
+    for (int i = 1; i <= parts; ++i) points.push_back(corners[k - 1] + step * i / parts);
+  }
+  const auto count = static_cast<Eigen::Index>(points.size());
+  Centerline line{.points = Eigen::Matrix3Xd(3, count),
+                  .radius = Eigen::VectorXd::Constant(count, radius),
+                  .arc_length = Eigen::VectorXd::Zero(count)};
+  for (Eigen::Index k = 0; k < count; ++k) {
+    line.points.col(k) = points[static_cast<std::size_t>(k)];
+    if (k == 0) continue;
+    line.arc_length(k) =
+        line.arc_length(k - 1) + (line.points.col(k) - line.points.col(k - 1)).norm();
+  }
+  return line;
+}
+
+/// A quarter of a circle of radius 40 mm.
+Centerline quarter_torus() {
+  std::vector<Vec3> corners;
+  for (int k = 0; k <= 180; ++k) {
+    const double angle = k * 0.5 * kRadPerDeg;
+    corners.emplace_back(40.0 * std::cos(angle), 0.0, 40.0 * std::sin(angle));
+  }
+  return line_through(corners, 4.0);
+}
+
+TEST(Way, QuarterTorusHasTheTortuosityAndTheAngleOfItsCircle) {
+  const Centerline way = quarter_torus();
+  const double expected = kPi / (2.0 * std::sqrt(2.0));
+  EXPECT_NEAR(tortuosity(way), expected, 1e-4);  // chords of half a degree are short by 3e-6
+  const Corner bend = find_sharpest_bend(way, 20.0);
+  EXPECT_NEAR(bend.angle, kPi - 20.0 / 40.0, 0.01);
+  EXPECT_DOUBLE_EQ(bend.arm, 20.0);
+}
+
+TEST(Way, SharpestBendIsTheCornerAndItsPlace) {
+  for (const double turn : {20.0, 60.0, 100.0}) {
+    SCOPED_TRACE(turn);
+    const double a = turn * kRadPerDeg;
+    const Centerline way = line_through(
+        {Vec3::Zero(), Vec3(0, 0, 60), Vec3(50 * std::sin(a), 0, 60 + 50 * std::cos(a))}, 4.0);
+    const Corner bend = find_sharpest_bend(way);
+    EXPECT_NEAR(bend.angle / kRadPerDeg, 180.0 - turn, 1e-6);
+    EXPECT_NEAR(bend.arc, 60.0, 1e-9);
+  }
+  EXPECT_NEAR(find_sharpest_bend(line_through({Vec3::Zero(), Vec3(0, 0, 60)}, 4.0)).angle, kPi,
+              1e-6);
+}
+
+TEST(Way, NarrowestIsFoundAwayFromTheEnds) {
+  Centerline way = line_through({Vec3::Zero(), Vec3(0, 0, 100)}, 4.0);
+  way.radius(1) = way.radius(way.radius.size() - 2) = 0.6;  // spheres against the caps
+  way.radius(140) = 1.5;
+  EXPECT_DOUBLE_EQ(find_narrowest(way, 1e9).diameter, 3.0);
+  EXPECT_NEAR(find_narrowest(way, 1e9).arc, 70.0, 1e-9);
+  EXPECT_NEAR(find_narrowest(way, 1e9).point.z(), 70.0, 1e-9);
+  EXPECT_DOUBLE_EQ(find_narrowest(way, 60.0).diameter, 8.0);
+}
+
+/// A vertical trunk of 10 mm radius, 200 mm long, and a branch of 3 mm that leaves it at 100 mm.
+struct TrunkAndBranch {
+  Centerline trunk = line_through({Vec3::Zero(), Vec3(0, 0, 200)}, 10.0);
+  Centerline branch, way;
+  std::vector<Branch> tree;
+
+  explicit TrunkAndBranch(const Vec3& direction, double radius = 3.0)
+      : branch(line_through({Vec3(0, 0, 100), Vec3(0, 0, 100) + 60.0 * direction}, radius)),
+        way(line_through({Vec3::Zero(), Vec3(0, 0, 100), Vec3(0, 0, 100) + 50.0 * direction},
+                         radius)),
+        tree{{.line = trunk}, {.line = branch, .parent = 0, .parent_arc = 100.0}} {
+    for (Eigen::Index k = 0; way.arc_length(k) < 100.0; ++k) way.radius(k) = 10.0;
+  }
+};
+
+TEST(Junctions, WayLeavesTheTrunkForItsBranch) {
+  const TrunkAndBranch left(Vec3::UnitX());
+  const auto found = find_junctions(left.way, left.tree);
+  ASSERT_EQ(found.size(), 1u);
+  EXPECT_TRUE(found[0].taken);
+  EXPECT_EQ(found[0].trunk, 0);
+  EXPECT_EQ(found[0].branch, 1);
+  EXPECT_NEAR(found[0].arc, 110.0, 0.51);  // the first point beyond the trunk's radius
+  EXPECT_NEAR(found[0].trunk_direction.dot(Vec3::UnitZ()), 1.0, 1e-9);
+  EXPECT_NEAR(found[0].branch_direction.dot(Vec3::UnitX()), 1.0, 1e-9);
+}
+
+TEST(Junctions, WayThatStaysInTheTrunkPassesTheBranch) {
+  const TrunkAndBranch left(Vec3::UnitX());
+  const auto found = find_junctions(left.trunk, left.tree);
+  ASSERT_EQ(found.size(), 1u);
+  EXPECT_FALSE(found[0].taken);
+  EXPECT_EQ(found[0].branch, 1);
+  EXPECT_NEAR(found[0].arc, 100.0, 1e-9);
+  // One that ends before the branch does not pass it.
+  const Centerline before = line_through({Vec3::Zero(), Vec3(0, 0, 80)}, 10.0);
+  EXPECT_TRUE(find_junctions(before, left.tree).empty());
+}
+
+TEST(Junctions, TreeWhoseFirstBranchEndsInTheSmallArteryTellsTheSame) {
+  const TrunkAndBranch left(Vec3::UnitX());
+  Branch first{.line = line_through({Vec3::Zero(), Vec3(0, 0, 100), Vec3(60, 0, 100)}, 3.0)};
+  first.line.radius.head(200).setConstant(10.0);
+  const Branch upper{.line = line_through({Vec3(0, 0, 100), Vec3(0, 0, 200)}, 10.0),
+                     .parent = 0,
+                     .parent_arc = 100.0};
+  const auto found = find_junctions(left.way, {first, upper});
+  ASSERT_EQ(found.size(), 1u);
+  EXPECT_TRUE(found[0].taken);
+  EXPECT_EQ(found[0].trunk, 1);
+  EXPECT_EQ(found[0].branch, 0);
+  EXPECT_NEAR(found[0].arc, 110.0, 0.51);
+  EXPECT_NEAR(found[0].trunk_direction.dot(Vec3::UnitZ()), 1.0, 1e-6);
+  EXPECT_NEAR(found[0].branch_direction.dot(Vec3::UnitX()), 1.0, 1e-9);
+}
+
+TEST(AccessLimits, GradesBeginAtTheirThresholds) {
+  const AccessLimits limits;
+  EXPECT_EQ(grade_of(1.11, limits.tortuosity), 0);
+  EXPECT_EQ(grade_of(1.25, limits.tortuosity), 1);
+  EXPECT_EQ(grade_of(1.55, limits.tortuosity), 2);
+  EXPECT_EQ(grade_of(2.0, limits.tortuosity), 3);
+  EXPECT_EQ(grade_of(170 * kRadPerDeg, limits.angle), 0);  // smaller angles are worse
+  EXPECT_EQ(grade_of(130 * kRadPerDeg, limits.angle), 1);
+  EXPECT_EQ(grade_of(100 * kRadPerDeg, limits.angle), 2);
+  EXPECT_EQ(grade_of(60 * kRadPerDeg, limits.angle), 3);
+}
+
+void expect_view(const Projection& p, double rotation_deg, double tilt_deg) {
+  EXPECT_NEAR(p.view.rotation / kRadPerDeg, rotation_deg, 1e-6);
+  EXPECT_NEAR(p.view.tilt / kRadPerDeg, tilt_deg, 1e-6);
+  EXPECT_NEAR(p.trunk_foreshortening, 0.0, 1e-9);
+  EXPECT_NEAR(p.branch_foreshortening, 0.0, 1e-9);
+}
+
+TEST(Projection, OfBranchesOfAVerticalAorta) {
+  const double c30 = std::cos(30 * kRadPerDeg), c45 = std::cos(45 * kRadPerDeg);
+  const struct {
+    Vec3 branch;
+    double rotation_deg;
+  } answers[] = {{Vec3(1, 0, 0), 0.0},         // to the left: from the front
+                 {Vec3(-1, 0, 0), 0.0},        // to the right: too
+                 {Vec3(0, -1, 0), 90.0},       // to the front: lateral, from the left
+                 {Vec3(c30, 0.5, 0), 30.0},    // a left renal artery, 30 deg behind the left
+                 {Vec3(c45, -c45, 0), -45.0},  // 45 deg in front of the left: from the right
+                 {Vec3(c45, -c45, 1).normalized(), -45.0}};  // and upward: in the same plane
+  for (const auto& [branch, rotation_deg] : answers) {
+    SCOPED_TRACE(branch.transpose());
+    for (const double sign : {1.0, -1.0}) {
+      const Projections found = find_projections(sign * Vec3::UnitZ(), branch);
+      EXPECT_TRUE(found.best.reachable);
+      expect_view(found.best, rotation_deg, 0.0);
+    }
+  }
+}
+
+TEST(Projection, ATiltedTrunkAsksForATiltedArm) {
+  // Its head end leans back, and a branch goes to the left: (0, sin t, cos t) x (1, 0, 0) is
+  // (0, cos t, -sin t), so the detector stands at (0, -cos t, sin t), in front and toward the head.
+  const double t = 20.0 * kRadPerDeg;
+  const Vec3 trunk(0.0, std::sin(t), std::cos(t));
+  expect_view(find_projections(trunk, Vec3::UnitX()).best, 0.0, 20.0);
+  expect_view(find_projections(Vec3(0.0, -std::sin(t), std::cos(t)), Vec3::UnitX()).best, 0.0,
+              -20.0);
+}
+
+TEST(Projection, OutOfReachIsToldAndTheSecondIsWithinReach) {
+  // Trunk to the back, branch to the left: only from the head or the feet.
+  const Projections found = find_projections(Vec3::UnitY(), Vec3::UnitX());
+  EXPECT_FALSE(found.best.reachable);
+  EXPECT_NEAR(std::abs(found.best.view.tilt / kRadPerDeg), 90.0, 1e-6);
+  ASSERT_TRUE(found.second);
+  EXPECT_TRUE(found.second->reachable);
+  EXPECT_LE(std::abs(found.second->view.tilt), 45.0 * kRadPerDeg + 1e-9);
+}
+
+TEST(Projection, SecondIsThirtyDegreesAwayAcrossTheBranch) {
+  // Across a branch to the left: views in the plane x = 0, 30 deg cranial or caudal, in which the
+  // trunk is short by 1 - cos 30.
+  const Projections found = find_projections(Vec3::UnitZ(), Vec3::UnitX());
+  ASSERT_TRUE(found.second);
+  EXPECT_NEAR(found.second->view.rotation, 0.0, 1e-9);
+  EXPECT_NEAR(std::abs(found.second->view.tilt) / kRadPerDeg, 30.0, 1e-9);
+  EXPECT_NEAR(found.second->branch_foreshortening, 0.0, 1e-9);
+  EXPECT_NEAR(found.second->trunk_foreshortening, 1.0 - std::cos(30.0 * kRadPerDeg), 1e-9);
+}
+
+TEST(Projection, OfAJunctionOfTheWayIsWithinTwoDegrees) {
+  const double a = 30.0 * kRadPerDeg;
+  const TrunkAndBranch renal(Vec3(std::cos(a), std::sin(a), 0.0));
+  const auto found = find_junctions(renal.way, renal.tree);
+  ASSERT_EQ(found.size(), 1u);
+  const Projections seen = find_projections(found[0].trunk_direction, found[0].branch_direction);
+  EXPECT_NEAR(seen.best.view.rotation / kRadPerDeg, 30.0, 2.0);
+  EXPECT_NEAR(seen.best.view.tilt / kRadPerDeg, 0.0, 2.0);
+}
+
+}  // namespace
+}  // namespace wireplan::plan
