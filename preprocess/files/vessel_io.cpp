@@ -228,19 +228,14 @@ Centerline read_centerline(const std::filesystem::path& path) {
 std::vector<Centerline> read_centerlines(const std::filesystem::path& path) {
   const vtkSmartPointer<vtkPolyData> data = read_with<vtkXMLPolyDataReader>(path);
   const Eigen::Matrix3Xd points = points_of(data);
-  const auto values = [&](const char* name) {
-    return values_of(data->GetPointData(), name, points.cols(), path);
-  };
-  const Eigen::VectorXd radius = values("radius_mm"), arc = values("arc_length_mm");
+  const Eigen::VectorXd radius = values_of(data->GetPointData(), "radius_mm", points.cols(), path),
+                        arc = values_of(data->GetPointData(), "arc_length_mm", points.cols(), path);
   std::vector<Centerline> lines;
-  Eigen::Index at = 0;  // lines follow one another, each with points of its own
+  vtkNew<vtkIdList> ids;
   for (vtkIdType k = 0; k < data->GetNumberOfLines(); ++k) {
-    const auto n = static_cast<Eigen::Index>(data->GetLines()->GetCellSize(k));
-    expects(at + n <= points.cols());
-    lines.push_back({.points = points.middleCols(at, n),
-                     .radius = radius.segment(at, n),
-                     .arc_length = arc.segment(at, n)});
-    at += n;
+    data->GetLines()->GetCellAtId(k, ids);
+    const std::vector<vtkIdType> at(ids->begin(), ids->end());
+    lines.push_back({points(Eigen::all, at), radius(at), arc(at)});
   }
   return lines;
 }

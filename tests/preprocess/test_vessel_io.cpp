@@ -79,6 +79,21 @@ TEST_F(VesselFile, CenterlineComesBackBitForBit) {
   EXPECT_EQ(read.arc_length, line.arc_length);
 }
 
+TEST_F(VesselFile, LinesOfATreeComeBackBitForBitAndInOrder) {
+  const Centerline line = full_line();
+  const Centerline part{.points = line.points.rightCols(2),
+                        .radius = line.radius.tail(2),
+                        .arc_length = line.arc_length.head(2)};
+  write_centerlines({line, part, line}, folder_ / "tree.vtp");
+  const std::vector<Centerline> read = read_centerlines(folder_ / "tree.vtp");
+  ASSERT_EQ(read.size(), 3u);
+  EXPECT_EQ(read[1].points, part.points);
+  EXPECT_EQ(read[1].radius, part.radius);
+  EXPECT_EQ(read[1].arc_length, part.arc_length);
+  EXPECT_EQ(read[0].points, line.points);
+  EXPECT_EQ(read[2].arc_length, line.arc_length);
+}
+
 TEST_F(VesselFile, WallComesBackBitForBit) {
   const Surface surface = full_surface();
   const Wall wall = full_wall(surface);

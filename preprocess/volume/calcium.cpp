@@ -1,0 +1,59 @@
+#include "preprocess/volume/calcium.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "preprocess/volume/voxels.h"
+
+namespace wireplan::preprocess {
+namespace {
+
+/// How far from the line calcium is looked for, at one of its points [mm].
+double reach_at(const Centerline& way, Eigen::Index k, double within) {
+  return 1.5 * way.radius(k) + within;
+}
+
+/// The voxels that all calcium of the way is in.
+Box box_of(const Grid& grid, const Centerline& way, double within) {
+  Voxel first = {grid.size[0], grid.size[1], grid.size[2]}, last = {-1, -1, -1};
+  double reach = 0.0;
+  for (Eigen::Index k = 0; k < way.points.cols(); ++k) {
+    const Vec3 ijk = grid.ijk_from_lps(way.points.col(k));
+    for (int axis = 0; axis < 3; ++axis) {
+      const int at = std::clamp(static_cast<int>(std::lround(ijk(axis))), 0, grid.size[axis] - 1);
+      first[axis] = std::min(first[axis], at);
+      last[axis] = std::max(last[axis], at);
+    }
+    reach = std::max(reach, reach_at(way, k, within));
+  }
+  return grown({first, last}, reach + grid.spacing.maxCoeff(), grid);
+}
+
+bool is_beside(const Vec3& point, const Centerline& way, double within) {
+  for (Eigen::Index k = 0; k < way.points.cols(); ++k) {
+    if ((way.points.col(k) - point).norm() <= reach_at(way, k, within)) return true;
+  }
+  return false;
+}
+
+}  // namespace
+
+double calcium_volume(const Image& image, const Mask& lumen, const Centerline& way,
+                      const CalciumOptions& options) {
+  expects(image.values.size() == lumen.labels.size() && way.points.cols() > 0);
+  const Box box = box_of(image.grid, way, options.within_mm);
+  const Grid grid = cropped(image.grid, box);
+  const std::vector<float> values = crop_values(image.grid, box, image.values);
+  const Labels labels = crop_values(image.grid, box, lumen.labels);
+  const std::vector<float> distance = distance_to(1, grid, labels);
+  const double farthest = options.within_mm + 0.5 * grid.spacing.mean();
+  std::size_t found = 0;
+  for (std::size_t n = 0; n < values.size(); ++n) {
+    if (labels[n] != 0 || static_cast<double>(values[n]) <= options.threshold_hu) continue;
+    if (static_cast<double>(distance[n]) > farthest) continue;
+    if (is_beside(center_of(grid, n), way, options.within_mm)) ++found;
+  }
+  return static_cast<double>(found) * grid.spacing.prod();
+}
+
+}  // namespace wireplan::preprocess
