@@ -10,6 +10,7 @@
 #include <system_error>
 #include <utility>
 
+#include "pipeline/files/access_limits_file.h"
 #include "pipeline/files/catalogue.h"
 
 namespace wireplan::pipeline {
@@ -508,6 +509,7 @@ Case read_case(const std::filesystem::path& path, const std::vector<std::string>
   wall.finish();
   input.study.wires = read_wires(root);
   read_insertion(root, input.study);
+  input.access_limits = read_access_limits(root);
   read_limits(root, input.limits);
   read_weights(root, input.weights);
   input.manoeuvres = read_manoeuvring(root);
@@ -550,6 +552,7 @@ Json case_parameters(const Case& input) {
                        {"residual_tolerance_n", study.insertion.residual_tolerance},
                        {"max_iterations", study.insertion.max_iterations},
                        {"record_every_mm", study.insertion.record_every}};
+  json["access_limits"] = access_limits_json(input.access_limits);
   json["limits"] = {{"tip_force_warn_n", input.limits.tip_force_warn},
                     {"tip_force_fail_n", input.limits.tip_force_fail},
                     {"penetration_fail_mm", input.limits.penetration_fail},

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "pipeline/files/json_reader.h"
+#include "plan/anatomy/access_limits.h"
 #include "plan/make_plan.h"
 #include "preprocess/segment/segment.h"
 #include "preprocess/surface/surface.h"
@@ -50,6 +51,7 @@ struct Case {
   plan::Study study;
   double target_beyond_mm = 0.0;  // the cross-section is so much further along the vessel
   Manoeuvring manoeuvres = Manoeuvring::kWhenNeeded;
+  plan::AccessLimits access_limits;
   plan::Limits limits;
   plan::Weights weights;
   /// Where unknowns.lumen is 0 the stages that repeat choose it: half a voxel if the input is a

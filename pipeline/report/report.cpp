@@ -6,6 +6,7 @@
 #include <optional>
 
 #include "pipeline/files/trial_file.h"
+#include "pipeline/report/anatomy_json.h"
 #include "pipeline/report/page.h"
 #include "pipeline/store/hash.h"
 #include "plan/manoeuvre.h"
@@ -393,6 +394,9 @@ Json build_report(const ReportInput& input) {
   report["provenance"] = provenance_json(input);
   report["artifacts"] = artifacts_json(input);
   report["vessel"] = vessel_json(input);
+  if (input.figures.contains("anatomy")) {
+    report["anatomy"] = anatomy_json(input.figures.at("anatomy"), input.study.wires);
+  }
   report["ranking"] = std::move(ranking);
   report["excluded"] = std::move(excluded);
   report["wires"] = std::move(wires);

@@ -10,6 +10,7 @@
 
 #include "pipeline/files/trial_file.h"
 #include "pipeline/files/viewer_files.h"
+#include "pipeline/report/anatomy_json.h"
 #include "pipeline/report/page.h"
 #include "pipeline/report/picture.h"
 #include "pipeline/report/places.h"
@@ -18,6 +19,7 @@
 #include "pipeline/stages/makers.h"
 #include "pipeline/stages/plan_artifact.h"
 #include "pipeline/stages/stored_trials.h"
+#include "pipeline/stages/tree_artifact.h"
 #include "pipeline/store/hash.h"
 #include "preprocess/files/vessel_io.h"
 
@@ -27,8 +29,8 @@ namespace {
 namespace fs = std::filesystem;
 
 // Stages that the report tells of; `plans` makes nothing that a user opens.
-constexpr std::array kToldStages = {"volume", "segment", "surface",   "centerline",
-                                    "wall",   "trials",  "manoeuvres"};
+constexpr std::array kToldStages = {"volume",  "segment", "surface", "centerline",
+                                    "anatomy", "wall",    "trials",  "manoeuvres"};
 
 // The numbers of a matrix or list, as they lie in memory.
 template <typename Numbers>
@@ -162,6 +164,7 @@ PageInput start_page(Workspace& work) {
   page.access = study.access;
   page.target = study.goal.point;
   page.target_radius = study.goal.radius;
+  page.panels["anatomy"] = anatomy_panel(page.path, read_tree(work));
   for (const simulate::Wire& wire : study.wires) page.wire_radius.push_back(wire.radius);
   return page;
 }

@@ -9,7 +9,7 @@
 namespace wireplan::pipeline {
 
 /// Of what the report shows, and of the pieces that it keeps.
-inline constexpr int kReportVersion = 17;
+inline constexpr int kReportVersion = 18;
 
 /// Each fills `folder` with the artifact of its stage. All but the report write figures.json,
 /// numbers for the report with a list of warnings.
@@ -17,6 +17,7 @@ void make_volume(Workspace& work, const std::filesystem::path& folder);
 void make_segment(Workspace& work, const std::filesystem::path& folder);
 void make_surface(Workspace& work, const std::filesystem::path& folder);
 void make_centerline(Workspace& work, const std::filesystem::path& folder);
+void make_anatomy(Workspace& work, const std::filesystem::path& folder);
 void make_wall(Workspace& work, const std::filesystem::path& folder);
 void make_trials(Workspace& work, const std::filesystem::path& folder);
 void make_manoeuvres(Workspace& work, const std::filesystem::path& folder);

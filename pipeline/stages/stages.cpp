@@ -159,6 +159,13 @@ std::vector<Stage> stages_of(const Case& given) {
                     .parameters = {"/access/point_mm", "/target/point_mm"},
                     .make = make_centerline});
   if (given.study.goal.at_section) read_too(stages.back(), {"/target/beyond_mm"});
+  Stage anatomy{.name = "anatomy",
+                .reads_input = from_volume,
+                .after = {"centerline"},
+                .parameters = {"/access_limits"},
+                .make = make_anatomy};
+  if (from_volume) anatomy.after.push_back("segment");
+  stages.push_back(anatomy);
   stages.push_back(
       {.name = "wall",
        .version = 2,

@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "pipeline/report/report.h"
+#include "pipeline/stages/tree_artifact.h"
 #include "preprocess/centerline/centerline.h"
 #include "preprocess/files/vessel_io.h"
 
@@ -135,28 +136,11 @@ std::string Workspace::piece(std::vector<KeyLine> key,
   return bytes;
 }
 
-std::vector<preprocess::Branch> Workspace::read_tree() const {
-  const Json branches = figures("centerline").at("branches");
-  std::vector<Centerline> lines =
-      preprocess::read_centerlines(artifact("centerline").folder / "tree.vtp");
-  expects(lines.size() == branches.size());
-  std::vector<preprocess::Branch> tree;
-  std::map<std::string, int> numbers;
-  for (std::size_t k = 0; k < lines.size(); ++k) {
-    const Json& parent = branches[k].at("parent");
-    tree.push_back({.line = std::move(lines[k]),
-                    .parent = parent.is_null() ? -1 : numbers.at(parent.get<std::string>()),
-                    .parent_arc = branches[k].at("parent_arc_mm")});
-    numbers[branches[k].at("name")] = static_cast<int>(k);
-  }
-  return tree;
-}
-
 const plan::Study& Workspace::study() {
   if (!study_) {
     study_ = given_.study;
     study_->tangent = preprocess::start_tangent(path(), kTangentSpan);
-    const auto way = std::make_shared<simulate::Way>(path(), read_tree());
+    const auto way = std::make_shared<simulate::Way>(path(), read_tree(*this));
     if (study_->goal.at_section) study_->goal.radius = way->section().radius;
     study_->goal.way = way;
     if (study_->insertion.length == 0.0) {

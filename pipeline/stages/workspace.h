@@ -13,7 +13,6 @@
 #include "pipeline/files/json_reader.h"
 #include "pipeline/store/store.h"
 #include "plan/trial_log.h"
-#include "preprocess/centerline/centerline.h"
 #include "preprocess/surface/openings.h"
 #include "preprocess/volume/image.h"
 #include "simulate/wall/vessel_model.h"
@@ -86,7 +85,6 @@ class Workspace {
   std::unique_ptr<const simulate::WallCompliance> compliance_aside_;  // while it is the rigid one
 
   std::string field_key_text() const;
-  std::vector<preprocess::Branch> read_tree() const;
   bool find_field();  // whether the store has it; model_ then
 };
 

@@ -124,6 +124,11 @@ inline Json full_case(Json json) {
                        {"residual_tolerance_n", 1e-5},
                        {"max_iterations", 50},
                        {"record_every_mm", 10}};
+  json["access_limits"] = {
+      {"device_diameter_mm", 2},  {"sheath_diameter_mm", 3}, {"sheath_length_mm", 90},
+      {"max_sheath_ratio", 1},    {"tortuosity", {1, 2, 3}}, {"angle_deg", {150, 100, 80}},
+      {"calcium_hu", 900},        {"calcium_within_mm", 1},  {"catheter_length_mm", 650},
+      {"working_length_mm", 150}, {"arm_rotation_deg", 90},  {"arm_tilt_deg", 40}};
   json["limits"] = {{"tip_force_warn_n", 0.2},
                     {"tip_force_fail_n", 1},
                     {"penetration_fail_mm", 0.5},

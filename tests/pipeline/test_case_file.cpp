@@ -120,6 +120,10 @@ TEST_F(CaseFile, NamesEachMistakeWithItsRemedy) {
       {"limits.tip_force_warn_n=2", {"limits.tip_force_warn_n is 2", "at most"}},
       {"ranking.weights={\"reach\": 0, \"peak_force\": 0, \"mean_force\": 0, \"margin\": 0}",
        {"ranking.weights is 0 in all"}},
+      {"access_limits.tortuosity=[1.5, 1.25, 1.6]",
+       {"access_limits.tortuosity is [1.5,1.25,1.6]", "rising"}},
+      {"access_limits.angle_deg=[160, 120]",
+       {"access_limits.angle_deg is [160.0,120.0]", "three thresholds", "falling"}},
       {"name=../x", {"name is \"../x\"", "letters"}},
   };
   for (const Mistake& mistake : mistakes) {

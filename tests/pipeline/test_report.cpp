@@ -38,6 +38,31 @@ TEST(Report, KeepsToItsSchemaWithPlans) {
   expect_valid(report, folder.path());
 }
 
+TEST(Report, TellsAccessViewsAndLengthsOfTheTube) {
+  // 4 mm in radius, straight, from z = 6 to 28 mm, with edges of 1.5 mm; its wire has 200 mm.
+  const TemporaryFolder folder;
+  write_finished_tube(folder.path());
+  const Json report =
+      run_to_report(folder / "case.json", folder / "cache", 0,
+                    {"access_limits.device_diameter_mm=9", "access_limits.catheter_length_mm=100",
+                     "access_limits.working_length_mm=70"});
+  const Json& access = report.at("anatomy").at("access");
+  EXPECT_NEAR(access.at("sheath").at("lumen_diameter_mm"), 8.0, 0.4);
+  EXPECT_TRUE(access.at("sheath").at("fits"));
+  EXPECT_FALSE(access.at("device").at("fits"));
+  EXPECT_NEAR(access.at("tortuosity").at("index"), 1.0, 0.01);
+  EXPECT_EQ(access.at("tortuosity").at("grade"), "none");
+  EXPECT_NEAR(access.at("sharpest_bend").at("angle_deg"), 180.0, 2.0);
+  EXPECT_TRUE(access.at("calcium").at("volume_mm3").is_null());
+  EXPECT_TRUE(report.at("anatomy").at("c_arm").at("ostia").empty());
+  const Json& lengths = report.at("anatomy").at("lengths");
+  EXPECT_EQ(lengths.at("places").back().at("what"), "target");
+  EXPECT_NEAR(lengths.at("way_mm"), 22.0, 0.22);
+  EXPECT_NEAR(lengths.at("wires").at(0).at("spare_mm"), 200.0 - 192.0, 0.22);
+  EXPECT_TRUE(lengths.at("wires").at(0).at("long_enough"));
+  expect_valid(report, folder.path());
+}
+
 TEST(Report, ATargetWithoutARadiusIsTheVesselsCrossSection) {
   // Both wires run along the wall, 3.5 mm off a target that is 4 mm further on than its point.
   const TemporaryFolder folder;

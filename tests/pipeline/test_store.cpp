@@ -207,8 +207,8 @@ class StageKeys : public testing::Test {
   }
 
   TemporaryFolder folder_;
-  const std::vector<std::string> all_ = {"surface",    "centerline", "wall",  "trials",
-                                         "manoeuvres", "plans",      "report"};
+  const std::vector<std::string> all_ = {"surface", "centerline", "anatomy", "wall",
+                                         "trials",  "manoeuvres", "plans",   "report"};
 };
 
 TEST_F(StageKeys, ASecondRunRunsNoStage) {
@@ -295,6 +295,13 @@ std::map<std::string, std::vector<std::string>> common_table() {
                           "residual_tolerance_n", "max_iterations", "record_every_mm"}) {
     table[std::string("/insertion/") + key] = trials;
   }
+  for (const char* key :
+       {"device_diameter_mm", "sheath_diameter_mm", "sheath_length_mm", "max_sheath_ratio",
+        "tortuosity/0", "tortuosity/1", "tortuosity/2", "angle_deg/0", "angle_deg/1", "angle_deg/2",
+        "calcium_hu", "calcium_within_mm", "catheter_length_mm", "working_length_mm",
+        "arm_rotation_deg", "arm_tilt_deg"}) {
+    table[std::string("/access_limits/") + key] = {"anatomy", "report"};
+  }
   // What judges, and simulates nothing.
   for (const char* key :
        {"limits/tip_force_warn_n", "limits/tip_force_fail_n", "limits/penetration_fail_mm",
@@ -320,7 +327,8 @@ Json common_changes() {
           {"/search/exhaustive", true},
           {"/robustness/repeats", 17},
           {"/robustness/plans", 4},
-          {"/robustness/seed", 8}};
+          {"/robustness/seed", 8},
+          {"/access_limits/tortuosity/1", 1.55}};
 }
 
 Json case_with_every_list_of_one(const fs::path& folder) {
@@ -404,20 +412,20 @@ TEST_F(StageKeys, ADryRunSaysWhatWouldRunAndWhyAndRunsNothing) {
   const RunResult dry = run({"wall.thickness_mm=2"}, /*dry=*/true);
   EXPECT_EQ(not_cached(dry),
             (std::vector<std::string>{"wall", "trials", "manoeuvres", "plans", "report"}));
-  EXPECT_EQ(dry.stages[2].reasons,
+  EXPECT_EQ(dry.stages[3].reasons,
             std::vector<std::string>{"parameter wall.thickness_mm: 1.0 -> 2.0"});
-  ASSERT_EQ(dry.stages[3].reasons.size(), 1u);
-  EXPECT_EQ(dry.stages[3].reasons[0].substr(0, 12), "input wall: ");
+  ASSERT_EQ(dry.stages[4].reasons.size(), 1u);
+  EXPECT_EQ(dry.stages[4].reasons[0].substr(0, 12), "input wall: ");
   EXPECT_EQ(not_cached(run({"wall.thickness_mm=2"}, /*dry=*/true)), not_cached(dry));
 }
 
 TEST_F(StageKeys, ADamagedArtifactIsMadeAgainWithTheSameContents) {
   start_finished();
   const RunResult first = run({});
-  overwrite(first.artifacts[2].folder / "wall.vtu", "");
+  overwrite(first.artifacts[3].folder / "wall.vtu", "");
   const RunResult second = run({});
   EXPECT_EQ(not_cached(second), std::vector<std::string>{"wall"});
-  EXPECT_EQ(second.artifacts[2].contents(), first.artifacts[2].contents());
+  EXPECT_EQ(second.artifacts[3].contents(), first.artifacts[3].contents());
 }
 
 TEST_F(StageKeys, AnInterruptedRunGoesOnFromItsFinishedTrials) {
@@ -445,7 +453,7 @@ TEST_F(StageKeys, AnInterruptedRunGoesOnFromItsFinishedTrials) {
 TEST_F(StageKeys, ANewWireAddsItsTrialsOnly) {
   start_finished();
   const auto trials_run = [](const RunResult& result) {
-    return read_json(result.artifacts[3].folder / kTimingFile, "wireplan.timing/1")
+    return read_json(result.artifacts[4].folder / kTimingFile, "wireplan.timing/1")
         .at("trials_run")
         .get<int>();
   };
@@ -458,8 +466,8 @@ TEST_F(StageKeys, ANewWireAddsItsTrialsOnly) {
   // Before the other, so that the old trials get new numbers.
   const RunResult both = run({"wires=" + Json::array({stiff, soft}).dump()});
   EXPECT_EQ(trials_run(both), 2);
-  EXPECT_EQ(read_text(both.artifacts[3].folder / "trials/0002.json"),
-            read_text(alone.artifacts[3].folder / "trials/0000.json"));
+  EXPECT_EQ(read_text(both.artifacts[4].folder / "trials/0002.json"),
+            read_text(alone.artifacts[4].folder / "trials/0000.json"));
   // Each angle is a trial of its own too; another stiffness makes all trials of its wire anew.
   EXPECT_EQ(trials_run(run({"access.inclination_deg=[0, 10, 20]"})), 1);
   EXPECT_EQ(trials_run(run({"friction=0.1"})), 2);
@@ -469,7 +477,7 @@ TEST_F(StageKeys, AKeptTrialThatIsDamagedIsComputedAgain) {
   start_finished();
   const RunResult first = run({});
   // The trial of the cache and the one kept are the same bytes on the disk.
-  const fs::path trial = first.artifacts[3].folder / "trials/0000.json";
+  const fs::path trial = first.artifacts[4].folder / "trials/0000.json";
   const std::string whole = read_text(trial);
   std::string flipped = whole;
   flipped[whole.find("insertion_mm") + 20] ^= 1;

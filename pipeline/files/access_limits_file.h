@@ -1,0 +1,14 @@
+#pragma once
+/// The case's `access_limits`: what the way in is held against.
+#include "pipeline/files/json_reader.h"
+#include "plan/anatomy/access_limits.h"
+
+namespace wireplan::pipeline {
+
+/// Reads the object, every key of which may be left out.
+plan::AccessLimits read_access_limits(JsonReader& root);
+
+/// All of it, under the keys of the case file.
+Json access_limits_json(const plan::AccessLimits& limits);
+
+}  // namespace wireplan::pipeline

@@ -1,0 +1,197 @@
+#include "pipeline/report/anatomy_json.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "plan/anatomy/way.h"
+
+namespace wireplan::pipeline {
+namespace {
+
+constexpr std::array kGrades = {"none", "mild", "moderate", "severe"};
+constexpr const char* kReportingStandards =
+    "limits of the case; by default the reporting standards for iliac arteries (Chaikof et al. "
+    "2002), here applied to the whole way";
+
+std::string branch_name(int k) { return "branch " + std::to_string(k + 1); }
+
+double degrees(double angle) { return angle / kRadPerDeg; }
+
+const char* grade_name(int grade) { return kGrades.at(static_cast<std::size_t>(grade)); }
+
+/// A device against the lumen that it must pass.
+Json passage_json(const plan::Narrowest& lumen, double device, double max_ratio,
+                  const char* source) {
+  const double ratio = device / lumen.diameter;
+  return {{"lumen_diameter_mm", lumen.diameter},
+          {"at_mm", lumen.arc},
+          {"place_mm", to_json(lumen.point)},
+          {"device_diameter_mm", device},
+          {"ratio", ratio},
+          {"max_ratio", max_ratio},
+          {"fits", ratio < max_ratio},
+          {"source", source}};
+}
+
+/// The branch that the way turns into within an arm of the bend, if any: its turn makes the angle.
+Json ostium_at(const plan::Corner& bend, const std::vector<plan::Junction>& junctions) {
+  for (const plan::Junction& junction : junctions) {
+    const bool near = std::abs(junction.arc - bend.arc) < bend.arm;
+    if (junction.taken && near) return branch_name(junction.branch);
+  }
+  return nullptr;
+}
+
+Json access_json(const Centerline& way, const std::vector<plan::Junction>& junctions,
+                 const plan::AccessLimits& limits) {
+  const double length = way.arc_length(way.arc_length.size() - 1);
+  Json access;
+  access["device"] = passage_json(plan::find_narrowest(way, length), limits.device_diameter, 1.0,
+                                  "limits of the case; a device must be thinner than the lumen");
+  access["sheath"] =
+      passage_json(plan::find_narrowest(way, limits.sheath_length), limits.sheath_diameter,
+                   limits.max_sheath_ratio,
+                   "limits of the case; the ratio by default that of sheath to femoral artery");
+  access["sheath"]["length_mm"] = limits.sheath_length;
+
+  const double index = plan::tortuosity(way);
+  const bool open = std::isfinite(index);
+  access["tortuosity"] = {{"index", open ? Json(index) : Json(nullptr)},
+                          {"grade", grade_name(plan::grade_of(index, limits.tortuosity))},
+                          {"thresholds", limits.tortuosity},
+                          {"source", kReportingStandards}};
+  if (!open) access["tortuosity"]["null_reasons"]["index"] = "the way ends where it starts";
+
+  const plan::Corner bend = plan::find_sharpest_bend(way);
+  Json thresholds = Json::array();
+  for (const double angle : limits.angle) thresholds.push_back(clean(degrees(angle)));
+  access["sharpest_bend"] = {{"angle_deg", degrees(bend.angle)},
+                             {"at_mm", bend.arc},
+                             {"place_mm", to_json(bend.point)},
+                             {"arm_mm", bend.arm},
+                             {"at_ostium_of", ostium_at(bend, junctions)},
+                             {"grade", grade_name(plan::grade_of(bend.angle, limits.angle))},
+                             {"thresholds_deg", thresholds},
+                             {"source", kReportingStandards}};
+  return access;
+}
+
+Json projection_json(const plan::Projection& projection) {
+  // As one says it: LAO 30, CRA 10, whole degrees.
+  const auto named = [](double angle, const char* positive, const char* negative) {
+    const auto whole = std::lround(degrees(angle));
+    return std::string(whole < 0 ? negative : positive) + " " + std::to_string(std::abs(whole));
+  };
+  return {{"view", named(projection.view.rotation, "LAO", "RAO") + ", " +
+                       named(projection.view.tilt, "CRA", "CAU")},
+          {"lao_deg", degrees(projection.view.rotation)},
+          {"cranial_deg", degrees(projection.view.tilt)},
+          {"reachable", projection.reachable},
+          {"trunk_foreshortening", projection.trunk_foreshortening},
+          {"branch_foreshortening", projection.branch_foreshortening}};
+}
+
+Json c_arm_json(const std::vector<plan::Junction>& junctions, const plan::ArmLimits& arm) {
+  Json rows = Json::array();
+  for (const plan::Junction& junction : junctions) {
+    if (!junction.taken) continue;
+    const plan::Projections found =
+        plan::find_projections(junction.trunk_direction, junction.branch_direction, arm);
+    const double cosine = junction.trunk_direction.dot(junction.branch_direction);
+    rows.push_back({{"trunk", branch_name(junction.trunk)},
+                    {"branch", branch_name(junction.branch)},
+                    {"at_mm", junction.arc},
+                    {"place_mm", to_json(junction.point)},
+                    {"turn_deg", degrees(std::acos(std::clamp(cosine, -1.0, 1.0)))},
+                    {"best", projection_json(found.best)},
+                    {"second", found.second ? projection_json(*found.second) : Json(nullptr)}});
+  }
+  return {{"ostia", rows},
+          {"max_rotation_deg", clean(degrees(arm.rotation))},
+          {"max_tilt_deg", clean(degrees(arm.tilt))},
+          {"source", "limits of the case; by default assumed, as fixed arms reach in general"}};
+}
+
+Json lengths_json(const Centerline& way, const std::vector<plan::Junction>& junctions,
+                  const plan::AccessLimits& limits) {
+  Json places = Json::array();
+  for (const plan::Junction& junction : junctions) {
+    places.push_back({{"what", junction.taken ? "the way turns into" : "passes"},
+                      {"branch", branch_name(junction.branch)},
+                      {"at_mm", junction.arc},
+                      {"place_mm", to_json(junction.point)}});
+  }
+  const double length = way.arc_length(way.arc_length.size() - 1);
+  const Vec3 end = way.points.col(way.points.cols() - 1);
+  places.push_back(
+      {{"what", "target"}, {"branch", nullptr}, {"at_mm", length}, {"place_mm", to_json(end)}});
+  return {{"places", places},
+          {"way_mm", length},
+          {"catheter_mm", limits.catheter_length},
+          {"working_mm", limits.working_length},
+          {"wire_needed_mm", length + limits.catheter_length + limits.working_length},
+          {"assumption",
+           "the wire's tip stays at the target while a catheter of that length comes off the wire, "
+           "and the working length is left to hold; counted from the access point, so what lies "
+           "between it and the skin is part of the working length"}};
+}
+
+/// The line every 2 mm and at its end, to a tenth of a millimetre.
+Json drawn_line(const Centerline& line) {
+  constexpr double kStep = 2.0;
+  const auto tenth = [](double value) { return std::round(value * 10.0) / 10.0; };
+  Json points = Json::array(), radii = Json::array();
+  double next = line.arc_length(0);
+  for (Eigen::Index k = 0; k < line.points.cols(); ++k) {
+    if (line.arc_length(k) < next && k + 1 < line.points.cols()) continue;
+    next = line.arc_length(k) + kStep;
+    const Vec3 p = line.points.col(k);
+    points.push_back({tenth(p.x()), tenth(p.y()), tenth(p.z())});
+    radii.push_back(tenth(line.radius(k)));
+  }
+  return {{"points", points}, {"radius", radii}};
+}
+
+}  // namespace
+
+Json anatomy_figures(const Centerline& way, const std::vector<preprocess::Branch>& tree,
+                     const plan::AccessLimits& limits) {
+  const std::vector<plan::Junction> junctions = plan::find_junctions(way, tree);
+  return {{"access", access_json(way, junctions, limits)},
+          {"c_arm", c_arm_json(junctions, limits.arm)},
+          {"lengths", lengths_json(way, junctions, limits)}};
+}
+
+Json calcium_json(double volume, const std::string& unknown, const plan::AccessLimits& limits) {
+  const bool known = unknown.empty();
+  Json row = {{"volume_mm3", known ? Json(volume) : Json(nullptr)},
+              {"above_hu", limits.calcium_hu},
+              {"within_mm", limits.calcium_within},
+              {"source", "limits of the case; by default assumed, no grade is agreed on"}};
+  if (!known) row["null_reasons"]["volume_mm3"] = unknown;
+  return row;
+}
+
+Json anatomy_panel(const Centerline& way, const std::vector<preprocess::Branch>& tree) {
+  Json lines = Json::array();
+  for (const preprocess::Branch& branch : tree) lines.push_back(drawn_line(branch.line));
+  return {{"tree", lines}, {"way", drawn_line(way)}};
+}
+
+Json anatomy_json(const Json& figures, const std::vector<simulate::Wire>& wires) {
+  Json anatomy;
+  for (const char* key : {"access", "c_arm", "lengths"}) anatomy[key] = figures.at(key);
+  Json& lengths = anatomy["lengths"];
+  const double needed = lengths.at("wire_needed_mm").get<double>();
+  lengths["wires"] = Json::array();
+  for (const simulate::Wire& wire : wires) {
+    lengths["wires"].push_back({{"wire", wire.name},
+                                {"length_mm", clean(wire.length())},
+                                {"spare_mm", wire.length() - needed},
+                                {"long_enough", wire.length() >= needed}});
+  }
+  return anatomy;
+}
+
+}  // namespace wireplan::pipeline

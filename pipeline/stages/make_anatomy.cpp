@@ -1,0 +1,43 @@
+// The stage that tells what the way is like before a wire is pushed.
+#include <string>
+
+#include "pipeline/report/anatomy_json.h"
+#include "pipeline/stages/makers.h"
+#include "pipeline/stages/tree_artifact.h"
+#include "preprocess/volume/calcium.h"
+
+namespace wireplan::pipeline {
+namespace {
+
+/// Why calcium cannot be told from the case's input; empty where it can.
+std::string calcium_unknown(Workspace& work, const plan::AccessLimits& limits) {
+  if (!work.given().volume) return "the case starts from a surface, which shows no calcium";
+  const std::string& modality = work.image().modality;
+  if (!modality.empty() && modality != "CT") return "the volume is no CT";
+  const double lumen = work.figures("segment").at("mean_hu").get<double>();
+  if (lumen > 0.8 * limits.calcium_hu) {
+    return "the contrast in the lumen is nearly as bright as calcium";
+  }
+  return "";
+}
+
+}  // namespace
+
+void make_anatomy(Workspace& work, const std::filesystem::path& folder) {
+  const plan::AccessLimits& limits = work.given().access_limits;
+  Json figures = figures_of("anatomy");
+  figures.update(anatomy_figures(work.path(), read_tree(work), limits));
+
+  const std::string unknown = calcium_unknown(work, limits);
+  double volume = 0.0;
+  if (unknown.empty()) {
+    volume = preprocess::calcium_volume(
+        work.image(), preprocess::read_mask(work.artifact("segment").folder / "mask.nrrd"),
+        work.path(), {.threshold_hu = limits.calcium_hu, .within_mm = limits.calcium_within});
+  }
+  if (work.given().volume) work.drop_image();
+  figures["access"]["calcium"] = calcium_json(volume, unknown, limits);
+  write_figures(figures, folder);
+}
+
+}  // namespace wireplan::pipeline
