@@ -170,6 +170,14 @@ const checkPage = (title, file) => {
       assert.ok((await images()).every((image, k) => k === 0 || image !== first[k]), "other slices");
     });
 
+    use("tells access, views and lengths where the report has them", async (page) => {
+      if (await page.locator("#anatomy").count() === 0) return;
+      const text = await page.textContent("#anatomy");
+      assert.match(text, /Sheath, in the first 110\u00a0mm/);
+      assert.match(text, /Way from access to target/);
+      assert.ok(await page.locator("#anatomy table").count() >= 2);
+    });
+
     use("has no serious finding of axe-core", async (page) => {
       await page.evaluate(() => document.querySelectorAll("details").forEach((d) => (d.open = true)));
       assert.deepEqual(await seriousFindings(page), []);

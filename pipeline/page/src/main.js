@@ -3,6 +3,7 @@ import {el} from "./dom.js";
 import {readPage} from "./data.js";
 import {shown} from "./format.js";
 import {makeSelection} from "./selection.js";
+import {anatomySection} from "./anatomy.js";
 import {answerSection, askedSection, provenanceSection, uncertainSection, warningSection} from "./texts.js";
 import {rankingSection} from "./ranking.js";
 import {vesselSection} from "./player.js";
@@ -24,11 +25,12 @@ const sections = [
   vessel.node,
   heatSection(page, selection),
   chartSection(page, selection),
+  anatomySection(page),
   uncertainSection(page),
   sliceSection(page),
   warningSection(page),
   provenanceSection(page),
-];
+].filter(Boolean);
 document.getElementById("page").append(
   el("header", {},
     el("h1", {}, "Guidewire plan: ", el("bdi", {}, shown(page.report.name))),

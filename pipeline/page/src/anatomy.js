@@ -1,0 +1,119 @@
+// Access, C-arm angles and lengths: what the way is like before a wire is pushed.
+import {el, facts, name, section, svg, table} from "./dom.js";
+import {degrees, number, percent, shown} from "./format.js";
+
+const mm = (value) => `${number(value)}\u00a0mm`;
+const place = (p) => `(${p.map((x) => x.toFixed(1)).join(", ")})\u00a0mm`;
+
+// ---- Access.
+const gradeText = (grade) => (grade === "none" ? "no finding" : grade);
+
+const thresholds = (from, [mild, moderate, severe]) =>
+  `mild ${from} ${mild}, moderate ${from} ${moderate}, severe ${from} ${severe}`;
+
+const passageRow = (what, row) => [
+  what,
+  `least lumen ${mm(row.lumen_diameter_mm)}, ${mm(row.at_mm)} from the access at ${place(row.place_mm)}`,
+  `device over lumen below ${number(row.max_ratio)}`,
+  `${row.fits ? "fits" : "does not fit"}: ${mm(row.device_diameter_mm)} in ${mm(row.lumen_diameter_mm)} is ${number(row.ratio)}`,
+  shown(row.source),
+];
+
+const accessTable = ({device, sheath, tortuosity, sharpest_bend: bend, calcium}) =>
+  table("Access", ["What", "Found", "Held against", "Verdict", "Source"], [
+    passageRow("Widest device, along the whole way", device),
+    passageRow(`Sheath, in the first ${mm(sheath.length_mm)}`, sheath),
+    ["Tortuosity",
+     tortuosity.index === null ? shown(tortuosity.null_reasons.index) : `the way is ${number(tortuosity.index)} times as long as the straight line between its ends`,
+     thresholds("from", tortuosity.thresholds.map(number)),
+     gradeText(tortuosity.grade), shown(tortuosity.source)],
+    ["Sharpest bend",
+     `${degrees(bend.angle_deg)} between its arms of ${mm(bend.arm_mm)} (180\u00b0 is straight), ${mm(bend.at_mm)} from the access at ${place(bend.place_mm)}${bend.at_ostium_of ? `, where the way turns into ${bend.at_ostium_of}: an ostium's turn, no bend of the access vessels` : ""}`,
+     thresholds("down from", bend.thresholds_deg.map(degrees)),
+     gradeText(bend.grade), shown(bend.source)],
+    ["Calcium beside the lumen",
+     calcium.volume_mm3 === null ? `not known: ${shown(calcium.null_reasons.volume_mm3)}` : `${number(calcium.volume_mm3)}\u00a0mm\u00b3`,
+     `voxels above ${number(calcium.above_hu)}\u00a0HU within ${mm(calcium.within_mm)} of the lumen`,
+     calcium.volume_mm3 === null ? "not known" : calcium.volume_mm3 > 0 ? "look at the slices: bone that touches the vessel counts too" : "none found",
+     shown(calcium.source)],
+  ]);
+
+// ---- C-arm.
+const viewText = (view) => {
+  if (!view) return "none";
+  const short = (part, what) => (part < 0.005 ? `${what} in full length` : `${what} ${percent(part)} too short`);
+  return `${view.view}: ${short(view.branch_foreshortening, "branch")}, ${short(view.trunk_foreshortening, "trunk")}` +
+    (view.reachable ? "" : "; out of the C-arm's reach");
+};
+
+const armTable = ({ostia}) =>
+  table("C-arm angles", ["Ostium", "From the access", "Turn", "Best view", "Second best"],
+    ostia.map((row) => [
+      `from ${row.trunk} into ${row.branch}`, mm(row.at_mm), degrees(row.turn_deg), viewText(row.best), viewText(row.second)]));
+
+/** The tree and the way as the detector of that view sees them, in mm. */
+const pictureOf = ({tree, way}, ostium) => {
+  const view = ostium.best.reachable || !ostium.second ? ostium.best : ostium.second;
+  const a = (view.lao_deg * Math.PI) / 180, b = (view.cranial_deg * Math.PI) / 180;
+  const right = [Math.cos(a), Math.sin(a), 0];
+  const up = [-Math.sin(a) * Math.sin(b), Math.cos(a) * Math.sin(b), Math.cos(b)];
+  const dot = (u, p) => u[0] * p[0] + u[1] * p[1] + u[2] * p[2];
+  const seen = (p) => [dot(right, p), -dot(up, p)];
+  const round = (x) => x.toFixed(1);
+
+  const box = [Infinity, Infinity, -Infinity, -Infinity];
+  const strokes = (line, color) => line.points.slice(1).map((p, k) => {
+    const [x1, y1] = seen(line.points[k]), [x2, y2] = seen(p), width = line.radius[k] + line.radius[k + 1];
+    box[0] = Math.min(box[0], x1 - width, x2 - width);
+    box[1] = Math.min(box[1], y1 - width, y2 - width);
+    box[2] = Math.max(box[2], x1 + width, x2 + width);
+    box[3] = Math.max(box[3], y1 + width, y2 + width);
+    return svg("line", {x1: round(x1), y1: round(y1), x2: round(x2), y2: round(y2), stroke: color, "stroke-width": round(width), "stroke-linecap": "round"});
+  });
+  const lumen = [...tree.flatMap((line) => strokes(line, "#c9ced6")), ...strokes(way, "#8fb3d9")];
+  const middle = svg("polyline", {points: way.points.map((p) => seen(p).map(round).join(",")).join(" "), fill: "none", stroke: "#1b1b1b", "stroke-width": 0.8});
+  const names = tree.map((line, k) => {
+    const [x, y] = seen(line.points.at(-1));
+    return svg("text", {x: round(x), y: round(y), "font-size": 8, "text-anchor": "middle", fill: "#1b1b1b"}, String(k + 1));
+  });
+  const [x, y] = seen(ostium.place_mm);
+  const mark = svg("circle", {cx: round(x), cy: round(y), r: 5, fill: "none", stroke: "#a3262a", "stroke-width": 1.2});
+  const label = `Vessel and way in the view ${view.view}, the ostium circled`;
+  return el("figure", {},
+    svg("svg", {class: "arm-view", viewBox: `${round(box[0])} ${round(box[1])} ${round(box[2] - box[0])} ${round(box[3] - box[1])}`, role: "img", "aria-label": label},
+      lumen, middle, names, mark),
+    el("figcaption", {}, `${view.view}: as the detector sees the way (blue) and the vessels beside it (grey), as wide as their lumen, each branch with its number at its end; the ostium of ${ostium.branch} is circled.`));
+};
+
+// ---- Lengths.
+const lengthTable = ({places}) =>
+  table("Lengths along the way", ["Place", "From the access"],
+    places.map(({what, branch, at_mm: at}) => [branch ? `${what} ${branch}` : what, mm(at)]));
+
+const wireSentence = (row) =>
+  [name(shown(row.wire)), `: ${mm(row.length_mm)}, ${row.long_enough ? `long enough, ${mm(row.spare_mm)} to spare` : `too short by ${mm(-row.spare_mm)}`}`];
+
+const lengthFacts = (lengths) =>
+  facts([
+    ["Way from access to target", mm(lengths.way_mm)],
+    ["Wire needed", `${mm(lengths.wire_needed_mm)}: the way, a catheter of ${mm(lengths.catheter_mm)} and ${mm(lengths.working_mm)} to hold`],
+    ["Assumed", shown(lengths.assumption)],
+    ["Wires of the case", el("ul", {}, lengths.wires.map((row) => el("li", {}, wireSentence(row))))],
+  ]);
+
+export const anatomySection = (page) => {
+  const {anatomy} = page.report;
+  if (!anatomy) return null;
+  const {access, c_arm: arm, lengths} = anatomy;
+  const {ostia} = arm;
+  return section("anatomy", "Access, C-arm angles and lengths",
+    el("p", {class: "note"}, "Measured on the middle of the lumen; no wire is simulated for it. Branches are numbered as the tree of the vessel is (tree.vtp)."),
+    el("h3", {}, "Access"), accessTable(access),
+    el("h3", {}, "C-arm angles"),
+    ostia.length
+      ? [el("p", {}, `Views that show a vessel and the branch that the way takes in their length, for a patient who lies straight on the back. LAO turns the detector to the patient's left, RAO to the right, CRA to the head, CAU to the feet. Within reach is ${degrees(arm.max_rotation_deg)} to either side and ${degrees(arm.max_tilt_deg)} up or down (${shown(arm.source)}).`),
+         armTable(arm),
+         page.panels.anatomy ? ostia.map((ostium) => pictureOf(page.panels.anatomy, ostium)) : null].flat()
+      : el("p", {}, "The way leaves no vessel for a branch, so no ostium asks for a view of its own."),
+    el("h3", {}, "Lengths and wires"), lengthTable(lengths), lengthFacts(lengths));
+};
