@@ -113,6 +113,7 @@ Json figures(const Surface& surface) {
             {"min_diameter_mm", 12.0},
             {"max_diameter_mm", 12.0},
             {"tortuosity", 1.0},
+            {"target_lumen_radius_mm", 4.0},
             {"branches", none}}},
           {"wall",
            {{"warnings", none},
