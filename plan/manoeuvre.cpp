@@ -107,16 +107,16 @@ class Search {
         branch.depth = trial_.depth();
       }
     }
-    branch.reached = trial_.ended() && trial_.result().outcome == simulate::Outcome::kReached;
-    for (const simulate::Push& push : trial_.result().pushes) {
+    branch.reached = trial_.reached();
+    for (const simulate::Push& push : trial_.pushes()) {
       branch.peak_force = std::max(branch.peak_force, push.peak_contact_force);
     }
     return branch;
   }
 
   double progress_here() const {
-    if (trial_.result().pushes.empty()) return 0.0;
-    return preprocess::find_progress(trial_.result().pushes.back().tip, path_);
+    if (trial_.pushes().empty()) return 0.0;
+    return preprocess::find_progress(trial_.pushes().back().tip, path_);
   }
 
   /// Tries turns, and pulls after them, round where the branch left the path. Keeps what came

@@ -4,7 +4,7 @@
 #include <array>
 #include <cmath>
 
-#include "plan/anatomy/way.h"
+#include "plan/anatomy/passage.h"
 
 namespace wireplan::pipeline {
 namespace {
@@ -155,12 +155,11 @@ Json drawn_line(const Centerline& line) {
 
 }  // namespace
 
-Json anatomy_figures(const Centerline& way, const std::vector<preprocess::Branch>& tree,
-                     const plan::AccessLimits& limits) {
-  const std::vector<plan::Junction> junctions = plan::find_junctions(way, tree);
-  return {{"access", access_json(way, junctions, limits)},
+Json anatomy_figures(const simulate::Way& way, const plan::AccessLimits& limits) {
+  const std::vector<plan::Junction> junctions = plan::find_junctions(way);
+  return {{"access", access_json(way.path(), junctions, limits)},
           {"c_arm", c_arm_json(junctions, limits.arm)},
-          {"lengths", lengths_json(way, junctions, limits)}};
+          {"lengths", lengths_json(way.path(), junctions, limits)}};
 }
 
 Json calcium_json(double volume, const std::string& unknown, const plan::AccessLimits& limits) {
@@ -173,10 +172,10 @@ Json calcium_json(double volume, const std::string& unknown, const plan::AccessL
   return row;
 }
 
-Json anatomy_panel(const Centerline& way, const std::vector<preprocess::Branch>& tree) {
+Json anatomy_panel(const simulate::Way& way) {
   Json lines = Json::array();
-  for (const preprocess::Branch& branch : tree) lines.push_back(drawn_line(branch.line));
-  return {{"tree", lines}, {"way", drawn_line(way)}};
+  for (const preprocess::Branch& branch : way.tree()) lines.push_back(drawn_line(branch.line));
+  return {{"tree", lines}, {"way", drawn_line(way.path())}};
 }
 
 Json anatomy_json(const Json& figures, const std::vector<simulate::Wire>& wires) {

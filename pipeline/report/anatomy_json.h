@@ -4,21 +4,20 @@
 
 #include "pipeline/files/json_reader.h"
 #include "plan/anatomy/access_limits.h"
-#include "preprocess/centerline/centerline.h"
+#include "simulate/insertion/way.h"
 #include "simulate/wire/rod.h"
 
 namespace wireplan::pipeline {
 
-/// What follows from way, tree and limits: "access" without calcium, "c_arm" and "lengths" without
-/// wires. Branches are called as the report's, "branch 1" and so on.
-Json anatomy_figures(const Centerline& way, const std::vector<preprocess::Branch>& tree,
-                     const plan::AccessLimits& limits);
+/// What follows from way and limits: "access" without calcium, "c_arm" and "lengths" without wires.
+/// Branches are called as the report's, "branch 1" and so on.
+Json anatomy_figures(const simulate::Way& way, const plan::AccessLimits& limits);
 
 /// The row of calcium: a volume [mm^3], or null with the reason where `unknown` tells one.
 Json calcium_json(double volume, const std::string& unknown, const plan::AccessLimits& limits);
 
 /// What the page draws: {"tree": [...], "way"}, each line with "points" and "radius" every 2 mm.
-Json anatomy_panel(const Centerline& way, const std::vector<preprocess::Branch>& tree);
+Json anatomy_panel(const simulate::Way& way);
 
 /// The figures of stage anatomy as the report has them, with which wires are long enough.
 Json anatomy_json(const Json& figures, const std::vector<simulate::Wire>& wires);

@@ -3,7 +3,6 @@
 
 #include "pipeline/report/anatomy_json.h"
 #include "pipeline/stages/makers.h"
-#include "pipeline/stages/tree_artifact.h"
 #include "preprocess/volume/calcium.h"
 
 namespace wireplan::pipeline {
@@ -26,7 +25,7 @@ std::string calcium_unknown(Workspace& work, const plan::AccessLimits& limits) {
 void make_anatomy(Workspace& work, const std::filesystem::path& folder) {
   const plan::AccessLimits& limits = work.given().access_limits;
   Json figures = figures_of("anatomy");
-  figures.update(anatomy_figures(work.path(), read_tree(work), limits));
+  figures.update(anatomy_figures(*work.study().goal.way, limits));
 
   const std::string unknown = calcium_unknown(work, limits);
   double volume = 0.0;

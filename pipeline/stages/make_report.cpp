@@ -19,7 +19,6 @@
 #include "pipeline/stages/makers.h"
 #include "pipeline/stages/plan_artifact.h"
 #include "pipeline/stages/stored_trials.h"
-#include "pipeline/stages/tree_artifact.h"
 #include "pipeline/store/hash.h"
 #include "preprocess/files/vessel_io.h"
 
@@ -164,7 +163,7 @@ PageInput start_page(Workspace& work) {
   page.access = study.access;
   page.target = study.goal.point;
   page.target_radius = study.goal.radius;
-  page.panels["anatomy"] = anatomy_panel(page.path, read_tree(work));
+  page.panels["anatomy"] = anatomy_panel(*study.goal.way);
   for (const simulate::Wire& wire : study.wires) page.wire_radius.push_back(wire.radius);
   return page;
 }

@@ -58,15 +58,25 @@ std::string millimetres(double value) {
 
 }  // namespace
 
-Trial::Trial(const Wire& wire, const Introducer& introducer, const Goal& goal,
+Trial::Trial(const Wire& wire, const Introducer& introducer, const std::vector<Goal>& goals,
              const VesselModel& vessel, const InsertionOptions& options)
-    : goal_(goal),
+    : goals_(goals),
       vessel_(vessel),
       options_(options),
       insertion_(wire, introducer, vessel, options),
-      best_distance_((insertion_.tip() - goal.point).norm()) {
-  expects(!goal.at_section || goal.way);
-  result_.terms = name_terms(insertion_.rod(), {}, &vessel, options.friction);
+      pursuits_(goals.size()) {
+  expects(!goals.empty());
+  for (std::size_t k = 0; k < goals_.size(); ++k) {
+    expects(!goals_[k].at_section || goals_[k].way);
+    expects(goals_[k].at_section || goals_.size() == 1);
+    pursuits_[k].best_distance = (insertion_.tip() - goals_[k].point).norm();
+  }
+  record_.terms = name_terms(insertion_.rod(), {}, &vessel, options.friction);
+}
+
+bool Trial::ended() const {
+  return std::all_of(pursuits_.begin(), pursuits_.end(),
+                     [](const Pursuit& pursuit) { return pursuit.outcome.has_value(); });
 }
 
 void Trial::make(const Move& move) {
@@ -80,7 +90,7 @@ void Trial::make(const Move& move) {
 }
 
 bool Trial::step(const Move& move) {
-  if (ended_) return false;
+  if (ended()) return false;
   // Some wire stays in the body, so that there is something to find an equilibrium of.
   const double depth = insertion_.depth();
   const double most_back = std::max(0.0, depth - options_.step);
@@ -91,203 +101,245 @@ bool Trial::step(const Move& move) {
   if (!push) {
     insertion_.take_back();
     if (const std::optional<int> opening = insertion_.slipped_out()) {
-      return end_where_it_is(Outcome::kLeftImage,
-                             "the wire springs out of the vessel through the opening at " +
-                                 place_of(*opening) + " after " + millimetres(depth) +
-                                 " of insertion, from " + place_text(insertion_.tip()) + " mm");
+      return end_all(Outcome::kLeftImage,
+                     "the wire springs out of the vessel through the opening at " +
+                         place_of(*opening) + " after " + millimetres(depth) +
+                         " of insertion, from " + place_text(insertion_.tip()) + " mm");
     }
-    return end(Outcome::kNotConverged, "no equilibrium after " + millimetres(depth) +
-                                           " of insertion, tip at " + place_text(insertion_.tip()) +
-                                           " mm");
+    return end_all(Outcome::kNotConverged, "no equilibrium after " + millimetres(depth) +
+                                               " of insertion, tip at " +
+                                               place_text(insertion_.tip()) + " mm");
   }
-  // Inside a sphere the wire goes on until the tip is nearest to its centre.
-  const double to_goal = (push->tip - goal_.point).norm();
-  if (!goal_.at_section && best_distance_ <= goal_.radius && to_goal >= best_distance_) {
-    insertion_.take_back();
-    return end(Outcome::kReached, reached_reason());
-  }
-  best_distance_ = to_goal;
-  result_.pushes.push_back(*push);
-  if (distance <= 0.0) pushing_since_ = result_.pushes.size();
+  if (end_in_sphere(*push)) return false;
+  record_.pushes.push_back(*push);
+  if (distance <= 0.0) pushing_since_ = record_.pushes.size();
   since_shape_ += std::abs(distance) + std::abs(move.turn) / kTurnPerShape * options_.record_every;
-  if (!check_place() || !check_advance(distance) || !check_motion()) return false;
-  if (since_shape_ >= options_.record_every - 1e-9) record_shape();
+  for (std::size_t k = 0; k < goals_.size(); ++k) {
+    if (!pursuits_[k].outcome) check_place(k);
+    if (!pursuits_[k].outcome) check_advance(k, distance);
+    if (!pursuits_[k].outcome) check_motion(k);
+  }
+  if (ended()) return false;
+  if (since_shape_ >= options_.record_every - 1e-9) {
+    since_shape_ = 0.0;
+    record_.shapes.push_back(shape_here());
+  }
   return true;
+}
+
+/// Measures the distances; inside a sphere the wire goes on until the tip is nearest to its centre.
+bool Trial::end_in_sphere(const Push& push) {
+  for (std::size_t k = 0; k < goals_.size(); ++k) {
+    double& best = pursuits_[k].best_distance;
+    const double to_goal = (push.tip - goals_[k].point).norm();
+    if (!goals_[k].at_section && best <= goals_[k].radius && to_goal >= best) {
+      insertion_.take_back();
+      end(k, Outcome::kReached, reached_reason(k));
+      return true;
+    }
+    best = to_goal;
+  }
+  return false;
 }
 
 std::string Trial::place_of(int opening) const {
   return place_text(vessel_.lumen.openings()[static_cast<std::size_t>(opening)].center) + " mm";
 }
 
-/// Whether the last step left the tip in the vessel and before the goal. Ends the trial otherwise.
-bool Trial::check_place() {
-  const Push& push = result_.pushes.back();
+/// Ends the trial where the last step did not leave the tip in the vessel and before the goal.
+void Trial::check_place(std::size_t goal) {
+  const Push& push = record_.pushes.back();
+  const Goal& own = goals_[goal];
   const std::string after = " after " + millimetres(push.insertion) + " of insertion";
   if (push.max_penetration > kOutside) {
-    return end(Outcome::kLeftLumen, millimetres(push.max_penetration) + " through the wall" +
-                                        after + ", tip at " + place_text(push.tip) + " mm");
+    return end(goal, Outcome::kLeftLumen,
+               millimetres(push.max_penetration) + " through the wall" + after + ", tip at " +
+                   place_text(push.tip) + " mm");
   }
-  if (goal_.at_section) {
+  if (own.at_section && own.way->may_have_arrived(push.tip)) {
     const Eigen::Matrix3Xd wire = insertion_.free_nodes();
-    if (goal_.way->find_arrival(wire, vessel_.lumen)) {
-      const std::optional<std::string> detour = goal_.way->find_detour(wire);
-      if (!detour) return end(Outcome::kReached, reached_reason());
-      return end(Outcome::kProlapsed, "the tip passes the target" + after +
-                                          ", but the wire did not come along the way: " + *detour);
+    if (own.way->find_arrival(wire, vessel_.lumen)) {
+      const std::optional<std::string> detour = own.way->find_detour(wire);
+      if (!detour) return end(goal, Outcome::kReached, reached_reason(goal));
+      return end(goal, Outcome::kProlapsed,
+                 "the tip passes the target" + after +
+                     ", but the wire did not come along the way: " + *detour);
     }
   }
   if (const std::optional<int> opening = insertion_.left_through()) {
     return end_where_it_is(
-        Outcome::kLeftImage,
+        goal, Outcome::kLeftImage,
         "the wire left the imaged vessel through its end at " + place_of(*opening) + after);
   }
   const std::optional<int> image_end =
-      goal_.way ? goal_.way->find_image_end(push.tip, vessel_.lumen) : std::nullopt;
+      own.way ? own.way->find_image_end(push.tip, vessel_.lumen) : std::nullopt;
   if (image_end) {
-    return end_where_it_is(Outcome::kLeftImage,
-                           "the tip came to the end of the imaged vessel, branch " +
-                               std::to_string(*image_end + 1) + ", at " + place_text(push.tip) +
-                               " mm" + after + "; the artery goes on there, the image does not");
+    end_where_it_is(goal, Outcome::kLeftImage,
+                    "the tip came to the end of the imaged vessel, branch " +
+                        std::to_string(*image_end + 1) + ", at " + place_text(push.tip) + " mm" +
+                        after + "; the artery goes on there, the image does not");
   }
-  return true;
 }
 
-/// Whether the tip still comes further along the way. Ends the trial otherwise.
-bool Trial::check_advance(double distance) {
-  if (!goal_.way) return true;
-  const Push& push = result_.pushes.back();
-  const Centerline& path = goal_.way->path();
+/// Ends the trial where the tip comes no further along the way.
+void Trial::check_advance(std::size_t goal, double distance) {
+  const Goal& own = goals_[goal];
+  if (!own.way) return;
+  Pursuit& pursuit = pursuits_[goal];
+  const Push& push = record_.pushes.back();
+  const Centerline& path = own.way->path();
   const double progress = preprocess::find_progress(push.tip, path);
-  if (distance <= 0.0 || progress > furthest_) {
-    furthest_ = progress;
-    since_furthest_ = 0.0;
-    return true;
+  if (distance <= 0.0 || progress > pursuit.furthest) {
+    pursuit.furthest = progress;
+    pursuit.since_furthest = 0.0;
+    return;
   }
-  since_furthest_ += distance;
+  pursuit.since_furthest += distance;
   const double whole = path.arc_length(path.arc_length.size() - 1);
-  const bool beside_goal = !goal_.at_section && furthest_ >= whole - goal_.radius;
-  if (since_furthest_ <= (beside_goal ? kPatienceBeyond : kPatience)) return true;
+  const bool beside_goal = !own.at_section && pursuit.furthest >= whole - own.radius;
+  if (pursuit.since_furthest <= (beside_goal ? kPatienceBeyond : kPatience)) return;
   if (beside_goal) {
-    return end(Outcome::kMissed, "the tip went by the target, " + millimetres(best_distance_) +
-                                     " from its point in the end, after " +
-                                     millimetres(push.insertion) + " of insertion");
+    return end(goal, Outcome::kMissed,
+               "the tip went by the target, " + millimetres(pursuit.best_distance) +
+                   " from its point in the end, after " + millimetres(push.insertion) +
+                   " of insertion");
   }
-  return end_where_it_is(progress > 0.0 ? Outcome::kStuck : Outcome::kMissed,
-                         "the tip came no further than " + millimetres(furthest_) +
-                             " along the way while " + millimetres(since_furthest_) +
-                             " of wire went in, and is at " + place_text(push.tip) + " mm");
+  end_where_it_is(goal, progress > 0.0 ? Outcome::kStuck : Outcome::kMissed,
+                  "the tip came no further than " + millimetres(pursuit.furthest) +
+                      " along the way while " + millimetres(pursuit.since_furthest) +
+                      " of wire went in, and is at " + place_text(push.tip) + " mm");
 }
 
-/// Whether the tip moves on as it is pushed. Ends the trial otherwise.
-bool Trial::check_motion() {
-  const Push& push = result_.pushes.back();
+/// Ends the trial where the tip does not move on as it is pushed.
+void Trial::check_motion(std::size_t goal) {
+  const Push& push = record_.pushes.back();
   const std::size_t back = static_cast<std::size_t>(std::ceil(kStuckPush / options_.step));
-  if (result_.pushes.size() - pushing_since_ <= back) return true;
-  const Push& then = result_.pushes[result_.pushes.size() - 1 - back];
+  if (record_.pushes.size() - pushing_since_ <= back) return;
+  const Push& then = record_.pushes[record_.pushes.size() - 1 - back];
   const double went = push.insertion - then.insertion;
   const double moved = (push.tip - then.tip).norm();
   const std::optional<Vec3> fold =
       moved < kProlapseMove * went ? insertion_.find_fold() : std::nullopt;
   if (fold) {
+    const std::shared_ptr<const Way>& way = goals_[goal].way;
     const std::optional<std::string> detour =
-        goal_.way ? goal_.way->find_detour(insertion_.free_nodes()) : std::nullopt;
-    return end_where_it_is(Outcome::kProlapsed, "the wire folds back at " + place_text(*fold) +
-                                                    " mm after " + millimetres(push.insertion) +
-                                                    " of insertion; its tip is behind at " +
-                                                    place_text(push.tip) + " mm" +
-                                                    (detour ? "; " + *detour : ""));
+        way ? way->find_detour(insertion_.free_nodes()) : std::nullopt;
+    return end_where_it_is(goal, Outcome::kProlapsed,
+                           "the wire folds back at " + place_text(*fold) + " mm after " +
+                               millimetres(push.insertion) +
+                               " of insertion; its tip is behind at " + place_text(push.tip) +
+                               " mm" + (detour ? "; " + *detour : ""));
   }
   if (moved < kStuckMove) {
-    return end_where_it_is(Outcome::kStuck, "the tip stays at " + place_text(push.tip) +
-                                                " mm while " + millimetres(went) +
-                                                " of wire went in; the wire bends most at " +
-                                                place_text(insertion_.most_bent()) + " mm");
+    end_where_it_is(goal, Outcome::kStuck,
+                    "the tip stays at " + place_text(push.tip) + " mm while " + millimetres(went) +
+                        " of wire went in; the wire bends most at " +
+                        place_text(insertion_.most_bent()) + " mm");
   }
-  return true;
 }
 
-void Trial::record_shape() {
-  since_shape_ = 0.0;
+Shape Trial::shape_here() const {
   const int first = insertion_.first_free();
-  result_.shapes.push_back({.insertion = insertion_.depth(),
-                            .hub_angle = insertion_.hub_angle(),
-                            .nodes = insertion_.free_nodes(),
-                            .contact_force = insertion_.forces()
-                                                 .rightCols(insertion_.rod().nodes() - first)
-                                                 .colwise()
-                                                 .norm()
-                                                 .transpose()});
+  return {.insertion = insertion_.depth(),
+          .hub_angle = insertion_.hub_angle(),
+          .nodes = insertion_.free_nodes(),
+          .contact_force = insertion_.forces()
+                               .rightCols(insertion_.rod().nodes() - first)
+                               .colwise()
+                               .norm()
+                               .transpose()};
 }
 
-/// As `outcome`, unless the tip is in another vessel: then that is the outcome. Always false.
-bool Trial::end_where_it_is(Outcome outcome, const std::string& reason) {
-  const std::optional<Astray> astray =
-      goal_.way ? goal_.way->find_astray(insertion_.tip()) : std::nullopt;
-  if (!astray) return end(outcome, reason);
-  return end(astray->passed_by ? Outcome::kPassedBy : Outcome::kWrongBranch,
-             "the tip is not on the way: " + astray->text + "; " + reason);
+/// As `outcome`, unless the tip is in another vessel: then that is the outcome.
+void Trial::end_where_it_is(std::size_t goal, Outcome outcome, const std::string& reason) {
+  const std::shared_ptr<const Way>& way = goals_[goal].way;
+  const std::optional<Astray> astray = way ? way->find_astray(insertion_.tip()) : std::nullopt;
+  if (!astray) return end(goal, outcome, reason);
+  end(goal, astray->passed_by ? Outcome::kPassedBy : Outcome::kWrongBranch,
+      "the tip is not on the way: " + astray->text + "; " + reason);
 }
 
-/// Keeps the final shape. Always false.
-bool Trial::end(Outcome outcome, const std::string& reason) {
-  ended_ = true;
-  result_.outcome = outcome;
-  result_.reason = reason;
-  result_.nodes = insertion_.free_nodes();
-  result_.contacts = insertion_.contacts();
-  result_.peak_forces = insertion_.peak_forces();
-  const bool recorded = !result_.shapes.empty() &&
-                        result_.shapes.back().insertion == insertion_.depth() &&
-                        result_.shapes.back().hub_angle == insertion_.hub_angle();
-  if (!recorded) record_shape();
+/// For all goals for which it has not ended. Always false.
+bool Trial::end_all(Outcome outcome, const std::string& reason) {
+  for (std::size_t k = 0; k < goals_.size(); ++k) {
+    if (pursuits_[k].outcome) continue;
+    if (outcome == Outcome::kNotConverged) {
+      end(k, outcome, reason);
+    } else {
+      end_where_it_is(k, outcome, reason);
+    }
+  }
   return false;
 }
 
-std::string Trial::reached_reason() const {
-  if (goal_.at_section) {
-    const double from_axis = preprocess::find_place(insertion_.tip(), goal_.way->path()).from_axis;
+/// Keeps the final shape.
+void Trial::end(std::size_t goal, Outcome outcome, const std::string& reason) {
+  Pursuit& pursuit = pursuits_[goal];
+  pursuit.outcome = outcome;
+  pursuit.pushes = record_.pushes.size();
+  pursuit.shapes = record_.shapes.size();
+  TrialResult& ended = pursuit.end;
+  ended.outcome = outcome;
+  ended.reason = reason;
+  ended.nodes = insertion_.free_nodes();
+  ended.contacts = insertion_.contacts();
+  ended.peak_forces = insertion_.peak_forces();
+  const bool recorded = !record_.shapes.empty() &&
+                        record_.shapes.back().insertion == insertion_.depth() &&
+                        record_.shapes.back().hub_angle == insertion_.hub_angle();
+  if (!recorded) ended.shapes.push_back(shape_here());
+}
+
+std::string Trial::reached_reason(std::size_t goal) const {
+  if (goals_[goal].at_section) {
+    const double from_axis =
+        preprocess::find_place(insertion_.tip(), goals_[goal].way->path()).from_axis;
     return "tip past the target's cross-section, " + millimetres(from_axis) +
            " from the vessel's axis, after " + millimetres(insertion_.depth()) + " of insertion";
   }
-  return "tip " + millimetres(best_distance_) + " from the target after " +
+  return "tip " + millimetres(pursuits_[goal].best_distance) + " from the target after " +
          millimetres(insertion_.depth()) + " of insertion";
 }
 
-TrialResult Trial::finish() {
-  if (!ended_ && !goal_.at_section && best_distance_ <= goal_.radius) {
-    end(Outcome::kReached, reached_reason());
-  } else if (!ended_) {
-    const bool all = insertion_.longest() - insertion_.depth() < 1e-9;
-    end_where_it_is(Outcome::kMissed, (all ? "all " : "") + millimetres(insertion_.depth()) +
-                                          " of wire went in, tip ended " +
-                                          millimetres(best_distance_) + " from the target at " +
-                                          place_text(insertion_.tip()) + " mm");
+std::vector<TrialResult> Trial::finish_all() {
+  std::vector<TrialResult> results;
+  for (std::size_t k = 0; k < goals_.size(); ++k) {
+    Pursuit& pursuit = pursuits_[k];
+    if (!pursuit.outcome && !goals_[k].at_section && pursuit.best_distance <= goals_[k].radius) {
+      end(k, Outcome::kReached, reached_reason(k));
+    } else if (!pursuit.outcome) {
+      const bool all = insertion_.longest() - insertion_.depth() < 1e-9;
+      end_where_it_is(k, Outcome::kMissed,
+                      (all ? "all " : "") + millimetres(insertion_.depth()) +
+                          " of wire went in, tip ended " + millimetres(pursuit.best_distance) +
+                          " from the target at " + place_text(insertion_.tip()) + " mm");
+    }
+    TrialResult& result = results.emplace_back(std::move(pursuit.end));
+    result.terms = record_.terms;
+    result.pushes.assign(record_.pushes.data(), record_.pushes.data() + pursuit.pushes);
+    result.shapes.insert(result.shapes.begin(), record_.shapes.data(),
+                         record_.shapes.data() + pursuit.shapes);
   }
-  return std::move(result_);
+  return results;
 }
 
 void Trial::save(Mark& mark) const {
-  expects(!ended_);
+  expects(!ended());
   insertion_.save(mark.insertion);
-  mark.pushes = result_.pushes.size();
-  mark.shapes = result_.shapes.size();
+  mark.pushes = record_.pushes.size();
+  mark.shapes = record_.shapes.size();
   mark.pushing_since = pushing_since_;
-  mark.best_distance = best_distance_;
   mark.since_shape = since_shape_;
-  mark.furthest = furthest_;
-  mark.since_furthest = since_furthest_;
+  mark.pursuits = pursuits_;
 }
 
 void Trial::restore(const Mark& mark) {
-  ended_ = false;
   insertion_.restore(mark.insertion);
-  result_.pushes.resize(mark.pushes);
-  result_.shapes.resize(mark.shapes);
+  record_.pushes.resize(mark.pushes);
+  record_.shapes.resize(mark.shapes);
   pushing_since_ = mark.pushing_since;
-  best_distance_ = mark.best_distance;
   since_shape_ = mark.since_shape;
-  furthest_ = mark.furthest;
-  since_furthest_ = mark.since_furthest;
+  pursuits_ = mark.pursuits;
 }
 
 TrialResult run_trial(const Wire& wire, const Introducer& introducer, const Goal& goal,
@@ -304,6 +356,14 @@ TrialResult run_trial(const Wire& wire, const Introducer& introducer, const Goal
   for (const Move& move : moves) trial.make(move);
   trial.make({.push = options.length - trial.depth()});
   return trial.finish();
+}
+
+std::vector<TrialResult> run_trials(const Wire& wire, const Introducer& introducer,
+                                    const std::vector<Goal>& goals, const VesselModel& vessel,
+                                    const InsertionOptions& options) {
+  Trial trial(wire, introducer, goals, vessel, options);
+  trial.make({.push = options.length});
+  return trial.finish_all();
 }
 
 }  // namespace wireplan::simulate

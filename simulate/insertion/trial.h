@@ -3,7 +3,9 @@
 /// vessel, options, moves) -> TrialResult. Serial and deterministic; shares the vessel read-only
 /// with other trials.
 #include <memory>
+#include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "simulate/insertion/insertion.h"
@@ -64,56 +66,76 @@ struct Move {
 ///
 /// Where the goal has a way, a trial ends too when pushing does not bring the tip further along it:
 /// for 40 mm, or for 10 mm where it is as far as the sphere of a goal.
+///
+/// One insertion can serve several goals: what the wire does depends on none of them, so each gets
+/// the result of a trial toward it alone, and the insertion goes on until it has ended for all.
 class Trial {
  public:
-  /// Keeps a reference to the vessel. Expects a unit direction and positive lengths.
+  /// Keeps a reference to the vessel. Expects a unit direction and positive lengths, and
+  /// cross-sections where there are several goals: a wire may be taken back in a sphere.
+  Trial(const Wire& wire, const Introducer& introducer, const std::vector<Goal>& goals,
+        const VesselModel& vessel, const InsertionOptions& options);
   Trial(const Wire& wire, const Introducer& introducer, const Goal& goal, const VesselModel& vessel,
-        const InsertionOptions& options);
+        const InsertionOptions& options)
+      : Trial(wire, introducer, std::vector<Goal>{goal}, vessel, options) {}
 
   /// Makes a move, in steps of the options' length or 15 degrees, as far as there is wire to push
   /// or to pull and the trial has not ended.
   void make(const Move& move);
   /// One such step. False where the trial has ended, or no wire is left for it.
   bool step(const Move& move);
-  bool ended() const { return ended_; }
+  /// Whether it has ended for all goals, and whether it reached the first.
+  bool ended() const;
+  bool reached() const { return pursuits_.front().outcome == Outcome::kReached; }
 
   double depth() const { return insertion_.depth(); }
-  /// What the trial gave so far. The final shape and contacts are filled in when it ends.
-  const TrialResult& result() const { return result_; }
+  const std::vector<Push>& pushes() const { return record_.pushes; }
   /// Ends the trial, unless it has ended: as reached if the tip is in the goal, else as missed.
-  /// Hands out the result.
-  TrialResult finish();
+  /// Hands out the results, in the order of the goals.
+  std::vector<TrialResult> finish_all();
+  TrialResult finish() { return std::move(finish_all().front()); }
+
+  /// How far the tip has come toward one goal, and how that ended.
+  struct Pursuit {
+    double best_distance = 0.0;   // of the tip from the goal, in the last step            [mm]
+    double furthest = 0.0;        // of the tip along the way, since the last other move   [mm]
+    double since_furthest = 0.0;  // pushed since then                                     [mm]
+    std::optional<Outcome> outcome = {};  // empty as long as the trial goes on for the goal
+    // Of one that has ended: so much of the record, and the end itself.
+    std::size_t pushes = 0, shapes = 0;
+    TrialResult end = {};
+  };
 
   /// save() marks where an unfinished trial is, restore() takes it back there; peak forces stay.
   struct Mark {
     Insertion::Snapshot insertion;
     std::size_t pushes = 0, shapes = 0, pushing_since = 0;
-    double best_distance = 0.0, since_shape = 0.0, furthest = 0.0, since_furthest = 0.0;
+    double since_shape = 0.0;
+    std::vector<Pursuit> pursuits;
   };
   void save(Mark& mark) const;
   void restore(const Mark& mark);
 
  private:
-  bool end(Outcome outcome, const std::string& reason);
-  bool end_where_it_is(Outcome outcome, const std::string& reason);
-  bool check_place();
-  bool check_advance(double distance);
-  bool check_motion();
-  std::string reached_reason() const;
+  void end(std::size_t goal, Outcome outcome, const std::string& reason);
+  void end_where_it_is(std::size_t goal, Outcome outcome, const std::string& reason);
+  bool end_all(Outcome outcome, const std::string& reason);
+  bool end_in_sphere(const Push& push);
+  void check_place(std::size_t goal);
+  void check_advance(std::size_t goal, double distance);
+  void check_motion(std::size_t goal);
+  std::string reached_reason(std::size_t goal) const;
   std::string place_of(int opening) const;
-  void record_shape();
+  Shape shape_here() const;
 
-  Goal goal_;
+  std::vector<Goal> goals_;
   const VesselModel& vessel_;
   InsertionOptions options_;
   Insertion insertion_;
-  TrialResult result_;
-  double best_distance_;           // of the tip from the goal, in the last step          [mm]
+  TrialResult record_;             // of all goals: pushes, shapes on the way and terms
+  std::vector<Pursuit> pursuits_;  // one per goal
   double since_shape_ = 0.0;       // way of the hand since a shape was recorded          [mm]
   std::size_t pushing_since_ = 0;  // all records from here on are pushes
-  double furthest_ = 0.0;          // of the tip along the way, since the last other move   [mm]
-  double since_furthest_ = 0.0;    // pushed since then                                     [mm]
-  bool ended_ = false;
 };
 
 /// Makes the moves, none for a straight push, then pushes the wire in until the tip reaches the
@@ -121,5 +143,10 @@ class Trial {
 TrialResult run_trial(const Wire& wire, const Introducer& introducer, const Goal& goal,
                       const VesselModel& vessel, const InsertionOptions& options,
                       const std::vector<Move>& moves = {});
+
+/// One straight push toward several cross-sections: for each what run_trial() gives.
+std::vector<TrialResult> run_trials(const Wire& wire, const Introducer& introducer,
+                                    const std::vector<Goal>& goals, const VesselModel& vessel,
+                                    const InsertionOptions& options);
 
 }  // namespace wireplan::simulate

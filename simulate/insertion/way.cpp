@@ -88,6 +88,20 @@ Way::Way(Centerline path, std::vector<Branch> tree)
   }
 }
 
+std::vector<int> Way::branches() const {
+  std::vector<int> along;
+  for (int k = target_branch_; k >= 0; k = tree_[static_cast<std::size_t>(k)].parent) {
+    along.insert(along.begin(), k);
+  }
+  return along;
+}
+
+bool Way::may_have_arrived(const Vec3& tip) const {
+  constexpr double kLongestEdge = 20.0;  // of a wire; where the last look begins           [mm]
+  const double reach = kSectionReach * section_.radius + kLookedAt + kLongestEdge;
+  return (tip - section_.center).norm() <= reach;
+}
+
 std::optional<Vec3> Way::find_arrival(const Eigen::Ref<const Eigen::Matrix3Xd>& wire,
                                       const Lumen& lumen) const {
   const auto height = [&](Eigen::Index i) {

@@ -34,6 +34,12 @@ class Way {
 
   const Centerline& path() const { return path_; }
   const CrossSection& section() const { return section_; }
+  const std::vector<preprocess::Branch>& tree() const { return tree_; }
+  /// The branches that the way goes along, from the root; empty without a tree.
+  std::vector<int> branches() const;
+
+  /// Whether a tip is near enough to the cross-section for find_arrival() to find one.
+  bool may_have_arrived(const Vec3& tip) const;
 
   /// Where the wire, nodes (3, n) that end with the tip, passes the cross-section onward, inside
   /// the lumen round its middle: in a straight line from there no wall is between. The last 20 mm

@@ -6,8 +6,8 @@
 #include <limits>
 
 #include "plan/anatomy/access_limits.h"
+#include "plan/anatomy/passage.h"
 #include "plan/anatomy/projection.h"
-#include "plan/anatomy/way.h"
 
 namespace wireplan::plan {
 namespace {
@@ -95,7 +95,7 @@ struct TrunkAndBranch {
 
 TEST(Junctions, WayLeavesTheTrunkForItsBranch) {
   const TrunkAndBranch left(Vec3::UnitX());
-  const auto found = find_junctions(left.way, left.tree);
+  const auto found = find_junctions(simulate::Way(left.way, left.tree));
   ASSERT_EQ(found.size(), 1u);
   EXPECT_TRUE(found[0].taken);
   EXPECT_EQ(found[0].trunk, 0);
@@ -107,14 +107,14 @@ TEST(Junctions, WayLeavesTheTrunkForItsBranch) {
 
 TEST(Junctions, WayThatStaysInTheTrunkPassesTheBranch) {
   const TrunkAndBranch left(Vec3::UnitX());
-  const auto found = find_junctions(left.trunk, left.tree);
+  const auto found = find_junctions(simulate::Way(left.trunk, left.tree));
   ASSERT_EQ(found.size(), 1u);
   EXPECT_FALSE(found[0].taken);
   EXPECT_EQ(found[0].branch, 1);
   EXPECT_NEAR(found[0].arc, 100.0, 1e-9);
   // One that ends before the branch does not pass it.
   const Centerline before = line_through({Vec3::Zero(), Vec3(0, 0, 80)}, 10.0);
-  EXPECT_TRUE(find_junctions(before, left.tree).empty());
+  EXPECT_TRUE(find_junctions(simulate::Way(before, left.tree)).empty());
 }
 
 TEST(Junctions, TreeWhoseFirstBranchEndsInTheSmallArteryTellsTheSame) {
@@ -124,7 +124,7 @@ TEST(Junctions, TreeWhoseFirstBranchEndsInTheSmallArteryTellsTheSame) {
   const Branch upper{.line = line_through({Vec3(0, 0, 100), Vec3(0, 0, 200)}, 10.0),
                      .parent = 0,
                      .parent_arc = 100.0};
-  const auto found = find_junctions(left.way, {first, upper});
+  const auto found = find_junctions(simulate::Way(left.way, {first, upper}));
   ASSERT_EQ(found.size(), 1u);
   EXPECT_TRUE(found[0].taken);
   EXPECT_EQ(found[0].trunk, 1);
@@ -208,7 +208,7 @@ TEST(Projection, SecondIsThirtyDegreesAwayAcrossTheBranch) {
 TEST(Projection, OfAJunctionOfTheWayIsWithinTwoDegrees) {
   const double a = 30.0 * kRadPerDeg;
   const TrunkAndBranch renal(Vec3(std::cos(a), std::sin(a), 0.0));
-  const auto found = find_junctions(renal.way, renal.tree);
+  const auto found = find_junctions(simulate::Way(renal.way, renal.tree));
   ASSERT_EQ(found.size(), 1u);
   const Projections seen = find_projections(found[0].trunk_direction, found[0].branch_direction);
   EXPECT_NEAR(seen.best.view.rotation / kRadPerDeg, 30.0, 2.0);

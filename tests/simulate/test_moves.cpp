@@ -192,7 +192,7 @@ TEST(Moves, AMarkTakesATrialBack) {
   trial.make({.push = 30.0});
   trial.restore(mark);
   EXPECT_NEAR(trial.depth(), 50.0, 1e-9);
-  EXPECT_EQ(trial.result().pushes.size(), 50u);
+  EXPECT_EQ(trial.pushes().size(), 50u);
   trial.make({.turn = 0.5});
   trial.make({.push = 20.0});
   const TrialResult detour = trial.finish();

@@ -139,6 +139,40 @@ TEST(Way, AWireThatTakesAnEarlierBranchIsInTheWrongOneByName) {
   EXPECT_EQ(right.outcome, Outcome::kReached) << outcome_name(right.outcome) << right.reason;
 }
 
+TEST(Way, OnePushTowardSeveralTargetsGivesEachTheTrialTowardItAlone) {
+  const std::vector<Branch> tree = tree_of_fork();
+  const std::vector<Goal> goals = {
+      goal_of(into_branch(kSecond, 25.0), tree), goal_of(into_branch(kFirst, 25.0), tree),
+      goal_of(line_through({{0.0, 0.0, 5.0}, {0.0, 0.0, 40.0}}, kTrunk), tree)};
+  const Introducer along{.point = Vec3(0.0, 0.0, 5.0), .direction = Vec3::UnitZ()};
+  const Introducer aslant{.point = Vec3(-1.0, 0.0, kFirst - 4.0),
+                          .direction = Vec3(0.95, 0.0, 0.3122).normalized()};
+  int reached = 0;
+  for (const Introducer& introducer : {along, aslant}) {
+    const std::vector<TrialResult> together =
+        run_trials(wire_of(20.0), introducer, goals, fork(), options());
+    ASSERT_EQ(together.size(), goals.size());
+    for (std::size_t k = 0; k < goals.size(); ++k) {
+      const TrialResult alone = run_trial(wire_of(20.0), introducer, goals[k], fork(), options());
+      reached += alone.outcome == Outcome::kReached ? 1 : 0;
+      EXPECT_EQ(together[k].outcome, alone.outcome);
+      EXPECT_EQ(together[k].reason, alone.reason);
+      EXPECT_EQ(together[k].terms, alone.terms);
+      EXPECT_EQ(together[k].nodes, alone.nodes);
+      EXPECT_EQ(together[k].contacts.size(), alone.contacts.size());
+      ASSERT_EQ(together[k].pushes.size(), alone.pushes.size());
+      EXPECT_EQ(together[k].pushes.back().push_work, alone.pushes.back().push_work);
+      ASSERT_EQ(together[k].shapes.size(), alone.shapes.size());
+      EXPECT_EQ(together[k].shapes.back().nodes, alone.shapes.back().nodes);
+      ASSERT_EQ(together[k].peak_forces.size(), alone.peak_forces.size());
+      for (std::size_t i = 0; i < alone.peak_forces.size(); ++i) {
+        EXPECT_EQ(together[k].peak_forces[i].force, alone.peak_forces[i].force);
+      }
+    }
+  }
+  EXPECT_EQ(reached, 2) << "the trunk by the one, the first branch by the other";
+}
+
 TEST(Way, WhatIsPassedByDoesNotDependOnWhichVesselTheTreeFollowsFirst) {
   // As if the second branch's end were the farthest: the tree's first line turns into it, and the
   // trunk beyond is a branch of that.

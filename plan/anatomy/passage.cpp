@@ -1,9 +1,8 @@
-#include "plan/anatomy/way.h"
+#include "plan/anatomy/passage.h"
 
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 #include "preprocess/centerline/path_place.h"
 
@@ -23,22 +22,6 @@ Eigen::Index segment_at(const Centerline& line, double arc) {
 
 double radius_at(const Centerline& line, double arc) {
   return preprocess::find_place(point_at(line, arc), line).radius;
-}
-
-/// The branches that lead to the point, from the root.
-std::vector<int> branches_to(const Vec3& point, const std::vector<Branch>& tree) {
-  int nearest = -1;
-  double least = std::numeric_limits<double>::infinity();
-  for (std::size_t k = 0; k < tree.size(); ++k) {
-    const double distance = preprocess::find_place(point, tree[k].line).from_axis;
-    if (distance >= least) continue;
-    least = distance;
-    nearest = static_cast<int>(k);
-  }
-  std::vector<int> chain;
-  for (int k = nearest; k >= 0; k = tree[static_cast<std::size_t>(k)].parent) chain.push_back(k);
-  std::reverse(chain.begin(), chain.end());
-  return chain;
 }
 
 /// The way up to the point before an arc length, then another line to its end.
@@ -154,9 +137,11 @@ Corner find_sharpest_bend(const Centerline& way, double arm) {
   return sharpest;
 }
 
-std::vector<Junction> find_junctions(const Centerline& way, const std::vector<Branch>& tree) {
+std::vector<Junction> find_junctions(const simulate::Way& of) {
+  const Centerline& way = of.path();
+  const std::vector<Branch>& tree = of.tree();
   const Vec3 end = way.points.col(way.points.cols() - 1);
-  const std::vector<int> chain = branches_to(end, tree);
+  const std::vector<int> chain = of.branches();
   std::vector<Junction> junctions;
   for (std::size_t k = 0; k < chain.size(); ++k) {
     // The stretch of the branch that the way goes along.

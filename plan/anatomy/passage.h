@@ -3,8 +3,8 @@
 /// where vessels leave it and how far in that is. No wire is simulated for it.
 #include <vector>
 
-#include "preprocess/centerline/centerline.h"
 #include "preprocess/vessel.h"
+#include "simulate/insertion/way.h"
 
 namespace wireplan::plan {
 
@@ -47,15 +47,13 @@ struct Junction {
   Vec3 trunk_direction = Vec3::UnitZ(), branch_direction = Vec3::UnitX();
 };
 
-/// All along the way, nearest first. The way is in the branch whose line is nearest to its end, and
-/// came there through that branch's parents. It leaves a trunk where it changes from one branch of
-/// the tree to another, and where the branch that it stays in is narrower there than the one beside
-/// it: a tree's first branch may well end in a small artery. Of a branch that the way takes, the
-/// ostium is where the way leaves the trunk's inscribed spheres; of one that it passes, the nearest
-/// point of the way. The trunk's direction is that of a chord of two of its diameters round the
-/// ostium, the branch's that of its first three radii, at least 6 mm, beyond it.
-/// Expects a tree that starts where the way does, as find_tree() makes it.
-std::vector<Junction> find_junctions(const Centerline& way,
-                                     const std::vector<preprocess::Branch>& tree);
+/// All along the way, nearest first; none without a tree. It leaves a trunk where it changes from
+/// one branch of the tree to another, and where the branch that it stays in is narrower there than
+/// the one beside it: a tree's first branch may well end in a small artery. Of a branch that the
+/// way takes, the ostium is where the way leaves the trunk's inscribed spheres; of one that it
+/// passes, the nearest point of the way. The trunk's direction is that of a chord of two of its
+/// diameters round the ostium, the branch's that of its first three radii, at least 6 mm, beyond
+/// it. Expects a tree that starts where the way does, as find_tree() makes it.
+std::vector<Junction> find_junctions(const simulate::Way& of);
 
 }  // namespace wireplan::plan
