@@ -120,6 +120,26 @@ simulate::TrialResult run_candidate(const Study& study, const Candidate& candida
   });
 }
 
+std::vector<simulate::TrialResult> run_for_all_goals(const Study& study, const Candidate& candidate,
+                                                     const simulate::VesselModel& vessel) {
+  expects(candidate.wire >= 0 && candidate.wire < std::ssize(study.wires));
+  expects(candidate.moves.empty());
+  std::vector<simulate::Goal> goals = {study.goal};
+  goals.insert(goals.end(), study.others.begin(), study.others.end());
+  std::vector<simulate::TrialResult> results;
+  simulate::TrialResult own = run_guarded([&] {
+    results =
+        simulate::run_trials(study.wires[static_cast<std::size_t>(candidate.wire)],
+                             make_introducer(study, candidate), goals, vessel, study.insertion);
+    return results.front();
+  });
+  if (own.outcome == simulate::Outcome::kFailed) return {own};
+  for (simulate::TrialResult& result : results) {
+    result = run_guarded([&] { return std::move(result); });
+  }
+  return results;
+}
+
 BatchResult run_batch(const Study& study, const std::vector<Candidate>& candidates,
                       const simulate::VesselModel& vessel, const BatchOptions& options) {
   // A slot that is never run keeps this.

@@ -41,6 +41,11 @@ simulate::TrialResult run_guarded(const std::function<simulate::TrialResult()>& 
 simulate::TrialResult run_candidate(const Study& study, const Candidate& candidate,
                                     const simulate::VesselModel& vessel);
 
+/// One straight push toward the study's goal and its others: what run_candidate() gives for the
+/// goal, then for each of the others. Only the first where it failed by our fault.
+std::vector<simulate::TrialResult> run_for_all_goals(const Study& study, const Candidate& candidate,
+                                                     const simulate::VesselModel& vessel);
+
 /// The parallel driver below run_batch: calls work(slot) once for each slot in [0, count), in no
 /// promised order; slots must write to places of their own. Returns which slots were finished: all,
 /// unless cancelled. What `work` throws ends the loop and reaches the caller.

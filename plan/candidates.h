@@ -14,6 +14,9 @@ struct Study {
   Vec3 access = Vec3::Zero();    //                                                 [mm]
   Vec3 tangent = Vec3::UnitZ();  // of the centerline at the access, into the vessel
   simulate::Goal goal;
+  /// Cross-sections that others plan for from the same access: scouts are pushed toward all of them
+  /// at once, and each gets its result.
+  std::vector<simulate::Goal> others = {};
   simulate::InsertionOptions insertion;
 };
 

@@ -95,8 +95,10 @@ Study scout_study(const Study& study) {
   const double factor = insertion.element_length / study.insertion.element_length;
   for (double& length : insertion.section_element_length) length *= factor;
   insertion.contact_spacing *= std::min(factor, 2.0);
-  insertion.step = std::max(
-      insertion.step, std::min({kCoarser * insertion.step, kLongestPush, 0.5 * study.goal.radius}));
+  double radius = study.goal.radius;
+  for (const simulate::Goal& other : study.others) radius = std::min(radius, other.radius);
+  insertion.step =
+      std::max(insertion.step, std::min({kCoarser * insertion.step, kLongestPush, 0.5 * radius}));
   insertion.residual_tolerance = std::max(insertion.residual_tolerance, kScoutTolerance);
   insertion.map_forces = false;
   return scout;

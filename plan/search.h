@@ -16,7 +16,8 @@ bool needs_search(const Study& study, bool exhaustive);
 /// The study at the scout's level:
 ///   - elements four times as long, but in curved sections none turns by over 1/3 rad at rest;
 ///   - pushes four times as long, but at most 2 mm, where the trial cuts them anyway, and at most
-///     half the goal's radius, so that none steps over a sphere, and thin vessels are followed;
+///     half the radius of the goal and of the others, so that none steps over a sphere, and thin
+///     vessels are followed;
 ///   - contact points up to twice as far apart, residuals up to 1e-4 N, no forces per triangle.
 /// Scouts are run on a rigid wall: one that yields costs several times as much (MEASUREMENTS.md),
 /// and its compliance is then never computed where no good plan goes.

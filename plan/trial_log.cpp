@@ -21,6 +21,18 @@ simulate::TrialResult simulate_run(const Study& study, const Run& run,
   return trial;
 }
 
+/// A scout tells of the study's other targets too.
+simulate::TrialResult simulate_run_and_others(const Study& study, const Run& run,
+                                              const simulate::VesselModel& vessel, TrialLog& log) {
+  const bool alone = study.others.empty() || run.level != Level::kScout || !run.is_plain() ||
+                     !run.candidate.moves.empty();
+  if (alone) return simulate_run(study, run, vessel);
+  std::vector<simulate::TrialResult> trials = run_for_all_goals(study, run.candidate, vessel);
+  for (simulate::TrialResult& trial : trials) trial.shapes.clear();
+  for (std::size_t k = 1; k < trials.size(); ++k) log.keep_other(k - 1, run, trials[k]);
+  return std::move(trials.front());
+}
+
 }  // namespace
 
 const char* level_name(Level level) {
@@ -70,7 +82,7 @@ std::vector<Measured> find_or_run(const Study& study, const PlanVessel& vessel,
         const std::size_t k = missing[static_cast<std::size_t>(slot)];
         expects(runs[k].level == level);
         const double start = thread_cpu_seconds();
-        const simulate::TrialResult trial = simulate_run(own, runs[k], model);
+        const simulate::TrialResult trial = simulate_run_and_others(own, runs[k], model, log);
         all[k] = measure(trial, own, vessel.path);
         all[k].cpu_seconds = thread_cpu_seconds() - start;
         log.keep(runs[k], trial, all[k]);

@@ -46,7 +46,8 @@ struct Scripts {
   long branches = 0;  // pushes that were tried
 };
 
-/// keep() is called from many threads at once, everything else from one at a time.
+/// keep() and keep_other() are called from many threads at once, everything else from one at a
+/// time.
 class TrialLog {
  public:
   virtual ~TrialLog() = default;
@@ -55,6 +56,11 @@ class TrialLog {
   /// `trial.shapes` is empty for runs whose shapes on the way nobody will ask for.
   virtual void keep(const Run& run, const simulate::TrialResult& trial,
                     const Measured& measured) = 0;
+
+  /// The same scout for one of Study::others, found along with the study's own. A log that serves
+  /// one target alone drops it.
+  virtual void keep_other(std::size_t /*other*/, const Run& /*run*/,
+                          const simulate::TrialResult& /*trial*/) {}
 
   /// The study's scripts; empty as long as they were not searched for.
   virtual std::optional<Scripts> find_scripts() = 0;

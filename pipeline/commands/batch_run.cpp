@@ -24,6 +24,7 @@
 #include "pipeline/commands/commands.h"
 #include "pipeline/files/case_file.h"
 #include "pipeline/files/text.h"
+#include "pipeline/report/overview.h"
 #include "pipeline/report/report.h"
 #include "pipeline/stages/stages.h"
 
@@ -316,8 +317,12 @@ class BatchRun {
                 {"best_plan", nullptr}};
     if (patient.outcome != "planned" && patient.outcome != "no_plan") return row;
     const std::string name = patient.given->name + "/report.json";
-    const Json report = read_report(options_.output / name);
     row["report"] = name;
+    if (const std::optional<Json> overview = find_overview(options_.output / name)) {
+      row["summary"] = describe_overview(*overview);
+      return row;
+    }
+    const Json report = read_report(options_.output / name);
     row["summary"] = describe_best(report);
     if (report.at("ranking").empty()) return row;
     const Json& best = report.at("ranking").front();

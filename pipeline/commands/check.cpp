@@ -27,8 +27,7 @@ void check_volume(const Case& given, Problems& problems) {
                    "points are in mm, patient LPS; given in RAS?");
     }
   };
-  expect_inside("access.point_mm", given.study.access);
-  expect_inside("target.point_mm", given.study.goal.point);
+  for (const auto& [key, point] : end_points(given)) expect_inside(key, point);
   for (std::size_t k = 0; k < given.segmentation.seeds.size(); ++k) {
     expect_inside("segmentation.seeds_mm[" + std::to_string(k) + "]", given.segmentation.seeds[k]);
   }
@@ -45,8 +44,7 @@ std::vector<std::string> check_surface_file(const Case& given, Problems& problem
                    "wrong surface.unit or surface.frame?");
     }
   };
-  expect_inside("access.point_mm", given.study.access);
-  expect_inside("target.point_mm", given.study.goal.point);
+  for (const auto& [key, point] : end_points(given)) expect_inside(key, point);
   return preprocess::tell_mends(repaired.mends);
 }
 

@@ -13,8 +13,12 @@
 #include "pipeline/commands/commands.h"
 #include "pipeline/commands/subcommands.h"
 #include "pipeline/files/case_file.h"
+#include "pipeline/files/disk.h"
 #include "pipeline/files/text.h"
+#include "pipeline/report/overview.h"
+#include "pipeline/report/page.h"
 #include "pipeline/report/report.h"
+#include "pipeline/stages/sections.h"
 #include "pipeline/stages/shards.h"
 #include "pipeline/stages/stages.h"
 
@@ -129,9 +133,14 @@ int print_status(const RunArguments& arguments) {
   const Case given = read_case(arguments.case_path, arguments.overrides);
   RunOptions options = run_options(arguments);
   options.dry_run = true;
-  for (const StageOutcome& outcome : run_stages(given, options).stages) {
+  options.on_stage = [](const StageOutcome& outcome) {
     std::cout << stage_line(outcome, /*with_reasons=*/true) << "\n";
-  }
+  };
+  for_each_section(given, options, [&](const Case& section, const RunOptions& own) {
+    const std::string name = section_name(section);
+    if (!name.empty()) std::cout << name << "\n";
+    run_stages(section, own);
+  });
   return kDone;
 }
 
@@ -145,7 +154,11 @@ int run_shard(const RunArguments& arguments, const std::string& shard, int round
   options.work.progress = [&](int done, int total) { bar.show(done, total); };
   options.on_stage = [&](const StageOutcome& outcome) { log->info(stage_line(outcome, false)); };
   std::signal(SIGINT, ask_to_stop);
-  std::cout << describe_share(share, run_share_of_case(given, options, share)) << "\n";
+  for_each_section(given, options, [&](const Case& section, const RunOptions& own) {
+    const std::string name = section_name(section);
+    std::cout << (name.empty() ? "" : name + ": ")
+              << describe_share(share, run_share_of_case(section, own, share)) << "\n";
+  });
   return kDone;
 }
 
@@ -164,6 +177,38 @@ std::string missing_shards(const RunResult& result) {
   return "";
 }
 
+void print_files(const fs::path& output) {
+  std::cout << "report: " << (output / "report.json").string() << "\n";
+  const fs::path page = output / "report.html";
+  if (fs::exists(page)) std::cout << "page: " << page.string() << "\n";
+}
+
+// The answer of a case of one section, whose report is published.
+int print_answer(const fs::path& output) {
+  const Json report = read_report(output / "report.json");
+  std::cout << describe_best(report) << "\n";
+  print_files(output);
+  return report.at("ranking").empty() ? kNoPlan : kDone;
+}
+
+// The answer of a case of several, whose reports are published below.
+int print_overview(const Case& given, const std::vector<Case>& sections, const fs::path& output) {
+  std::vector<SectionReport> reports;
+  for (const Case& section : sections) {
+    const std::string folder = section_folder(section).string();
+    reports.push_back({.access = section.accesses[section.access].name,
+                       .target = section.targets[section.target].name,
+                       .folder = folder,
+                       .report = read_report(output / folder / "report.json")});
+  }
+  const Json overview = build_overview(given.name, reports);
+  write_json(overview, output / "report.json");
+  if (page_missing().empty()) write_whole(build_overview_page(overview), output / "report.html");
+  std::cout << describe_overview(overview) << "\n";
+  print_files(output);
+  return serves_all_targets(overview) ? kDone : kNoPlan;
+}
+
 int run_case(const RunArguments& arguments) {
   if (arguments.dry_run) return print_status(arguments);
   const Case given = read_case(arguments.case_path, arguments.overrides);
@@ -179,24 +224,24 @@ int run_case(const RunArguments& arguments) {
     log->info(stage_line(outcome, arguments.explain));
   };
   std::signal(SIGINT, ask_to_stop);
-  const RunResult result = run_stages(given, options);
-  publish(result.artifacts, output);
-  if (arguments.after_shards) {
-    const std::string missing = missing_shards(result);
+  std::vector<Case> done;
+  std::string last;
+  for_each_section(given, options, [&](const Case& section, const RunOptions& own) {
+    const std::string name = section_name(section);
+    if (!name.empty()) log->info(name);
+    const RunResult result = run_stages(section, own);
+    publish(result.artifacts, output / section_folder(section));
+    const std::string missing = arguments.after_shards ? missing_shards(result) : "";
     if (!missing.empty()) log->warn(missing);
-  }
+    done.push_back(section);
+    last = result.stages.back().stage;
+  });
 
-  // The answer.
-  if (result.stages.back().stage != "report") {
-    std::cout << "done up to " << result.stages.back().stage << ": " << output.string() << "\n";
+  if (last != "report") {
+    std::cout << "done up to " << last << ": " << output.string() << "\n";
     return kDone;
   }
-  const fs::path file = output / "report.json";
-  const Json report = read_report(file);
-  std::cout << describe_best(report) << "\nreport: " << file.string() << "\n";
-  const fs::path page = output / "report.html";
-  if (fs::exists(page)) std::cout << "page: " << page.string() << "\n";
-  return report.at("ranking").empty() ? kNoPlan : kDone;
+  return done.size() == 1 ? print_answer(output) : print_overview(given, done, output);
 }
 
 struct BatchArguments {

@@ -162,50 +162,6 @@ void read_segmentation(JsonReader& root, Case& input) {
   reader.finish();
 }
 
-std::vector<double> read_angles(JsonReader& reader, const std::string& key,
-                                const std::vector<double>& fallback_deg, Range range_deg) {
-  std::vector<double> angles = reader.numbers(key, fallback_deg, range_deg);
-  for (double& angle : angles) angle *= kRadPerDeg;
-  return angles;
-}
-
-void read_access_and_target(JsonReader& root, Case& input) {
-  plan::Study& study = input.study;
-  const std::size_t problems_before = root.problems().count();
-  const Range turn{.min = -360.0, .max = 360.0};
-  JsonReader access = root.object("access", true);
-  study.access = access.point("point_mm", std::nullopt);
-  study.inclinations =
-      read_angles(access, "inclination_deg", {0.0, 15.0, 30.0}, {.min = 0.0, .max = 80.0});
-  study.azimuths = read_angles(access, "azimuth_deg", {0.0, 90.0, 180.0, 270.0}, turn);
-  access.finish();
-
-  JsonReader target = root.object("target", true);
-  study.goal.point = target.point("point_mm", std::nullopt);
-  study.goal.at_section = !target.has("radius_mm");
-  if (!study.goal.at_section) {
-    study.goal.radius =
-        target.number("radius_mm", std::nullopt, {.min = 0.1, .max = 50.0}, "given in m?");
-  }
-  input.target_beyond_mm =
-      target.number("beyond_mm", 0.0, {.min = 0.0, .max = 500.0}, "given in m?");
-  if (input.target_beyond_mm > 0.0 && !study.goal.at_section) {
-    root.problems().add("target.beyond_mm", "given beside target.radius_mm", "one of the two",
-                        "beyond_mm moves the cross-section on along the vessel; a sphere has none");
-  }
-  target.finish();
-  study.rolls = read_angles(root, "tip_roll_deg", {0.0, 90.0, 180.0, 270.0}, turn);
-  const double nearest = study.goal.at_section ? 0.0 : study.goal.radius;
-  if (root.problems().count() == problems_before &&
-      (study.goal.point - study.access).norm() <= nearest) {
-    root.problems().add("target.point_mm", to_json(study.goal.point).dump(),
-                        study.goal.at_section
-                            ? "another point than access.point_mm"
-                            : "a point further than target.radius_mm from access.point_mm",
-                        "a wire would be there before it is pushed");
-  }
-}
-
 constexpr std::array kManoeuvrings = {std::pair("never", Manoeuvring::kNever),
                                       std::pair("when_needed", Manoeuvring::kWhenNeeded),
                                       std::pair("always", Manoeuvring::kAlways)};
@@ -387,12 +343,6 @@ Json robustness_json(const Case& input) {
           {"lumen_mm", unknowns.lumen}};
 }
 
-Json degrees(const std::vector<double>& angles) {
-  Json list = Json::array();
-  for (const double angle : angles) list.push_back(clean(angle / kRadPerDeg));
-  return list;
-}
-
 Json input_json(const Case& input) {
   Json json;
   if (input.volume) {
@@ -501,7 +451,13 @@ Case read_case(const std::filesystem::path& path, const std::vector<std::string>
   JsonReader root(file, "", problems);
   root.text("schema", std::nullopt);
   input.name = read_name(root, input.file);
-  read_access_and_target(root, input);
+  const std::size_t problems_before = problems.count();
+  AccessesAndTargets ends = read_accesses_and_targets(root);
+  input.accesses = std::move(ends.accesses);
+  input.targets = std::move(ends.targets);
+  if (problems.count() == problems_before) choose_section(input, 0, 0);
+  input.study.rolls =
+      read_angles(root, "tip_roll_deg", {0.0, 90.0, 180.0, 270.0}, {.min = -360.0, .max = 360.0});
   read_inputs(root, input);
   read_segmentation(root, input);
   JsonReader wall = root.object("wall", false);
@@ -523,6 +479,43 @@ Case read_case(const std::filesystem::path& path, const std::vector<std::string>
   return input;
 }
 
+void choose_section(Case& given, std::size_t access, std::size_t target) {
+  const AccessInput& from = given.accesses.at(access);
+  const TargetInput& to = given.targets.at(target);
+  given.access = access;
+  given.target = target;
+  given.study.access = from.point;
+  given.study.inclinations = from.inclinations;
+  given.study.azimuths = from.azimuths;
+  given.study.goal = {.point = to.point, .at_section = to.at_section};
+  if (!to.at_section) given.study.goal.radius = to.radius;
+}
+
+std::string access_key(const Case& given) {
+  return given.accesses.size() == 1 ? "access" : "accesses[" + std::to_string(given.access) + "]";
+}
+
+std::string target_key(const Case& given) {
+  return given.targets.size() == 1 ? "target" : "targets[" + std::to_string(given.target) + "]";
+}
+
+std::vector<std::pair<std::string, Vec3>> end_points(Case given) {
+  std::vector<std::pair<std::string, Vec3>> points;
+  for (given.access = 0; given.access < given.accesses.size(); ++given.access) {
+    points.emplace_back(access_key(given) + ".point_mm", given.accesses[given.access].point);
+  }
+  for (given.target = 0; given.target < given.targets.size(); ++given.target) {
+    points.emplace_back(target_key(given) + ".point_mm", given.targets[given.target].point);
+  }
+  return points;
+}
+
+std::string section_name(const Case& given) {
+  const std::string &from = given.accesses[given.access].name,
+                    &to = given.targets[given.target].name;
+  return from + (from.empty() || to.empty() ? "" : " to ") + to;
+}
+
 Json case_parameters(const Case& input) {
   const plan::Study& study = input.study;
   Json json = {{"schema", kSchema}, {"name", input.name}};
@@ -531,18 +524,19 @@ Json case_parameters(const Case& input) {
                   {"thickness_mm", input.wall.extrusion.thickness_mm},
                   {"young_modulus_kpa", clean(input.wall.extrusion.young_modulus / kMpaPerKpa)},
                   {"poisson_ratio", input.wall.extrusion.poisson_ratio}};
-  json["access"] = {{"point_mm", to_json(study.access)},
-                    {"inclination_deg", degrees(study.inclinations)},
-                    {"azimuth_deg", degrees(study.azimuths)}};
-  json["target"] = {{"point_mm", to_json(study.goal.point)}};
-  if (study.goal.at_section) {
-    json["target"]["beyond_mm"] = input.target_beyond_mm;
-  } else {
-    json["target"]["radius_mm"] = study.goal.radius;
-  }
+  const auto put = [&](const char* one, const char* list, const auto& inputs, auto to_json_of) {
+    if (inputs.size() == 1) {
+      json[one] = to_json_of(inputs.front());
+      return;
+    }
+    json[list] = Json::array();
+    for (const auto& each : inputs) json[list].push_back(to_json_of(each));
+  };
+  put("access", "accesses", input.accesses, access_json);
+  put("target", "targets", input.targets, target_json);
   json["wires"] = Json::array();
   for (const simulate::Wire& wire : study.wires) json["wires"].push_back(wire_json(wire));
-  json["tip_roll_deg"] = degrees(study.rolls);
+  json["tip_roll_deg"] = degrees_json(study.rolls);
   json["manoeuvres"] = manoeuvring_name(input.manoeuvres);
   json["friction"] = study.insertion.friction;
   json["insertion"] = {{"length_mm", study.insertion.length},

@@ -5,8 +5,10 @@
 #include <filesystem>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
+#include "pipeline/files/access_target_file.h"
 #include "pipeline/files/json_reader.h"
 #include "plan/anatomy/access_limits.h"
 #include "plan/make_plan.h"
@@ -46,10 +48,12 @@ struct Case {
   preprocess::SegmentOptions segmentation;  // of a volume; seeds besides the access point
   preprocess::SurfaceOptions surface;
   WallInput wall;
+  std::vector<AccessInput> accesses;  // one at least of each; every pair is a section
+  std::vector<TargetInput> targets;
+  std::size_t access = 0, target = 0;  // of the section that the study is for
   /// Its tangent and the goal's way are found later, from the centerline. Where insertion.length is
   /// 0 the trials stage takes 1.25 times the path's length and 20 mm more.
   plan::Study study;
-  double target_beyond_mm = 0.0;  // the cross-section is so much further along the vessel
   Manoeuvring manoeuvres = Manoeuvring::kWhenNeeded;
   plan::AccessLimits access_limits;
   plan::Limits limits;
@@ -63,6 +67,20 @@ struct Case {
 /// Reads CASE (a file, or a folder with a case.json), applies `overrides` ("wall.thickness_mm=2":
 /// the value is JSON, and else text), defaults and units. Throws Error with all problems at once.
 Case read_case(const std::filesystem::path& path, const std::vector<std::string>& overrides = {});
+
+/// Makes the study that of one access and one target.
+void choose_section(Case& given, std::size_t access, std::size_t target);
+
+/// The keys of the section's access and target in the case file: "target", "targets[1]".
+std::string access_key(const Case& given);
+std::string target_key(const Case& given);
+
+/// Every access and target of the case by its key: "access.point_mm", [mm].
+std::vector<std::pair<std::string, Vec3>> end_points(Case given);
+
+/// "right femoral to left renal"; of what the case has only one, without its name. Empty for a case
+/// of one section.
+std::string section_name(const Case& given);
 
 /// Every parameter after defaults, under the keys of the case file; catalogue wires written out.
 Json case_parameters(const Case& input);

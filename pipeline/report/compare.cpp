@@ -1,10 +1,12 @@
 #include "pipeline/report/compare.h"
 
 #include <algorithm>
+#include <optional>
 #include <tuple>
 
 #include "pipeline/files/json_reader.h"
 #include "pipeline/files/text.h"
+#include "pipeline/report/overview.h"
 #include "pipeline/report/report.h"
 
 namespace wireplan::pipeline {
@@ -16,8 +18,24 @@ std::string number(const Json& value, const char* pattern) {
   return value.is_null() ? "-" : format(pattern, value.get<double>());
 }
 
-const Json& parameter(const Json& report, const char* pointer) {
-  return report.at("provenance").at("parameters").at(Json::json_pointer(pointer));
+/// Null where the case does not have it.
+Json parameter(const Json& report, const char* pointer) {
+  const Json& parameters = report.at("provenance").at("parameters");
+  const Json::json_pointer place(pointer);
+  return parameters.contains(place) ? parameters.at(place) : Json(nullptr);
+}
+
+/// Of an overview its sections' reports.
+std::vector<std::filesystem::path> reports_in(const std::filesystem::path& file) {
+  const std::optional<Json> overview = find_overview(file);
+  if (!overview) return {file};
+  std::vector<std::filesystem::path> files;
+  for (const Json& target : overview->at("targets")) {
+    for (const Json& row : target.at("sections")) {
+      files.push_back(file.parent_path() / row.at("folder").get<std::string>() / "report.json");
+    }
+  }
+  return files;
 }
 
 /// Whether a value of the case is the same in all reports.
@@ -141,11 +159,13 @@ std::string list_best_plans(const std::vector<Json>& reports) {
 }  // namespace
 
 std::string compare_reports(const std::vector<std::filesystem::path>& files) {
-  expects(files.size() >= 2);
   std::vector<Json> reports;
-  for (const std::filesystem::path& file : files) {
-    reports.push_back(read_json(file, kReportSchema, kOlderReportSchema));
+  for (const std::filesystem::path& given : files) {
+    for (const std::filesystem::path& file : reports_in(given)) {
+      reports.push_back(read_json(file, kReportSchema, kOlderReportSchema));
+    }
   }
+  expects(reports.size() >= 2);
 
   const bool one_patient = same_patient(reports);
   std::string text = list_reports(reports) +

@@ -144,6 +144,15 @@ void fill(std::string& page, const std::string& mark, const std::string& text) {
   page.replace(at, mark.size(), text);
 }
 
+std::string fill_template(const Json& report, const Json& scene, const Json& timing) {
+  std::string page = kPageTemplate;
+  // The report, which holds names of others' choosing, comes last: no mark is looked for in it.
+  fill(page, "%WIREPLAN_TIMING%", embed_json(timing));
+  fill(page, "%WIREPLAN_SCENE%", embed_json(scene));
+  fill(page, "%WIREPLAN_REPORT%", embed_json(report));
+  return page;
+}
+
 }  // namespace
 
 PageTrial page_trial(const simulate::TrialResult& trial) {
@@ -168,12 +177,12 @@ std::string build_page(const Json& report, const PageInput& input) {
           static_cast<Eigen::Index>(input.peak_force.size()) == input.surface.triangles.cols());
   Json rest = report;
   rest.erase("timing");
-  std::string page = kPageTemplate;
-  // The report, which holds names of others' choosing, comes last: no mark is looked for in it.
-  fill(page, "%WIREPLAN_TIMING%", embed_json(report.at("timing")));
-  fill(page, "%WIREPLAN_SCENE%", embed_json(scene_json(input)));
-  fill(page, "%WIREPLAN_REPORT%", embed_json(rest));
-  return page;
+  return fill_template(rest, scene_json(input), report.at("timing"));
+}
+
+std::string build_overview_page(const Json& overview) {
+  expects(page_missing().empty());
+  return fill_template(overview, nullptr, nullptr);
 }
 
 std::string embed_json(const Json& value) {

@@ -52,6 +52,9 @@ std::string page_template_sha256();
 /// The page of a report (report.h). Expects page_missing() to be empty.
 std::string build_page(const Json& report, const PageInput& input);
 
+/// The page of an overview (overview.h): no vessel and no trials, but links to the sections' pages.
+std::string build_overview_page(const Json& overview);
+
 /// A JSON text that can stand inside a script element of HTML: <, >, & and all that is not ASCII
 /// escaped, so that no name ends the element or the script.
 std::string embed_json(const Json& value);

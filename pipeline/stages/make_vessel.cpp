@@ -159,8 +159,16 @@ void make_volume(Workspace& work, const fs::path& folder) {
 
 void make_segment(Workspace& work, const fs::path& folder) {
   preprocess::SegmentOptions options = work.given().segmentation;
-  options.seeds.insert(options.seeds.begin(), work.given().study.access);
-  options.target = work.given().study.goal.point;
+  // One vessel for all sections: it holds every access and target.
+  const Case& given = work.given();
+  options.seeds.insert(options.seeds.begin(), given.accesses.front().point);
+  for (std::size_t k = 1; k < given.accesses.size(); ++k) {
+    options.seeds.push_back(given.accesses[k].point);
+  }
+  for (std::size_t k = 1; k < given.targets.size(); ++k) {
+    options.seeds.push_back(given.targets[k].point);
+  }
+  options.target = given.targets.front().point;
   const std::string& modality = work.image().modality;
   if (!options.lower_hu && !modality.empty() && modality != "CT") {
     throw Error("the volume's modality is " + modality +
@@ -233,11 +241,13 @@ void make_centerline(Workspace& work, const fs::path& folder) {
   const Surface surface =
       preprocess::read_surface_artifact(work.artifact("surface").folder / "surface.vtp");
   const plan::Study& study = work.given().study;
-  require_inside(surface, "access.point_mm", study.access);
-  require_inside(surface, "target.point_mm", study.goal.point);
+  const Case& given = work.given();
+  require_inside(surface, access_key(given) + ".point_mm", study.access);
+  require_inside(surface, target_key(given) + ".point_mm", study.goal.point);
 
-  const Centerline line = preprocess::find_centerline(surface, study.access, study.goal.point,
-                                                      {.beyond_mm = work.given().target_beyond_mm});
+  const Centerline line =
+      preprocess::find_centerline(surface, study.access, study.goal.point,
+                                  {.beyond_mm = given.targets[given.target].beyond_mm});
   preprocess::write_centerline(line, folder / "centerline.vtp");
   write_curve_markups(line.points, "centerline", folder / "centerline.mrk.json");
 

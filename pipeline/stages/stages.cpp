@@ -62,11 +62,17 @@ std::string stage_key_text(const Stage& stage, const Workspace& work) {
   return key_text(lines);
 }
 
+// Under which the store remembers what a section last used.
+fs::path section_file(const Case& given) {
+  const std::string section = section_name(given);
+  return section.empty() ? given.file : fs::path(given.file.string() + "#" + section);
+}
+
 // What changed since the stage last ran for this case.
 std::vector<std::string> why_it_runs(const Store& store, const Case& given, const Stage& stage,
                                      const std::string& key_text, bool forced) {
   if (forced) return {"it is forced"};
-  const std::string before = store.last_key_text(given.file, stage.name);
+  const std::string before = store.last_key_text(section_file(given), stage.name);
   if (before.empty()) return {"it has no earlier result for this case"};
   std::vector<std::string> reasons = describe_difference(before, key_text);
   if (reasons.empty()) reasons = {"its result is gone from the cache or damaged"};
@@ -88,7 +94,9 @@ void require_known(const std::vector<Stage>& stages, const std::string& name) {
 
 // What a stage says of the world is told with the case and the stage, and where to look.
 std::string in_context(const Workspace& work, const std::string& stage, const std::string& what) {
-  std::string text = work.given().file.string() + ": stage " + stage + ": " + what;
+  const std::string section = section_name(work.given());
+  std::string text = work.given().file.string() + (section.empty() ? "" : ": " + section) +
+                     ": stage " + stage + ": " + what;
   if (work.has("surface")) {
     text += " (the surface: " + (work.artifact("surface").folder / "surface.vtp").string() + ")";
   }
@@ -128,6 +136,16 @@ void read_too(Stage& stage, std::initializer_list<const char*> pointers) {
   }
 }
 
+/// Adds the points of all accesses and targets of the case.
+void read_points(Stage& stage, const Case& given) {
+  for (auto [key, point] : end_points(given)) {  // "targets[1].point_mm"
+    std::replace_if(
+        key.begin(), key.end(), [](char c) { return c == '[' || c == '.'; }, '/');
+    std::erase(key, ']');
+    stage.parameters.push_back("/" + key);
+  }
+}
+
 }  // namespace
 
 std::vector<Stage> stages_of(const Case& given) {
@@ -138,8 +156,9 @@ std::vector<Stage> stages_of(const Case& given) {
     stages.push_back({.name = "segment",
                       .version = 3,
                       .reads_input = true,
-                      .parameters = {"/segmentation", "/access/point_mm", "/target/point_mm"},
+                      .parameters = {"/segmentation"},
                       .make = make_segment});
+    read_points(stages.back(), given);
     stages.push_back({.name = "surface",
                       .version = 6,
                       .reads_input = true,
@@ -179,6 +198,9 @@ std::vector<Stage> stages_of(const Case& given) {
                               "/wall/model", "/insertion"},
                .make = make_trials};
   if (given.wall.elastic) trials.after.push_back("wall");  // a rigid one does not act
+  if (const std::vector<std::size_t> served = targets_served(given); served.size() > 1) {
+    for (const std::size_t k : served) trials.after.push_back(centerline_toward(k));
+  }
   if (plan::needs_search(given.study, given.exhaustive)) read_too(trials, {"/search"});
   stages.push_back(trials);
   Stage manoeuvres = trials;
@@ -220,6 +242,13 @@ Json used_parameters(const Case& given) {
   const auto name_only = [](const fs::path& path) { return path.filename().string(); };
   if (given.volume) parameters["volume"]["path"] = name_only(given.volume->path);
   if (given.surface_input) parameters["surface"]["path"] = name_only(given.surface_input->path);
+  if (section_name(given).empty()) return parameters;
+  const AccessInput& access = given.accesses[given.access];
+  const TargetInput& target = given.targets[given.target];
+  parameters["section"] = {{"access", access.name}, {"target", target.name}};
+  parameters["access"] = access_json(access);
+  parameters["target"] = target_json(target);
+  for (const char* key : {"access", "target"}) parameters[key].erase("name");
   return parameters;
 }
 
@@ -238,6 +267,7 @@ RunResult run_stages(const Case& given, const RunOptions& options,
   work.parameters = used_parameters(given);
   work.input_stamp = input_stamp(work.input);
   work.input_sha256 = hash_input(work.input);
+  for (const auto& [name, artifact] : options.beside) work.add(name, artifact);
   for (const Stage& stage : stages) {
     if (options.work.cancelled && options.work.cancelled()) throw Interrupted();
 
@@ -270,7 +300,7 @@ RunResult run_stages(const Case& given, const RunOptions& options,
                  why_it_runs(store, given, stage, text, forced)};
     }
     if (artifact) {
-      if (!options.dry_run) store.remember(given.file, *artifact);
+      if (!options.dry_run) store.remember(section_file(given), *artifact);
       work.add(*artifact);
       result.artifacts.push_back(*artifact);
     }

@@ -6,6 +6,7 @@
 #include <functional>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "pipeline/stages/makers.h"
@@ -23,9 +24,11 @@ struct Stage {
 };
 
 /// In the order in which they run; a case that enters at a surface has no volume and no segment.
+/// Those up to `surface`, and `wall`, are the same for all sections of a case.
 std::vector<Stage> stages_of(const Case& given);
 
-/// case_parameters() with file names in the place of paths.
+/// case_parameters() with file names in the place of paths, and the section's access and target
+/// beside the lists that they are of.
 Json used_parameters(const Case& given);
 
 enum class StageState {
@@ -48,6 +51,8 @@ struct RunOptions {
   bool dry_run = false;            // look only
   WorkOptions work;
   std::function<void(const StageOutcome&)> on_stage;  // after each; may be empty
+  /// Artifacts of other sections that this one reads, by the names of Workspace.
+  std::vector<std::pair<std::string, Artifact>> beside = {};
   /// Called instead of running `to`, where that is not in the store; may be empty.
   std::function<void(Workspace&)> instead = {};
 };

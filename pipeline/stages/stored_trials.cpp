@@ -52,6 +52,15 @@ StoredTrials::StoredTrials(Workspace& work)
   for (const Level level : {Level::kScout, Level::kProbe, Level::kFull}) {
     studies_[static_cast<std::size_t>(level)] = plan::study_at(work.study(), level);
   }
+  const Case& given = work.given();
+  for (const std::size_t k : targets_served(given)) {
+    if (k == given.target) continue;
+    // What the section of that target has in the place of this one's.
+    other_keys_.push_back(with_values(
+        shared_key_, {{"input centerline", work.artifact(centerline_toward(k)).contents()},
+                      {"parameter target.point_mm", to_json(given.targets[k].point).dump()},
+                      {"parameter target.beyond_mm", Json(given.targets[k].beyond_mm).dump()}}));
+  }
 }
 
 const plan::Study& StoredTrials::study_of(Level level) const {
@@ -60,7 +69,7 @@ const plan::Study& StoredTrials::study_of(Level level) const {
 
 // All that one run reads: what the stage of the trials reads, but of the lists only its own entry.
 // The elements of a scout follow from all wires of the study.
-std::string StoredTrials::key_of(const plan::Run& run) const {
+std::string StoredTrials::key_of(const plan::Run& run, const std::string& shared_key) const {
   const auto& [wire, inclination, azimuth, roll, moves] = run.candidate;
   const plan::Study& study = study_of(run.level);
   Json script = Json::array();
@@ -83,7 +92,7 @@ std::string StoredTrials::key_of(const plan::Run& run) const {
                                           d.shift.x(), d.shift.y(), d.inward})
                                         .dump()});
   }
-  return shared_key_ + key_text(lines);
+  return shared_key + key_text(lines);
 }
 
 std::string StoredTrials::shapes_key_of(const plan::Run& run) const {
@@ -148,6 +157,12 @@ void StoredTrials::keep(const plan::Run& run, const simulate::TrialResult& trial
   const std::scoped_lock lock(mutex_);
   work_.measured[{run.level, run.id}] = measured;
   places_[{run.level, run.id}] = std::move(files);
+}
+
+void StoredTrials::keep_other(std::size_t other, const plan::Run& run,
+                              const simulate::TrialResult& trial) {
+  work_.store().keep_piece(key_of(run, other_keys_.at(other)),
+                           trial_text(study_of(run.level), run.candidate, trial));
 }
 
 std::optional<plan::Scripts> StoredTrials::find_scripts() {

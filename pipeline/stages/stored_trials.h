@@ -10,6 +10,7 @@
 #include <optional>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "pipeline/stages/workspace.h"
 
@@ -23,6 +24,8 @@ class StoredTrials final : public plan::TrialLog {
   std::optional<plan::Measured> find(const plan::Run& run) override;
   void keep(const plan::Run& run, const simulate::TrialResult& trial,
             const plan::Measured& measured) override;
+  void keep_other(std::size_t other, const plan::Run& run,
+                  const simulate::TrialResult& trial) override;
   std::optional<plan::Scripts> find_scripts() override;
   void keep_scripts(const plan::Scripts&) override {}  // make_manoeuvres() writes them
 
@@ -36,13 +39,15 @@ class StoredTrials final : public plan::TrialLog {
   struct Files {
     std::filesystem::path trial, shapes;  // the latter empty where there are none
   };
-  std::string key_of(const plan::Run& run) const;
+  std::string key_of(const plan::Run& run) const { return key_of(run, shared_key_); }
+  std::string key_of(const plan::Run& run, const std::string& shared_key) const;
   std::string shapes_key_of(const plan::Run& run) const;
   const plan::Study& study_of(plan::Level level) const;
   std::optional<Files> locate(const plan::Run& run) const;
 
   Workspace& work_;
-  std::string shared_key_;  // what all runs of the case read
+  std::string shared_key_;               // what all runs of the case read
+  std::vector<std::string> other_keys_;  // the same toward each of the study's others
   std::array<plan::Study, 3> studies_;
   std::mutex mutex_;  // guards places_ and the workspace's measured
   std::map<std::pair<plan::Level, int>, Files> places_;

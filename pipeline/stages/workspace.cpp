@@ -5,7 +5,6 @@
 #include <utility>
 
 #include "pipeline/report/report.h"
-#include "pipeline/stages/tree_artifact.h"
 #include "preprocess/centerline/centerline.h"
 #include "preprocess/files/vessel_io.h"
 
@@ -19,15 +18,54 @@ constexpr double kTangentSpan = 10.0;
 // Wire that is brought along where the case leaves it open: a wire does not keep to the middle.
 constexpr double kInsertionFactor = 1.25, kInsertionExtra = 20.0;
 
-// Enough wire for a way round the middle, as far as the shortest wire goes.
-double choose_insertion(const Centerline& path, const plan::Study& study) {
-  const double path_length = path.arc_length(path.arc_length.size() - 1);
+// The tree as find_tree() made it, back from the artifact of stage centerline.
+std::vector<preprocess::Branch> read_tree(const Workspace& work) {
+  std::vector<Centerline> lines =
+      preprocess::read_centerlines(work.artifact("centerline").folder / "tree.vtp");
+  const Json branches = work.figures("centerline").at("branches");
+  expects(lines.size() == branches.size());
+  std::vector<preprocess::Branch> tree;
+  for (std::size_t k = 0; k < lines.size(); ++k) {
+    // The parent is told by its name.
+    const auto parent = std::find_if(branches.begin(), branches.end(), [&](const Json& other) {
+      return other.at("name") == branches[k].at("parent");
+    });
+    tree.push_back(
+        {.line = std::move(lines[k]),
+         .parent = parent == branches.end() ? -1 : static_cast<int>(parent - branches.begin()),
+         .parent_arc = branches[k].at("parent_arc_mm").get<double>()});
+  }
+  return tree;
+}
+
+// Enough wire for a way round the middle to the furthest goal, as far as the shortest wire goes.
+double choose_insertion(const plan::Study& study) {
+  const auto length_of = [](const simulate::Goal& goal) {
+    return goal.way->path().arc_length.tail<1>().value();
+  };
+  double path_length = length_of(study.goal);
+  for (const simulate::Goal& other : study.others) {
+    path_length = std::max(path_length, length_of(other));
+  }
   double length = std::ceil(kInsertionFactor * path_length + kInsertionExtra);
   for (const simulate::Wire& wire : study.wires) length = std::min(length, wire.length());
   return length;
 }
 
 }  // namespace
+
+std::vector<std::size_t> targets_served(const Case& given) {
+  if (!given.targets[given.target].at_section) return {given.target};
+  std::vector<std::size_t> served;
+  for (std::size_t k = 0; k < given.targets.size(); ++k) {
+    if (given.targets[k].at_section) served.push_back(k);
+  }
+  return served;
+}
+
+std::string centerline_toward(std::size_t target) {
+  return "centerline toward " + std::to_string(target);
+}
 
 Json figures_of(const std::string& stage) {
   return {{"schema", "wireplan." + stage + "/1"}, {"warnings", Json::array()}};
@@ -38,7 +76,10 @@ void write_figures(const Json& figures, const fs::path& folder) {
 }
 
 Workspace::Workspace(Case given, WorkOptions options, Store store)
-    : given_(std::move(given)), options_(std::move(options)), store_(std::move(store)) {
+    : given_(std::move(given)),
+      options_(std::move(options)),
+      store_(std::move(store)),
+      models_(options_.models ? options_.models : std::make_shared<ModelStock>()) {
   input = given_.volume ? given_.volume->path : given_.surface_input->path;
 }
 
@@ -87,43 +128,52 @@ std::string Workspace::field_key_text() const {
                              {"program", build_info().dump()}});
 }
 
+ModelStock& Workspace::models() {
+  std::string made_from = field_key_text();
+  if (given_.wall.elastic && has("wall")) made_from += artifact("wall").contents();
+  if (models_->made_from != made_from) *models_ = ModelStock{.made_from = std::move(made_from)};
+  return *models_;
+}
+
 bool Workspace::find_field() {
   const std::optional<fs::path> kept = store_.find_piece(field_key_text());
   if (!kept) return false;
   std::optional<simulate::Lumen> field = simulate::Lumen::from_bytes(read_if_there(*kept));
   if (!field) return false;
-  model_ = std::make_unique<simulate::VesselModel>(surface(), std::move(*field));
+  models().model = std::make_unique<simulate::VesselModel>(surface(), std::move(*field));
   return true;
 }
 
 void Workspace::share_field() {
-  if (model_) return;
+  if (models().model) return;
   const std::optional<FileLock> lock = store_.lock("field", field_key_text(), options_.cancelled);
   if (!lock) throw Interrupted();
   if (!find_field()) store_.keep_piece(field_key_text(), rigid_model().lumen.to_bytes());
 }
 
 const simulate::VesselModel& Workspace::rigid_model() {
-  if (!model_ && !find_field()) {
+  ModelStock& stock = models();
+  if (!stock.model && !find_field()) {
     // The field as a yielding wall needs it, since the wall may come later.
     simulate::LumenOptions options = simulate::follow(surface());
     if (given_.wall.elastic) options.band = simulate::VesselModel::yielding_band(options);
-    model_ = std::make_unique<simulate::VesselModel>(surface(), options);
+    stock.model = std::make_unique<simulate::VesselModel>(surface(), options);
   }
-  if (model_->compliance) compliance_aside_ = std::move(model_->compliance);
-  return *model_;
+  if (stock.model->compliance) stock.compliance_aside = std::move(stock.model->compliance);
+  return *stock.model;
 }
 
 const simulate::VesselModel& Workspace::model() {
-  if (model_ && model_->compliance) return *model_;
+  ModelStock& stock = models();
+  if (stock.model && stock.model->compliance) return *stock.model;
   rigid_model();
   if (given_.wall.elastic) {
-    if (!compliance_aside_) {
-      compliance_aside_ = std::make_unique<simulate::WallCompliance>(surface(), wall());
+    if (!stock.compliance_aside) {
+      stock.compliance_aside = std::make_unique<simulate::WallCompliance>(surface(), wall());
     }
-    model_->compliance = std::move(compliance_aside_);
+    stock.model->compliance = std::move(stock.compliance_aside);
   }
-  return *model_;
+  return *stock.model;
 }
 
 std::string Workspace::piece(std::vector<KeyLine> key,
@@ -137,16 +187,27 @@ std::string Workspace::piece(std::vector<KeyLine> key,
 }
 
 const plan::Study& Workspace::study() {
-  if (!study_) {
-    study_ = given_.study;
-    study_->tangent = preprocess::start_tangent(path(), kTangentSpan);
-    const auto way = std::make_shared<simulate::Way>(path(), read_tree(*this));
-    if (study_->goal.at_section) study_->goal.radius = way->section().radius;
-    study_->goal.way = way;
-    if (study_->insertion.length == 0.0) {
-      study_->insertion.length = choose_insertion(path(), *study_);
-    }
+  if (study_) return *study_;
+  plan::Study study = given_.study;
+  const std::vector<preprocess::Branch> tree = read_tree(*this);
+  const auto set_way = [&](simulate::Goal& goal, const Centerline& path) {
+    goal.way = std::make_shared<simulate::Way>(path, tree);
+    if (goal.at_section) goal.radius = goal.way->section().radius;
+  };
+  set_way(study.goal, path());
+  study.tangent = preprocess::start_tangent(path(), kTangentSpan);
+  const std::vector<std::size_t> served = targets_served(given_);
+  for (const std::size_t k : served) {
+    if (k == given_.target) continue;
+    const Centerline other =
+        preprocess::read_centerline(artifact(centerline_toward(k)).folder / "centerline.vtp");
+    set_way(study.others.emplace_back(
+                simulate::Goal{.point = given_.targets[k].point, .at_section = true}),
+            other);
+    if (k == served.front()) study.tangent = preprocess::start_tangent(other, kTangentSpan);
   }
+  if (study.insertion.length == 0.0) study.insertion.length = choose_insertion(study);
+  study_ = std::move(study);
   return *study_;
 }
 

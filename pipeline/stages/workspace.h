@@ -21,12 +21,27 @@ namespace wireplan::pipeline {
 
 using plan::Interrupted;
 
+/// The vessel as trials feel it, for all sections of a case: made once.
+struct ModelStock {
+  std::string made_from;  // key of surface and wall
+  std::unique_ptr<simulate::VesselModel> model = nullptr;
+  std::unique_ptr<const simulate::WallCompliance> compliance_aside = nullptr;  // while it is rigid
+};
+
 /// How a stage speaks to whom started it; each may be empty.
 struct WorkOptions {
   int threads = 0;                                    // of the trials; 0: all cores
   std::function<void(int done, int total)> progress;  // trials; from any thread, one at a time
   std::function<bool()> cancelled;                    // from any thread
+  std::shared_ptr<ModelStock> models = nullptr;       // null: made anew, and kept for itself
 };
+
+/// Targets that one push from an access can serve: the cross-sections among the case's targets. The
+/// section's own alone where that is a sphere.
+std::vector<std::size_t> targets_served(const Case& given);
+
+/// Under which a section's workspace has the artifact of stage centerline toward another target.
+std::string centerline_toward(std::size_t target);
 
 /// The artifacts made so far and what was read from them, each once and only when a stage asks.
 class Workspace {
@@ -37,7 +52,8 @@ class Workspace {
   const WorkOptions& options() const { return options_; }
   const Store& store() const { return store_; }
 
-  void add(const Artifact& artifact) { artifacts_[artifact.stage] = artifact; }
+  void add(const Artifact& artifact) { add(artifact.stage, artifact); }
+  void add(const std::string& name, const Artifact& artifact) { artifacts_[name] = artifact; }
   bool has(const std::string& stage) const { return artifacts_.count(stage) != 0; }
   /// Expects the stage to be done.
   const Artifact& artifact(const std::string& stage) const;
@@ -59,8 +75,9 @@ class Workspace {
   /// Bytes that follow from `key` and from this program: a piece of the store, made where it has
   /// none.
   std::string piece(std::vector<KeyLine> key, const std::function<std::string()>& make) const;
-  /// The case's study with what the centerline tells: the tangent at the access, the goal's way,
-  /// and the insertion length where the case leaves it open.
+  /// The case's study with what the centerlines tell: the tangent at the access, the ways of the
+  /// goal and of the others, and the insertion length where the case leaves it open. Sections that
+  /// one push can serve have tangent and length in common.
   const plan::Study& study();
 
   std::filesystem::path input;  // the volume or surface that the case names
@@ -81,11 +98,11 @@ class Workspace {
   std::optional<Centerline> path_;
   std::optional<Wall> wall_;
   std::optional<plan::Study> study_;
-  std::unique_ptr<simulate::VesselModel> model_;
-  std::unique_ptr<const simulate::WallCompliance> compliance_aside_;  // while it is the rigid one
+  std::shared_ptr<ModelStock> models_;
 
   std::string field_key_text() const;
-  bool find_field();  // whether the store has it; model_ then
+  ModelStock& models();  // of this surface and wall
+  bool find_field();     // whether the store has it; the stock's model then
 };
 
 /// The start of a stage's figures.json, and its end.

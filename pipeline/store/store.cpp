@@ -202,6 +202,17 @@ std::string without_parameters(const std::string& key_text, const std::vector<st
   return kept;
 }
 
+std::string with_values(const std::string& text, const std::vector<KeyLine>& lines) {
+  std::vector<KeyLine> all = parse_key_text(text);
+  for (const KeyLine& line : lines) {
+    const auto own = std::find_if(all.begin(), all.end(),
+                                  [&](const KeyLine& other) { return other.name == line.name; });
+    expects(own != all.end());
+    own->value = line.value;
+  }
+  return key_text(all);
+}
+
 std::vector<std::string> describe_difference(const std::string& before, const std::string& now) {
   const std::vector<KeyLine> old_lines = parse_key_text(before), new_lines = parse_key_text(now);
   const auto find = [](const std::vector<KeyLine>& lines, const std::string& name) {

@@ -27,6 +27,9 @@ std::string key_text(const std::vector<KeyLine>& lines);
 /// "parameter wires[0].name".
 std::string without_parameters(const std::string& key_text, const std::vector<std::string>& names);
 
+/// The text with other values in the lines of these names. Expects it to have a line of each.
+std::string with_values(const std::string& key_text, const std::vector<KeyLine>& lines);
+
 /// What differs between two such texts, one sentence each: "parameter wall.thickness_mm: 1.0 ->
 /// 2.0"; of digests only the first digits.
 std::vector<std::string> describe_difference(const std::string& before, const std::string& now);

@@ -148,4 +148,19 @@ inline void expect_mentions(const std::string& text, const std::vector<std::stri
   }
 }
 
+/// From a surface, with two accesses and three targets that have every key.
+inline Json listed_case() {
+  Json json = full_case(surface_case());
+  Json access = json["access"];
+  json.erase("access");
+  json.erase("target");
+  access["name"] = "right femoral";
+  json["accesses"] = Json::array({access, access});
+  json["accesses"][1].update(Json{{"name", "left femoral"}, {"point_mm", {1, 2, 4}}});
+  json["targets"] = Json::array({{{"name", "sac"}, {"point_mm", {1, 2, 100}}, {"radius_mm", 5}},
+                                 {{"name", "beyond"}, {"point_mm", {1, 2, 90}}, {"beyond_mm", 10}},
+                                 {{"name", "renal"}, {"point_mm", {1, 2, 80}}}});
+  return json;
+}
+
 }  // namespace wireplan::pipeline

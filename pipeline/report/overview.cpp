@@ -1,0 +1,183 @@
+#include "pipeline/report/overview.h"
+
+#include <algorithm>
+#include <optional>
+#include <tuple>
+#include <utility>
+
+#include "pipeline/files/disk.h"
+#include "pipeline/files/text.h"
+#include "pipeline/report/report.h"
+
+namespace wireplan::pipeline {
+namespace {
+
+/// Of the first ranked plan; null where none is ranked.
+Json best_plan_json(const Json& report) {
+  const Json& ranking = report.at("ranking");
+  if (ranking.empty()) return nullptr;
+  const Json& plan = ranking.front();
+  const auto id = plan.at("trial").get<std::size_t>();
+  const Json& trial = report.at("trials").at(id);
+  Json best;
+  for (const char* key : {"trial", "wire", "inclination_deg", "azimuth_deg", "roll_deg", "script",
+                          "score", "score_error", "mean_score"}) {
+    best[key] = plan.at(key);
+  }
+  best["repeats_safe"] = nullptr;
+  best["repeats"] = nullptr;
+  for (const Json& repeated : report.at("robustness").at("plans")) {
+    if (repeated.at("trial") != id) continue;
+    best["repeats_safe"] = repeated.at("successes");
+    best["repeats"] = repeated.at("repeats");
+  }
+  for (const char* key : {"insertion_mm", "peak_tip_force_n", "peak_contact_force_n"}) {
+    best[key] = trial.at(key);
+  }
+  best["sentence"] = plan.at("sentence");
+  return best;
+}
+
+/// What the access table of the section's report says, in numbers.
+Json access_figures(const Json& report) {
+  const Json& access = report.at("anatomy").at("access");
+  Json figures;
+  figures["way_mm"] = report.at("anatomy").at("lengths").at("way_mm");
+  figures["least_diameter_mm"] = access.at("device").at("lumen_diameter_mm");
+  figures["device_fits"] = access.at("device").at("fits");
+  figures["least_diameter_at_sheath_mm"] = access.at("sheath").at("lumen_diameter_mm");
+  figures["sheath_fits"] = access.at("sheath").at("fits");
+  figures["tortuosity"] = access.at("tortuosity").at("index");
+  figures["tortuosity_grade"] = access.at("tortuosity").at("grade");
+  figures["sharpest_bend_deg"] = access.at("sharpest_bend").at("angle_deg");
+  figures["sharpest_bend_grade"] = access.at("sharpest_bend").at("grade");
+  figures["calcium_mm3"] = access.at("calcium").at("volume_mm3");
+  return figures;
+}
+
+Json row_json(const SectionReport& section) {
+  const Json& report = section.report;
+  const auto count = [&](const char* key) {
+    return std::count_if(
+        report.at("trials").begin(), report.at("trials").end(),
+        [&](const Json& trial) { return trial.at(key).is_boolean() && trial.at(key).get<bool>(); });
+  };
+  Json row = {{"access", section.access.empty() ? Json(nullptr) : Json(section.access)},
+              {"folder", section.folder},
+              {"trials", report.at("trials").size()},
+              {"reached", count("reached")},
+              {"safe_plans", report.at("ranking").size()}};
+  if (report.contains("verdict")) row["verdict"] = report.at("verdict");
+  row["best_plan"] = best_plan_json(report);
+  row["access_table"] = access_figures(report);
+  return row;
+}
+
+/// Smaller is better: no safe plan last, then by the share that is not safe, then by score.
+std::tuple<bool, double, double> order_key(const Json& row) {
+  const Json& best = row.at("best_plan");
+  if (best.is_null()) return {true, 1.0, 1.0};
+  const bool repeated = !best.at("repeats").is_null() && best.at("repeats") != 0;
+  const double unsafe =
+      repeated ? 1.0 - best.at("repeats_safe").get<double>() / best.at("repeats").get<double>()
+               : 0.0;
+  return {false, unsafe, best.at("score").get<double>()};
+}
+
+std::string from(const Json& row) {
+  return row.at("access").is_null() ? "" : " from " + row.at("access").get<std::string>();
+}
+
+std::string describe_plan(const Json& best) {
+  const std::string script = best.at("script").get<std::string>();
+  std::string text =
+      best.at("wire").get<std::string>() +
+      format(", inclination %g deg, azimuth %g deg, roll %g deg",
+             best.at("inclination_deg").get<double>(), best.at("azimuth_deg").get<double>(),
+             best.at("roll_deg").get<double>());
+  if (!script.empty()) text += ", " + script;
+  if (!best.at("repeats").is_null()) {
+    text += ", safe in " + best.at("repeats_safe").dump() + " of " + best.at("repeats").dump() +
+            " repeats";
+  }
+  return text +
+         format(", at most %.3f N on the wall", best.at("peak_contact_force_n").get<double>());
+}
+
+std::string describe_target(const Json& target) {
+  const Json& rows = target.at("sections");
+  const std::string name = target.at("target").is_null() ? std::string("the target")
+                                                         : target.at("target").get<std::string>();
+  const Json& first = rows.front();
+  if (first.at("best_plan").is_null()) {
+    return name + ": no safe plan" + (rows.size() > 1 ? " from any access" : from(first));
+  }
+  return name + ":" + from(first) +
+         (rows.size() > 1 ? ", the best of " + std::to_string(rows.size()) : "") + ": " +
+         describe_plan(first.at("best_plan"));
+}
+
+}  // namespace
+
+Json build_overview(const std::string& name, const std::vector<SectionReport>& sections) {
+  expects(!sections.empty());
+  Json targets = Json::array();
+  for (const SectionReport& section : sections) {
+    const Json target = section.target.empty() ? Json(nullptr) : Json(section.target);
+    auto own = std::find_if(targets.begin(), targets.end(),
+                            [&](const Json& other) { return other.at("target") == target; });
+    if (own == targets.end()) {
+      targets.push_back({{"target", target}, {"sections", Json::array()}});
+      own = targets.end() - 1;
+    }
+    own->at("sections").push_back(row_json(section));
+  }
+  for (Json& target : targets) {
+    Json& rows = target.at("sections");
+    std::vector<Json> sorted(rows.begin(), rows.end());
+    std::stable_sort(sorted.begin(), sorted.end(),
+                     [](const Json& a, const Json& b) { return order_key(a) < order_key(b); });
+    rows = sorted;
+    target["sentence"] = describe_target(target);
+  }
+  const Json& first = sections.front().report;
+  return {{"schema", kOverviewSchema},
+          {"name", name},
+          {"statement", first.at("statement")},
+          {"inputs", first.at("provenance").at("inputs")},
+          {"program", first.at("provenance").at("program")},
+          {"targets", std::move(targets)}};
+}
+
+std::optional<Json> find_overview(const std::filesystem::path& path) {
+  const Json any = Json::parse(read_if_there(path), nullptr, /*allow_exceptions=*/false);
+  if (!any.is_object() || any.value("schema", "") != kOverviewSchema) return {};
+  try {
+    describe_overview(any);
+    for (const Json& target : any.at("targets")) {
+      for (const Json& row : target.at("sections")) row.at("folder").get<std::string>();
+    }
+  } catch (const Json::exception&) {
+    throw Error(path.string() + ": is no whole overview, expected targets and sections as " +
+                "`wireplan run` writes them; run the case again");
+  }
+  return any;
+}
+
+std::string describe_overview(const Json& overview) {
+  std::string text;
+  for (const Json& target : overview.at("targets")) {
+    if (!text.empty()) text += "\n";
+    text += target.at("sentence").get<std::string>();
+  }
+  return text;
+}
+
+bool serves_all_targets(const Json& overview) {
+  const Json& targets = overview.at("targets");
+  return std::all_of(targets.begin(), targets.end(), [](const Json& target) {
+    return !target.at("sections").front().at("best_plan").is_null();
+  });
+}
+
+}  // namespace wireplan::pipeline

@@ -1,0 +1,34 @@
+#pragma once
+/// The report of a case of several sections (stages/sections.h): for each target its accesses side
+/// by side, best first, each with the folder that holds its own report.
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "pipeline/files/json_reader.h"
+
+namespace wireplan::pipeline {
+
+inline constexpr const char* kOverviewSchema = "wireplan.overview/1";
+
+struct SectionReport {
+  std::string access, target;  // by name; the one that the case has only one of is empty
+  std::string folder;          // below that of the overview
+  Json report;                 // report.json of the section
+};
+
+/// Accesses of one target are in this order: those with a safe plan first, by what share of its
+/// best plan's repeats is safe, then by its score. Expects sections of one case.
+Json build_overview(const std::string& name, const std::vector<SectionReport>& sections);
+
+/// The overview in a file; nothing where the file holds no overview.
+std::optional<Json> find_overview(const std::filesystem::path& path);
+
+/// A line per target: the access to take, or that none has a safe plan.
+std::string describe_overview(const Json& overview);
+
+/// Whether every target has a safe plan from one access at least.
+bool serves_all_targets(const Json& overview);
+
+}  // namespace wireplan::pipeline
