@@ -3,35 +3,13 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstdio>
 #include <utility>
 
+#include "plan/number_text.h"
 #include "plan/statistics.h"
 
 namespace wireplan::plan {
 namespace {
-
-/// "0.21", "1.9", "12": two significant digits, at most four decimals, never an exponent.
-std::string two_digits(double value) {
-  const double size = std::max(std::abs(value), 1e-4);
-  const int decimals = std::clamp(1 - static_cast<int>(std::floor(std::log10(size))), 0, 4);
-  char text[64];
-  std::snprintf(text, sizeof text, "%.*f", decimals, value);
-  return text;
-}
-
-std::string one_decimal(double value) {
-  char text[64];
-  std::snprintf(text, sizeof text, "%.1f", value);
-  return text;
-}
-
-/// As many digits as it takes to tell a value from a limit that it just broke.
-std::string four_digits(double value) {
-  char text[64];
-  std::snprintf(text, sizeof text, "%.4g", value);
-  return text;
-}
 
 double saturating(double force, double scale) { return force / (force + scale); }
 

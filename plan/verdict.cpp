@@ -1,0 +1,375 @@
+#include "plan/verdict.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <utility>
+
+#include "plan/number_text.h"
+#include "plan/statistics.h"
+#include "plan/verdict_changes.h"
+
+namespace wireplan::plan {
+namespace {
+
+constexpr std::array kGradeWords = {"no", "mild", "moderate", "severe"};
+constexpr int kSevere = 3;
+
+std::string percent(double part) { return std::to_string(std::lround(100.0 * part)); }
+
+std::string whole_degrees(double angle) { return std::to_string(std::lround(angle / kRadPerDeg)); }
+
+std::string whole_millimetres(double length) { return std::to_string(std::lround(length)) + " mm"; }
+
+const char* grade_word(int grade) { return kGradeWords.at(static_cast<std::size_t>(grade)); }
+
+int safe_count(const RepeatedPlan& plan) {
+  return static_cast<int>(std::count_if(plan.repeats.begin(), plan.repeats.end(),
+                                        [](const Repeat& repeat) { return repeat.safe; }));
+}
+
+double safe_share(const RepeatedPlan& plan) {
+  return static_cast<double>(safe_count(plan)) / static_cast<double>(plan.repeats.size());
+}
+
+/// "14 of 16"
+std::string safe_of(const RepeatedPlan& plan) {
+  return std::to_string(safe_count(plan)) + " of " + std::to_string(plan.repeats.size());
+}
+
+/// Collects findings; the worst one is the answer.
+class Weighing {
+ public:
+  Weighing(const Known& known, const VerdictRules& rules)
+      : known_(known), ranking_(known.judgement.ranking), rules_(rules) {}
+
+  Verdict weigh() {
+    if (ranking_.plans.empty()) {
+      weigh_failure();
+    } else {
+      weigh_plan(ranking_.plans.front());
+    }
+    if (known_.way) weigh_way(*known_.way);
+    return verdict();
+  }
+
+ private:
+  struct Finding {
+    Answer answer;  // that it leads to
+    std::string sentence;
+  };
+
+  void find(Answer answer, std::string sentence) {
+    findings_.push_back({answer, std::move(sentence)});
+  }
+  void change(std::string sentence) { changes_.push_back(std::move(sentence)); }
+
+  const Measured& trial(int id) const { return known_.plan.trials[static_cast<std::size_t>(id)]; }
+  const simulate::Wire& wire_of(int id) const {
+    const Candidate& candidate = known_.plan.candidates[static_cast<std::size_t>(id)];
+    return known_.study.wires[static_cast<std::size_t>(candidate.wire)];
+  }
+  const RepeatedPlan* repeats_of(int id) const {
+    return find_repeated(known_.judgement.repeated, id);
+  }
+
+  // ---- No plan.
+  void weigh_failure() {
+    Endings all, full, scouts;
+    int reached_coarsely = 0;
+    for (std::size_t k = 0; k < known_.plan.trials.size(); ++k) {
+      const int id = static_cast<int>(k);
+      const bool in_full = known_.plan.levels[k] == Level::kFull;
+      add_ending(all, trial(id), wire_of(id), known_.study, known_.limits);
+      add_ending(in_full ? full : scouts, trial(id), wire_of(id), known_.study, known_.limits);
+      if (!in_full) reached_coarsely += trial(id).metrics.reached;
+    }
+    headline_ = all.reached == 0
+                    ? "None of " + count_of(all.trials, "trial") + " reaches the target."
+                    : std::to_string(all.reached) + " of " + count_of(all.trials, "trial") +
+                          " reach the target, none of them within the limits.";
+    if (full.reached > 0) {
+      find(
+          Answer::kNotFeasible,
+          count_of(full.reached, "trial") + " in full " +
+              (full.reached == 1 ? "reaches the target but breaks" : "reach the target but break") +
+              " a limit: " + describe_broken_limits(full, known_.limits) + ".");
+    }
+    const std::string endings = describe_endings(all);
+    if (!endings.empty()) {
+      find(Answer::kNotFeasible,
+           "Of " + count_of(all.trials, "trial") + " " + endings + "; " +
+               (scouts.trials == 0 ? "all were" : std::to_string(full.trials) + " of them were") +
+               " run in full" +
+               (scouts.trials == 0 ? "." : ", the others against a rigid wall only."));
+    }
+    weigh_what_is_open(all, full, reached_coarsely);
+    for (std::string& text : changes_by(all, known_, "trial")) change(std::move(text));
+    if (scouts.trials > 0) {
+      change("Running all trials in full: " + std::to_string(scouts.trials) + " of " +
+             std::to_string(all.trials) + " were run against a rigid wall only.");
+    }
+  }
+
+  void weigh_what_is_open(const Endings& all, const Endings& full, int reached_coarsely) {
+    bool open = false;
+    const auto leave_open = [&](const std::string& sentence) {
+      find(Answer::kUnsure, sentence);
+      open = true;
+    };
+    if (full.clear() == 0) leave_open("No trial that was run in full came to a clear end.");
+    if (all.unclear() > rules_.unclear_part * all.trials) {
+      leave_open(std::to_string(all.unclear()) + " of " + count_of(all.trials, "trial") +
+                 " ended without telling whether the wire would reach the target; at most " +
+                 percent(rules_.unclear_part) + " % may.");
+    }
+    if (reached_coarsely > 0) {
+      leave_open(count_of(reached_coarsely, "trial") +
+                 (reached_coarsely == 1 ? " reaches" : " reach") +
+                 " the target against a rigid wall and " +
+                 (reached_coarsely == 1 ? "was" : "were") + " not run in full.");
+    }
+    if (!open) return;
+    for (Finding& finding : findings_) finding.answer = Answer::kUnsure;
+  }
+
+  // ---- A plan.
+  void weigh_plan(const RankedPlan& first) {
+    const RepeatedPlan* repeats = repeats_of(first.trial);
+    const Metrics& m = trial(first.trial).metrics;
+    headline_ = "The wire " + wire_of(first.trial).name +
+                " reaches the target within all limits, " +
+                (repeats == nullptr ? "not tried under disturbances"
+                                    : "safe in " + safe_of(*repeats) + " disturbed repeats") +
+                ", with at most " + two_digits(m.peak_tip_force) + " N at its tip.";
+    weigh_share(first, repeats);
+    weigh_tip_force(first, repeats);
+    weigh_tip_error(first);
+    if (m.wall_motion.beyond_linear_theory()) {
+      find(Answer::kFeasibleWithRisk,
+           "The wall moves " + two_digits(m.wall_motion.displacement) +
+               " mm where the vessel's radius is " + two_digits(m.wall_motion.radius) +
+               " mm, more than the " + two_digits(kLinearWallPart) +
+               " of the radius that its model holds for: forces there are rough.");
+    }
+    const double length = wire_of(first.trial).length();
+    if (known_.way && known_.way->wire_needed && length < *known_.way->wire_needed) {
+      const std::string needed = whole_millimetres(*known_.way->wire_needed);
+      find(Answer::kFeasible, "The wire is " + whole_millimetres(length) + " long, and " + needed +
+                                  " are needed to take a catheter over it and hold it.");
+      change("A wire of at least " + needed + ", or a shorter catheter.");
+    }
+  }
+
+  void weigh_share(const RankedPlan& first, const RepeatedPlan* repeats) {
+    if (repeats == nullptr) {
+      find(Answer::kUnsure,
+           "How often the plan stays safe is not known: it was not repeated under disturbances.");
+      change("Repeating the plan under disturbances, to know how often it stays safe.");
+      return;
+    }
+    const int count = static_cast<int>(repeats->repeats.size());
+    const auto [low, high] = wilson_interval(safe_count(*repeats), count);
+    const auto reached = std::count_if(repeats->repeats.begin(), repeats->repeats.end(),
+                                       [](const Repeat& repeat) { return repeat.reached; });
+    const bool too_few = low <= rules_.doubtful_share && high >= rules_.safe_share;
+    const bool too_low = safe_share(*repeats) < rules_.safe_share;
+    std::string text = "Safe in " + safe_of(*repeats) + " disturbed repeats, which is " +
+                       percent(safe_share(*repeats)) + " % (" + percent(low) + " to " +
+                       percent(high) + " % with 95 % confidence), where " +
+                       percent(rules_.safe_share) + " % is asked for";
+    if (reached > safe_count(*repeats)) text += "; it reaches in " + std::to_string(reached);
+    if (too_few) text += "; too few repeats to tell";
+    find(too_few   ? Answer::kUnsure
+         : too_low ? Answer::kFeasibleWithRisk
+                   : Answer::kFeasible,
+         text + ".");
+    if (too_few) change("More than " + count_of(count, "repeat") + ", to know the share better.");
+    if (!too_low) return;
+    offer_other(first, "safe in ", [&](const RankedPlan& other) {
+      const RepeatedPlan* own = repeats_of(other.trial);
+      const bool better = own != nullptr && safe_share(*own) >= rules_.safe_share;
+      return better ? safe_of(*own) : std::string();
+    });
+    Endings failed;
+    for (const RepeatedTrials& own : known_.plan.repeated) {
+      if (own.trial != first.trial) continue;
+      for (std::size_t k = 0; k < own.trials.size(); ++k) {
+        if (repeats->repeats[k].safe) continue;
+        add_ending(failed, own.trials[k], wire_of(first.trial), known_.study, known_.limits);
+      }
+    }
+    for (std::string& text_of : changes_by(failed, known_, "failed repeat")) {
+      change(std::move(text_of));
+    }
+  }
+
+  /// In 95 % of its repeats.
+  static double disturbed_tip_force(const RepeatedPlan& repeats) {
+    std::vector<double> forces;
+    for (const Repeat& repeat : repeats.repeats) forces.push_back(repeat.peak_tip_force);
+    return find_spread(forces).high;
+  }
+
+  double most_tip_force(int id) const {
+    const double force = trial(id).metrics.peak_tip_force;
+    const RepeatedPlan* repeats = repeats_of(id);
+    return repeats == nullptr ? force : std::max(force, disturbed_tip_force(*repeats));
+  }
+
+  void weigh_tip_force(const RankedPlan& first, const RepeatedPlan* repeats) {
+    std::string text =
+        "Tip force at most " + two_digits(trial(first.trial).metrics.peak_tip_force) + " N";
+    if (repeats != nullptr) {
+      text += ", and " + two_digits(disturbed_tip_force(*repeats)) +
+              " N in 95 % of the disturbed repeats";
+    }
+    const double warn = known_.limits.tip_force_warn;
+    const bool risk = most_tip_force(first.trial) > warn;
+    text += std::string(risk ? ": above" : ": below") + " the warning level of " +
+            four_digits(warn) + " N (limit " + four_digits(known_.limits.tip_force_fail) + " N).";
+    find(risk ? Answer::kFeasibleWithRisk : Answer::kFeasible, text);
+    if (!risk) return;
+    offer_other(first, "tip force at most ", [&](const RankedPlan& other) {
+      const double less = most_tip_force(other.trial);
+      return less <= warn ? two_digits(less) + " N" : std::string();
+    });
+  }
+
+  void weigh_tip_error(const RankedPlan& first) {
+    const simulate::Goal& goal = known_.study.goal;
+    if (!first.tip_error) {
+      find(Answer::kUnsure, "The error of the tip's place is not known.");
+      change("Computing the plan with finer elements too, to know the tip's error.");
+      return;
+    }
+    const double distance = trial(first.trial).metrics.tip_to_target;
+    const double room = goal.at_section ? rules_.tip_error_part * goal.radius
+                                        : std::max(0.0, goal.radius - distance);
+    const bool large = *first.tip_error >= room;
+    std::string text = "The tip's stated error is " + two_digits(*first.tip_error) +
+                       " mm, of the computation alone";
+    text += goal.at_section
+                ? "; the lumen at the target has a radius of " + one_decimal(goal.radius) + " mm"
+                : "; it ends " + one_decimal(distance) + " mm from the middle of a target of " +
+                      one_decimal(goal.radius) + " mm radius";
+    if (large) text += ", so it may not be in the target";
+    find(large ? Answer::kUnsure : Answer::kFeasible, text + ".");
+    if (large) change("A computation with finer elements, for a smaller error of the tip.");
+  }
+
+  /// The best other plan that `merit` has something to say of.
+  template <typename Merit>
+  void offer_other(const RankedPlan& first, const std::string& what, const Merit& merit) {
+    for (std::size_t k = 0; k < ranking_.plans.size(); ++k) {
+      const RankedPlan& other = ranking_.plans[k];
+      if (other.trial == first.trial) continue;
+      const std::string text = merit(other);
+      if (text.empty()) continue;
+      const auto id = static_cast<std::size_t>(other.trial);
+      change("Plan " + std::to_string(k + 1) + " in its place (" +
+             describe(known_.study, known_.plan.candidates[id]) + "): " + what + text + ".");
+      return;
+    }
+  }
+
+  // ---- The way.
+  void weigh_way(const WayFindings& way) {
+    weigh_device(way.device);
+    weigh_sheath(way);
+    bool severe = false;
+    if (way.tortuosity) {
+      severe = way.tortuosity_grade >= kSevere;
+      find(severe ? Answer::kFeasibleWithRisk : Answer::kFeasible,
+           "The way is " + three_digits(*way.tortuosity) +
+               " times as long as the straight line between its ends: " +
+               grade_word(way.tortuosity_grade) + " tortuosity.");
+    }
+    const std::string bend = "The sharpest bend leaves " + whole_degrees(way.bend) +
+                             " deg between its arms (180 is straight), " +
+                             whole_millimetres(way.bend_at) + " from the access";
+    if (way.bend_ostium.empty()) {
+      severe = severe || way.bend_grade >= kSevere;
+      find(way.bend_grade >= kSevere ? Answer::kFeasibleWithRisk : Answer::kFeasible,
+           bend + ": " + grade_word(way.bend_grade) + " angulation.");
+    } else {
+      find(Answer::kFeasible, bend + ", where the way turns into " + way.bend_ostium + ".");
+    }
+    if (severe) change("Another access, from which the way is less bent.");
+  }
+
+  void weigh_device(const Passage& passage) {
+    const double off = 2.0 * known_.plan.robustness.unknowns.lumen;
+    const bool too_wide = passage.device >= passage.max_ratio * passage.lumen;
+    const bool surely = passage.device > passage.max_ratio * (passage.lumen + off);
+    std::string text = "The narrowest place of the way is " + three_digits(passage.lumen) +
+                       " mm wide, " + whole_millimetres(passage.at) +
+                       " from the access; the widest device has " + three_digits(passage.device) +
+                       " mm and ";
+    text += surely     ? "does not pass"
+            : too_wide ? "passes only if the lumen is wider than it seems, which it may be by " +
+                             two_digits(off) + " mm"
+                       : "passes";
+    if (surely) narrow_ = text + ".";
+    find(surely     ? Answer::kNotFeasible
+         : too_wide ? Answer::kFeasibleWithRisk
+                    : Answer::kFeasible,
+         text + ".");
+    if (too_wide) {
+      change("A device thinner than " + three_digits(passage.max_ratio * passage.lumen) + " mm.");
+    }
+  }
+
+  void weigh_sheath(const WayFindings& way) {
+    const Passage& sheath = way.sheath;
+    const bool too_wide = sheath.device >= sheath.max_ratio * sheath.lumen;
+    find(too_wide ? Answer::kFeasibleWithRisk : Answer::kFeasible,
+         "The sheath of " + three_digits(sheath.device) + " mm is " +
+             two_digits(sheath.device / sheath.lumen) + " of the narrowest lumen in the first " +
+             whole_millimetres(way.sheath_length) + " (" + three_digits(sheath.lumen) + " mm); " +
+             (too_wide ? "it must be below " : "below ") + four_digits(sheath.max_ratio) +
+             (too_wide ? "." : " it passes."));
+    if (too_wide) {
+      change("A sheath thinner than " + three_digits(sheath.max_ratio * sheath.lumen) +
+             " mm, or another access.");
+    }
+  }
+
+  Verdict verdict() {
+    const auto worse = [](const Finding& a, const Finding& b) { return a.answer > b.answer; };
+    std::stable_sort(findings_.begin(), findings_.end(), worse);
+    expects(!findings_.empty());
+    Verdict verdict{.answer = findings_.front().answer,
+                    .headline = narrow_.empty() ? headline_ : narrow_,
+                    .reasons = {},
+                    .changes = std::move(changes_)};
+    for (Finding& finding : findings_) verdict.reasons.push_back(std::move(finding.sentence));
+    return verdict;
+  }
+
+  const Known& known_;
+  const Ranking& ranking_;
+  VerdictRules rules_;
+  std::vector<Finding> findings_;
+  std::vector<std::string> changes_;
+  std::string headline_;
+  std::string narrow_;  // the headline where the device does not pass
+};
+
+}  // namespace
+
+const char* answer_name(Answer answer) {
+  constexpr std::array kNames = {"feasible", "feasible_with_risk", "unsure", "not_feasible"};
+  return kNames.at(static_cast<std::size_t>(answer));
+}
+
+const char* answer_words(Answer answer) {
+  constexpr std::array kWords = {"feasible", "feasible with risk", "unsure", "not feasible"};
+  return kWords.at(static_cast<std::size_t>(answer));
+}
+
+Verdict find_verdict(const Known& known, const VerdictRules& rules) {
+  return Weighing(known, rules).weigh();
+}
+
+}  // namespace wireplan::plan

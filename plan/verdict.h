@@ -1,0 +1,85 @@
+#pragma once
+/// Whether the target can be reached, why, and what would change that: for who decides on the
+/// procedure. Follows from what was simulated and measured; simulates nothing.
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "plan/judge.h"
+
+namespace wireplan::plan {
+
+enum class Answer { kFeasible, kFeasibleWithRisk, kUnsure, kNotFeasible };
+const char* answer_name(Answer answer);   // in files: "feasible", "feasible_with_risk", ...
+const char* answer_words(Answer answer);  // to a reader: "feasible with risk"
+
+struct Verdict {
+  Answer answer = Answer::kUnsure;
+  std::string headline;              // one sentence
+  std::vector<std::string> reasons;  // sentences with their numbers, those that decide first
+  std::vector<std::string> changes;  // what would change it, from what failed; empty: nothing known
+};
+
+/// A device and the narrowest place that it must pass.
+struct Passage {
+  double lumen = 0.0, at = 0.0;  // diameter; arc length from the access                    [mm]
+  double device = 0.0;           // diameter                                                [mm]
+  double max_ratio = 1.0;        // of device over lumen; at it, the device does not pass
+};
+
+/// What is known of the way before a wire is pushed (anatomy/way.h), with its grades.
+struct WayFindings {
+  Passage device, sheath;
+  double sheath_length = 0.0;         // of the way, that the sheath lies in                [mm]
+  std::optional<double> tortuosity;   // empty where the way ends where it starts
+  int tortuosity_grade = 0;           // of 3, grade_of()
+  double bend = 0.0, bend_at = 0.0;   // sharpest, between its arms [rad]; arc length [mm]
+  int bend_grade = 0;                 // of 3
+  std::string bend_ostium;            // the branch that the way turns into there; else empty
+  std::optional<double> wire_needed;  // with what is to be held and taken over the wire    [mm]
+};
+
+/// Where one answer ends and the next begins. None of them was measured on patients.
+struct VerdictRules {
+  /// Of disturbed repeats that are safe: below, there is a risk. One attempt in ten that fails is
+  /// what is borne; chosen.
+  double safe_share = 0.9;
+  /// A plan that works every other time is none to count on. Where the 95 % interval of the share
+  /// holds both this and `safe_share`, the repeats do not tell the two apart: unsure.
+  double doubtful_share = 0.5;
+  /// Of the lumen's radius at a target in a vessel: with a larger error of the tip it is open
+  /// whether the tip is in that vessel or before its mouth. Of a sphere, what the tip has left to
+  /// its border counts in full.
+  double tip_error_part = 0.5;
+  /// Of all trials: where more end without telling whether the wire would reach (at an end of the
+  /// image, without equilibrium, by our fault), "none reaches" is no finding. Chosen: the trials
+  /// that reach are fewer than this in most cases.
+  double unclear_part = 0.25;
+};
+
+struct Known {
+  const Study& study;
+  const Plan& plan;
+  const Judgement& judgement;
+  Limits limits = {};
+  std::optional<WayFindings> way = {};
+  std::vector<std::string> angled_wires = {};  // of the catalogue, that the case did not try
+};
+
+/// The first of these that holds:
+///   not feasible        the narrowest place is narrower than the device by more than the wall's
+///                       place is unknown (Unknowns::lumen, at both sides); or no trial is a plan,
+///                       some were run in full and none of what follows leaves that open
+///   unsure              no plan, and: nothing that was run in full came to a clear end, or more
+///                       than `unclear_part` of all did not, or one reached that was not run in
+///                       full. A plan, but: it was not repeated, its share of safe repeats is not
+///                       known well enough, or its tip's error is not known or too large
+///   feasible with risk  tip force, also that of 19 in 20 repeats, above the level to warn of;
+///                       share of safe repeats too low; wall moved beyond linear theory; sheath at
+///                       its largest ratio to the lumen, or device as wide as the lumen; way or
+///                       bend severe, but for the turn into a branch
+///   feasible            else
+/// "A plan" is the first of the ranking.
+Verdict find_verdict(const Known& known, const VerdictRules& rules = {});
+
+}  // namespace wireplan::plan

@@ -1,0 +1,182 @@
+#include "plan/verdict_changes.h"
+
+#include <algorithm>
+#include <utility>
+
+#include "plan/number_text.h"
+
+namespace wireplan::plan {
+namespace {
+
+/// What fewer than one in so many end by is left out of what would change the verdict.
+constexpr int kOneIn = 10;
+
+/// "12 of 63 trials"
+std::string part_of(int count, const Endings& endings, const std::string& noun) {
+  return std::to_string(count) + " of " + count_of(endings.trials, noun);
+}
+
+bool tried_angled(const Study& study) {
+  return std::any_of(study.wires.begin(), study.wires.end(),
+                     [](const simulate::Wire& wire) { return !wire.straight(); });
+}
+
+bool tried_moves(const Plan& plan) {
+  return plan.scripts.starts_tried > 0 ||
+         std::any_of(plan.candidates.begin(), plan.candidates.end(),
+                     [](const Candidate& candidate) { return !candidate.moves.empty(); });
+}
+
+std::string change_at_branch(const Endings& endings, const Known& known, const std::string& noun) {
+  const std::string went = part_of(endings.passed_by + endings.wrong_branch, endings, noun) +
+                           " went past the branch or into another one";
+  if (!tried_angled(known.study)) {
+    std::string text = "A wire with an angled tip: " + went + ", and no such wire was tried";
+    if (!known.angled_wires.empty()) {
+      text += " (in the catalogue: " + list_words(known.angled_wires) + ")";
+    }
+    return text + ".";
+  }
+  if (!tried_moves(known.plan)) {
+    return "Turning the wire at the branch: " + went + ", and all were pushed without a turn.";
+  }
+  return "A shaped catheter that leads the wire into the branch (not simulated): " + went +
+         ", though wires with an angled tip and turns of the wire were tried.";
+}
+
+std::string change_of_wire_length(const Endings& endings, const Known& known,
+                                  const std::string& noun) {
+  return "More wire in the vessel: " + part_of(endings.all_wire_in, endings, noun) +
+         " ended before the target with all the wire in that may go in, at most " +
+         one_decimal(known.study.insertion.length) + " mm.";
+}
+
+}  // namespace
+
+std::string list_words(const std::vector<std::string>& parts) {
+  std::string text;
+  for (std::size_t k = 0; k < parts.size(); ++k) {
+    if (k > 0) text += k + 1 == parts.size() ? " and " : ", ";
+    text += parts[k];
+  }
+  return text;
+}
+
+std::string count_of(int count, const std::string& noun) {
+  return std::to_string(count) + " " + noun + (count == 1 ? "" : "s");
+}
+
+void add_ending(Endings& endings, const Measured& trial, const simulate::Wire& wire,
+                const Study& study, const Limits& limits) {
+  using simulate::Outcome;
+  const Metrics& m = trial.metrics;
+  ++endings.trials;
+  switch (trial.outcome) {
+    case Outcome::kReached:
+      ++endings.reached;
+      endings.broke_tip_force += m.peak_tip_force > limits.tip_force_fail;
+      endings.broke_path += m.off_path > limits.off_path_fail;
+      endings.broke_wall += m.max_penetration > limits.penetration_fail;
+      return;
+    case Outcome::kMissed: {
+      const double most = std::min(study.insertion.length, wire.length());
+      ++(m.insertion > most - 1e-6 ? endings.all_wire_in : endings.missed);
+      return;
+    }
+    case Outcome::kPassedBy:
+      ++endings.passed_by;
+      return;
+    case Outcome::kWrongBranch:
+      ++endings.wrong_branch;
+      return;
+    case Outcome::kLeftImage:
+      ++endings.left_image;
+      return;
+    case Outcome::kStuck:
+      ++endings.stuck;
+      return;
+    case Outcome::kProlapsed:
+      ++endings.prolapsed;
+      return;
+    case Outcome::kLeftLumen:
+      ++endings.left_lumen;
+      return;
+    case Outcome::kNotConverged:
+      ++endings.no_equilibrium;
+      return;
+    case Outcome::kFailed:
+      ++endings.our_fault;
+      return;
+  }
+}
+
+std::string describe_endings(const Endings& endings) {
+  std::vector<std::pair<int, const char*>> groups = {
+      {endings.passed_by, "passed by the branch"},
+      {endings.wrong_branch, "took a wrong branch"},
+      {endings.stuck, "got stuck"},
+      {endings.prolapsed, "folded back on the way"},
+      {endings.left_lumen, "went through the wall"},
+      {endings.all_wire_in, "ended with all wire in"},
+      {endings.missed, "missed the target"},
+      {endings.left_image, "came to an end of the imaged vessel"},
+      {endings.no_equilibrium, "found no balance of forces"},
+      {endings.our_fault, "failed in the program"}};
+  std::stable_sort(groups.begin(), groups.end(),
+                   [](const auto& a, const auto& b) { return a.first > b.first; });
+  std::vector<std::string> parts;
+  for (const auto& [count, text] : groups) {
+    if (count > 0) parts.push_back(std::to_string(count) + " " + text);
+  }
+  return list_words(parts);
+}
+
+std::string describe_broken_limits(const Endings& endings, const Limits& limits) {
+  std::vector<std::string> parts;
+  const auto add = [&](int count, const std::string& text) {
+    if (count > 0) parts.push_back(text + " in " + std::to_string(count));
+  };
+  add(endings.broke_tip_force, "tip force above " + four_digits(limits.tip_force_fail) + " N");
+  add(endings.broke_path,
+      "wire more than " + four_digits(limits.off_path_fail) + " mm outside the way's lumen");
+  add(endings.broke_wall,
+      "wire more than " + four_digits(limits.penetration_fail) + " mm past the wall");
+  expects(!parts.empty());
+  return list_words(parts);
+}
+
+std::vector<std::string> changes_by(const Endings& endings, const Known& known,
+                                    const std::string& noun) {
+  std::vector<std::pair<int, std::string>> changes;
+  const auto add = [&](int count, std::string text) {
+    if (count > 0 && kOneIn * count >= endings.trials) changes.emplace_back(count, std::move(text));
+  };
+  add(endings.passed_by + endings.wrong_branch, change_at_branch(endings, known, noun));
+  add(endings.stuck + endings.prolapsed,
+      "Another access, or a wire of another stiffness: " +
+          part_of(endings.stuck + endings.prolapsed, endings, noun) +
+          " got stuck or folded back on the way.");
+  const int hurt = endings.left_lumen + endings.broke_wall;
+  add(hurt, "A softer wire: " + part_of(hurt, endings, noun) + " went through the wall.");
+  add(endings.broke_tip_force,
+      "A wire with a softer tip: " + part_of(endings.broke_tip_force, endings, noun) +
+          " press the tip on the wall with more than " + four_digits(known.limits.tip_force_fail) +
+          " N.");
+  add(endings.broke_path,
+      "Another entry angle or another access: " + part_of(endings.broke_path, endings, noun) +
+          " came to the target another way.");
+  add(endings.all_wire_in, change_of_wire_length(endings, known, noun));
+  add(endings.left_image,
+      "A scan that shows more of the vessel: " + part_of(endings.left_image, endings, noun) +
+          " came to an end of the imaged vessel.");
+  add(endings.no_equilibrium + endings.our_fault,
+      "A finer computation: " + part_of(endings.no_equilibrium + endings.our_fault, endings, noun) +
+          " gave no result, as no balance of forces was found or the program failed.");
+  std::stable_sort(changes.begin(), changes.end(),
+                   [](const auto& a, const auto& b) { return a.first > b.first; });
+  std::vector<std::string> texts;
+  for (auto& [count, text] : changes) texts.push_back(std::move(text));
+  return texts;
+}
+
+}  // namespace wireplan::plan

@@ -1,0 +1,44 @@
+#pragma once
+/// How trials failed, and what would change that.
+#include <string>
+#include <vector>
+
+#include "plan/verdict.h"
+
+namespace wireplan::plan {
+
+/// "a", "a and b", "a, b and c"
+std::string list_words(const std::vector<std::string>& parts);
+/// "1 trial", "3 trials"
+std::string count_of(int count, const std::string& noun);
+
+/// How trials ended.
+struct Endings {
+  int trials = 0;
+  int reached = 0;                                          // also those that broke a limit
+  int broke_tip_force = 0, broke_path = 0, broke_wall = 0;  // of these; one may break several
+  int passed_by = 0, wrong_branch = 0, left_image = 0, stuck = 0, prolapsed = 0, left_lumen = 0;
+  int no_equilibrium = 0, our_fault = 0;
+  int all_wire_in = 0;  // of those that missed, with no more wire to push ...
+  int missed = 0;       // ... and the others
+
+  int unclear() const { return left_image + no_equilibrium + our_fault; }
+  int clear() const { return trials - unclear(); }
+};
+
+/// Adds a trial of that wire.
+void add_ending(Endings& endings, const Measured& trial, const simulate::Wire& wire,
+                const Study& study, const Limits& limits);
+
+/// "12 passed by the branch, 3 got stuck": all that did not reach, the most frequent first.
+std::string describe_endings(const Endings& endings);
+
+/// Which limits those that reached break; expects that there are some.
+std::string describe_broken_limits(const Endings& endings, const Limits& limits);
+
+/// What would change how these end, the most frequent first; from what at least one in ten of them
+/// ended by. `noun` is what they are: "trial", "repeat".
+std::vector<std::string> changes_by(const Endings& endings, const Known& known,
+                                    const std::string& noun);
+
+}  // namespace wireplan::plan

@@ -1,0 +1,378 @@
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <string>
+#include <vector>
+
+#include "plan/verdict.h"
+
+namespace wireplan::plan {
+namespace {
+
+using simulate::Outcome;
+
+/// What planning knows, made by hand: only what the verdict reads.
+struct WhatIsKnown {
+  Study study;
+  Plan plan;
+  Limits limits;
+  std::optional<WayFindings> way;
+  std::vector<std::string> angled_wires;
+
+  WhatIsKnown() {
+    study.wires.push_back(
+        {.name = "straight",
+         .radius = 0.4,
+         .sections = {{.length = 1500.0, .bending_stiffness = 50.0, .rest_curvature = 0.0}}});
+    study.goal = {.radius = 2.5, .at_section = true};
+    study.insertion.length = 400.0;
+  }
+
+  Metrics& add(Outcome outcome, Level level = Level::kFull) {
+    plan.candidates.push_back({});
+    plan.levels.push_back(level);
+    Metrics& m = plan.trials.emplace_back(Measured{.outcome = outcome}).metrics;
+    m.reached = outcome == Outcome::kReached;
+    m.insertion = 120.0;
+    m.peak_tip_force = 0.1;
+    m.peak_contact_force = 0.2;
+    return m;
+  }
+  void add_many(int count, Outcome outcome, Level level = Level::kFull) {
+    for (int k = 0; k < count; ++k) add(outcome, level);
+  }
+  /// Repeats of a trial: so many that reach, and then some of another end.
+  void repeat(int trial, int safe, int others = 0, Outcome outcome = Outcome::kPassedBy,
+              double tip_force = 0.1) {
+    RepeatedTrials& own = plan.repeated.emplace_back(RepeatedTrials{.trial = trial});
+    for (int k = 0; k < safe + others; ++k) {
+      Metrics& m =
+          own.trials.emplace_back(Measured{.outcome = k < safe ? Outcome::kReached : outcome})
+              .metrics;
+      m.reached = own.trials.back().outcome == Outcome::kReached;
+      m.peak_tip_force = tip_force;
+    }
+  }
+  void refine(int trial, double tip_error) {
+    plan.refinements.push_back({.trial = trial,
+                                .rows = {},
+                                .error = NumericalError{.tip = tip_error},
+                                .observed_order = {},
+                                .reason = "",
+                                .cpu_seconds = {}});
+  }
+  /// A plan without anything against it.
+  static WhatIsKnown good() {
+    WhatIsKnown bench;
+    bench.add(Outcome::kReached);
+    bench.add(Outcome::kStuck);
+    bench.repeat(0, 16);
+    bench.refine(0, 0.12);
+    return bench;
+  }
+
+  Verdict verdict() const {
+    return find_verdict({.study = study,
+                         .plan = plan,
+                         .judgement = judge(study, plan, limits, {}),
+                         .limits = limits,
+                         .way = way,
+                         .angled_wires = angled_wires});
+  }
+};
+
+WayFindings wide_way() {
+  return {.device = {.lumen = 5.0, .at = 312.0, .device = 1.67},
+          .sheath = {.lumen = 6.75, .at = 20.0, .device = 2.7, .max_ratio = 1.05},
+          .sheath_length = 110.0,
+          .tortuosity = 1.1,
+          .tortuosity_grade = 0,
+          .bend = 130.0 * kRadPerDeg,
+          .bend_at = 80.0,
+          .bend_grade = 1,
+          .bend_ostium = "",
+          .wire_needed = 1400.0};
+}
+
+bool tells(const std::vector<std::string>& sentences, const std::string& text) {
+  return std::any_of(sentences.begin(), sentences.end(), [&](const std::string& sentence) {
+    return sentence.find(text) != std::string::npos;
+  });
+}
+
+TEST(Verdict, OfAGoodPlanIsFeasibleAndTellsItsNumbers) {
+  WhatIsKnown bench = WhatIsKnown::good();
+  bench.way = wide_way();
+  const Verdict verdict = bench.verdict();
+  EXPECT_EQ(verdict.answer, Answer::kFeasible);
+  EXPECT_EQ(verdict.headline,
+            "The wire straight reaches the target within all limits, safe in 16 of 16 disturbed "
+            "repeats, with at most 0.10 N at its tip.");
+  EXPECT_EQ(
+      verdict.reasons,
+      (std::vector<std::string>{
+          "Safe in 16 of 16 disturbed repeats, which is 100 % (81 to 100 % with 95 % confidence), "
+          "where 90 % is asked for.",
+          "Tip force at most 0.10 N, and 0.10 N in 95 % of the disturbed repeats: below the "
+          "warning level of 0.3 N (limit 1.5 N).",
+          "The tip's stated error is 0.12 mm, of the computation alone; the lumen at the target "
+          "has a radius of 2.5 mm.",
+          "The narrowest place of the way is 5 mm wide, 312 mm from the access; the widest "
+          "device has 1.67 mm and passes.",
+          "The sheath of 2.7 mm is 0.40 of the narrowest lumen in the first 110 mm (6.75 mm); "
+          "below 1.05 it passes.",
+          "The way is 1.1 times as long as the straight line between its ends: no tortuosity.",
+          "The sharpest bend leaves 130 deg between its arms (180 is straight), 80 mm from the "
+          "access: mild angulation."}));
+  EXPECT_TRUE(verdict.changes.empty());
+}
+
+TEST(Verdict, NothingKnownOfTheWayIsNotSpokenOf) {
+  const Verdict verdict = WhatIsKnown::good().verdict();
+  EXPECT_EQ(verdict.answer, Answer::kFeasible);
+  EXPECT_EQ(verdict.reasons.size(), 3U);
+}
+
+TEST(Verdict, ShareOfSafeRepeatsDecidesAtItsEdges) {
+  struct Row {
+    int safe, others;
+    Answer answer;
+  };
+  // 15/16 is 94 %, 14/16 88 %. Of 3 repeats the interval starts at 44 %, of 4 at 51 %; of 7 in 8 it
+  // is 53 to 98 %, of 6 in 8 41 to 93 %.
+  for (const Row& row : {Row{15, 1, Answer::kFeasible}, Row{14, 2, Answer::kFeasibleWithRisk},
+                         Row{9, 1, Answer::kFeasible}, Row{3, 0, Answer::kUnsure},
+                         Row{4, 0, Answer::kFeasible}, Row{7, 1, Answer::kFeasibleWithRisk},
+                         Row{6, 2, Answer::kUnsure}, Row{2, 14, Answer::kFeasibleWithRisk}}) {
+    SCOPED_TRACE(std::to_string(row.safe) + " and " + std::to_string(row.others));
+    WhatIsKnown bench = WhatIsKnown::good();
+    bench.plan.repeated.clear();
+    bench.repeat(0, row.safe, row.others);
+    EXPECT_EQ(bench.verdict().answer, row.answer);
+  }
+}
+
+TEST(Verdict, OfALowShareTellsReachedRepeatsAndWhatWouldMendThem) {
+  WhatIsKnown bench = WhatIsKnown::good();
+  bench.plan.repeated.clear();
+  bench.repeat(0, 12, 4);
+  // One of the safe ones breaks the limit of tip force.
+  bench.plan.repeated[0].trials[0].metrics.peak_tip_force = 2.0;
+  bench.angled_wires = {"angled-a", "angled-b"};
+  const Verdict verdict = bench.verdict();
+  EXPECT_EQ(verdict.answer, Answer::kFeasibleWithRisk);
+  EXPECT_EQ(verdict.reasons.front(),
+            "Safe in 11 of 16 disturbed repeats, which is 69 % (44 to 86 % with 95 % confidence), "
+            "where 90 % is asked for; it reaches in 12.");
+  EXPECT_TRUE(tells(verdict.changes,
+                    "A wire with an angled tip: 4 of 5 failed repeats went past the branch or into "
+                    "another one, and no such wire was tried (in the catalogue: angled-a and "
+                    "angled-b)."));
+  EXPECT_TRUE(tells(verdict.changes, "1 of 5 failed repeats press the tip on the wall"));
+}
+
+TEST(Verdict, OffersAPlanThatIsSafeMoreOften) {
+  WhatIsKnown bench = WhatIsKnown::good();
+  bench.plan.repeated.clear();
+  bench.repeat(0, 14, 2);
+  bench.add(Outcome::kReached).peak_contact_force = 3.0;
+  bench.repeat(2, 16);
+  bench.plan.repeated[1].trials[0].metrics.peak_contact_force = 3.0;
+  for (Measured& trial : bench.plan.repeated[1].trials) trial.metrics.peak_contact_force = 3.0;
+  const Verdict verdict = bench.verdict();
+  EXPECT_EQ(verdict.answer, Answer::kFeasibleWithRisk);
+  EXPECT_TRUE(tells(verdict.changes,
+                    "Plan 2 in its place (straight, inclination 0 deg, azimuth 0 deg, roll 0 "
+                    "deg): safe in 16 of 16."));
+}
+
+TEST(Verdict, WithoutRepeatsIsUnsure) {
+  WhatIsKnown bench = WhatIsKnown::good();
+  bench.plan.repeated.clear();
+  const Verdict verdict = bench.verdict();
+  EXPECT_EQ(verdict.answer, Answer::kUnsure);
+  EXPECT_TRUE(tells(verdict.reasons, "How often the plan stays safe is not known"));
+  EXPECT_TRUE(tells({verdict.headline}, "not tried under disturbances"));
+  EXPECT_TRUE(tells(verdict.changes, "Repeating the plan under disturbances"));
+}
+
+TEST(Verdict, TipForceAboveTheWarningLevelIsARisk) {
+  for (const double force : {0.3, 0.31}) {
+    WhatIsKnown bench = WhatIsKnown::good();
+    bench.plan.trials[0].metrics.peak_tip_force = force;
+    const Verdict verdict = bench.verdict();
+    EXPECT_EQ(verdict.answer, force > 0.3 ? Answer::kFeasibleWithRisk : Answer::kFeasible);
+    EXPECT_EQ(tells(verdict.reasons, "0.31 N, and 0.10 N in 95 % of the disturbed repeats: above"),
+              force > 0.3);
+  }
+  // Also where only the repeats are.
+  WhatIsKnown bench = WhatIsKnown::good();
+  bench.plan.repeated.clear();
+  bench.repeat(0, 16, 0, Outcome::kStuck, 0.5);
+  EXPECT_EQ(bench.verdict().answer, Answer::kFeasibleWithRisk);
+}
+
+TEST(Verdict, TipErrorThatIsUnknownOrLargeIsUnsure) {
+  WhatIsKnown unknown = WhatIsKnown::good();
+  unknown.plan.refinements.clear();
+  EXPECT_EQ(unknown.verdict().answer, Answer::kUnsure);
+  EXPECT_TRUE(tells(unknown.verdict().reasons, "The error of the tip's place is not known."));
+
+  // Half of the lumen's radius of 2.5 mm.
+  for (const double error : {1.24, 1.25}) {
+    WhatIsKnown bench = WhatIsKnown::good();
+    bench.plan.refinements[0].error->tip = error;
+    EXPECT_EQ(bench.verdict().answer, error < 1.25 ? Answer::kFeasible : Answer::kUnsure);
+  }
+  // Of a sphere what is left to its border.
+  for (const double error : {0.49, 0.51}) {
+    WhatIsKnown bench = WhatIsKnown::good();
+    bench.study.goal.at_section = false;
+    bench.plan.trials[0].metrics.tip_to_target = 2.0;
+    bench.plan.refinements[0].error->tip = error;
+    const Verdict verdict = bench.verdict();
+    EXPECT_EQ(verdict.answer, error < 0.5 ? Answer::kFeasible : Answer::kUnsure);
+    EXPECT_EQ(tells(verdict.reasons, "so it may not be in the target"), error > 0.5);
+  }
+}
+
+TEST(Verdict, AWallMovedBeyondItsModelIsARisk) {
+  WhatIsKnown bench = WhatIsKnown::good();
+  bench.plan.trials[0].metrics.wall_motion = {.displacement = 1.2, .radius = 3.0};
+  EXPECT_EQ(bench.verdict().answer, Answer::kFeasibleWithRisk);
+  EXPECT_TRUE(tells(bench.verdict().reasons, "The wall moves 1.2 mm where"));
+}
+
+TEST(Verdict, ADeviceIsHeldAgainstTheNarrowestPlaceAndWhatItsWidthIsUnknownBy) {
+  // The wall's place is unknown by 0.25 mm at each side: 1.2 mm may be 1.7 mm.
+  for (const auto& [lumen, answer] :
+       {std::pair(1.1, Answer::kNotFeasible), std::pair(1.2, Answer::kFeasibleWithRisk),
+        std::pair(1.67, Answer::kFeasibleWithRisk), std::pair(1.68, Answer::kFeasible)}) {
+    SCOPED_TRACE(lumen);
+    WhatIsKnown bench = WhatIsKnown::good();
+    bench.way = wide_way();
+    bench.way->device.lumen = lumen;
+    const Verdict verdict = bench.verdict();
+    EXPECT_EQ(verdict.answer, answer);
+    EXPECT_EQ(tells(verdict.changes, "A device thinner than "), lumen < 1.68);
+    if (answer == Answer::kNotFeasible) {
+      EXPECT_EQ(verdict.headline,
+                "The narrowest place of the way is 1.1 mm wide, 312 mm from the access; the widest "
+                "device has 1.67 mm and does not pass.");
+    }
+  }
+}
+
+TEST(Verdict, SheathGradesAndShortWiresOfTheWay) {
+  WhatIsKnown bench = WhatIsKnown::good();
+  bench.way = wide_way();
+  bench.way->sheath.lumen = 2.7 / 1.05;  // at the largest ratio
+  EXPECT_EQ(bench.verdict().answer, Answer::kFeasibleWithRisk);
+  EXPECT_TRUE(tells(bench.verdict().changes, "A sheath thinner than 2.7 mm, or another access."));
+
+  bench.way = wide_way();
+  bench.way->tortuosity_grade = 3;
+  EXPECT_EQ(bench.verdict().answer, Answer::kFeasibleWithRisk);
+  EXPECT_TRUE(tells(bench.verdict().changes, "Another access, from which the way is less bent."));
+
+  bench.way = wide_way();
+  bench.way->bend_grade = 3;
+  EXPECT_EQ(bench.verdict().answer, Answer::kFeasibleWithRisk);
+  bench.way->bend_ostium = "branch 3";  // a branch's own angle is none of the access
+  EXPECT_EQ(bench.verdict().answer, Answer::kFeasible);
+  EXPECT_TRUE(tells(bench.verdict().reasons, "where the way turns into branch 3."));
+
+  bench.way = wide_way();
+  bench.way->wire_needed = 1600.0;
+  EXPECT_EQ(bench.verdict().answer, Answer::kFeasible);
+  EXPECT_TRUE(tells(bench.verdict().changes, "A wire of at least 1600 mm"));
+}
+
+TEST(Verdict, WhereAllFailInFullIsNotFeasible) {
+  WhatIsKnown bench;
+  bench.add_many(7, Outcome::kPassedBy);
+  bench.add_many(2, Outcome::kStuck);
+  bench.add_many(11, Outcome::kStuck, Level::kScout);
+  const Verdict verdict = bench.verdict();
+  EXPECT_EQ(verdict.answer, Answer::kNotFeasible);
+  EXPECT_EQ(verdict.headline, "None of 20 trials reaches the target.");
+  EXPECT_EQ(verdict.reasons,
+            (std::vector<std::string>{"Of 20 trials 13 got stuck and 7 passed by the branch; 9 of "
+                                      "them were run in full, the others against a rigid wall "
+                                      "only."}));
+  EXPECT_EQ(verdict.changes.size(), 3U);
+  EXPECT_TRUE(tells(verdict.changes, "Another access, or a wire of another stiffness: 13 of 20"));
+  EXPECT_TRUE(tells(verdict.changes, "A wire with an angled tip: 7 of 20 trials"));
+  EXPECT_TRUE(tells(verdict.changes, "Running all trials in full: 11 of 20"));
+}
+
+TEST(Verdict, WhereAllThatReachBreakALimitIsNotFeasible) {
+  WhatIsKnown bench;
+  bench.add(Outcome::kReached).peak_tip_force = 2.0;
+  bench.add(Outcome::kReached).max_penetration = 0.4;
+  bench.add(Outcome::kStuck);
+  const Verdict verdict = bench.verdict();
+  EXPECT_EQ(verdict.answer, Answer::kNotFeasible);
+  EXPECT_EQ(verdict.headline, "2 of 3 trials reach the target, none of them within the limits.");
+  EXPECT_EQ(verdict.reasons.front(),
+            "2 trials in full reach the target but break a limit: tip force above 1.5 N in 1 and "
+            "wire more than 0.3 mm past the wall in 1.");
+  EXPECT_TRUE(tells(verdict.changes, "A wire with a softer tip: 1 of 3 trials"));
+  EXPECT_TRUE(tells(verdict.changes, "A softer wire: 1 of 3 trials"));
+}
+
+TEST(Verdict, WhereMuchEndsWithoutAResultIsUnsure) {
+  // A quarter may, more may not.
+  for (const int unclear : {2, 3}) {
+    WhatIsKnown bench;
+    bench.add_many(8 - unclear, Outcome::kStuck);
+    bench.add_many(unclear, Outcome::kNotConverged);
+    EXPECT_EQ(bench.verdict().answer, unclear == 2 ? Answer::kNotFeasible : Answer::kUnsure);
+    EXPECT_TRUE(tells(bench.verdict().changes, "A finer computation: "));
+  }
+  WhatIsKnown ends;
+  ends.add_many(5, Outcome::kStuck);
+  ends.add_many(5, Outcome::kLeftImage);
+  EXPECT_EQ(ends.verdict().answer, Answer::kUnsure);
+  EXPECT_TRUE(tells(ends.verdict().reasons,
+                    "5 of 10 trials ended without telling whether the wire would reach the target; "
+                    "at most 25 % may."));
+  EXPECT_TRUE(
+      tells(ends.verdict().changes, "A scan that shows more of the vessel: 5 of 10 trials"));
+}
+
+TEST(Verdict, WhatWasOnlyScoutedIsUnsure) {
+  WhatIsKnown scouted;
+  scouted.add_many(9, Outcome::kStuck, Level::kScout);
+  EXPECT_EQ(scouted.verdict().answer, Answer::kUnsure);
+  EXPECT_TRUE(
+      tells(scouted.verdict().reasons, "No trial that was run in full came to a clear end."));
+
+  WhatIsKnown reached;
+  reached.add_many(9, Outcome::kStuck);
+  reached.add(Outcome::kReached, Level::kScout);
+  EXPECT_EQ(reached.verdict().answer, Answer::kUnsure);
+  EXPECT_TRUE(tells(reached.verdict().reasons,
+                    "1 trial reaches the target against a rigid wall and was not run in full."));
+}
+
+TEST(Verdict, ChangesFollowFromWhatWasTried) {
+  WhatIsKnown bench;
+  bench.add_many(9, Outcome::kWrongBranch);
+  bench.study.wires[0].sections[0].rest_curvature = 0.04;
+  EXPECT_TRUE(tells(bench.verdict().changes, "Turning the wire at the branch: 9 of 9 trials"));
+  bench.plan.scripts.starts_tried = 2;
+  EXPECT_TRUE(tells(bench.verdict().changes, "A shaped catheter that leads the wire"));
+
+  WhatIsKnown wire;
+  wire.add(Outcome::kMissed).insertion = 400.0;
+  EXPECT_TRUE(tells(wire.verdict().changes,
+                    "More wire in the vessel: 1 of 1 trial ended before the target with all the "
+                    "wire in that may go in, at most 400.0 mm."));
+  // One in eleven is too few to speak of.
+  wire.add_many(10, Outcome::kStuck);
+  EXPECT_FALSE(tells(wire.verdict().changes, "More wire"));
+}
+
+}  // namespace
+}  // namespace wireplan::plan
