@@ -18,6 +18,7 @@
 #include "pipeline/report/overview.h"
 #include "pipeline/report/page.h"
 #include "pipeline/report/report.h"
+#include "pipeline/report/verdict_json.h"
 #include "pipeline/stages/sections.h"
 #include "pipeline/stages/shards.h"
 #include "pipeline/stages/stages.h"
@@ -186,7 +187,7 @@ void print_files(const fs::path& output) {
 // The answer of a case of one section, whose report is published.
 int print_answer(const fs::path& output) {
   const Json report = read_report(output / "report.json");
-  std::cout << describe_best(report) << "\n";
+  std::cout << describe_verdict(report) << describe_best(report) << "\n";
   print_files(output);
   return report.at("ranking").empty() ? kNoPlan : kDone;
 }

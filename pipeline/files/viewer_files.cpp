@@ -61,18 +61,6 @@ void write_markups(Json markups, const std::filesystem::path& path) {
              path);
 }
 
-// A field of the table: text in quotes, quotes in it doubled.
-std::string csv_field(const Json& value) {
-  if (value.is_null()) return "";
-  if (!value.is_string()) return value.dump();
-  std::string field = "\"";
-  for (const char c : value.get_ref<const std::string&>()) {
-    if (c == '"') field += '"';
-    field += c;
-  }
-  return field + "\"";
-}
-
 }  // namespace
 
 void write_curve_markups(const std::vector<NamedCurve>& curves, const std::filesystem::path& path) {
@@ -95,6 +83,17 @@ void write_plan_markups(const PlanMarkups& plan, const std::filesystem::path& pa
   markups.push_back(markup("Fiducial", plan.name + " points",
                            {{"access", plan.access}, {"target", plan.target}}, /*labels=*/true));
   write_markups(std::move(markups), path);
+}
+
+std::string csv_field(const Json& value) {
+  if (value.is_null()) return "";
+  if (!value.is_string()) return value.dump();
+  std::string field = "\"";
+  for (const char c : value.get_ref<const std::string&>()) {
+    if (c == '"') field += '"';
+    field += c;
+  }
+  return field + "\"";
 }
 
 std::string trials_csv(const Json& report) {

@@ -31,6 +31,9 @@ struct PlanMarkups {
 };
 void write_plan_markups(const PlanMarkups& plan, const std::filesystem::path& path);
 
+/// A field of a table (RFC 4180): text in quotes, quotes in it doubled; null is empty.
+std::string csv_field(const Json& value);
+
 /// The report's trials as a table (RFC 4180): a row per trial, its rank where it has one, units in
 /// the header; what has no value is an empty field.
 std::string trials_csv(const Json& report);

@@ -162,6 +162,12 @@ Json anatomy_figures(const simulate::Way& way, const plan::AccessLimits& limits)
           {"lengths", lengths_json(way.path(), junctions, limits)}};
 }
 
+int grade_from(const std::string& name) {
+  const auto found = std::find(kGrades.begin(), kGrades.end(), name);
+  expects(found != kGrades.end());
+  return static_cast<int>(found - kGrades.begin());
+}
+
 Json calcium_json(double volume, const std::string& unknown, const plan::AccessLimits& limits) {
   const bool known = unknown.empty();
   Json row = {{"volume_mm3", known ? Json(volume) : Json(nullptr)},

@@ -16,6 +16,9 @@ Json anatomy_figures(const simulate::Way& way, const plan::AccessLimits& limits)
 /// The row of calcium: a volume [mm^3], or null with the reason where `unknown` tells one.
 Json calcium_json(double volume, const std::string& unknown, const plan::AccessLimits& limits);
 
+/// The grade that a name in those figures stands for, 0 to 3; see plan::grade_of.
+int grade_from(const std::string& name);
+
 /// What the page draws: {"tree": [...], "way"}, each line with "points" and "radius" every 2 mm.
 Json anatomy_panel(const simulate::Way& way);
 

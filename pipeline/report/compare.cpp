@@ -8,6 +8,7 @@
 #include "pipeline/files/text.h"
 #include "pipeline/report/overview.h"
 #include "pipeline/report/report.h"
+#include "pipeline/report/verdict_json.h"
 
 namespace wireplan::pipeline {
 namespace {
@@ -72,13 +73,13 @@ const std::vector<std::string> kPlanHeads = {
     "inclination/azimuth/roll", "score", "+-", "mean score", "success", "force N"};
 
 std::string list_reports(const std::vector<Json>& reports) {
-  std::vector<std::vector<std::string>> rows = {{"", "case", "plans/trials"}};
+  std::vector<std::vector<std::string>> rows = {{"", "case", "verdict", "plans/trials"}};
   rows.front().insert(rows.front().end(), kPlanHeads.begin(), kPlanHeads.end());
-  rows.front()[3] = "best plan, " + rows.front()[3];
+  rows.front()[4] = "best plan, " + rows.front()[4];
   for (std::size_t k = 0; k < reports.size(); ++k) {
     const Json& ranking = reports[k].at("ranking");
     std::vector<std::string> row = {
-        format("%zu", k + 1), reports[k].at("name"),
+        format("%zu", k + 1), reports[k].at("name"), answer_of(reports[k]),
         format("%zu/%zu", ranking.size(), reports[k].at("trials").size())};
     if (ranking.empty()) {
       row.insert(row.end(), {"none reaches", "-", "-", "-", "-", "-"});

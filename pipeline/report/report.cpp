@@ -8,6 +8,7 @@
 #include "pipeline/files/trial_file.h"
 #include "pipeline/report/anatomy_json.h"
 #include "pipeline/report/page.h"
+#include "pipeline/report/verdict_json.h"
 #include "pipeline/store/hash.h"
 #include "plan/manoeuvre.h"
 
@@ -311,6 +312,7 @@ Json numerics_json(const ReportInput& input) {
     Row row;
     row.put("trial", refinement.trial);
     row.put_optional("position_error_mm", part(&plan::NumericalError::position), refinement.reason);
+    row.put_optional("tip_error_mm", part(&plan::NumericalError::tip), refinement.reason);
     row.put_optional("peak_contact_force_error_n", part(&plan::NumericalError::peak_force),
                      refinement.reason);
     row.put_optional("mean_contact_force_error_n", part(&plan::NumericalError::mean_force),
@@ -346,6 +348,7 @@ Json artifacts_json(const ReportInput& input) {
       "and in the best plan (peak_force_best_plan_n)");
   add("plans.png", "best plan of each wire, or its closest attempt");
   if (page_missing().empty()) add("report.html", "this report as a page for any browser");
+  add("sheet.csv", "the figures of the page's first sheet as a table");
   add("trials.csv", "every trial as a row of a table");
   for (std::size_t k = 1; k <= std::min(kPlansShown, input.judgement.ranking.plans.size()); ++k) {
     add("trials/plan-" + std::to_string(k) + ".pvd",
@@ -391,6 +394,7 @@ Json build_report(const ReportInput& input) {
   report["statement"] = kStatement;
   report["limits"] = limits_of_validity(input);
   report["outcome"] = ranking.empty() ? "no plan reaches the target" : "ranked";
+  report["verdict"] = verdict_json(input.verdict);
   report["provenance"] = provenance_json(input);
   report["artifacts"] = artifacts_json(input);
   report["vessel"] = vessel_json(input);

@@ -7,6 +7,7 @@
 
 #include "pipeline/files/json_reader.h"
 #include "plan/judge.h"
+#include "plan/verdict.h"
 #include "preprocess/surface/openings.h"
 
 namespace wireplan::pipeline {
@@ -27,6 +28,7 @@ struct ReportInput {
   plan::Study study;                     // as the trials used it
   plan::Plan plan;                       // what was simulated, and ...
   plan::Judgement judgement;             // ... what that is worth by the case's limits and weights
+  plan::Verdict verdict;                 // for who decides
   std::vector<std::string> warnings;     // besides those in the figures
   Json robustness;                       // of repeats_json.h
   Json timing;                           // all that differs between equal runs

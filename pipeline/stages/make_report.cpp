@@ -8,6 +8,7 @@
 #include <thread>
 #include <utility>
 
+#include "pipeline/files/catalogue.h"
 #include "pipeline/files/trial_file.h"
 #include "pipeline/files/viewer_files.h"
 #include "pipeline/report/anatomy_json.h"
@@ -16,6 +17,8 @@
 #include "pipeline/report/places.h"
 #include "pipeline/report/repeats_json.h"
 #include "pipeline/report/report.h"
+#include "pipeline/report/sheet_csv.h"
+#include "pipeline/report/verdict_json.h"
 #include "pipeline/stages/makers.h"
 #include "pipeline/stages/plan_artifact.h"
 #include "pipeline/stages/stored_trials.h"
@@ -54,6 +57,27 @@ class ForceMap {
   std::vector<double> force_;  // [N]
 };
 
+/// Wires of the catalogue with an angled tip that the case did not ask for.
+std::vector<std::string> other_angled_wires(const plan::Study& study) {
+  std::vector<std::string> names;
+  for (const CatalogueWire& entry : catalogue()) {
+    const bool asked = std::any_of(study.wires.begin(), study.wires.end(),
+                                   [&](const auto& wire) { return wire.name == entry.wire.name; });
+    if (!asked && !entry.wire.straight()) names.push_back(entry.wire.name);
+  }
+  return names;
+}
+
+plan::Verdict decide(const Workspace& work, const ReportInput& report) {
+  plan::Known known{.study = report.study,
+                    .plan = report.plan,
+                    .judgement = report.judgement,
+                    .limits = work.given().limits,
+                    .angled_wires = other_angled_wires(report.study)};
+  if (work.has("anatomy")) known.way = way_findings(report.figures.at("anatomy"));
+  return plan::find_verdict(known);
+}
+
 // All of the report that the stages before it tell.
 ReportInput describe_run(Workspace& work) {
   const Case& given = work.given();
@@ -70,6 +94,8 @@ ReportInput describe_run(Workspace& work) {
     report.stages.push_back(stage);
     report.figures[stage] = work.figures(stage);
   }
+
+  report.verdict = decide(work, report);
 
   // The values that stages chose where the case left them open.
   report.parameters = work.parameters;
@@ -363,6 +389,7 @@ void make_report(Workspace& work, const fs::path& folder) {
       std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   const Json result = build_report(report);
   if (page_missing().empty()) write_whole(build_page(result, page), folder / "report.html");
+  write_whole(sheet_csv(result), folder / "sheet.csv");
   write_whole(trials_csv(result), folder / "trials.csv");
   write_json(result, folder / "report.json");
 }

@@ -66,6 +66,15 @@ TEST_F(Compare, ReadsReportsOfTheVersionBefore) {
   EXPECT_EQ(compared({older, newer}), same);
 }
 
+TEST_F(Compare, TellsEachVerdictWhereThereIsOne) {
+  Json risky = report_of("amplatz", 0.2);
+  risky["verdict"] = {{"answer", "feasible_with_risk"}};
+  const std::string text = compared({risky, report_of("glidewire", 0.3)});
+  EXPECT_TRUE(has(text, "verdict")) << text;
+  EXPECT_TRUE(has(text, "case-amplatz    feasible with risk  ")) << text;
+  EXPECT_TRUE(has(text, "case-glidewire  -  ")) << text;
+}
+
 TEST_F(Compare, PutsThePlansOfOnePatientInOneOrder) {
   const std::string text = compared({report_of("soft", 0.4), report_of("stiff", 0.3)});
   EXPECT_TRUE(has(text, "All reports are of one patient")) << text;

@@ -6,6 +6,7 @@
 #include "pipeline/files/case_file.h"
 #include "pipeline/files/trial_file.h"
 #include "pipeline/report/report.h"
+#include "pipeline/report/verdict_json.h"
 #include "pipeline/stages/stages.h"
 #include "preprocess/files/vessel_io.h"
 #include "tests/pipeline/finished_case.h"
@@ -36,6 +37,31 @@ TEST(Report, KeepsToItsSchemaWithPlans) {
   ASSERT_FALSE(report.at("ranking").empty());
   EXPECT_EQ(report.at("trials").size(), 2u);
   expect_valid(report, folder.path());
+}
+
+TEST(Report, AnswersWithAVerdictAndItsReasons) {
+  const TemporaryFolder folder;
+  write_finished_tube(folder.path());
+  const Json report = run_to_report(folder / "case.json", folder / "cache");
+  EXPECT_EQ(std::next(report.begin(), 5).key(), "verdict") << "right after the outcome";
+  const Json& verdict = report.at("verdict");
+  EXPECT_GE(verdict.at("reasons").size(), 6u) << "share, forces, error, and of the way";
+  const std::string told = describe_verdict(report);
+  EXPECT_EQ(told.find("verdict: " + answer_of(report) + ". The wire "), 0u) << told;
+  EXPECT_NE(told.find("reaches the target within all limits, safe in "), std::string::npos) << told;
+
+  // A device that is wider than the tube of 8 mm.
+  const Json wide = run_to_report(folder / "case.json", folder / "cache", 0,
+                                  {"access_limits.device_diameter_mm=9.5"});
+  EXPECT_EQ(wide.at("verdict").at("answer"), "not_feasible");
+  EXPECT_NE(describe_verdict(wide).find("the widest device has 9.5 mm and does not pass"),
+            std::string::npos);
+  EXPECT_FALSE(wide.at("ranking").empty());
+
+  Json older = report;
+  older.erase("verdict");
+  EXPECT_EQ(describe_verdict(older), "");
+  EXPECT_EQ(answer_of(older), "-");
 }
 
 TEST(Report, TellsAccessViewsAndLengthsOfTheTube) {
@@ -287,6 +313,10 @@ TEST(Report, KeepsToItsSchemaWithoutPlans) {
   EXPECT_EQ(report.at("excluded").size(), 2u);
   EXPECT_EQ(report.at("outcome"), "no plan reaches the target");
   EXPECT_NE(describe_best(report).find("no plan reaches the target"), std::string::npos);
+  EXPECT_EQ(report.at("verdict").at("answer"), "not_feasible");
+  EXPECT_EQ(report.at("verdict").at("headline"), "None of 2 trials reaches the target.");
+  EXPECT_NE(report.at("verdict").at("changes").at(0).get<std::string>().find("More wire"),
+            std::string::npos);
   expect_valid(report, folder.path());
 }
 

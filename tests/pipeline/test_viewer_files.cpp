@@ -7,6 +7,7 @@
 #include "pipeline/files/case_file.h"
 #include "pipeline/files/viewer_files.h"
 #include "pipeline/report/report.h"
+#include "pipeline/report/sheet_csv.h"
 #include "pipeline/stages/stages.h"
 #include "preprocess/files/vessel_io.h"
 #include "preprocess/volume/image.h"
@@ -78,6 +79,54 @@ TEST(ViewerFiles, ListEveryTrialWithUnitsInTheHeader) {
             "rank,id,wire,insertion_mm,reached\r\n"
             ",0,\"say \"\"x\"\", please\",,false\r\n"
             "1,1,\"soft\",30.5,true\r\n");
+}
+
+TEST(ViewerFiles, ListTheFiguresOfTheSheet) {
+  const Json report = {
+      {"verdict",
+       {{"answer", "feasible"},
+        {"headline", "A \"plan\"."},
+        {"reasons", {"So."}},
+        {"changes", Json::array()}}},
+      {"provenance",
+       {{"parameters", {{"limits", {{"tip_force_warn_n", 0.3}}}}}, {"warnings", Json::array()}}},
+      {"statement", "Research use only."},
+      {"ranking",
+       {{{"trial", 0},
+         {"wire", "soft"},
+         {"inclination_deg", 10},
+         {"azimuth_deg", 90},
+         {"roll_deg", 0},
+         {"script", ""},
+         {"score", 0.25}}}},
+      {"trials",
+       {{{"insertion_mm", 30.5}, {"peak_tip_force_n", 0.125}, {"peak_contact_force_n", 0.5}}}},
+      {"numerics", {{"plans", {{{"trial", 0}, {"tip_error_mm", nullptr}}}}}},
+      {"robustness",
+       {{"plans",
+         {{{"trial", 0},
+           {"successes", 3},
+           {"repeats", 4},
+           {"success_rate_interval", {0.25, 0.75}}}}},
+        {"sensitivity", {{"shares", {{{"unknown", "lumen"}, {"share", 0.5}}}}}}}}};
+  EXPECT_EQ(sheet_csv(report),
+            "section,quantity,value,unit,limit,note\r\n"
+            "\"verdict\",\"answer\",\"feasible\",,,\"A \"\"plan\"\".\"\r\n"
+            "\"verdict\",\"reason\",,,,\"So.\"\r\n"
+            "\"plan 1\",\"wire\",\"soft\",,,\r\n"
+            "\"plan 1\",\"inclination\",10,\"deg\",,\r\n"
+            "\"plan 1\",\"azimuth\",90,\"deg\",,\r\n"
+            "\"plan 1\",\"roll of the tip\",0,\"deg\",,\r\n"
+            "\"plan 1\",\"wire in the vessel\",30.5,\"mm\",,\r\n"
+            "\"plan 1\",\"tip force\",0.125,\"N\",0.3,\r\n"
+            "\"plan 1\",\"largest contact force\",0.5,\"N\",,\r\n"
+            "\"plan 1\",\"score\",0.25,,,\r\n"
+            "\"plan 1\",\"safe repeats\",3,,4,\r\n"
+            "\"plan 1\",\"share safe, low end of 95 % interval\",0.25,,,\r\n"
+            "\"plan 1\",\"share safe, high end of 95 % interval\",0.75,,,\r\n"
+            "\"plan 1\",\"stated error of the tip\",,\"mm\",,\r\n"
+            "\"uncertain\",\"share of lumen in what moves the plans\",0.5,,,\r\n"
+            "\"statement\",\"statement\",,,,\"Research use only.\"\r\n");
 }
 
 TEST(ViewerFiles, ComeWithEveryRankedPlanOfARun) {

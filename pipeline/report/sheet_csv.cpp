@@ -1,0 +1,135 @@
+#include "pipeline/report/sheet_csv.h"
+
+#include <algorithm>
+#include <utility>
+
+#include "pipeline/files/viewer_files.h"
+
+namespace wireplan::pipeline {
+namespace {
+
+constexpr std::size_t kPlans = 3;  // as on the sheet
+
+class Table {
+ public:
+  void begin(std::string section) { section_ = std::move(section); }
+  void row(const std::string& quantity, const Json& value, const char* unit = "",
+           const Json& limit = nullptr, const Json& note = nullptr) {
+    text_ += csv_field(section_) + "," + csv_field(quantity) + "," + csv_field(value) + "," +
+             (*unit == 0 ? "" : csv_field(unit)) + "," + csv_field(limit) + "," + csv_field(note) +
+             "\r\n";
+  }
+  std::string finish() { return std::move(text_); }
+
+ private:
+  std::string section_, text_ = "section,quantity,value,unit,limit,note\r\n";
+};
+
+void add_verdict(Table& table, const Json& verdict) {
+  table.begin("verdict");
+  table.row("answer", verdict.at("answer"), "", nullptr, verdict.at("headline"));
+  for (const Json& text : verdict.at("reasons")) table.row("reason", nullptr, "", nullptr, text);
+  for (const Json& text : verdict.at("changes")) table.row("change", nullptr, "", nullptr, text);
+}
+
+const Json* find_by_trial(const Json& rows, const Json& trial) {
+  const auto found = std::find_if(rows.begin(), rows.end(),
+                                  [&](const Json& row) { return row.at("trial") == trial; });
+  return found == rows.end() ? nullptr : &*found;
+}
+
+void add_plans(Table& table, const Json& report) {
+  const Json& ranking = report.at("ranking");
+  const Json& limits = report.at("provenance").at("parameters").at("limits");
+  for (std::size_t k = 0; k < std::min(kPlans, ranking.size()); ++k) {
+    const Json& plan = ranking.at(k);
+    const Json& trial = report.at("trials").at(plan.at("trial").get<std::size_t>());
+    table.begin("plan " + std::to_string(k + 1));
+    table.row("wire", plan.at("wire"));
+    table.row("inclination", plan.at("inclination_deg"), "deg");
+    table.row("azimuth", plan.at("azimuth_deg"), "deg");
+    table.row("roll of the tip", plan.at("roll_deg"), "deg");
+    if (!plan.at("script").get<std::string>().empty()) table.row("moves", plan.at("script"));
+    table.row("wire in the vessel", trial.at("insertion_mm"), "mm");
+    table.row("tip force", trial.at("peak_tip_force_n"), "N", limits.at("tip_force_warn_n"));
+    table.row("largest contact force", trial.at("peak_contact_force_n"), "N");
+    table.row("score", plan.at("score"));
+    const Json* repeats = find_by_trial(report.at("robustness").at("plans"), plan.at("trial"));
+    if (repeats != nullptr) {
+      table.row("safe repeats", repeats->at("successes"), "", repeats->at("repeats"));
+      const Json& interval = repeats->at("success_rate_interval");
+      table.row("share safe, low end of 95 % interval", interval.at(0));
+      table.row("share safe, high end of 95 % interval", interval.at(1));
+    }
+    const Json* errors = find_by_trial(report.at("numerics").at("plans"), plan.at("trial"));
+    if (errors != nullptr) table.row("stated error of the tip", errors->at("tip_error_mm"), "mm");
+  }
+}
+
+void add_anatomy(Table& table, const Json& anatomy) {
+  const Json& access = anatomy.at("access");
+  const Json& bend = access.at("sharpest_bend");
+  table.begin("access");
+  for (const char* key : {"device", "sheath"}) {
+    const Json& row = access.at(key);
+    const std::string name = key;
+    table.row(name + ": narrowest lumen", row.at("lumen_diameter_mm"), "mm",
+              row.at("device_diameter_mm"), row.at("fits") ? "fits" : "does not fit");
+    table.row(name + ": over lumen", row.at("ratio"), "", row.at("max_ratio"));
+    table.row(name + ": place from the access", row.at("at_mm"), "mm");
+  }
+  table.row("tortuosity", access.at("tortuosity").at("index"), "", nullptr,
+            access.at("tortuosity").at("grade"));
+  table.row("sharpest bend", bend.at("angle_deg"), "deg", nullptr, bend.at("grade"));
+  table.row("sharpest bend: place from the access", bend.at("at_mm"), "mm", nullptr,
+            bend.at("at_ostium_of"));
+  table.row("calcium beside the lumen", access.at("calcium").at("volume_mm3"), "mm3");
+
+  table.begin("c-arm");
+  for (const Json& ostium : anatomy.at("c_arm").at("ostia")) {
+    for (const auto& [key, title] : {std::pair("best", "best view"), {"second", "second view"}}) {
+      const Json& view = ostium.at(key);
+      if (view.is_null()) continue;
+      std::string which = title;
+      which.append(", ostium of ").append(ostium.at("branch").get_ref<const std::string&>());
+      table.row(which + ": LAO", view.at("lao_deg"), "deg", nullptr, view.at("view"));
+      table.row(which + ": cranial", view.at("cranial_deg"), "deg");
+    }
+  }
+
+  table.begin("lengths");
+  const Json& lengths = anatomy.at("lengths");
+  for (const Json& place : lengths.at("places")) {
+    const Json& branch = place.at("branch");
+    std::string what = place.at("what");
+    if (!branch.is_null()) what.append(" ").append(branch.get_ref<const std::string&>());
+    table.row(what, place.at("at_mm"), "mm");
+  }
+  table.row("wire needed", lengths.at("wire_needed_mm"), "mm");
+  for (const Json& wire : lengths.at("wires")) {
+    table.row("wire " + wire.at("wire").get<std::string>(), wire.at("length_mm"), "mm",
+              lengths.at("wire_needed_mm"));
+  }
+}
+
+}  // namespace
+
+std::string sheet_csv(const Json& report) {
+  Table table;
+  if (report.contains("verdict")) add_verdict(table, report.at("verdict"));
+  add_plans(table, report);
+  if (report.contains("anatomy")) add_anatomy(table, report.at("anatomy"));
+  table.begin("uncertain");
+  for (const Json& share : report.at("robustness").at("sensitivity").at("shares")) {
+    table.row("share of " + share.at("unknown").get<std::string>() + " in what moves the plans",
+              share.at("share"));
+  }
+  for (const Json& text : report.at("provenance").at("warnings")) {
+    table.row("warning", nullptr, "", nullptr, text);
+  }
+  table.begin("statement");
+  table.row("statement", nullptr, "", nullptr, report.at("statement"));
+  return table.finish();
+}
+
+}  // namespace wireplan::pipeline

@@ -1,0 +1,66 @@
+#include "pipeline/report/verdict_json.h"
+
+#include <algorithm>
+#include <iterator>
+
+#include "pipeline/report/anatomy_json.h"
+
+namespace wireplan::pipeline {
+namespace {
+
+plan::Passage passage(const Json& row) {
+  return {.lumen = row.at("lumen_diameter_mm"),
+          .at = row.at("at_mm"),
+          .device = row.at("device_diameter_mm"),
+          .max_ratio = row.at("max_ratio")};
+}
+
+}  // namespace
+
+plan::WayFindings way_findings(const Json& anatomy) {
+  const Json& access = anatomy.at("access");
+  const Json& tortuosity = access.at("tortuosity");
+  const Json& bend = access.at("sharpest_bend");
+  plan::WayFindings way;
+  way.device = passage(access.at("device"));
+  way.sheath = passage(access.at("sheath"));
+  way.sheath_length = access.at("sheath").at("length_mm");
+  if (!tortuosity.at("index").is_null()) way.tortuosity = tortuosity.at("index").get<double>();
+  way.tortuosity_grade = grade_from(tortuosity.at("grade"));
+  way.bend = bend.at("angle_deg").get<double>() * kRadPerDeg;
+  way.bend_at = bend.at("at_mm");
+  way.bend_grade = grade_from(bend.at("grade"));
+  if (!bend.at("at_ostium_of").is_null()) way.bend_ostium = bend.at("at_ostium_of");
+  way.wire_needed = anatomy.at("lengths").at("wire_needed_mm").get<double>();
+  return way;
+}
+
+Json verdict_json(const plan::Verdict& verdict) {
+  Json json;
+  json["answer"] = answer_name(verdict.answer);
+  json["headline"] = verdict.headline;
+  json["reasons"] = verdict.reasons;
+  json["changes"] = verdict.changes;
+  return json;
+}
+
+std::string answer_of(const Json& report) {
+  if (!report.contains("verdict")) return "-";
+  std::string words = report.at("verdict").at("answer");
+  std::replace(words.begin(), words.end(), '_', ' ');
+  return words;
+}
+
+std::string describe_verdict(const Json& report) {
+  if (!report.contains("verdict")) return "";
+  const Json& verdict = report.at("verdict");
+  std::string text =
+      "verdict: " + answer_of(report) + ". " + verdict.at("headline").get<std::string>() + "\n";
+  const Json& reasons = verdict.at("reasons");
+  if (verdict.at("answer") != "feasible" && !reasons.empty()) {
+    text += "reason: " + reasons.front().get<std::string>() + "\n";
+  }
+  return text;
+}
+
+}  // namespace wireplan::pipeline
