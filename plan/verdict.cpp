@@ -75,62 +75,56 @@ class Weighing {
 
   // ---- No plan.
   void weigh_failure() {
-    Endings all, full, scouts;
-    int reached_coarsely = 0;
+    Endings all, full;
+    int coarse = 0, reached_coarsely = 0;
     for (std::size_t k = 0; k < known_.plan.trials.size(); ++k) {
       const int id = static_cast<int>(k);
       const bool in_full = known_.plan.levels[k] == Level::kFull;
       add_ending(all, trial(id), wire_of(id), known_.study, known_.limits);
-      add_ending(in_full ? full : scouts, trial(id), wire_of(id), known_.study, known_.limits);
-      if (!in_full) reached_coarsely += trial(id).metrics.reached;
+      if (in_full) add_ending(full, trial(id), wire_of(id), known_.study, known_.limits);
+      coarse += !in_full;
+      reached_coarsely += !in_full && trial(id).metrics.reached;
     }
     headline_ = all.reached == 0
                     ? "None of " + count_of(all.trials, "trial") + " reaches the target."
                     : std::to_string(all.reached) + " of " + count_of(all.trials, "trial") +
                           " reach the target, none of them within the limits.";
+    const Answer answer =
+        leaves_open(all, full, reached_coarsely) ? Answer::kUnsure : Answer::kNotFeasible;
     if (full.reached > 0) {
-      find(
-          Answer::kNotFeasible,
-          count_of(full.reached, "trial") + " in full " +
-              (full.reached == 1 ? "reaches the target but breaks" : "reach the target but break") +
-              " a limit: " + describe_broken_limits(full, known_.limits) + ".");
+      find(answer, count_of(full.reached, "trial") +
+                       (full.reached == 1 ? " reaches the target but breaks"
+                                          : " reach the target but break") +
+                       " a limit: " + describe_broken_limits(full, known_.limits) + ".");
     }
     const std::string endings = describe_endings(all);
-    if (!endings.empty()) {
-      find(Answer::kNotFeasible,
-           "Of " + count_of(all.trials, "trial") + " " + endings + "; " +
-               (scouts.trials == 0 ? "all were" : std::to_string(full.trials) + " of them were") +
-               " run in full" +
-               (scouts.trials == 0 ? "." : ", the others against a rigid wall only."));
-    }
-    weigh_what_is_open(all, full, reached_coarsely);
+    if (!endings.empty()) find(answer, "Of " + count_of(all.trials, "trial") + " " + endings + ".");
     for (std::string& text : changes_by(all, known_, "trial")) change(std::move(text));
-    if (scouts.trials > 0) {
-      change("Running all trials in full: " + std::to_string(scouts.trials) + " of " +
-             std::to_string(all.trials) + " were run against a rigid wall only.");
+    if (coarse > 0) {
+      change("Running all trials in full detail: " + std::to_string(coarse) + " of " +
+             std::to_string(all.trials) + " were run coarsely only, against a rigid wall.");
     }
   }
 
-  void weigh_what_is_open(const Endings& all, const Endings& full, int reached_coarsely) {
-    bool open = false;
-    const auto leave_open = [&](const std::string& sentence) {
-      find(Answer::kUnsure, sentence);
-      open = true;
-    };
-    if (full.clear() == 0) leave_open("No trial that was run in full came to a clear end.");
+  bool leaves_open(const Endings& all, const Endings& full, int reached_coarsely) {
+    const std::size_t before = findings_.size();
+    if (full.clear() == 0) {
+      find(Answer::kUnsure, "No trial that was run in full detail came to a clear end" +
+                                std::string(full.trials == 0 ? ": none was run so." : "."));
+    }
     if (all.unclear() > rules_.unclear_part * all.trials) {
-      leave_open(std::to_string(all.unclear()) + " of " + count_of(all.trials, "trial") +
-                 " ended without telling whether the wire would reach the target; at most " +
-                 percent(rules_.unclear_part) + " % may.");
+      find(Answer::kUnsure,
+           std::to_string(all.unclear()) + " of " + count_of(all.trials, "trial") +
+               " ended without telling whether the wire would reach the target; at most " +
+               percent(rules_.unclear_part) + " % may.");
     }
     if (reached_coarsely > 0) {
-      leave_open(count_of(reached_coarsely, "trial") +
-                 (reached_coarsely == 1 ? " reaches" : " reach") +
-                 " the target against a rigid wall and " +
-                 (reached_coarsely == 1 ? "was" : "were") + " not run in full.");
+      find(Answer::kUnsure,
+           count_of(reached_coarsely, "trial") + (reached_coarsely == 1 ? " reaches" : " reach") +
+               " the target when run coarsely against a rigid wall, and " +
+               (reached_coarsely == 1 ? "was" : "were") + " not run in full detail.");
     }
-    if (!open) return;
-    for (Finding& finding : findings_) finding.answer = Answer::kUnsure;
+    return findings_.size() > before;
   }
 
   // ---- A plan.
@@ -145,6 +139,10 @@ class Weighing {
     weigh_share(first, repeats);
     weigh_tip_force(first, repeats);
     weigh_tip_error(first);
+    if (!doubts_.empty()) {
+      headline_ = "In the computation the wire " + wire_of(first.trial).name +
+                  " reaches the target within all limits, but " + list_words(doubts_) + ".";
+    }
     if (m.wall_motion.beyond_linear_theory()) {
       find(Answer::kFeasibleWithRisk,
            "The wall moves " + two_digits(m.wall_motion.displacement) +
@@ -165,6 +163,7 @@ class Weighing {
     if (repeats == nullptr) {
       find(Answer::kUnsure,
            "How often the plan stays safe is not known: it was not repeated under disturbances.");
+      doubts_.push_back("how often it stays safe is not known");
       change("Repeating the plan under disturbances, to know how often it stays safe.");
       return;
     }
@@ -184,6 +183,7 @@ class Weighing {
          : too_low ? Answer::kFeasibleWithRisk
                    : Answer::kFeasible,
          text + ".");
+    if (too_few) doubts_.push_back("the repeats are too few to tell how often it stays safe");
     if (too_few) change("More than " + count_of(count, "repeat") + ", to know the share better.");
     if (!too_low) return;
     offer_other(first, "safe in ", [&](const RankedPlan& other) {
@@ -240,6 +240,7 @@ class Weighing {
     const simulate::Goal& goal = known_.study.goal;
     if (!first.tip_error) {
       find(Answer::kUnsure, "The error of the tip's place is not known.");
+      doubts_.push_back("the error of the tip's place is not known");
       change("Computing the plan with finer elements too, to know the tip's error.");
       return;
     }
@@ -255,6 +256,7 @@ class Weighing {
                       one_decimal(goal.radius) + " mm radius";
     if (large) text += ", so it may not be in the target";
     find(large ? Answer::kUnsure : Answer::kFeasible, text + ".");
+    if (large) doubts_.push_back("the tip's error is too large to tell that it is in the target");
     if (large) change("A computation with finer elements, for a smaller error of the tip.");
   }
 
@@ -303,15 +305,17 @@ class Weighing {
     const bool too_wide = passage.device >= passage.max_ratio * passage.lumen;
     const bool surely = passage.device > passage.max_ratio * (passage.lumen + off);
     std::string text = "The narrowest place of the way is " + three_digits(passage.lumen) +
-                       " mm wide, " + whole_millimetres(passage.at) +
-                       " from the access; the widest device has " + three_digits(passage.device) +
-                       " mm and ";
+                       " mm wide, " + whole_millimetres(passage.at) + " from the access; " +
+                       (passage.assumed ? "a device of " : "the widest device, of ") +
+                       three_digits(passage.device) +
+                       (passage.assumed ? " mm, which is assumed, " : " mm, ");
     text += surely     ? "does not pass"
             : too_wide ? "passes only if the lumen is wider than it seems, which it may be by " +
                              two_digits(off) + " mm"
                        : "passes";
-    if (surely) narrow_ = text + ".";
-    find(surely     ? Answer::kNotFeasible
+    const bool decides = surely && !passage.assumed;
+    if (decides) narrow_ = text + ".";
+    find(decides    ? Answer::kNotFeasible
          : too_wide ? Answer::kFeasibleWithRisk
                     : Answer::kFeasible,
          text + ".");
@@ -324,8 +328,10 @@ class Weighing {
     const Passage& sheath = way.sheath;
     const bool too_wide = sheath.device >= sheath.max_ratio * sheath.lumen;
     find(too_wide ? Answer::kFeasibleWithRisk : Answer::kFeasible,
-         "The sheath of " + three_digits(sheath.device) + " mm is " +
-             two_digits(sheath.device / sheath.lumen) + " of the narrowest lumen in the first " +
+         "The sheath of " + three_digits(sheath.device) +
+             (sheath.assumed ? " mm (assumed) is " : " mm is ") +
+             two_digits(sheath.device / sheath.lumen) +
+             " times as wide as the narrowest lumen in the first " +
              whole_millimetres(way.sheath_length) + " (" + three_digits(sheath.lumen) + " mm); " +
              (too_wide ? "it must be below " : "below ") + four_digits(sheath.max_ratio) +
              (too_wide ? "." : " it passes."));
@@ -353,7 +359,8 @@ class Weighing {
   std::vector<Finding> findings_;
   std::vector<std::string> changes_;
   std::string headline_;
-  std::string narrow_;  // the headline where the device does not pass
+  std::vector<std::string> doubts_;  // that leave it open whether the plan holds
+  std::string narrow_;               // the headline where the device does not pass
 };
 
 }  // namespace

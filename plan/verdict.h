@@ -25,6 +25,7 @@ struct Passage {
   double lumen = 0.0, at = 0.0;  // diameter; arc length from the access                    [mm]
   double device = 0.0;           // diameter                                                [mm]
   double max_ratio = 1.0;        // of device over lumen; at it, the device does not pass
+  bool assumed = false;          // the device is a default; nobody said that it is to pass
 };
 
 /// What is known of the way before a wire is pushed (anatomy/way.h), with its grades.
@@ -67,9 +68,9 @@ struct Known {
 };
 
 /// The first of these that holds:
-///   not feasible        the narrowest place is narrower than the device by more than the wall's
-///                       place is unknown (Unknowns::lumen, at both sides); or no trial is a plan,
-///                       some were run in full and none of what follows leaves that open
+///   not feasible        the narrowest place is narrower than a device that was asked for by more
+///                       than the wall's place is unknown (Unknowns::lumen, at both sides); or no
+///                       trial is a plan, and nothing of what follows leaves that open
 ///   unsure              no plan, and: nothing that was run in full came to a clear end, or more
 ///                       than `unclear_part` of all did not, or one reached that was not run in
 ///                       full. A plan, but: it was not repeated, its share of safe repeats is not

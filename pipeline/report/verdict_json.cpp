@@ -4,6 +4,7 @@
 #include <iterator>
 
 #include "pipeline/report/anatomy_json.h"
+#include "plan/anatomy/access_limits.h"
 
 namespace wireplan::pipeline {
 namespace {
@@ -24,6 +25,9 @@ plan::WayFindings way_findings(const Json& anatomy) {
   plan::WayFindings way;
   way.device = passage(access.at("device"));
   way.sheath = passage(access.at("sheath"));
+  const plan::AccessLimits defaults;
+  way.device.assumed = way.device.device == defaults.device_diameter;
+  way.sheath.assumed = way.sheath.device == defaults.sheath_diameter;
   way.sheath_length = access.at("sheath").at("length_mm");
   if (!tortuosity.at("index").is_null()) way.tortuosity = tortuosity.at("index").get<double>();
   way.tortuosity_grade = grade_from(tortuosity.at("grade"));

@@ -7,7 +7,8 @@
 
 namespace wireplan::pipeline {
 
-/// What the figures of stage anatomy say of the way; all wires need the same length.
+/// What the figures of stage anatomy say of the way. Devices of the default diameters count as
+/// assumed.
 plan::WayFindings way_findings(const Json& anatomy);
 
 /// "verdict" of a report.

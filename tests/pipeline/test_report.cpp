@@ -54,7 +54,7 @@ TEST(Report, AnswersWithAVerdictAndItsReasons) {
   const Json wide = run_to_report(folder / "case.json", folder / "cache", 0,
                                   {"access_limits.device_diameter_mm=9.5"});
   EXPECT_EQ(wide.at("verdict").at("answer"), "not_feasible");
-  EXPECT_NE(describe_verdict(wide).find("the widest device has 9.5 mm and does not pass"),
+  EXPECT_NE(describe_verdict(wide).find("the widest device, of 9.5 mm, does not pass"),
             std::string::npos);
   EXPECT_FALSE(wide.at("ranking").empty());
 
