@@ -12,6 +12,7 @@
 #include "pipeline/files/phantom_file.h"
 #include "pipeline/files/text.h"
 #include "pipeline/report/compare.h"
+#include "pipeline/report/print.h"
 #include "pipeline/report/render.h"
 #include "pipeline/store/cache.h"
 
@@ -136,7 +137,8 @@ int simulate_file(const std::string& path, const std::string& given_output) {
   return answer.solved ? kDone : kNoPlan;
 }
 
-int render_pictures(const std::string& report, const std::string& output) {
+int render_pictures(const std::string& report, const std::string& output, bool pdf) {
+  if (pdf) std::cout << print_sheet(report, output).string() << "\n";
   for (const std::string& line : render_report(report, output)) std::cout << line << "\n";
   return kDone;
 }
@@ -272,18 +274,22 @@ void add_render(CLI::App& app, int& code) {
   struct Arguments {
     std::string report;
     std::string output;
+    bool pdf = false;
   };
   const auto arguments = std::make_shared<Arguments>();
   CLI::App* render = app.add_subcommand("render", "Pictures of a report, without a display");
   render->add_option("REPORT", arguments->report, "report.json among the files of its run")
       ->required();
   render->add_option("-o,--output", arguments->output, "Folder for the pictures")->required();
+  render->add_flag("--pdf", arguments->pdf, "Print the page's first sheet too, with Chromium");
   render->footer(
       "Writes vessel.png (the best plans), forces.png (the largest force on the wall),\n"
-      "angles.png (every trial) and numerics.png (error against run time).\n"
+      "angles.png (every trial) and numerics.png (error against run time); with --pdf also\n"
+      "sheet.pdf, one A4 page, by the Chromium on the PATH or named by WIREPLAN_CHROMIUM.\n"
       "Example: wireplan render wireplan-out/abdomen/report.json -o pictures");
-  render->callback(
-      [&code, arguments] { code = render_pictures(arguments->report, arguments->output); });
+  render->callback([&code, arguments] {
+    code = render_pictures(arguments->report, arguments->output, arguments->pdf);
+  });
 }
 
 void add_bench(CLI::App& app, int& code) {

@@ -4,7 +4,9 @@
 #include <cstdlib>
 
 #include "pipeline/files/case_file.h"
+#include "pipeline/files/disk.h"
 #include "pipeline/report/picture.h"
+#include "pipeline/report/print.h"
 #include "pipeline/report/render.h"
 #include "pipeline/report/report.h"
 #include "pipeline/stages/stages.h"
@@ -58,6 +60,35 @@ TEST(Render, SaysWhichFileOfTheRunIsMissing) {
   } catch (const Error& error) {
     EXPECT_NE(std::string(error.what()).find("surface.vtp"), std::string::npos) << error.what();
   }
+}
+
+TEST(Render, SaysWhatIsMissingForASheetOnPaper) {
+  const TemporaryFolder folder;
+  const fs::path out = folder / "out";
+  fs::create_directories(out);
+  const auto said = [&]() -> std::string {
+    try {
+      print_sheet(out / "report.json", folder / "printed");
+    } catch (const Error& error) {
+      return error.what();
+    }
+    return "nothing";
+  };
+  EXPECT_NE(said().find("report.html: is not there, expected the page"), std::string::npos);
+  write_whole("<html>", out / "report.html");
+  EXPECT_NE(said().find("an earlier wireplan made it; run the case again"), std::string::npos);
+
+  write_whole("<html id=sheet-title>", out / "report.html");
+  ::setenv("WIREPLAN_CHROMIUM", (folder / "none").c_str(), 1);
+  EXPECT_NE(said().find("is no program, expected the path of Chromium"), std::string::npos);
+  ::setenv("WIREPLAN_CHROMIUM", "/bin/false", 1);
+  EXPECT_NE(said().find("/bin/false: printed no PDF of"), std::string::npos);
+  ::unsetenv("WIREPLAN_CHROMIUM");
+  const std::string path = std::getenv("PATH");
+  ::setenv("PATH", folder.path().c_str(), 1);
+  EXPECT_NE(said().find("no Chromium or Chrome on the PATH"), std::string::npos);
+  ::setenv("PATH", path.c_str(), 1);
+  EXPECT_FALSE(fs::exists(folder / "printed"));
 }
 
 TEST(Render, ColorsEachTrialOfTheGridByItsForce) {
