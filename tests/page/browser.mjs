@@ -60,6 +60,30 @@ export const column = (page, title) =>
     return [...table.tBodies[0].rows].map((row) => row.cells[at].textContent);
   }, title);
 
+/** Pages of a PDF as Chromium writes it. */
+export const pageCount = (pdf) => (pdf.toString("latin1").match(/\/Type\s*\/Page\b/g) ?? []).length;
+
+/** Blocks of the sheet that reach beyond it or whose content reaches beyond them, and pairs that overlap. */
+export const clippedBlocks = (page) =>
+  page.evaluate(() => {
+    const sheet = document.getElementById("sheet").getBoundingClientRect();
+    const blocks = [...document.querySelectorAll("#sheet > *, #sheet .block")];
+    const found = [];
+    for (const block of blocks) {
+      const box = block.getBoundingClientRect(), name = block.id || block.className || block.tagName;
+      if (box.bottom > sheet.bottom + 1 || box.right > sheet.right + 1 || box.left < sheet.left - 1) found.push(`${name} leaves the sheet`);
+      if (block.scrollWidth > block.clientWidth + 1) found.push(`${name} is too narrow`);
+      if (block.tagName !== "H1" && block.scrollHeight > block.clientHeight + 2) found.push(`${name} is too low`);
+      for (const other of blocks) {
+        if (other === block || other.contains(block) || block.contains(other)) continue;
+        const its = other.getBoundingClientRect();
+        const apart = its.top >= box.bottom - 1 || box.top >= its.bottom - 1 || its.left >= box.right - 1 || box.left >= its.right - 1;
+        if (!apart) found.push(`${name} lies on ${other.id || other.className}`);
+      }
+    }
+    return found;
+  });
+
 /** Findings of axe-core that are serious or critical, with where. */
 export const seriousFindings = async (page) => {
   // The page forbids scripts from elsewhere, not those of the debugger.

@@ -6,6 +6,7 @@
 #include <random>
 
 #include "pipeline/files/disk.h"
+#include "pipeline/report/anatomy_json.h"
 #include "pipeline/report/page.h"
 #include "pipeline/report/report.h"
 #include "pipeline/report/slices.h"
@@ -15,6 +16,9 @@ namespace wireplan::pipeline {
 namespace {
 
 constexpr double kRadius = 6.0, kLength = 250.0;  // of the vessel, along z            [mm]
+// Of a length that no table has room for.
+const std::string kMaker =
+    " wire of a maker whose names go on for much longer than anybody who lays out a table expects";
 constexpr int kPushes = 300, kShapes = 60, kInsertions = 20;
 
 double draw(std::mt19937_64& random) { return static_cast<double>(random() >> 11U) * 0x1p-53; }
@@ -23,7 +27,7 @@ plan::Study make_study() {
   plan::Study study;
   for (const char* name : {"soft", "medium", "stiff"}) {
     study.wires.push_back(
-        {.name = name,
+        {.name = name + kMaker,
          .radius = 0.445,
          .sections = {{.length = 500.0, .bending_stiffness = 50.0, .rest_curvature = 0.04}}});
   }
@@ -136,7 +140,8 @@ Json parameters() {
   return {
       {"wall", {{"model", "elastic"}}},
       {"access", {{"inclination_deg", {5, 15, 25, 35}}, {"azimuth_deg", {0, 72, 144, 216, 288}}}},
-      {"wires", {{{"name", "soft"}}, {{"name", "medium"}}, {{"name", "stiff"}}}},
+      {"wires",
+       {{{"name", "soft" + kMaker}}, {{"name", "medium" + kMaker}}, {{"name", "stiff" + kMaker}}}},
       {"tip_roll_deg", {0, 72, 144, 216, 288}},
       {"friction", 0.04},
       {"limits", {{"tip_force_warn_n", 0.3}}}};
@@ -169,13 +174,27 @@ Json robustness(const plan::Ranking& ranking) {
            {{"explained", 0.8}, {"shares", {{{"unknown", "friction"}, {"share", 0.6}}}}}}};
 }
 
+/// More and longer sentences than the sheet has room for.
+plan::Verdict long_verdict() {
+  plan::Verdict verdict{.answer = plan::Answer::kFeasibleWithRisk,
+                        .headline = "The" + kMaker + " reaches the target," + kMaker + kMaker,
+                        .reasons = {},
+                        .changes = {}};
+  for (int k = 0; k < 14; ++k) {
+    verdict.reasons.push_back("Reason " + std::to_string(k) + kMaker + kMaker + kMaker);
+    verdict.changes.push_back("Change " + std::to_string(k) + kMaker + kMaker + kMaker);
+  }
+  return verdict;
+}
+
 std::string make_page(const std::string& name) {
   const Surface surface = shapes::straight_tube(kRadius, kLength, 0.93);
   Centerline path;
-  path.points.resize(3, 2);
-  path.points << 0.0, 0.0, 0.0, 0.0, 5.0, kLength - 10.0;
-  path.radius = Eigen::Vector2d(kRadius, kRadius);
-  path.arc_length = Eigen::Vector2d(0.0, kLength - 15.0);
+  constexpr Eigen::Index kPoints = 118;
+  path.points = Eigen::Matrix3Xd::Zero(3, kPoints);
+  path.points.row(2).setLinSpaced(kPoints, 5.0, kLength - 10.0);
+  path.radius = Eigen::VectorXd::Constant(kPoints, kRadius);
+  path.arc_length = path.points.row(2).transpose().array() - 5.0;
 
   ReportInput report;
   report.name = name;
@@ -208,6 +227,16 @@ std::string make_page(const std::string& name) {
   }
   report.judgement = plan::judge(report.study, plan, {}, {});
   report.robustness = robustness(report.judgement.ranking);
+  report.verdict = long_verdict();
+  for (int k = 0; k < 9; ++k) {
+    report.warnings.push_back("trials: warning " + std::to_string(k) + kMaker + kMaker);
+  }
+  const simulate::Way way(path, {preprocess::Branch{.line = path}});
+  Json anatomy = anatomy_figures(way, {});
+  anatomy["warnings"] = Json::array();
+  anatomy["access"]["calcium"] = calcium_json(12.5, "", {});
+  report.figures["anatomy"] = anatomy;
+  page.panels["anatomy"] = anatomy_panel(way);
   report.timing = {{"threads", 1}, {"stages", Json::array()}, {"numerics", Json::array()}};
   for (Eigen::Index k = 0; k < surface.triangles.cols(); ++k)
     page.peak_force.push_back(draw(random));

@@ -3,12 +3,12 @@
 // WIREPLAN_MAKE_LARGE_PAGE. WIREPLAN_PAGE_MODULES is the folder with node_modules of the page.
 // WIREPLAN_SCREENSHOTS, where given, is a folder for pictures of every page.
 import assert from "node:assert/strict";
-import {execFileSync} from "node:child_process";
-import {mkdtempSync, rmSync, statSync} from "node:fs";
+import {execFileSync, spawnSync} from "node:child_process";
+import {mkdtempSync, readFileSync, rmSync, statSync} from "node:fs";
 import {tmpdir} from "node:os";
 import {basename, dirname, join, resolve} from "node:path";
 import {after, before, describe, test} from "node:test";
-import {chromiumPath, column, hasModules, launch, open, picture, seriousFindings} from "./browser.mjs";
+import {chromiumPath, clippedBlocks, column, hasModules, launch, open, pageCount, picture, seriousFindings} from "./browser.mjs";
 import {hostileCase, hostileWire, runSmallCase} from "./small_case.mjs";
 
 const kMegabyte = 1e6;
@@ -31,6 +31,8 @@ after(async () => {
   await flat.close();
   rmSync(folder, {recursive: true});
 });
+
+const kSheetBlocks = ["verdict", "why", "changes", "picture", "plans", "access", "uncertain", "fetch", "lengths"];
 
 /** Everything on the page that a pointer could use. */
 const countControls = (page) =>
@@ -189,11 +191,39 @@ const checkPage = (title, file) => {
       assert.deepEqual(await seriousFindings(page), []);
     }, {width: 375, height: 740});
 
-    use("prints, with nothing cut off at the side", async (page) => {
+    use("begins with one sheet that has all blocks", async (page) => {
+      assert.equal(await page.evaluate(() => document.querySelector("main > *").firstChild.id), "sheet");
+      for (const id of kSheetBlocks) {
+        const text = await page.textContent(`#sheet-${id}`);
+        assert.ok(text.length > 20, `${id}: ${text}`);
+      }
+      assert.match(await page.textContent("#sheet .statement"), /Research use only/);
+      assert.match(await page.textContent("#sheet .answer-word"), /^(Feasible|Feasible with risk|Unsure|Not feasible)$/);
+      assert.equal(await page.locator("#sheet-picture svg[role=img]").count(), 1);
+      assert.ok(await page.locator("#verdict li").count() >= await page.locator("#sheet-why li:not(.more)").count());
+      assert.deepEqual(await clippedBlocks(page), []);
+      const shot = await page.locator("#sheet").screenshot();
+      assert.ok(shot.length > 20000, `a picture of ${shot.length} bytes is not blank`);
+    });
+
+    use("prints the sheet on one page, with no block cut off", async (page) => {
+      assert.equal(pageCount(await page.pdf({preferCSSPageSize: true})), 1);
+      assert.equal(pageCount(await page.pdf({format: "A4"})), 1);
+      await page.emulateMedia({media: "print"});
+      await page.setViewportSize({width: 718, height: 1047}); // A4, less 1 cm at each side
+      assert.ok(await page.evaluate(() => document.documentElement.scrollWidth <= window.innerWidth));
+      assert.deepEqual(await clippedBlocks(page), []);
+      assert.ok(await page.isHidden("#answer"), "the rest of the page is not printed");
+    });
+
+    use("prints the whole page on request, with nothing cut off at the side", async (page) => {
+      await page.evaluate(() => (window.print = () => {}));
+      await page.click("text=Print the whole page");
       await page.emulateMedia({media: "print"});
       await page.setViewportSize({width: 1047, height: 718}); // A4 across, less 1 cm at each side
       assert.ok(await page.evaluate(() => document.documentElement.scrollWidth <= window.innerWidth));
-      const pdf = await page.pdf({format: "A4"});
+      const pdf = await page.pdf({preferCSSPageSize: true});
+      assert.ok(pageCount(pdf) > 3, `${pageCount(pdf)} pages`);
       assert.ok(pdf.length > 50000, `${pdf.length} bytes`);
     });
 
@@ -229,6 +259,27 @@ if (!given.length) {
     execFileSync(process.env.WIREPLAN_MAKE_LARGE_PAGE, [large, hostileCase], {stdio: "pipe"});
   });
   checkPage("a small case", () => small);
+
+  test("keeps a sheet of long names and many reasons on its page", async () => {
+    const {page, close} = await open(browser, large);
+    assert.equal(pageCount(await page.pdf({preferCSSPageSize: true})), 1);
+    assert.deepEqual(await clippedBlocks(page), []);
+    assert.match(await page.textContent("#sheet-why .more"), /^\d+ more below\.$/);
+    assert.equal(await page.locator("#verdict li").count(), 28, "below are all");
+    await close();
+  });
+
+  test("is printed by wireplan render --pdf", () => {
+    const render = (report, out) => spawnSync(process.env.WIREPLAN_PROGRAM,
+      ["render", report, "-o", out, "--pdf"], {encoding: "utf8", env: {...process.env, WIREPLAN_CHROMIUM: chromiumPath}});
+    const out = join(folder, "it's a folder #1");
+    const done = render(join(dirname(small), "report.json"), out);
+    assert.equal(done.status, 0, done.stderr);
+    assert.match(done.stdout, /sheet\.pdf/);
+    const pdf = readFileSync(join(out, "sheet.pdf"));
+    assert.equal(pageCount(pdf), 1);
+    assert.ok(pdf.length > 20000, `${pdf.length} bytes`);
+  });
 
   test("shows hostile names as text", async () => {
     const named = await open(browser, large);

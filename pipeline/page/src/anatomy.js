@@ -51,9 +51,19 @@ const armTable = ({ostia}) =>
     ostia.map((row) => [
       `from ${row.trunk} into ${row.branch}`, mm(row.at_mm), degrees(row.turn_deg), viewText(row.best), viewText(row.second)]));
 
-/** The tree and the way as the detector of that view sees them, in mm. */
-const pictureOf = ({tree, way}, ostium) => {
-  const view = ostium.best.reachable || !ostium.second ? ostium.best : ostium.second;
+const kFromTheFront = {view: "LAO 0, CRA 0", lao_deg: 0, cranial_deg: 0};
+
+/** The view to work in at an ostium: the best that the arm reaches; from the front without one. */
+export const workingView = (ostium) => {
+  if (!ostium) return kFromTheFront;
+  return ostium.best.reachable || !ostium.second ? ostium.best : ostium.second;
+};
+
+/**
+ * The tree and the way as the detector of that view sees them, in mm. `marks`: the wire's nodes, in
+ * whose place the middle of the way is drawn without; an ostium; access and target.
+ */
+export const drawView = ({tree, way}, view, marks) => {
   const a = (view.lao_deg * Math.PI) / 180, b = (view.cranial_deg * Math.PI) / 180;
   const right = [Math.cos(a), Math.sin(a), 0];
   const up = [-Math.sin(a) * Math.sin(b), Math.cos(a) * Math.sin(b), Math.cos(b)];
@@ -71,17 +81,31 @@ const pictureOf = ({tree, way}, ostium) => {
     return svg("line", {x1: round(x1), y1: round(y1), x2: round(x2), y2: round(y2), stroke: color, "stroke-width": round(width), "stroke-linecap": "round"});
   });
   const lumen = [...tree.flatMap((line) => strokes(line, "#c9ced6")), ...strokes(way, "#8fb3d9")];
-  const middle = svg("polyline", {points: way.points.map((p) => seen(p).map(round).join(",")).join(" "), fill: "none", stroke: "#1b1b1b", "stroke-width": 0.8});
-  const names = tree.map((line, k) => {
-    const [x, y] = seen(line.points.at(-1));
-    return svg("text", {x: round(x), y: round(y), "font-size": 8, "text-anchor": "middle", fill: "#1b1b1b"}, String(k + 1));
-  });
-  const [x, y] = seen(ostium.place_mm);
-  const mark = svg("circle", {cx: round(x), cy: round(y), r: 5, fill: "none", stroke: "#a3262a", "stroke-width": 1.2});
-  const label = `Vessel and way in the view ${view.view}, the ostium circled`;
+  const unit = Math.max(box[2] - box[0], box[3] - box[1]) / 400;  // of marks and letters
+  const line = (points, color, width) =>
+    svg("polyline", {points: points.map((p) => seen(p).map(round).join(",")).join(" "), fill: "none", stroke: color, "stroke-width": width * unit});
+  const middle = marks.wire?.length ? line(marks.wire, "#a3262a", 1.4) : line(way.points, "#1b1b1b", 0.8);
+  const label = (p, text, size) => {
+    const [x, y] = seen(p);
+    return svg("text", {x: round(x), y: round(y), "font-size": size * unit, "text-anchor": "middle", fill: "#1b1b1b", stroke: "#ffffff", "stroke-width": (size * unit) / 5, "paint-order": "stroke"}, text);
+  };
+  const names = tree.map((branch, k) => label(branch.points.at(-1), String(k + 1), 10));
+  const ends = [["A", marks.access], ["T", marks.target]].filter(([, p]) => p).map(([text, p]) => label(p, text, 15));
+  const circle = (p) => {
+    const [x, y] = seen(p);
+    return svg("circle", {cx: round(x), cy: round(y), r: 6 * unit, fill: "none", stroke: "#a3262a", "stroke-width": 1.4 * unit});
+  };
+  const pad = 8 * unit;
+  const viewBox = [box[0] - pad, box[1] - pad, box[2] - box[0] + 2 * pad, box[3] - box[1] + 2 * pad].map(round).join(" ");
+  const what = `Vessel and way in the view ${view.view}${marks.ostium ? ", the ostium circled" : ""}`;
+  return svg("svg", {class: "arm-view", viewBox, preserveAspectRatio: "xMidYMin meet", role: "img", "aria-label": what},
+    lumen, middle, names, ends, marks.ostium ? circle(marks.ostium) : null);
+};
+
+const pictureOf = (panel, ostium) => {
+  const view = workingView(ostium);
   return el("figure", {},
-    svg("svg", {class: "arm-view", viewBox: `${round(box[0])} ${round(box[1])} ${round(box[2] - box[0])} ${round(box[3] - box[1])}`, role: "img", "aria-label": label},
-      lumen, middle, names, mark),
+    drawView(panel, view, {ostium: ostium.place_mm}),
     el("figcaption", {}, `${view.view}: as the detector sees the way (blue) and the vessels beside it (grey), as wide as their lumen, each branch with its number at its end; the ostium of ${ostium.branch} is circled.`));
 };
 

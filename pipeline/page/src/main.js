@@ -4,6 +4,7 @@ import {readPage} from "./data.js";
 import {shown} from "./format.js";
 import {makeSelection} from "./selection.js";
 import {anatomySection} from "./anatomy.js";
+import {sheetSection, verdictSection} from "./sheet.js";
 import {answerSection, askedSection, provenanceSection, uncertainSection, warningSection} from "./texts.js";
 import {rankingSection} from "./ranking.js";
 import {vesselSection} from "./player.js";
@@ -18,7 +19,9 @@ document.title = `${shown(page.report.name)}: wireplan report`;
 
 const notice = () => el("p", {class: "notice"}, el("strong", {}, page.report.statement));
 const vessel = vesselSection(page, selection);
+const sheet = sheetSection(page);
 const sections = [
+  verdictSection(page),
   answerSection(page),
   askedSection(page),
   rankingSection(page, selection),
@@ -32,13 +35,14 @@ const sections = [
   provenanceSection(page),
 ].filter(Boolean);
 document.getElementById("page").append(
+  sheet.node,
   el("header", {},
-    el("h1", {}, "Guidewire plan: ", el("bdi", {}, shown(page.report.name))),
     notice(),
     el("nav", {"aria-label": "Contents"},
       el("ul", {}, sections.map((s) => el("li", {}, el("a", {href: `#${s.id}`}, s.querySelector("h2").textContent)))))),
   ...sections,
   notice());
+sheet.fit();
 vessel.start();
 // For who waits until the page can be used.
 document.documentElement.dataset.ready = "true";

@@ -1,0 +1,247 @@
+// The first sheet: what is needed to decide and to prepare, on one A4 page. It has the size of the
+// page on paper also on a screen, so that what fits here fits there.
+import {el, name} from "./dom.js";
+import {degrees, number, plural, shown} from "./format.js";
+import {drawView, workingView} from "./anatomy.js";
+
+const kPlans = 3, kReasons = 8, kChanges = 4, kWarnings = 3, kPlaces = 6;
+const kAnswers = {
+  feasible: "Feasible",
+  feasible_with_risk: "Feasible with risk",
+  unsure: "Unsure",
+  not_feasible: "Not feasible",
+};
+const kUnknowns = {
+  friction: "friction",
+  wall: "stiffness of the wall",
+  angle: "angle of the introducer",
+  entry: "place of entry",
+  lumen: "width of the lumen",
+};
+const kMillimetresPerInch = 25.4;
+
+const two = (value) => number(Number(value.toPrecision(2)));
+const wholePercent = (part) => `${Math.round(100 * part)}\u00a0%`;
+const sentence = (text) => shown(text).replace(/ deg\b/g, "\u00b0");
+const mm = (value) => `${number(value)}\u00a0mm`;
+/** A place on the way: whole millimetres, as far as they tell something. */
+const along = (value) => mm(value < 10 ? Number(value.toFixed(1)) : Math.round(value));
+const block = (id, title, ...children) =>
+  el("section", {class: "block", id: `sheet-${id}`, "aria-label": title}, el("h2", {}, title), ...children);
+
+/** On a narrow screen it scrolls sideways. */
+const sheetTable = (label, heads, rows) =>
+  el("div", {class: "scroll", tabindex: "0", role: "region", "aria-label": label},
+    el("table", {},
+      el("thead", {}, el("tr", {}, heads.map((head) => (head ? el("th", {scope: "col"}, head) : el("td", {}))))),
+      el("tbody", {}, rows.map((row) => el("tr", {}, row)))));
+
+/** A list that can be cut from its end: what is left out is counted, and stands below the sheet. */
+const cutList = (items, most) => {
+  const kept = items.slice(0, most).map((item) => el("li", {}, item));
+  const more = el("li", {class: "more"});
+  const list = el("ul", {}, kept, more);
+  const tell = () => {
+    const left = items.length - kept.length;
+    more.textContent = left ? `${left} more below.` : "";
+    more.hidden = !left;
+  };
+  tell();
+  list.cut = () => {
+    if (kept.length < 2) return false;
+    kept.pop().remove();
+    tell();
+    return true;
+  };
+  return list;
+};
+
+// ---- Plans.
+const kLong = new Set([1, 5]);  // columns of wires and of moves
+const safeText = (repeats) => (repeats ? `${repeats.successes} of ${repeats.repeats}` : "not repeated");
+
+const planTable = ({report, trials}) => {
+  const {tip_force_warn_n: warn} = report.provenance.parameters.limits ?? {};
+  const heads = ["", "Wire", "Tilt", "Toward", "Roll", "Moves", "Wire in vessel", "Force at tip", "Largest force on wall", "Safe repeats"];
+  const rows = report.ranking.slice(0, kPlans).map((plan, k) => {
+    const t = trials[plan.trial];
+    return [`${k + 1}`, name(shown(t.wire)), degrees(t.inclination_deg), degrees(t.azimuth_deg), degrees(t.roll_deg),
+      t.script ? shown(t.script) : "one push", mm(t.insertion_mm), `${two(t.peak_tip_force_n)}\u00a0N`,
+      `${two(t.peak_contact_force_n)}\u00a0N`, safeText(report.robustness?.plans?.find((row) => row.trial === plan.trial))];
+  });
+  const note = `Tilt of the introducer from the vessel's axis, toward the front at 0\u00b0; roll of the wire's tip. Safe: the target is reached and no limit is broken.` +
+    (warn === undefined ? "" : ` Force at the tip: a warning from ${number(warn)}\u00a0N on.`);
+  return block("plans", rows.length ? `The best of ${plural(report.ranking.length, "safe plan")}` : "Plans",
+    rows.length
+      ? [sheetTable("Best plans", heads, rows.map((row) => row.map((cell, k) =>
+          kLong.has(k) ? el("td", {}, el("div", {class: "two-lines"}, cell)) : el("td", {class: "short"}, cell)))),
+         el("p", {class: "note"}, note)]
+      : el("p", {}, "No plan reaches the target within the limits. The table of all trials below tells each one's end."));
+};
+
+// ---- Access.
+const gradeText = (grade) => (grade === "none" ? "no finding" : grade);
+
+const passageRow = (what, row) => [what, `lumen of ${mm(row.lumen_diameter_mm)} at its narrowest, ${along(row.at_mm)} in`,
+  `${mm(row.device_diameter_mm)}, ratio ${two(row.ratio)}`, `below ${number(row.max_ratio)}`, row.fits ? "fits" : "does not fit"];
+
+const accessTable = ({anatomy}) => {
+  if (!anatomy) return block("access", "Access", el("p", {}, "Not measured in this report."));
+  const {device, sheath, tortuosity, sharpest_bend: bend, calcium} = anatomy.access;
+  const severe = (rows) => rows.at(-1);
+  const rows = [
+    passageRow("Widest device", device),
+    passageRow(`Sheath, first ${mm(sheath.length_mm)}`, sheath),
+    ["Tortuosity", tortuosity.index === null ? "not known" : `way over straight line`, number(tortuosity.index),
+     `severe from ${number(severe(tortuosity.thresholds))}`, gradeText(tortuosity.grade)],
+    ["Sharpest bend", `${along(bend.at_mm)} in${bend.at_ostium_of ? `, the turn into ${bend.at_ostium_of}` : ""}`, degrees(Math.round(bend.angle_deg)),
+     `severe below ${degrees(severe(bend.thresholds_deg))}`, bend.at_ostium_of ? "a branch's own turn" : gradeText(bend.grade)],
+    ["Calcium beside it", calcium.volume_mm3 === null ? "not known without a CT" : `above ${number(calcium.above_hu)}\u00a0HU within ${mm(calcium.within_mm)}`,
+     calcium.volume_mm3 === null ? "\u2013" : `${number(calcium.volume_mm3)}\u00a0mm\u00b3`, "no grade agreed on",
+     calcium.volume_mm3 > 0 ? "look at the slices" : calcium.volume_mm3 === null ? "not known" : "none found"],
+  ];
+  return block("access", "Access, along the way from the access point to the target",
+    sheetTable("Findings of the access", ["What", "Where", "Found", "Held against", "Finding"],
+      rows.map((row) => row.map((cell) => el("td", {}, cell)))));
+};
+
+// ---- What to prepare.
+const wireText = (report, wire, what) => {
+  const given = report.provenance.parameters.wires.find((row) => row.name === wire);
+  const length = report.anatomy?.lengths.wires.find((row) => row.wire === wire);
+  const inches = given?.diameter_mm ? `, ${(given.diameter_mm / kMillimetresPerInch).toFixed(3)}\u00a0in` : "";
+  const enough = length ? `, ${mm(length.length_mm)} long${length.long_enough ? "" : `: ${mm(-length.spare_mm)} too short`}` : "";
+  return el("span", {class: "two-lines"}, what, name(shown(wire)), inches, enough);
+};
+
+const fetchBlock = ({report}) => {
+  const {anatomy, ranking} = report;
+  const wires = [...new Set(ranking.slice(0, kPlans).map((plan) => plan.wire))];
+  const items = wires.map((wire, k) => wireText(report, wire, k ? "In reserve: " : "Wire: "));
+  if (anatomy) {
+    const {sheath, device} = anatomy.access;
+    items.push(`Sheath of at most ${mm(sheath.max_ratio * sheath.lumen_diameter_mm)} outer diameter; taken here: ${mm(sheath.device_diameter_mm)}`,
+      `Catheter of at most ${mm(device.lumen_diameter_mm)}; taken here: ${mm(device.device_diameter_mm)}, ${mm(anatomy.lengths.catheter_mm)} long`,
+      `Wire needed with both: ${along(anatomy.lengths.wire_needed_mm)}`);
+  }
+  return block("fetch", "To fetch", items.length ? el("ul", {}, items.map((item) => el("li", {}, item))) : el("p", {}, "Nothing: there is no plan."));
+};
+
+const lengthBlock = ({anatomy}) => {
+  if (!anatomy) return null;
+  const {places} = anatomy.lengths;
+  const told = (row) => [row.branch ? `${row.what === "passes" ? "past" : "into"} ${row.branch}` : "target", along(row.at_mm)];
+  const last = places.slice(-kPlaces);
+  return block("lengths", "Lengths from the access",
+    el("dl", {class: "pairs"}, last.map(told).flatMap(([place, at]) => [el("dt", {}, place), el("dd", {}, at)])),
+    last.length < places.length ? el("p", {class: "note"}, `${places.length - last.length} before these below.`) : null);
+};
+
+// ---- What is uncertain.
+const uncertainBlock = ({report, trials}) => {
+  const [first] = report.ranking;
+  const items = [];
+  if (first) {
+    const error = trials[first.trial].errors.tip_error_mm;
+    items.push(error === undefined || error === null
+      ? "Plan 1: the error of the tip's place is not known."
+      : `Plan 1: the tip is where it is told to within ${mm(Number(error.toPrecision(2)))}, by the computation alone.`);
+    const repeats = report.robustness?.plans?.find((row) => row.trial === first.trial);
+    items.push(repeats
+      ? `Plan 1: safe in ${safeText(repeats)} repeats with other angles, entry, friction, wall and lumen; the share lies between ${repeats.success_rate_interval.map(wholePercent).join(" and ")}.`
+      : "Plan 1 was not repeated with other angles, friction, wall and lumen.");
+    const shares = report.robustness?.sensitivity?.shares ?? [];
+    if (shares.length) {
+      items.push(`What decides most between plans: ${shares.slice(0, 2).map((row) => `${kUnknowns[row.unknown] ?? shown(row.unknown)} (${wholePercent(row.share)})`).join(", ")}.`);
+    }
+    if (first.tied_with.length) items.push(`${plural(first.tied_with.length, "other plan")} cannot be told apart from plan 1.`);
+  }
+  items.push("Not in the numbers: errors of the vessel's outline, of the wires' data, blood flow, breathing.");
+  const warnings = report.provenance.warnings.map((text) => `Warning: ${shown(text).replace(/^[a-z]+: /, "").replace(/: see wall_motion of each$/, "")}`);
+  return block("uncertain", "What is uncertain", cutList([...items, ...warnings], items.length + kWarnings));
+};
+
+// ---- The verdict and the picture.
+const verdictBlocks = ({verdict}) => {
+  if (!verdict) {
+    return [el("section", {class: "block verdict unknown", id: "sheet-verdict", "aria-label": "Verdict"}, el("p", {class: "answer-word"}, "No verdict"),
+      el("p", {class: "headline"}, "This report has none; run the case again for one.")), []];
+  }
+  const reasons = cutList(verdict.reasons.map(sentence), kReasons);
+  const changes = cutList(verdict.changes.map(sentence), kChanges);
+  return [
+    el("section", {class: `block verdict ${verdict.answer}`, id: "sheet-verdict", "aria-label": "Verdict"},
+      el("p", {class: "answer-word"}, kAnswers[verdict.answer] ?? shown(verdict.answer)),
+      el("p", {class: "headline"}, sentence(verdict.headline))),
+    [block("why", "Why", reasons),
+     block("changes", "What would change it", verdict.changes.length ? changes : el("p", {}, "The trials show nothing that would."))],
+  ];
+};
+
+const pictureBlock = (page) => {
+  const {anatomy, ranking} = page.report;
+  const panel = page.panels.anatomy;
+  if (!anatomy || !panel) {
+    return block("picture", "The vessel", el("p", {}, "A picture of the vessel stands below."));
+  }
+  const ostium = anatomy.c_arm.ostia.at(-1);
+  const view = workingView(ostium);
+  const nodes = ranking.length ? page.trials[ranking[0].trial].nodes() : new Float32Array();
+  const wire = Array.from({length: nodes.length / 3}, (_, k) => [...nodes.subarray(3 * k, 3 * k + 3)]);
+  const drawing = drawView(panel, view, {wire, ostium: ostium?.place_mm, access: page.access, target: page.target});
+  const second = ostium?.second && view !== ostium.second ? `Second best: ${ostium.second.view}. ` : "";
+  return block("picture", `Working view: ${view.view}`, drawing,
+    el("p", {class: "note"}, `${ostium ? `Shows the turn into ${ostium.branch} (circled) in its length. ` : "Antero-posterior: the way turns into no branch. "}${second}` +
+      `Way blue, other vessels grey, ${wire.length ? "wire of plan 1 red, " : ""}A access, T target.`));
+};
+
+/** Cuts lists, the longest first, until nothing of the sheet is beyond its lower border. */
+const fit = (sheet) => {
+  const lists = [...sheet.querySelectorAll("ul")].filter((list) => list.cut);
+  const over = () => {
+    const end = sheet.getBoundingClientRect().bottom;
+    return [...sheet.querySelectorAll(".block, .block > *")].some((node) =>
+      node.getBoundingClientRect().bottom > end + 0.5 ||
+      (node.classList.contains("block") && node.parentElement.getBoundingClientRect().bottom + 0.5 < node.getBoundingClientRect().bottom));
+  };
+  sheet.classList.add("on-paper");
+  for (let tries = 0; tries < 30 && over(); ++tries) {
+    lists.sort((a, b) => b.scrollHeight - a.scrollHeight);
+    if (!lists.some((list) => list.cut())) break;
+  }
+  sheet.classList.remove("on-paper");
+};
+
+export const sheetSection = (page) => {
+  const {report} = page;
+  const [verdict, why] = verdictBlocks(report);
+  const {program} = report.provenance;
+  const print = (all) => () => {
+    document.documentElement.classList.toggle("print-all", all);
+    window.print();
+  };
+  const sheet = el("section", {class: "sheet", id: "sheet", "aria-labelledby": "sheet-title"},
+    el("h1", {id: "sheet-title"}, "Guidewire plan: ", name(shown(report.name))),
+    verdict,
+    el("div", {class: "columns wide-left"}, el("div", {class: "stack"}, why), pictureBlock(page)),
+    planTable(page),
+    accessTable(report),
+    el("div", {class: "columns"}, uncertainBlock(page), el("div", {class: "stack"}, fetchBlock(page), lengthBlock(report))),
+    el("p", {class: "statement"}, el("strong", {}, report.statement), ` ${program.name} ${program.version}.`));
+  const node = el("div", {class: "sheet-frame"}, sheet,
+    el("p", {class: "sheet-buttons buttons"},
+      el("button", {type: "button", onclick: print(false)}, "Print this sheet"),
+      el("button", {type: "button", onclick: print(true)}, "Print the whole page")));
+  return {node, fit: () => fit(sheet)};
+};
+
+/** All reasons and changes, of which the sheet may have cut some. */
+export const verdictSection = ({report: {verdict}}) => {
+  if (!verdict) return null;
+  const list = (texts, none) => (texts.length ? el("ul", {}, texts.map((text) => el("li", {}, sentence(text)))) : el("p", {}, none));
+  return el("section", {id: "verdict", "aria-labelledby": "verdict-title"},
+    el("h2", {id: "verdict-title"}, "The verdict in full"),
+    el("p", {class: "answer"}, el("strong", {}, kAnswers[verdict.answer] ?? shown(verdict.answer)), `. ${sentence(verdict.headline)}`),
+    el("h3", {}, "Why"), list(verdict.reasons, "Nothing is known."),
+    el("h3", {}, "What would change it"), list(verdict.changes, "The trials show nothing that would."));
+};
