@@ -75,42 +75,58 @@ class Weighing {
 
   // ---- No plan.
   void weigh_failure() {
-    Endings all, full;
-    int coarse = 0, reached_coarsely = 0;
+    Endings all, fine, full;
+    int reached_coarsely = 0;
     for (std::size_t k = 0; k < known_.plan.trials.size(); ++k) {
       const int id = static_cast<int>(k);
-      const bool in_full = known_.plan.levels[k] == Level::kFull;
-      add_ending(all, trial(id), wire_of(id), known_.study, known_.limits);
-      if (in_full) add_ending(full, trial(id), wire_of(id), known_.study, known_.limits);
-      coarse += !in_full;
-      reached_coarsely += !in_full && trial(id).metrics.reached;
+      const Level level = known_.plan.levels[k];
+      const auto add = [&](Endings& endings) {
+        add_ending(endings, trial(id), wire_of(id), known_.study, known_.limits);
+      };
+      add(all);
+      if (level != Level::kScout) add(fine);
+      if (level == Level::kFull) add(full);
+      reached_coarsely += level != Level::kFull && trial(id).metrics.reached;
     }
     headline_ = all.reached == 0
                     ? "None of " + count_of(all.trials, "trial") + " reaches the target."
                     : std::to_string(all.reached) + " of " + count_of(all.trials, "trial") +
                           " reach the target, none of them within the limits.";
     const Answer answer =
-        leaves_open(all, full, reached_coarsely) ? Answer::kUnsure : Answer::kNotFeasible;
+        leaves_open(all, fine, reached_coarsely) ? Answer::kUnsure : Answer::kNotFeasible;
     if (full.reached > 0) {
       find(answer, count_of(full.reached, "trial") +
                        (full.reached == 1 ? " reaches the target but breaks"
                                           : " reach the target but break") +
                        " a limit: " + describe_broken_limits(full, known_.limits) + ".");
     }
-    const std::string endings = describe_endings(all);
-    if (!endings.empty()) find(answer, "Of " + count_of(all.trials, "trial") + " " + endings + ".");
+    if (all.reached < all.trials) find(answer, how_trials_ended(all, fine));
     for (std::string& text : changes_by(all, known_, "trial")) change(std::move(text));
-    if (coarse > 0) {
-      change("Running all trials in full detail: " + std::to_string(coarse) + " of " +
-             std::to_string(all.trials) + " were run coarsely only, against a rigid wall.");
+    if (full.trials < all.trials) {
+      change("Running all trials in full detail: " + std::to_string(all.trials - full.trials) +
+             " of " + std::to_string(all.trials) + " were run against a rigid wall only.");
     }
   }
 
-  bool leaves_open(const Endings& all, const Endings& full, int reached_coarsely) {
+  static std::string how_trials_ended(const Endings& all, const Endings& fine) {
+    const std::string number = std::to_string(all.trials), endings = describe_endings(all);
+    std::string text = endings.starts_with(number + " ")
+                           ? "All " + count_of(all.trials, "trial") + endings.substr(number.size())
+                           : "Of " + count_of(all.trials, "trial") + " " + endings;
+    if (fine.trials < all.trials) {
+      text += "; " + std::to_string(fine.trials) +
+              " of them were computed with fine elements, the "
+              "others coarsely";
+    }
+    return text + ".";
+  }
+
+  bool leaves_open(const Endings& all, const Endings& fine, int reached_coarsely) {
     const std::size_t before = findings_.size();
-    if (full.clear() == 0) {
-      find(Answer::kUnsure, "No trial that was run in full detail came to a clear end" +
-                                std::string(full.trials == 0 ? ": none was run so." : "."));
+    if (fine.clear() == 0) {
+      find(Answer::kUnsure,
+           "No trial that was computed with fine elements came to a clear end" +
+               std::string(fine.trials == 0 ? ": all were computed coarsely." : "."));
     }
     if (all.unclear() > rules_.unclear_part * all.trials) {
       find(Answer::kUnsure,
@@ -121,8 +137,8 @@ class Weighing {
     if (reached_coarsely > 0) {
       find(Answer::kUnsure,
            count_of(reached_coarsely, "trial") + (reached_coarsely == 1 ? " reaches" : " reach") +
-               " the target when run coarsely against a rigid wall, and " +
-               (reached_coarsely == 1 ? "was" : "were") + " not run in full detail.");
+               " the target against a rigid wall, and " + (reached_coarsely == 1 ? "was" : "were") +
+               " not run in full detail.");
     }
     return findings_.size() > before;
   }

@@ -71,10 +71,11 @@ struct Known {
 ///   not feasible        the narrowest place is narrower than a device that was asked for by more
 ///                       than the wall's place is unknown (Unknowns::lumen, at both sides); or no
 ///                       trial is a plan, and nothing of what follows leaves that open
-///   unsure              no plan, and: nothing that was run in full came to a clear end, or more
-///                       than `unclear_part` of all did not, or one reached that was not run in
-///                       full. A plan, but: it was not repeated, its share of safe repeats is not
-///                       known well enough, or its tip's error is not known or too large
+///   unsure              no plan, and: none computed with fine elements came to a clear end (probes
+///                       count, since what clearly fails in one is not run in full), or more than
+///                       `unclear_part` of all did not, or one reached that was not run in full.
+///                       A plan, but: it was not repeated, its share of safe repeats is not known
+///                       well enough, or its tip's error is not known or too large
 ///   feasible with risk  tip force, also that of 19 in 20 repeats, above the level to warn of;
 ///                       share of safe repeats too low; wall moved beyond linear theory; sheath at
 ///                       its largest ratio to the lumen, or device as wide as the lumen; way or

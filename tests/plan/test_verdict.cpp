@@ -313,12 +313,15 @@ TEST(Verdict, WhereAllFailInFullIsNotFeasible) {
   EXPECT_EQ(verdict.answer, Answer::kNotFeasible);
   EXPECT_EQ(verdict.headline, "None of 20 trials reaches the target.");
   EXPECT_EQ(verdict.reasons,
-            (std::vector<std::string>{"Of 20 trials 13 got stuck and 7 passed by the branch."}));
+            (std::vector<std::string>{"Of 20 trials 13 got stuck and 7 passed by the branch; 9 of "
+                                      "them were computed with fine elements, the others "
+                                      "coarsely."}));
   EXPECT_EQ(verdict.changes.size(), 3U);
   EXPECT_TRUE(tells(verdict.changes, "Another access, or a wire of another stiffness: 13 of 20"));
   EXPECT_TRUE(tells(verdict.changes, "A wire with an angled tip: 7 of 20 trials"));
   EXPECT_TRUE(
-      tells(verdict.changes, "Running all trials in full detail: 11 of 20 were run coarsely only"));
+      tells(verdict.changes,
+            "Running all trials in full detail: 11 of 20 were run against a rigid wall only."));
 }
 
 TEST(Verdict, WhereAllThatReachBreakALimitIsNotFeasible) {
@@ -361,15 +364,22 @@ TEST(Verdict, WhatWasOnlyScoutedIsUnsure) {
   scouted.add_many(9, Outcome::kStuck, Level::kScout);
   EXPECT_EQ(scouted.verdict().answer, Answer::kUnsure);
   EXPECT_EQ(scouted.verdict().reasons.front(),
-            "No trial that was run in full detail came to a clear end: none was run so.");
+            "No trial that was computed with fine elements came to a clear end: all were computed "
+            "coarsely.");
 
   WhatIsKnown reached;
   reached.add_many(9, Outcome::kStuck);
   reached.add(Outcome::kReached, Level::kScout);
   EXPECT_EQ(reached.verdict().answer, Answer::kUnsure);
   EXPECT_EQ(reached.verdict().reasons.front(),
-            "1 trial reaches the target when run coarsely against a rigid wall, and was not run in "
-            "full detail.");
+            "1 trial reaches the target against a rigid wall, and was not run in full detail.");
+}
+
+TEST(Verdict, WhatClearlyFailsInAProbeIsAFinding) {
+  WhatIsKnown probed;
+  probed.add_many(9, Outcome::kPassedBy, Level::kProbe);
+  EXPECT_EQ(probed.verdict().answer, Answer::kNotFeasible);
+  EXPECT_EQ(probed.verdict().reasons.front(), "All 9 trials passed by the branch.");
 }
 
 TEST(Verdict, ChangesFollowFromWhatWasTried) {
