@@ -34,15 +34,17 @@ const sections = [
   warningSection(page),
   provenanceSection(page),
 ].filter(Boolean);
-document.getElementById("page").append(
-  sheet.node,
+// By itself first: laying it out takes no time then.
+const main = document.getElementById("page");
+main.append(sheet.node);
+sheet.fit();
+main.append(
   el("header", {},
     notice(),
     el("nav", {"aria-label": "Contents"},
       el("ul", {}, sections.map((s) => el("li", {}, el("a", {href: `#${s.id}`}, s.querySelector("h2").textContent)))))),
   ...sections,
   notice());
-sheet.fit();
 vessel.start();
 // For who waits until the page can be used.
 document.documentElement.dataset.ready = "true";

@@ -43,9 +43,10 @@ export const answerSection = (page) => {
   }
   const t = trials[best.trial], errors = t.errors;
   const ties = best.tied_with.length;
+  const repeats = report.robustness?.plans?.find((row) => row.trial === best.trial);
   const rate = best.success_rate === null || best.success_rate === undefined
     ? "How often it is safe when angles, friction and wall differ was not asked."
-    : `With angles, friction and wall disturbed it is safe (reaches, and breaks no limit) in ${percent(best.success_rate)} of repeats (${percent(best.success_rate_interval[0])} to ${percent(best.success_rate_interval[1])}).`;
+    : `With angles, friction and wall disturbed it is safe (reaches, and breaks no limit) in ${repeats ? `${repeats.successes} of ${plural(repeats.repeats, "repeat")}` : `${percent(best.success_rate)} of repeats`} (${percent(best.success_rate_interval[0])} to ${percent(best.success_rate_interval[1])}).`;
   return section("answer", "The answer",
     el("p", {class: "answer"},
       "Best of ", plural(report.ranking.length, "safe plan"), `, which reach and break no limit; ${trials.filter((x) => x.reached).length} of ${trials.length} tried reach: `,
