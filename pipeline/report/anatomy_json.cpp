@@ -20,17 +20,23 @@ double degrees(double angle) { return angle / kRadPerDeg; }
 
 const char* grade_name(int grade) { return kGrades.at(static_cast<std::size_t>(grade)); }
 
-/// A device against the lumen that it must pass.
-Json passage_json(const plan::Narrowest& lumen, double device, double max_ratio,
-                  const char* source) {
+/// A device against the first `length` mm of the lumen, which it must pass. It passes where it is
+/// thinner than the inscribed spheres too: a narrow place may be wide one way alone.
+Json passage_json(const Centerline& way, const Eigen::VectorXd& diameters, double length,
+                  double device, double max_ratio, const char* source) {
+  Centerline sections = way;
+  sections.radius = 0.5 * diameters;
+  const plan::Narrowest lumen = plan::find_narrowest(sections, length);
+  const double inscribed = plan::find_narrowest(way, length).diameter;
   const double ratio = device / lumen.diameter;
   return {{"lumen_diameter_mm", lumen.diameter},
+          {"inscribed_diameter_mm", inscribed},
           {"at_mm", lumen.arc},
           {"place_mm", to_json(lumen.point)},
           {"device_diameter_mm", device},
           {"ratio", ratio},
           {"max_ratio", max_ratio},
-          {"fits", ratio < max_ratio},
+          {"fits", ratio < max_ratio && device < max_ratio * inscribed},
           {"source", source}};
 }
 
@@ -43,16 +49,15 @@ Json ostium_at(const plan::Corner& bend, const std::vector<plan::Junction>& junc
   return nullptr;
 }
 
-Json access_json(const Centerline& way, const std::vector<plan::Junction>& junctions,
-                 const plan::AccessLimits& limits) {
+Json access_json(const Centerline& way, const Eigen::VectorXd& diameters,
+                 const std::vector<plan::Junction>& junctions, const plan::AccessLimits& limits) {
   const double length = way.arc_length(way.arc_length.size() - 1);
   Json access;
-  access["device"] = passage_json(plan::find_narrowest(way, length), limits.device_diameter, 1.0,
+  access["device"] = passage_json(way, diameters, length, limits.device_diameter, 1.0,
                                   "limits of the case; a device must be thinner than the lumen");
-  access["sheath"] =
-      passage_json(plan::find_narrowest(way, limits.sheath_length), limits.sheath_diameter,
-                   limits.max_sheath_ratio,
-                   "limits of the case; the ratio by default that of sheath to femoral artery");
+  access["sheath"] = passage_json(
+      way, diameters, limits.sheath_length, limits.sheath_diameter, limits.max_sheath_ratio,
+      "limits of the case; the ratio by default that of sheath to femoral artery");
   access["sheath"]["length_mm"] = limits.sheath_length;
 
   const double index = plan::tortuosity(way);
@@ -155,9 +160,10 @@ Json drawn_line(const Centerline& line) {
 
 }  // namespace
 
-Json anatomy_figures(const simulate::Way& way, const plan::AccessLimits& limits) {
+Json anatomy_figures(const simulate::Way& way, const Eigen::VectorXd& diameters,
+                     const plan::AccessLimits& limits) {
   const std::vector<plan::Junction> junctions = plan::find_junctions(way);
-  return {{"access", access_json(way.path(), junctions, limits)},
+  return {{"access", access_json(way.path(), diameters, junctions, limits)},
           {"c_arm", c_arm_json(junctions, limits.arm)},
           {"lengths", lengths_json(way.path(), junctions, limits)}};
 }

@@ -9,9 +9,11 @@
 
 namespace wireplan::pipeline {
 
-/// What follows from way and limits: "access" without calcium, "c_arm" and "lengths" without wires.
-/// Branches are called as the report's, "branch 1" and so on.
-Json anatomy_figures(const simulate::Way& way, const plan::AccessLimits& limits);
+/// What follows from way, limits and how wide the vessel is at each point of the way [mm]: "access"
+/// without calcium, "c_arm" and "lengths" without wires. Branches are called as the report's,
+/// "branch 1" and so on.
+Json anatomy_figures(const simulate::Way& way, const Eigen::VectorXd& diameters,
+                     const plan::AccessLimits& limits);
 
 /// The row of calcium: a volume [mm^3], or null with the reason where `unknown` tells one.
 Json calcium_json(double volume, const std::string& unknown, const plan::AccessLimits& limits);

@@ -3,6 +3,7 @@
 
 #include "pipeline/report/anatomy_json.h"
 #include "pipeline/stages/makers.h"
+#include "preprocess/centerline/section_width.h"
 #include "preprocess/volume/calcium.h"
 
 namespace wireplan::pipeline {
@@ -25,7 +26,9 @@ std::string calcium_unknown(Workspace& work, const plan::AccessLimits& limits) {
 void make_anatomy(Workspace& work, const std::filesystem::path& folder) {
   const plan::AccessLimits& limits = work.given().access_limits;
   Json figures = figures_of("anatomy");
-  figures.update(anatomy_figures(*work.study().goal.way, limits));
+  const simulate::Way& way = *work.study().goal.way;
+  figures.update(
+      anatomy_figures(way, preprocess::section_diameters(work.surface(), way.path()), limits));
 
   const std::string unknown = calcium_unknown(work, limits);
   double volume = 0.0;

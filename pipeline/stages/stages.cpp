@@ -179,8 +179,9 @@ std::vector<Stage> stages_of(const Case& given) {
                     .make = make_centerline});
   if (given.study.goal.at_section) read_too(stages.back(), {"/target/beyond_mm"});
   Stage anatomy{.name = "anatomy",
+                .version = 2,
                 .reads_input = from_volume,
-                .after = {"centerline"},
+                .after = {"surface", "centerline"},
                 .parameters = {"/access_limits"},
                 .make = make_anatomy};
   if (from_volume) anatomy.after.push_back("segment");

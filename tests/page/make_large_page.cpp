@@ -232,7 +232,7 @@ std::string make_page(const std::string& name) {
     report.warnings.push_back("trials: warning " + std::to_string(k) + kMaker + kMaker);
   }
   const simulate::Way way(path, {preprocess::Branch{.line = path}});
-  Json anatomy = anatomy_figures(way, {});
+  Json anatomy = anatomy_figures(way, 2.0 * path.radius, {});
   anatomy["warnings"] = Json::array();
   anatomy["access"]["calcium"] = calcium_json(12.5, "", {});
   report.figures["anatomy"] = anatomy;

@@ -4,7 +4,10 @@
 #include <cmath>
 #include <numeric>
 
+#include "plan/anatomy/passage.h"
+#include "plan/anatomy/projection.h"
 #include "preprocess/centerline/centerline.h"
+#include "preprocess/centerline/section_width.h"
 #include "preprocess/segment/segment.h"
 #include "preprocess/surface/surface.h"
 #include "tests/pipeline/upper_abdomen.h"
@@ -86,6 +89,22 @@ double quantile(std::vector<double> values, double part) {
   return values[static_cast<std::size_t>(part * static_cast<double>(values.size() - 1))];
 }
 
+const Centerline& axis_of(const Phantom& phantom, const std::string& name) {
+  const auto found = std::find(phantom.names.begin(), phantom.names.end(), name);
+  expects(found != phantom.names.end());
+  return phantom.centerlines[static_cast<std::size_t>(found - phantom.names.begin())];
+}
+
+double arc_near(const Centerline& axis, const Vec3& p) {
+  return axis.arc_length(nearest(axis, p).index);
+}
+
+/// Over `reach` [mm] to each side of an arc length.
+Vec3 chord_round(const Centerline& axis, double arc, double reach) {
+  const Vec3 chord = plan::point_at(axis, arc + reach) - plan::point_at(axis, arc - reach);
+  return chord.z() > 0.0 ? chord : Vec3(-chord);  // the way goes up
+}
+
 TEST(VesselPhantom, SurfaceAxisAndRadiusOfAnAbdomenAreTheTrueOnes) {
   PhantomSpec spec = upper_abdomen(0.7, 22.0);
   spec.calcium.clear();  // plaque is no part of the tubes' radii
@@ -137,6 +156,35 @@ TEST(VesselPhantom, SurfaceAxisAndRadiusOfAnAbdomenAreTheTrueOnes) {
   // The inscribed ball meets the dents of the noise, and flat triangles take one to two hundredths
   // where the edge is half the radius: this part has thin arteries alone, but for the aorta.
   EXPECT_LT(quantile(off_radius, 0.5), 0.05);
+
+  // What the access table says of the way into the left renal artery.
+  const Vec3 target(30, 16, 84);
+  const Centerline path = preprocess::find_centerline(surface, access, target, {});
+  const simulate::Way way(path, preprocess::find_tree(surface, access));
+  const Centerline& aorta = axis_of(phantom, "aorta");
+  const Centerline& renal = axis_of(phantom, "left-renal");
+  const Vec3 root = renal.points.col(0);
+  const double true_length = std::abs(arc_near(aorta, root) - arc_near(aorta, access)) +
+                             nearest(aorta, root).distance + arc_near(renal, target);
+  // The line rounds the corner in which the axes meet: half a millimetre, 0.8 % of the whole way
+  // from the groin (MEASUREMENTS.md).
+  EXPECT_NEAR(path.arc_length.tail<1>().value(), true_length, 0.6);
+  Centerline sections = path;
+  sections.radius = 0.5 * preprocess::section_diameters(surface, path);
+  const plan::Narrowest narrowest = plan::find_narrowest(sections, 1e9);
+  EXPECT_NEAR(narrowest.diameter / (2.0 * nearest(renal, narrowest.point).radius), 1.0, 0.02);
+  const std::vector<plan::Junction> junctions = plan::find_junctions(way);
+  const auto taken = std::find_if(junctions.begin(), junctions.end(),
+                                  [](const plan::Junction& j) { return j.taken; });
+  ASSERT_NE(taken, junctions.end());
+  const Vec3 trunk = chord_round(aorta, arc_near(aorta, taken->point), 18.0);
+  const double ostium = arc_near(renal, taken->point);
+  const Vec3 branch = plan::point_at(renal, ostium + 9.0) - plan::point_at(renal, ostium);
+  const plan::View truth = plan::find_projections(trunk, branch).best.view;
+  const plan::View found =
+      plan::find_projections(taken->trunk_direction, taken->branch_direction).best.view;
+  EXPECT_NEAR(found.rotation / kRadPerDeg, truth.rotation / kRadPerDeg, 2.0);
+  EXPECT_NEAR(found.tilt / kRadPerDeg, truth.tilt / kRadPerDeg, 2.0);
 }
 
 }  // namespace

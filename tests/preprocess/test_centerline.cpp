@@ -15,6 +15,7 @@
 #include <vector>
 
 #include "preprocess/centerline/centerline.h"
+#include "preprocess/centerline/section_width.h"
 #include "preprocess/surface/surface.h"
 #include "preprocess/surface/surface_repair.h"
 #include "tests/shapes.h"
@@ -234,6 +235,41 @@ TEST(CenterlineTree, OfATubeIsOneLineToEachEnd) {
   for (const Branch& branch : tree) {
     for (const auto& p : branch.line.points.colwise()) ASSERT_LT(p.head<2>().norm(), 0.15);
   }
+}
+
+/// A straight line along z, 10 to 50 mm, at this distance from the axis.
+Centerline line_along_z(double beside) {
+  constexpr Eigen::Index kPoints = 81;
+  Centerline line{Eigen::Matrix3Xd::Zero(3, kPoints), Eigen::VectorXd::Constant(kPoints, 2.0),
+                  Eigen::VectorXd::LinSpaced(kPoints, 0.0, 40.0)};
+  line.points.row(0).setConstant(beside);
+  line.points.row(2) = (line.arc_length.array() + 10.0).matrix().transpose();
+  return line;
+}
+
+TEST(SectionWidth, OfATubeIsItsDiameterWhereverTheLineRuns) {
+  const Surface tube = shapes::straight_tube(4.0, 60.0, 0.8);
+  for (const double beside : {0.0, 2.5}) {
+    const Eigen::VectorXd diameters = section_diameters(tube, line_along_z(beside));
+    EXPECT_NEAR(diameters.minCoeff(), 8.0, 0.06);
+    EXPECT_NEAR(diameters.maxCoeff(), 8.0, 0.06);
+  }
+}
+
+TEST(SectionWidth, OfAnEllipseIsThatOfTheCircleOfItsArea) {
+  const Surface tube = shapes::level_set(
+      [](const Vec3& p) {
+        const double part = std::hypot(p.x() / 2.0, p.y() / 5.0);
+        return std::min({4.0 * (1.0 - part), p.z(), 60.0 - p.z()});
+      },
+      Vec3(-3.0, -6.0, -1.0), Vec3(3.0, 6.0, 61.0), 0.5);
+  const Eigen::VectorXd diameters = section_diameters(tube, line_along_z(0.0));
+  EXPECT_NEAR(diameters.mean(), 2.0 * std::sqrt(10.0), 0.1);
+}
+
+TEST(SectionWidth, WhereNoCutGoesRoundThePointIsTheSpheres) {
+  const Surface tube = shapes::straight_tube(4.0, 60.0, 0.8);
+  EXPECT_DOUBLE_EQ(section_diameters(tube, line_along_z(10.0)).maxCoeff(), 4.0);
 }
 
 TEST(StartTangent, IsTheMeanDirectionOverTheSpan) {

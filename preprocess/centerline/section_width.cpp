@@ -1,0 +1,123 @@
+#include "preprocess/centerline/section_width.h"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <limits>
+#include <unordered_map>
+#include <utility>
+#include <vector>
+
+namespace wireplan::preprocess {
+namespace {
+
+constexpr double kMeanOver = 1.5;    // of line to either side                             [mm]
+constexpr double kLeastChord = 1.0;  // to either side, for the direction                  [mm]
+
+/// An edge of the surface as a key.
+std::uint64_t key_of(int a, int b) {
+  const auto [low, high] = std::minmax(a, b);
+  return static_cast<std::uint64_t>(low) << 32U | static_cast<std::uint32_t>(high);
+}
+
+/// The closed polygons in which a plane cuts the surface; each side is that of one triangle, which
+/// goes from one cut edge to another.
+class PlaneCut {
+ public:
+  PlaneCut(const Surface& surface, const Vec3& point, const Vec3& normal)
+      : surface_(surface),
+        heights_((normal.transpose() * (surface.vertices.colwise() - point)).transpose()) {
+    for (Eigen::Index t = 0; t < surface.triangles.cols(); ++t) {
+      std::uint64_t from = 0, to = 0;
+      for (int corner = 0; corner < 3; ++corner) {
+        const int a = surface.triangles(corner, t), b = surface.triangles((corner + 1) % 3, t);
+        const bool up = heights_(a) < 0.0 && heights_(b) >= 0.0;
+        const bool down = heights_(a) >= 0.0 && heights_(b) < 0.0;
+        if (up) from = key_of(a, b);
+        if (down) to = key_of(a, b);
+      }
+      if (from != 0 || to != 0) next_[from] = to;  // along the rim, always the same way round
+    }
+  }
+
+  /// Each loop once.
+  std::vector<std::vector<Vec3>> loops() {
+    std::vector<std::vector<Vec3>> all;
+    while (!next_.empty()) {
+      std::vector<Vec3> loop;
+      std::uint64_t edge = next_.begin()->first;
+      for (auto found = next_.find(edge); found != next_.end(); found = next_.find(edge)) {
+        loop.push_back(crossing(edge));
+        edge = found->second;
+        next_.erase(found);
+      }
+      all.push_back(std::move(loop));
+    }
+    return all;
+  }
+
+ private:
+  Vec3 crossing(std::uint64_t edge) const {
+    const auto a = static_cast<Eigen::Index>(edge >> 32U),
+               b = static_cast<Eigen::Index>(edge & 0xffffffffU);
+    const double part = heights_(a) / (heights_(a) - heights_(b));
+    return surface_.vertices.col(a) + part * (surface_.vertices.col(b) - surface_.vertices.col(a));
+  }
+
+  const Surface& surface_;
+  Eigen::VectorXd heights_;
+  std::unordered_map<std::uint64_t, std::uint64_t> next_;
+};
+
+/// Area of a plane polygon, and how often it goes round a point of its plane.
+std::pair<double, int> area_and_turns(const std::vector<Vec3>& loop, const Vec3& point,
+                                      const Vec3& normal) {
+  double area = 0.0, angle = 0.0;
+  for (std::size_t k = 0; k < loop.size(); ++k) {
+    const Vec3 a = loop[k] - point, b = loop[(k + 1) % loop.size()] - point;
+    const double twice = normal.dot(a.cross(b));
+    area += 0.5 * twice;
+    angle += std::atan2(twice, a.dot(b));
+  }
+  return {std::abs(area), static_cast<int>(std::lround(angle / (2.0 * kPi)))};
+}
+
+/// Of the smallest cut that goes round the point; the sphere's where none does.
+double diameter_at(const Surface& surface, const Centerline& line, Eigen::Index k) {
+  const double reach = std::max(kLeastChord, line.radius(k));
+  Eigen::Index before = k, after = k;
+  while (before > 0 && line.arc_length(k) - line.arc_length(before) < reach) --before;
+  const Eigen::Index last = line.points.cols() - 1;
+  while (after < last && line.arc_length(after) - line.arc_length(k) < reach) ++after;
+  const Vec3 point = line.points.col(k);
+  const Vec3 normal = (line.points.col(after) - line.points.col(before)).normalized();
+  double least = std::numeric_limits<double>::infinity();
+  for (const std::vector<Vec3>& loop : PlaneCut(surface, point, normal).loops()) {
+    const auto [area, turns] = area_and_turns(loop, point, normal);
+    if (turns != 0) least = std::min(least, area);
+  }
+  return std::isfinite(least) ? std::sqrt(4.0 * least / kPi) : 2.0 * line.radius(k);
+}
+
+}  // namespace
+
+Eigen::VectorXd section_diameters(const Surface& surface, const Centerline& line) {
+  const Eigen::Index count = line.points.cols();
+  expects(count >= 2);
+  Eigen::VectorXd single(count), mean(count);
+  for (Eigen::Index k = 0; k < count; ++k) single(k) = diameter_at(surface, line, k);
+  for (Eigen::Index k = 0; k < count; ++k) {
+    double sum = 0.0;
+    int some = 0;
+    for (Eigen::Index i = 0; i < count; ++i) {
+      if (std::abs(line.arc_length(i) - line.arc_length(k)) > kMeanOver) continue;
+      sum += single(i);
+      ++some;
+    }
+    mean(k) = sum / some;
+  }
+  return mean;
+}
+
+}  // namespace wireplan::preprocess
