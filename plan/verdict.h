@@ -28,7 +28,7 @@ struct Passage {
   bool assumed = false;          // the device is a default; nobody said that it is to pass
 };
 
-/// What is known of the way before a wire is pushed (anatomy/way.h), with its grades.
+/// What is known of the way before a wire is pushed (anatomy/passage.h), with its grades.
 struct WayFindings {
   Passage device, sheath;
   double sheath_length = 0.0;         // of the way, that the sheath lies in                [mm]

@@ -58,8 +58,7 @@ std::vector<Json> summarize_stability(const std::vector<Json>& rows) {
     entry["rows"] = count("method", method);
     for (const std::string& verdict : kVerdicts) entry[verdict] = count("verdict", verdict);
     for (const char* outcome : {"converged", "finished", "not_converged", "unstable", "reached",
-                                "missed", "stuck", "prolapsed", "left_image",
-                                "left_lumen"}) {
+                                "missed", "stuck", "prolapsed", "left_image", "left_lumen"}) {
       entry[outcome] = count("outcome", outcome);
     }
     summary.push_back(entry);

@@ -12,6 +12,7 @@
 #include "pipeline/files/phantom_file.h"
 #include "pipeline/files/text.h"
 #include "pipeline/report/compare.h"
+#include "pipeline/report/overview.h"
 #include "pipeline/report/print.h"
 #include "pipeline/report/render.h"
 #include "pipeline/store/cache.h"
@@ -137,9 +138,15 @@ int simulate_file(const std::string& path, const std::string& given_output) {
   return answer.solved ? kDone : kNoPlan;
 }
 
-int render_pictures(const std::string& report, const std::string& output, bool pdf) {
-  if (pdf) std::cout << print_sheet(report, output).string() << "\n";
-  for (const std::string& line : render_report(report, output)) std::cout << line << "\n";
+// Those of an overview's sections in folders named as theirs.
+int render_pictures(const fs::path& given, const fs::path& output, bool pdf) {
+  for (const fs::path& report : reports_in(given)) {
+    const fs::path folder =
+        report == given ? output
+                        : output / report.parent_path().lexically_relative(given.parent_path());
+    if (pdf) std::cout << print_sheet(report, folder).string() << "\n";
+    for (const std::string& line : render_report(report, folder)) std::cout << line << "\n";
+  }
   return kDone;
 }
 
@@ -226,7 +233,7 @@ void add_compare(CLI::App& app, int& code) {
   CLI::App* compare = app.add_subcommand("compare", "Wires and plans of several reports");
   compare->add_option("REPORT", *reports, "report.json of two cases or more")
       ->required()
-      ->expected(2, 100000);
+      ->expected(1, 100000);
   compare->footer(
       "The same patient with other wires, or many patients with the same.\n"
       "Example: wireplan compare out/one/report.json out/two/report.json");

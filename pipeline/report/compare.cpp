@@ -26,19 +26,6 @@ Json parameter(const Json& report, const char* pointer) {
   return parameters.contains(place) ? parameters.at(place) : Json(nullptr);
 }
 
-/// Of an overview its sections' reports.
-std::vector<std::filesystem::path> reports_in(const std::filesystem::path& file) {
-  const std::optional<Json> overview = find_overview(file);
-  if (!overview) return {file};
-  std::vector<std::filesystem::path> files;
-  for (const Json& target : overview->at("targets")) {
-    for (const Json& row : target.at("sections")) {
-      files.push_back(file.parent_path() / row.at("folder").get<std::string>() / "report.json");
-    }
-  }
-  return files;
-}
-
 /// Whether a value of the case is the same in all reports.
 bool agree(const std::vector<Json>& reports, const char* pointer) {
   return std::all_of(reports.begin(), reports.end(), [&](const Json& report) {
@@ -51,6 +38,18 @@ bool same_patient(const std::vector<Json>& reports) {
     return report.at("provenance").at("inputs") == reports.front().at("provenance").at("inputs");
   });
   return one_input && agree(reports, "/access/point_mm") && agree(reports, "/target/point_mm");
+}
+
+/// Of the case, and of the section where it has several.
+std::string name_of(const Json& report) {
+  const Json section = parameter(report, "/section");
+  std::string name = report.at("name").get<std::string>();
+  if (section.is_null()) return name;
+  for (const char* key : {"access", "target"}) {
+    const std::string part = section.at(key).get<std::string>();
+    if (!part.empty()) name += ", " + part;
+  }
+  return name;
 }
 
 std::string describe_way(const Json& plan) {
@@ -79,7 +78,7 @@ std::string list_reports(const std::vector<Json>& reports) {
   for (std::size_t k = 0; k < reports.size(); ++k) {
     const Json& ranking = reports[k].at("ranking");
     std::vector<std::string> row = {
-        format("%zu", k + 1), reports[k].at("name"), answer_of(reports[k]),
+        format("%zu", k + 1), name_of(reports[k]), answer_of(reports[k]),
         format("%zu/%zu", ranking.size(), reports[k].at("trials").size())};
     if (ranking.empty()) {
       row.insert(row.end(), {"none reaches", "-", "-", "-", "-", "-"});
@@ -166,7 +165,10 @@ std::string compare_reports(const std::vector<std::filesystem::path>& files) {
       reports.push_back(read_json(file, kReportSchema, kOlderReportSchema));
     }
   }
-  expects(reports.size() >= 2);
+  if (reports.size() < 2) {
+    throw Error("compare: " + files.front().string() +
+                " alone, expected two reports or more, or the overview of a case of several");
+  }
 
   const bool one_patient = same_patient(reports);
   std::string text = list_reports(reports) +

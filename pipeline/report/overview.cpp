@@ -51,6 +51,7 @@ Json access_figures(const Json& report) {
   figures["tortuosity_grade"] = access.at("tortuosity").at("grade");
   figures["sharpest_bend_deg"] = access.at("sharpest_bend").at("angle_deg");
   figures["sharpest_bend_grade"] = access.at("sharpest_bend").at("grade");
+  figures["sharpest_bend_at_ostium_of"] = access.at("sharpest_bend").at("at_ostium_of");
   figures["calcium_mm3"] = access.at("calcium").at("volume_mm3");
   return figures;
 }
@@ -162,6 +163,18 @@ std::optional<Json> find_overview(const std::filesystem::path& path) {
                 "`wireplan run` writes them; run the case again");
   }
   return any;
+}
+
+std::vector<std::filesystem::path> reports_in(const std::filesystem::path& file) {
+  const std::optional<Json> overview = find_overview(file);
+  if (!overview) return {file};
+  std::vector<std::filesystem::path> files;
+  for (const Json& target : overview->at("targets")) {
+    for (const Json& row : target.at("sections")) {
+      files.push_back(file.parent_path() / row.at("folder").get<std::string>() / "report.json");
+    }
+  }
+  return files;
 }
 
 std::string describe_overview(const Json& overview) {

@@ -25,6 +25,9 @@ Json build_overview(const std::string& name, const std::vector<SectionReport>& s
 /// The overview in a file; nothing where the file holds no overview.
 std::optional<Json> find_overview(const std::filesystem::path& path);
 
+/// The reports that a file stands for: of an overview its sections', else the file itself.
+std::vector<std::filesystem::path> reports_in(const std::filesystem::path& file);
+
 /// A line per target: the access to take, or that none has a safe plan.
 std::string describe_overview(const Json& overview);
 

@@ -23,26 +23,41 @@ const tubeVolume = () => {
   return Buffer.concat([Buffer.from(header, "latin1"), Buffer.from(values.buffer)]);
 };
 
-/** Runs the case in `folder` and gives its page. */
-export const runSmallCase = (program, folder) => {
+const smallCase = (changes) => ({
+  schema: "wireplan.case/1",
+  name: "small",
+  volume: {path: "ct.nrrd"},
+  segmentation: {lower_hu: 200, upper_hu: 600},
+  surface: {edge_length_mm: 2},
+  insertion: {length_mm: 45, step_mm: 2, element_length_mm: 2},
+  ...changes,
+});
+const wire = (name, stiffness) => ({
+  name, diameter_mm: 0.889,
+  sections: [{length_mm: 200, bending_stiffness_n_mm2: stiffness}],
+});
+
+/** Runs a case in `folder` and gives its page. */
+const run = (program, folder, given) => {
   mkdirSync(folder, {recursive: true});
   writeFileSync(join(folder, "ct.nrrd"), tubeVolume());
-  const wire = (name, stiffness) => ({
-    name, diameter_mm: 0.889,
-    sections: [{length_mm: 200, bending_stiffness_n_mm2: stiffness}],
-  });
-  const given = {
-    schema: "wireplan.case/1",
-    name: "small",
-    volume: {path: "ct.nrrd"},
-    segmentation: {lower_hu: 200, upper_hu: 600},
-    surface: {edge_length_mm: 2},
-    access: {point_mm: [0, 0, 8], inclination_deg: [10, 25], azimuth_deg: [0, 90]},
-    target: {point_mm: [0, 0, 45], radius_mm: 6},
-    wires: [wire(hostileWire, 50), wire("plain", 5)],
-    insertion: {length_mm: 45, step_mm: 2, element_length_mm: 2},
-  };
   writeFileSync(join(folder, "case.json"), JSON.stringify(given));
   execFileSync(program, ["run", folder, "-o", join(folder, "out"), "--cache", join(folder, "cache")], {stdio: "pipe"});
   return join(folder, "out", "report.html");
 };
+
+export const runSmallCase = (program, folder) => run(program, folder, smallCase({
+  access: {point_mm: [0, 0, 8], inclination_deg: [10, 25], azimuth_deg: [0, 90]},
+  target: {point_mm: [0, 0, 45], radius_mm: 6},
+  wires: [wire(hostileWire, 50), wire("plain", 5)],
+}));
+
+/** From both ends of the tube to two places between. */
+export const runSmallSections = (program, folder) => run(program, folder, smallCase({
+  accesses: [
+    {name: "from below", point_mm: [0, 0, 8], inclination_deg: [10]},
+    {name: "from above", point_mm: [0, 0, 52], inclination_deg: [10]},
+  ],
+  targets: [{name: "low", point_mm: [0, 0, 25]}, {name: "high", point_mm: [0, 0, 38]}],
+  wires: [wire("plain", 5)],
+}));

@@ -9,7 +9,7 @@ import {tmpdir} from "node:os";
 import {basename, dirname, join, resolve} from "node:path";
 import {after, before, describe, test} from "node:test";
 import {chromiumPath, clippedBlocks, column, hasModules, launch, open, pageCount, picture, seriousFindings} from "./browser.mjs";
-import {hostileCase, hostileWire, runSmallCase} from "./small_case.mjs";
+import {hostileCase, hostileWire, runSmallCase, runSmallSections} from "./small_case.mjs";
 
 const kMegabyte = 1e6;
 const kSkipped = 77;
@@ -279,6 +279,26 @@ if (!given.length) {
     const pdf = readFileSync(join(out, "sheet.pdf"));
     assert.equal(pageCount(pdf), 1);
     assert.ok(pdf.length > 20000, `${pdf.length} bytes`);
+  });
+
+  test("compares the accesses of each target on the page of an overview", async () => {
+    const overview = runSmallSections(process.env.WIREPLAN_PROGRAM, join(folder, "sections"));
+    for (const width of [1280, 375]) {
+      const {page, faults, close} = await open(browser, overview, {width, height: 900});
+      assert.deepEqual(await page.locator("main h2").allTextContents(), ["low", "high"]);
+      const links = await page.locator("main tbody a").evaluateAll((nodes) => nodes.map((node) => [node.textContent, decodeURI(node.href)]));
+      assert.deepEqual(links.map(([text]) => text).sort(), ["from above", "from above", "from below", "from below"]);
+      for (const [, address] of links) assert.ok(statSync(new URL(address)).size > 1e5, address);
+      assert.match(await page.textContent("main"), /Research use only/);
+      const wide = await page.evaluate(() => document.documentElement.scrollWidth - document.documentElement.clientWidth);
+      assert.ok(wide <= 0, `${wide} px too wide`);
+      if (width > 1000) assert.equal(pageCount(await page.pdf({preferCSSPageSize: true})), 1);
+      if (process.env.WIREPLAN_SCREENSHOTS) {
+        await page.screenshot({path: join(process.env.WIREPLAN_SCREENSHOTS, `overview-${width}.png`), fullPage: true});
+      }
+      assert.deepEqual(faults, []);
+      await close();
+    }
   });
 
   test("shows hostile names as text", async () => {

@@ -177,13 +177,14 @@ TEST(Overview, PutsTheAccessWithMoreSafeRepeatsFirst) {
     json["robustness"]["plans"] =
         Json::array({{{"trial", 0}, {"successes", safe}, {"repeats", 16}}});
     json["provenance"] = {{"inputs", Json::array()}, {"program", {}}};
-    json["anatomy"] = {{"lengths", {{"way_mm", 100.0}}},
-                       {"access",
-                        {{"device", {{"lumen_diameter_mm", 5.0}, {"fits", true}}},
-                         {"sheath", {{"lumen_diameter_mm", 5.0}, {"fits", true}}},
-                         {"tortuosity", {{"index", 1.1}, {"grade", "none"}}},
-                         {"sharpest_bend", {{"angle_deg", 170.0}, {"grade", "none"}}},
-                         {"calcium", {{"volume_mm3", nullptr}}}}}};
+    json["anatomy"] = {
+        {"lengths", {{"way_mm", 100.0}}},
+        {"access",
+         {{"device", {{"lumen_diameter_mm", 5.0}, {"fits", true}}},
+          {"sheath", {{"lumen_diameter_mm", 5.0}, {"fits", true}}},
+          {"tortuosity", {{"index", 1.1}, {"grade", "none"}}},
+          {"sharpest_bend", {{"angle_deg", 170.0}, {"grade", "none"}, {"at_ostium_of", nullptr}}},
+          {"calcium", {{"volume_mm3", nullptr}}}}}};
     return json;
   };
   const auto order = [&](const std::vector<SectionReport>& sections) {

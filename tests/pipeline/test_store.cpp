@@ -3,8 +3,10 @@
 
 #include <fstream>
 #include <map>
+#include <optional>
 
 #include "pipeline/files/case_file.h"
+#include "pipeline/files/plan_file.h"
 #include "pipeline/stages/stages.h"
 #include "pipeline/store/hash.h"
 #include "pipeline/store/store.h"
@@ -164,6 +166,21 @@ TEST(Store, ContentsIgnoreTimes) {
     });
   };
   EXPECT_EQ(commit("key: 1\n", "1 s").contents(), commit("key: 2\n", "2 s").contents());
+}
+
+TEST(KeptRun, ThatLacksAMetricOfThisProgramCountsAsAbsent) {
+  plan::Measured measured{.outcome = simulate::Outcome::kReached};
+  measured.metrics.peak_tip_force = 0.25;
+  const std::string text = measured_text(measured, /*with_shape=*/false);
+  const std::optional<plan::Measured> back = measured_from_text(text);
+  ASSERT_TRUE(back);
+  EXPECT_EQ(back->metrics.peak_tip_force, 0.25);
+  for (const plan::MetricField& field : plan::kMetricFields) {
+    Json older = Json::parse(text);
+    ASSERT_EQ(older["metrics"].erase(field.name), 1u) << field.name;
+    EXPECT_FALSE(measured_from_text(older.dump())) << field.name;
+  }
+  EXPECT_FALSE(measured_from_text(text.substr(0, text.size() / 2)));
 }
 
 TEST(Publish, ReplacesItsOwnFilesAndTouchesNoOthers) {

@@ -28,8 +28,11 @@ const lazy = (make) => {
   return () => (value ??= make());
 };
 
+/** The report, or the overview of several. */
+export const readReport = () => parse("data-report");
+
 export const readPage = () => {
-  const report = parse("data-report");
+  const report = readReport();
   const scene = parse("data-scene");
   const timing = parse("data-timing");
 

@@ -11,6 +11,13 @@ const kAnswers = {
   unsure: "Unsure",
   not_feasible: "Not feasible",
 };
+/** The access and the target of a case that has several. */
+const sectionText = ({provenance: {parameters: {section}}}) => {
+  const parts = [section?.access, section?.target].filter(Boolean).map(shown);
+  return parts.length ? `, ${parts.join(" to ")}` : "";
+};
+
+export const answerName = (answer) => kAnswers[answer] ?? shown(answer);
 const kUnknowns = {
   friction: "friction",
   wall: "stiffness of the wall",
@@ -171,7 +178,7 @@ const verdictBlocks = ({verdict}) => {
   const changes = cutList(verdict.changes.map(sentence), kChanges);
   return [
     el("section", {class: `block verdict ${verdict.answer}`, id: "sheet-verdict", "aria-label": "Verdict"},
-      el("p", {class: "answer-word"}, kAnswers[verdict.answer] ?? shown(verdict.answer)),
+      el("p", {class: "answer-word"}, answerName(verdict.answer)),
       el("p", {class: "headline"}, sentence(verdict.headline))),
     [block("why", "Why", reasons),
      block("changes", "What would change it", verdict.changes.length ? changes : el("p", {}, "The trials show nothing that would."))],
@@ -221,7 +228,7 @@ export const sheetSection = (page) => {
     window.print();
   };
   const sheet = el("section", {class: "sheet", id: "sheet", "aria-labelledby": "sheet-title"},
-    el("h1", {id: "sheet-title"}, "Guidewire plan: ", name(shown(report.name))),
+    el("h1", {id: "sheet-title"}, "Guidewire plan: ", name(shown(report.name)), sectionText(report)),
     verdict,
     el("div", {class: "columns wide-left"}, el("div", {class: "stack"}, why), pictureBlock(page)),
     planTable(page),
@@ -241,7 +248,7 @@ export const verdictSection = ({report: {verdict}}) => {
   const list = (texts, none) => (texts.length ? el("ul", {}, texts.map((text) => el("li", {}, sentence(text)))) : el("p", {}, none));
   return el("section", {id: "verdict", "aria-labelledby": "verdict-title"},
     el("h2", {id: "verdict-title"}, "The verdict in full"),
-    el("p", {class: "answer"}, el("strong", {}, kAnswers[verdict.answer] ?? shown(verdict.answer)), `. ${sentence(verdict.headline)}`),
+    el("p", {class: "answer"}, el("strong", {}, answerName(verdict.answer)), `. ${sentence(verdict.headline)}`),
     el("h3", {}, "Why"), list(verdict.reasons, "Nothing is known."),
     el("h3", {}, "What would change it"), list(verdict.changes, "The trials show nothing that would."));
 };
