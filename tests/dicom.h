@@ -13,8 +13,8 @@
 namespace wireplan::dicom_files {
 
 /// What identifies the patient of every file made here.
-inline const std::vector<std::string> kPatient = {"LOVELACE", "AUGUSTA", "PATIENT-4711", "19540321",
-                                                  "20260115"};
+inline const std::vector<std::string> kPatient = {
+    "LOVELACE", "AUGUSTA", "PATIENT-4711", "19540321", "20260115", "ACC-0815", "ANALYTICAL"};
 
 struct DicomSlice {
   std::string series = "1.2.3.4", number = "3";
@@ -23,6 +23,7 @@ struct DicomSlice {
   double slope = 1.0, intercept = 0.0;
   std::int16_t first_value = 0;  // of 3 columns x 2 rows, each voxel one more than the last
   bool compressed = false;       // run lengths
+  std::string description = {};  // of the series
   /// Instead of these: columns x rows values of a slice with square pixels of 1 mm.
   int columns = 0, rows = 0;
   std::vector<std::int16_t> values = {};
@@ -117,6 +118,9 @@ inline std::string dicom(const DicomSlice& slice) {
   element(bytes, 0x08, 0x18, "UI", instance);
   element(bytes, 0x08, 0x60, "CS", "CT");
   element(bytes, 0x08, 0x20, "DA", "20260115");
+  element(bytes, 0x08, 0x50, "SH", "ACC-0815");
+  element(bytes, 0x08, 0x80, "LO", "ANALYTICAL HOSPITAL");
+  if (!slice.description.empty()) element(bytes, 0x08, 0x103e, "LO", slice.description);
   element(bytes, 0x10, 0x10, "PN", "LOVELACE^AUGUSTA");
   element(bytes, 0x10, 0x20, "LO", "PATIENT-4711");
   element(bytes, 0x10, 0x30, "DA", "19540321");

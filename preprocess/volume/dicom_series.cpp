@@ -11,7 +11,6 @@
 #include <fstream>
 #include <iterator>
 #include <memory>
-#include <numeric>
 #include <sstream>
 #include <string>
 #include <utility>
@@ -23,6 +22,7 @@
 #include "preprocess/volume/apart.h"
 #include "preprocess/volume/dicom_check.h"
 #include "preprocess/volume/dicom_frames.h"
+#include "preprocess/volume/dicom_stack.h"
 #include "preprocess/volume/itk_image.h"
 #include "preprocess/volume/volume_file.h"
 
@@ -120,6 +120,18 @@ void require_no_pixels(const fs::path& file) {
               "); export the series again, uncompressed");
 }
 
+/// Who the patient is, by names and numbers, and who and when it was done: never to be shown.
+std::vector<std::string> patient_of(itk::GDCMImageIO& io) {
+  std::vector<std::string> values;
+  for (const char* tag :
+       {"0010|0010", "0010|0020", "0010|1000", "0010|1001", "0010|1005", "0010|0030", "0008|0020",
+        "0008|0021", "0008|0022", "0008|0023", "0008|0050", "0020|0010", "0008|0080", "0008|0090",
+        "0008|1050", "0008|1070", "0040|0253", "0040|1001"}) {
+    values.push_back(dicom_value(io, tag));
+  }
+  return values;
+}
+
 /// Reads the header of a file; false where it holds no image.
 bool read_header(Slice& slice, const fs::path& folder) {
   const auto copy = copy_of(slice);
@@ -133,15 +145,16 @@ bool read_header(Slice& slice, const fs::path& folder) {
   slice.io->ReadImageInformation();
   slice.series_uid = dicom_value(*slice.io, "0020|000e");
   slice.series_number = dicom_value(*slice.io, "0020|0011");
-  slice.description = dicom_value(*slice.io, "0008|103e");
+  slice.description = without_identity(dicom_value(*slice.io, "0008|103e"), patient_of(*slice.io));
   slice.modality = dicom_value(*slice.io, "0008|0060");
   slice.unit = dicom_value(*slice.io, "0028|1054");
   slice.grid = header_grid(*slice.io, folder);
   return true;
 }
 
-/// Headers of all DICOM images in the folder, by series, in the order of their file names.
-std::vector<Series> find_series(const fs::path& folder, const At& at) {
+/// The files of a folder by their names, or the one that is given.
+std::vector<fs::path> files_of(const fs::path& folder) {
+  if (!fs::is_directory(folder)) return {folder};
   std::vector<fs::path> files;
   for (const fs::directory_entry& entry : fs::directory_iterator(folder)) {
     if (entry.is_regular_file()) {
@@ -149,9 +162,13 @@ std::vector<Series> find_series(const fs::path& folder, const At& at) {
     }
   }
   std::sort(files.begin(), files.end());
+  return files;
+}
 
-  std::vector<Series> all;
-  for (const fs::path& file : files) {
+/// Headers of all DICOM images in the folder, by series, in the order of their file names, up to
+/// one that throws.
+void find_series(const fs::path& folder, const At& at, std::vector<Series>& all) {
+  for (const fs::path& file : files_of(folder)) {
     Slice slice;
     slice.file = file;
     slice.form = check_dicom(file, &slice.end);
@@ -168,92 +185,6 @@ std::vector<Series> find_series(const fs::path& folder, const At& at) {
       home->push_back(slice);
     }
   }
-  return all;
-}
-
-/// What is wrong with the places [mm, sorted] of slices along their normal; empty where they form a
-/// regular stack. Scanners round positions, so a slice may lie a tenth of the step from its place.
-std::string find_uneven(const std::vector<double>& positions) {
-  const std::size_t gaps = positions.size() - 1;
-  const double step = (positions.back() - positions.front()) / static_cast<double>(gaps);
-  bool even = step > 0.0;
-  for (std::size_t k = 0; k <= gaps; ++k) {
-    const double place = positions.front() + static_cast<double>(k) * step;
-    even = even && std::abs(positions[k] - place) <= 0.1 * step;
-  }
-  if (even) return {};
-
-  std::vector<double> sizes(gaps);
-  for (std::size_t k = 0; k < gaps; ++k) sizes[k] = positions[k + 1] - positions[k];
-  std::vector<double> sorted = sizes;
-  std::nth_element(sorted.begin(), sorted.begin() + gaps / 2, sorted.end());
-  const double usual = sorted[gaps / 2];
-  std::ostringstream text;
-  constexpr double kSamePlace = 0.01;  // [mm]
-  const auto same =
-      std::count_if(sizes.begin(), sizes.end(), [&](double size) { return size <= kSamePlace; });
-  if (2 * static_cast<std::size_t>(same) >= gaps) {
-    text << "images lie at the same place (" << positions.size()
-         << " images, places: " << gaps + 1 - static_cast<std::size_t>(same)
-         << "; contrast tracking, or several phases), expected one at each; keep one phase "
-            "or "
-            "reconstruction in the folder";
-    return text.str();
-  }
-
-  // Name the gap that differs most from the usual one.
-  const auto differs = [&](double size) { return std::abs(size - usual); };
-  const auto odd = std::max_element(sizes.begin(), sizes.end(),
-                                    [&](double a, double b) { return differs(a) < differs(b); });
-  const std::size_t k = static_cast<std::size_t>(odd - sizes.begin());
-  const auto count = std::count_if(sizes.begin(), sizes.end(),
-                                   [&](double size) { return differs(size) > 0.1 * usual; });
-  text << "uneven slices: the ones at " << positions[k] << " and " << positions[k + 1]
-       << " mm along the normal are " << *odd << " mm apart, the others " << usual << " mm";
-  if (count > 1) text << " (" << count << " of " << gaps << " gaps differ)";
-  if (*odd < 0.5 * usual) {
-    text << "; images lie at the same place: keep one phase or reconstruction in the folder";
-  } else {
-    text << "; export the series again, with all its slices and one spacing, or resample it";
-  }
-  return text.str();
-}
-
-struct Stack {
-  std::vector<std::size_t> order;  // of the images, along their normal
-  Grid grid;
-  std::string problem;  // why they form no volume; empty where they do
-};
-
-/// The grid of images that lie at `origins` and are else as `first`, which is one of them.
-Stack stack(const std::vector<Vec3>& origins, const Grid& first) {
-  Stack stack{.order = std::vector<std::size_t>(origins.size()), .grid = first, .problem = {}};
-  if (origins.size() < 2) {
-    stack.problem = "one DICOM slice, expected a series of at least 2";
-    return stack;
-  }
-  const Vec3 normal = first.direction.col(2);
-  std::iota(stack.order.begin(), stack.order.end(), std::size_t{0});
-  std::stable_sort(stack.order.begin(), stack.order.end(), [&](std::size_t a, std::size_t b) {
-    return normal.dot(origins[a]) < normal.dot(origins[b]);
-  });
-  std::vector<double> positions;
-  for (const std::size_t k : stack.order) positions.push_back(normal.dot(origins[k]));
-  stack.problem = find_uneven(positions);
-
-  Grid& grid = stack.grid;
-  grid.origin = origins[stack.order.front()];
-  const Vec3 rise = origins[stack.order.back()] - grid.origin;
-  const double along = normal.dot(rise), drift = (rise - normal * along).norm();
-  if (stack.problem.empty() && drift > 0.5 * grid.spacing.head<2>().minCoeff()) {
-    stack.problem = "the slices are shifted by " + one_decimal(drift) +
-                    " mm in their plane from first to last (tilted gantry, " +
-                    one_decimal(std::atan2(drift, along) / kRadPerDeg) +
-                    " degrees); resample the series to an upright grid";
-  }
-  grid.size[2] = static_cast<int>(origins.size());
-  grid.spacing[2] = along / static_cast<double>(origins.size() - 1);
-  return stack;
 }
 
 std::vector<Vec3> origins_of(const Series& series) {
@@ -290,18 +221,23 @@ Error several_series(const fs::path& folder, std::vector<Series> all) {
   return Error(text.str());
 }
 
-/// The series to read: the only one, or the one that alone has a volume's shape.
+/// The series to read: the only one, or the one that alone has a volume's shape; the end where
+/// there is none.
+std::vector<Series>::iterator find_chosen(std::vector<Series>& all) {
+  if (all.size() == 1) return all.begin();
+  const auto found = std::find_if(all.begin(), all.end(), has_volume_shape);
+  const bool alone = std::count_if(all.begin(), all.end(), has_volume_shape) == 1;
+  return alone ? found : all.end();
+}
+
 Series choose_series(const fs::path& folder, std::vector<Series> all) {
   if (all.empty()) {
     throw Error(folder.string() +
                 ": a folder without DICOM images (folders inside it are not searched); " +
                 kFormats);
   }
-  if (all.size() == 1) return std::move(all.front());
-  const auto found = std::find_if(all.begin(), all.end(), has_volume_shape);
-  if (found == all.end() || std::count_if(all.begin(), all.end(), has_volume_shape) != 1) {
-    throw several_series(folder, std::move(all));
-  }
+  const auto found = find_chosen(all);
+  if (found == all.end()) throw several_series(folder, std::move(all));
   return std::move(*found);
 }
 
@@ -357,18 +293,21 @@ void require_whole_dicom(itk::GDCMImageIO& io, const fs::path& file) {
   }
 }
 
-/// How the pixels of a file are packed; empty where they are not.
-std::string packing_of(const fs::path& file) {
+/// How the pixels of a file are packed.
+struct Packing {
+  std::string name, uid;
+  bool packed = false;
+};
+Packing packing_of(const fs::path& file) {
   const gdcm::Tag pixels(0x7fe0, 0x0010);
   gdcm::Reader reader;
   reader.SetFileName(file.c_str());
   if (!reader.ReadUpToTag(pixels, {pixels})) return {};
   const gdcm::TransferSyntax syntax = reader.GetFile().GetHeader().GetDataSetTransferSyntax();
-  if (!syntax.IsEncapsulated()) return {};
   gdcm::UIDs names;
   const bool known = names.SetFromUID(syntax.GetString());
-  return std::string(known ? names.GetName() : "an unknown syntax") + " (" + syntax.GetString() +
-         ")";
+  return {known ? names.GetName() : "an unknown syntax", syntax.GetString(),
+          syntax.IsEncapsulated()};
 }
 
 /// Reads the pixels of a slice, or of all its frames, and appends their values.
@@ -381,10 +320,11 @@ void append_slice(const Slice& slice, const fs::path& folder, std::vector<float>
   } catch (const Error&) {
     throw;
   } catch (const std::exception&) {
-    const std::string packing = packing_of(slice.io->GetFileName());
-    if (packing.empty()) throw;
-    throw Error(slice.file.string() + ": its pixels are packed as " + packing +
-                " and are all there, but GDCM does not unpack them; export the series again, "
+    const Packing packing = packing_of(slice.io->GetFileName());
+    if (!packing.packed) throw;
+    throw Error(slice.file.string() + ": its pixels are packed as " + packing.name + " (" +
+                packing.uid +
+                ") and are all there, but GDCM does not unpack them; export the series again, "
                 "uncompressed");
   }
 }
@@ -405,9 +345,9 @@ Grid receive_grid(const Receive& receive) {
   return grid;
 }
 
-/// All frames of an enhanced file, in the order of their places, each with its own scale.
-Image read_frames(Slice& slice, const fs::path& folder) {
-  const std::vector<DicomFrame> frames = read_dicom_frames(slice.file);
+/// Where the frames of an enhanced file lie.
+Stack stack_frames(const Slice& slice, const std::vector<DicomFrame>& frames,
+                   const fs::path& folder) {
   const auto is_placed = [](const DicomFrame& frame) { return frame.placed; };
   if (frames.size() != static_cast<std::size_t>(slice.grid.size[2]) ||
       !std::all_of(frames.begin(), frames.end(), is_placed)) {
@@ -435,7 +375,13 @@ Image read_frames(Slice& slice, const fs::path& folder) {
   Mat3 axes;
   axes << first.right, first.down, first.right.cross(first.down);
   grid.direction = orthonormal_direction(axes, folder);
-  const Stack stacked = stack(origins, grid);
+  return stack(origins, grid);
+}
+
+/// All frames of an enhanced file, in the order of their places, each with its own scale.
+Image read_frames(Slice& slice, const fs::path& folder) {
+  const std::vector<DicomFrame> frames = read_dicom_frames(slice.file);
+  const Stack stacked = stack_frames(slice, frames, folder);
   if (!stacked.problem.empty()) throw Error(folder.string() + ": " + stacked.problem);
 
   // GDCM scales all frames as the first; what is stored are integers.
@@ -467,7 +413,9 @@ void send_header(const Send& send, const Grid& grid, std::string modality) {
 /// Sends the grid of the folder's series and what made it, then its values slice by slice.
 void send_dicom_folder(const fs::path& folder, const Send& send, const At& at) {
   at(folder.string());
-  Series slices = choose_series(folder, find_series(folder, at));
+  std::vector<Series> all;
+  find_series(folder, at, all);
+  Series slices = choose_series(folder, std::move(all));
   Slice& first = slices.front();
   at(first.file.string());
   require_hounsfield(first.unit, first.modality, folder);
@@ -493,7 +441,103 @@ void send_dicom_folder(const fs::path& folder, const Send& send, const At& at) {
   }
 }
 
+// ---- What is seen of a folder ------------------------------------------------------------------
+
+SeriesDescription describe_series(const Series& series, const fs::path& folder) {
+  const Slice& first = series.front();
+  const auto copy = copy_of(first);
+  const Packing packing = packing_of(copy ? copy->path() : first.file.string());
+  SeriesDescription told{.number = first.series_number,
+                         .modality = first.modality,
+                         .description = first.description,
+                         .unit = first.unit,
+                         .syntax = packing.name,
+                         .syntax_uid = packing.uid,
+                         .files = static_cast<int>(series.size()),
+                         .grid = first.grid,
+                         .problem = {}};
+  for (const Slice& slice : series) told.images += slice.grid.size[2];
+  try {
+    const bool frames = told.files == 1 && told.images > 1;
+    const Stack stacked = frames ? stack_frames(first, read_dicom_frames(first.file), folder)
+                                 : stack(origins_of(series), first.grid);
+    told.placed = frames || told.files > 1;
+    told.grid = stacked.grid;
+    told.problem = stacked.problem;
+    require_hounsfield(first.unit, first.modality, folder);
+  } catch (const Error& error) {
+    told.problem = without_path(error.what(), folder);
+  }
+  return told;
+}
+
+void send_text(const Send& send, const std::string& text) {
+  const std::size_t size = text.size();
+  send(&size, sizeof size);
+  send(text.data(), size);
+}
+
+std::string receive_text(const Receive& receive) {
+  std::size_t size = 0;
+  receive(&size, sizeof size);
+  std::string text(size, '\0');
+  receive(text.data(), size);
+  return text;
+}
+
+/// Calls `text` and `plain` with the fields of a description, to send or to receive them.
+template <typename Told, typename Text, typename Plain>
+void for_each_field(Told& told, Text text, Plain plain) {
+  for (auto* field : {&told.number, &told.modality, &told.description, &told.unit, &told.syntax,
+                      &told.syntax_uid, &told.problem}) {
+    text(*field);
+  }
+  plain(told.files);
+  plain(told.images);
+  plain(told.placed);
+  plain(told.read);
+}
+
 }  // namespace
+
+std::vector<SeriesDescription> describe_dicom(const fs::path& path) {
+  std::vector<SeriesDescription> told;
+  run_apart(
+      [&](const Send& send, const At& at) {
+        call_itk(path, damaged("DICOM"), [&] {
+          std::vector<Series> all;
+          try {
+            find_series(path, at, all);
+          } catch (const Error&) {
+            // read_image tells it; what was found until then is described
+          }
+          const auto read = fs::is_directory(path) ? find_chosen(all) : all.end();
+          const std::size_t count = all.size();
+          send(&count, sizeof count);
+          for (auto series = all.begin(); series != all.end(); ++series) {
+            SeriesDescription one = describe_series(*series, path);
+            one.read = series == read && one.problem.empty();
+            for_each_field(
+                one, [&](const std::string& field) { send_text(send, field); },
+                [&](const auto& field) { send(&field, sizeof field); });
+            send_grid(send, one.grid);
+          }
+        });
+      },
+      [&](const Receive& receive) {
+        std::size_t count = 0;
+        receive(&count, sizeof count);
+        while (told.size() < count) {
+          SeriesDescription& one = told.emplace_back();
+          for_each_field(
+              one, [&](std::string& field) { field = receive_text(receive); },
+              [&](auto& field) { receive(&field, sizeof field); });
+          one.grid = receive_grid(receive);
+        }
+      },
+      kEndsLibrary);
+  return told;
+}
 
 /// In a process of its own, since distributions build GDCM with assertions, and those end the
 /// process on some values that a damaged header holds.

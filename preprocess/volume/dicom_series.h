@@ -1,12 +1,16 @@
 #pragma once
 /// Folders of DICOM files; for the .cpp files here.
 #include <filesystem>
+#include <vector>
 
-#include "preprocess/volume/image.h"
+#include "preprocess/volume/describe.h"
 
 namespace wireplan::preprocess {
 
 /// The one series of the folder, its slices sorted by position. Throws `Error` as read_image tells.
 Image read_dicom_folder(const std::filesystem::path& folder);
+
+/// All series of the folder, or of the one DICOM file, up to a file that is damaged.
+std::vector<SeriesDescription> describe_dicom(const std::filesystem::path& path);
 
 }  // namespace wireplan::preprocess

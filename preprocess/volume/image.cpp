@@ -70,7 +70,7 @@ void write_nrrd(const Grid& grid, const void* voxels, itk::IOComponentEnum type,
 
 bool reads_volumes() { return true; }
 
-Image read_image(const fs::path& path) {
+Image read_told(const fs::path& path, VolumeHeader& told) {
   std::error_code unknown;
   if (!fs::exists(path, unknown)) {
     throw Error(path.string() + ": no such file or folder; " + kFormats);
@@ -78,12 +78,18 @@ Image read_image(const fs::path& path) {
   silence_libraries();
   Image image;
   if (fs::is_directory(path, unknown)) {
+    told.format = "DICOM";
     image = call_itk(path, damaged("DICOM"), [&] { return read_dicom_folder(path); });
   } else {
-    image = read_file(path);
+    image = read_file(path, told);
   }
   require_finite(image, path);
   return image;
+}
+
+Image read_image(const fs::path& path) {
+  VolumeHeader told;
+  return read_told(path, told);
 }
 
 void write_image(const Image& image, const fs::path& path) {
@@ -107,7 +113,8 @@ Mask read_mask(const fs::path& path) {
     throw Error(path.string() + ": no such file, expected a mask (8 bit image of 0 and 1)");
   }
   silence_libraries();
-  const Image image = read_file(path);
+  VolumeHeader told;
+  const Image image = read_file(path, told);
   const bool is_mask = std::all_of(image.values.begin(), image.values.end(),
                                    [](float value) { return value == 0.0F || value == 1.0F; });
   if (!is_mask) throw Error(path.string() + ": not a mask, expected an image of 0 and 1");

@@ -30,12 +30,38 @@ void append_as(const std::vector<char>& bytes, std::vector<float>& values) {
                  [](Stored v) { return static_cast<float>(v); });
 }
 
+/// "int16" of 16 bit integers, and so on.
+std::string name_of_stored(const itk::ImageIOBase& io) {
+  using Type = itk::IOComponentEnum;
+  const std::string bits = std::to_string(8 * io.GetComponentSize());
+  switch (io.GetComponentType()) {
+    case Type::FLOAT:
+    case Type::DOUBLE:
+      return "float" + bits;
+    case Type::UCHAR:
+    case Type::USHORT:
+    case Type::UINT:
+    case Type::ULONG:
+    case Type::ULONGLONG:
+      return "uint" + bits;
+    case Type::UNKNOWNCOMPONENTTYPE:
+      return "";
+    default:
+      return "int" + bits;
+  }
+}
+
 }  // namespace
 
 std::string damaged(const std::string& format) {
   return "its header reads as " + format +
          ", but its voxels cannot be read; the file is damaged or cut short: copy or export it "
          "again";
+}
+
+std::string without_path(const std::string& message, const fs::path& path) {
+  const std::string start = path.string() + ": ";
+  return message.starts_with(start) ? message.substr(start.size()) : message;
 }
 
 std::string lower_case(std::string text) {
@@ -97,6 +123,17 @@ Grid header_grid(const itk::ImageIOBase& io, const fs::path& path) {
   }
   grid.direction = orthonormal_direction(direction, path);
   return grid;
+}
+
+void tell_header(const itk::ImageIOBase& io, VolumeHeader& told) {
+  told.stored_as = name_of_stored(io);
+  for (unsigned axis = 0; axis < 3; ++axis) {
+    const bool exists = axis < io.GetNumberOfDimensions();
+    const auto size = exists ? io.GetDimensions(axis) : 1;
+    told.size[axis] =
+        static_cast<int>(std::min<itk::SizeValueType>(size, std::numeric_limits<int>::max()));
+    told.spacing[axis] = told.mm_per_unit * (exists ? io.GetSpacing(axis) : 1.0);
+  }
 }
 
 void require_volume(const Grid& grid, const fs::path& path) {

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "itkImageIOBase.h"
-#include "preprocess/volume/image.h"
+#include "preprocess/volume/describe.h"
 
 namespace wireplan::preprocess {
 
@@ -30,6 +30,9 @@ auto call_itk(const std::filesystem::path& path, const std::string& problem, Cal
 /// What is wrong where a header of this format reads but the voxels do not.
 std::string damaged(const std::string& format);
 
+/// The message of an Error about that path, without the path at its beginning.
+std::string without_path(const std::string& message, const std::filesystem::path& path);
+
 std::string lower_case(std::string text);
 
 std::string one_decimal(double value);  // with one digit behind the point
@@ -49,6 +52,9 @@ Error unknown_values(const std::filesystem::path& path);
 
 /// Size and placement from a header that has been read; axes beyond the third are ignored.
 Grid header_grid(const itk::ImageIOBase& io, const std::filesystem::path& path);
+
+/// Sizes, spacing and type of voxels as they stand in a header, sound or not.
+void tell_header(const itk::ImageIOBase& io, VolumeHeader& told);
 
 /// wireplan takes one value per voxel and one volume per file.
 void require_scalar_volume(const itk::ImageIOBase& io, const Grid& grid,

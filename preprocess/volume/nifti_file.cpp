@@ -9,6 +9,8 @@
 #include <cmath>
 #include <cstdint>
 #include <fstream>
+#include <map>
+#include <utility>
 #include <vector>
 
 #include "preprocess/volume/volume_file.h"
@@ -234,6 +236,38 @@ Form choose_form(const Header& header, const Grid& grid, double unit, const fs::
   return has_sform ? sform : qform;
 }
 
+/// The name that nifti1.h gives a type of voxel.
+std::string name_of_type(int code) {
+  static const std::map<int, std::string> kNames = {
+      {2, "uint8"},    {4, "int16"},     {8, "int32"},         {16, "float32"}, {32, "complex64"},
+      {64, "float64"}, {128, "rgb24"},   {256, "int8"},        {512, "uint16"}, {768, "uint32"},
+      {1024, "int64"}, {1280, "uint64"}, {1792, "complex128"}, {2304, "rgba32"}};
+  const auto known = kNames.find(code);
+  return known == kNames.end() ? "type " + std::to_string(code) : known->second;
+}
+
+/// Sizes, spacing and units as they stand there, sound or not.
+void tell_nifti(const Header& header, VolumeHeader& told) {
+  const Layout& layout = header.layout();
+  told.format = layout.wide ? "NIfTI-2" : "NIfTI-1";
+  told.stored_as = name_of_type(header.get<std::int16_t>(layout.type));
+  const int unit = (layout.wide ? header.code(layout.units) : header.byte(layout.units)) & 7;
+  static const std::map<int, std::pair<std::string, double>> kUnits = {
+      {0, {"", 1.0}}, {1, {"m", 1000.0}}, {2, {"mm", 1.0}}, {3, {"um", 1e-3}}};
+  const auto known = kUnits.find(unit);
+  told.length_unit = known == kUnits.end() ? "code " + std::to_string(unit) : known->second.first;
+  if (known != kUnits.end()) told.mm_per_unit = known->second.second;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const bool exists = static_cast<std::int64_t>(axis) < header.dimension(0);
+    told.size[axis] = exists ? static_cast<int>(header.dimension(axis + 1)) : 1;
+    told.spacing[static_cast<Eigen::Index>(axis)] =
+        told.mm_per_unit * std::abs(header.real(layout.spacing, axis + 1));
+  }
+  told.placed_by = header.code(layout.qform_code, 1) > 0 ? "sform"
+                   : header.code(layout.qform_code) > 0  ? "qform"
+                                                         : "";
+}
+
 Grid grid_of(const Header& header, const fs::path& path) {
   const double unit = mm_per_unit(header, path);
   Grid grid;
@@ -328,9 +362,10 @@ bool read_values(const Header& header, ByteStream& file, const fs::path& path,
 
 }  // namespace
 
-Image read_nifti(const fs::path& path) {
+Image read_nifti(const fs::path& path, VolumeHeader& told) {
   ByteStream file(path);
   const Header header = read_header(file, path);
+  tell_nifti(header, told);
   Image image;
   image.grid = grid_of(header, path);
   const double offset = header.layout().wide

@@ -4,7 +4,7 @@
 /// place, refuses shears of rounding size, reads larger ones in silence and knows no NIfTI-2.
 #include <filesystem>
 
-#include "preprocess/volume/image.h"
+#include "preprocess/volume/describe.h"
 
 namespace wireplan::preprocess {
 
@@ -12,6 +12,7 @@ namespace wireplan::preprocess {
 /// by the qform, else upright (nifti1.h, methods 3, 2 and 1). Throws `Error` where it is no NIfTI,
 /// damaged or cut short, a colour or 4D image, sheared (with the angle), or where both forms are
 /// given and place a corner more than half a voxel apart.
-Image read_nifti(const std::filesystem::path& path);
+/// What is read of the header stands in `told` then too.
+Image read_nifti(const std::filesystem::path& path, VolumeHeader& told);
 
 }  // namespace wireplan::preprocess

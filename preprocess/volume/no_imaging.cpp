@@ -1,4 +1,5 @@
 // In the place of image.cpp where wireplan is built without ITK.
+#include "preprocess/volume/describe.h"
 #include "preprocess/volume/image.h"
 
 namespace wireplan::preprocess {
@@ -18,5 +19,6 @@ Image read_image(const std::filesystem::path&) { refuse(); }
 void write_image(const Image&, const std::filesystem::path&) { refuse(); }
 void write_mask(const Mask&, const std::filesystem::path&) { refuse(); }
 Mask read_mask(const std::filesystem::path&) { refuse(); }
+VolumeDescription describe_volume(const std::filesystem::path&) { refuse(); }
 
 }  // namespace wireplan::preprocess

@@ -4,8 +4,10 @@
 
 #include <Eigen/Eigenvalues>  // before ITK, which would bring in its own older copy
 #include <algorithm>
+#include <array>
 #include <cctype>
 #include <cmath>
+#include <cstdio>
 #include <cstdlib>
 #include <fstream>
 #include <iomanip>
@@ -68,6 +70,7 @@ struct MetaHeader {
   std::string data_file;   // "LOCAL", or where the voxels are
   std::streamoff end = 0;  // where voxels of this file begin
   double packed = 0.0;     // bytes, where the voxels are compressed
+  std::string unit;        // of length, as it is told
   double mm = 1.0;         // of a unit of length
 };
 
@@ -132,7 +135,10 @@ MetaHeader read_meta_header(const fs::path& path, const std::string& no_image) {
       line = key + " = " + (value == "LOCAL" ? value : elsewhere.string());
     }
     if (key == "CompressedDataSize") header.packed = std::strtod(value.c_str(), nullptr);
-    if (key == "DistanceUnits") header.mm = meta_unit(value, path);
+    if (key == "DistanceUnits") {
+      header.mm = meta_unit(value, path);
+      if (value != "?") header.unit = value;
+    }
     header.lines += line + "\n";
   }
   require(dimensions >= 2);
@@ -181,7 +187,7 @@ class TemporaryFile {
   fs::path path_;
 };
 
-Image read_meta(const fs::path& path) {
+Image read_meta(const fs::path& path, VolumeHeader& told) {
   const std::string no_image = std::string("not a MetaImage image, or damaged; ") + kFormats;
   const MetaHeader header =
       call_itk(path, no_image, [&] { return read_meta_header(path, no_image); });
@@ -203,6 +209,10 @@ Image read_meta(const fs::path& path) {
     io->SetFileName(file.string());
     if (!io->CanReadFile(file.c_str())) throw Error(path.string() + ": " + no_image);
     io->ReadImageInformation();
+    told.format = "MetaImage";
+    told.length_unit = header.unit;
+    told.mm_per_unit = header.mm;
+    tell_header(*io, told);
     require_whole_meta(*io, header, path);
   });
   Image image = call_itk(path, damaged("MetaImage"), [&] { return read_volume(*io, path); });
@@ -253,9 +263,52 @@ double nrrd_unit(const std::map<std::string, std::string>& fields, const fs::pat
   return *scales.begin();
 }
 
-Image read_nrrd(const fs::path& path) {
+/// The segments that 3D Slicer names in a header ("Segment0_Name:=aorta").
+std::vector<NamedSegment> nrrd_segments(const fs::path& path) {
+  std::map<int, NamedSegment> segments;
+  std::ifstream file(path, std::ios::binary);
+  constexpr std::size_t kLongest = 100000;  // lines
+  std::string line;
+  for (std::size_t k = 0; k < kLongest && std::getline(file, line) && !trimmed(line).empty(); ++k) {
+    int number = 0, read = 0;
+    if (std::sscanf(line.c_str(), "Segment%6d_%n", &number, &read) != 1 || read == 0) continue;
+    const std::string field = trimmed(line.substr(static_cast<std::size_t>(read)));
+    const auto value_of = [&](const std::string& key) -> std::optional<std::string> {
+      if (!field.starts_with(key + ":=")) return std::nullopt;
+      return field.substr(key.size() + 2);
+    };
+    if (const auto name = value_of("Name")) segments[number].name = *name;
+    if (const auto value = value_of("LabelValue"))
+      segments[number].value = std::atoi(value->c_str());
+    if (const auto layer = value_of("Layer")) segments[number].layer = std::atoi(layer->c_str());
+  }
+  std::vector<NamedSegment> result;
+  for (const auto& [number, segment] : segments) result.push_back(segment);
+  return result;
+}
+
+/// What the fields of a header tell, sound or not, before ITK is asked.
+void tell_nrrd(const std::map<std::string, std::string>& fields, const fs::path& path,
+               VolumeHeader& told) {
+  if (fields.empty()) return;
+  told.format = "NRRD";
+  told.segments = nrrd_segments(path);
+  const auto value = [&](const char* key) {
+    const auto found = fields.find(key);
+    return found == fields.end() ? std::string() : found->second;
+  };
+  told.stored_as = value("type");
+  std::istringstream units(value("space units"));
+  units >> std::quoted(told.length_unit);
+  std::istringstream sizes(value("sizes"));
+  std::array<int, 3> size{};
+  if (sizes >> size[0] >> size[1] >> size[2]) told.size = size;
+}
+
+Image read_nrrd(const fs::path& path, VolumeHeader& told) {
   const std::string no_image = std::string("not a NRRD image, or damaged; ") + kFormats;
   const std::map<std::string, std::string> fields = nrrd_fields(path);
+  tell_nrrd(fields, path, told);
   static const std::set<std::string> kEncodings = {"raw",  "gzip", "gz", "ascii",
                                                    "text", "txt",  "hex"};
   const auto encoding = fields.find("encoding");
@@ -269,6 +322,8 @@ Image read_nrrd(const fs::path& path) {
     io->SetFileName(path.string());
     if (!io->CanReadFile(path.c_str())) throw Error(path.string() + ": " + no_image);
     io->ReadImageInformation();
+    told.mm_per_unit = mm;
+    tell_header(*io, told);
   });
   Image image = call_itk(path, damaged("NRRD"), [&] { return read_volume(*io, path); });
   image.grid.spacing *= mm;
@@ -286,14 +341,14 @@ Image read_volume(itk::ImageIOBase& io, const fs::path& path) {
   return image;
 }
 
-Image read_file(const fs::path& path) {
+Image read_file(const fs::path& path, VolumeHeader& told) {
   const std::string name = lower_case(path.filename().string());
   const auto ends_with = [&](const char* one, const char* other) {
     return name.ends_with(one) || name.ends_with(other);
   };
-  if (ends_with(".nii", ".nii.gz")) return read_nifti(path);
-  if (ends_with(".nrrd", ".nhdr")) return read_nrrd(path);
-  if (ends_with(".mha", ".mhd")) return read_meta(path);
+  if (ends_with(".nii", ".nii.gz")) return read_nifti(path, told);
+  if (ends_with(".nrrd", ".nhdr")) return read_nrrd(path, told);
+  if (ends_with(".mha", ".mhd")) return read_meta(path, told);
   if (check_dicom(path) != DicomForm::kNone) {
     throw Error(path.string() +
                 ": a single DICOM file; give the folder that holds the whole series");

@@ -8,7 +8,11 @@
 namespace wireplan::preprocess {
 
 /// Reads a volume by the extension of its file, after looking whether it is what it is called.
-Image read_file(const std::filesystem::path& path);
+/// What is read of its header stands in `told` then too, where it is refused after that.
+Image read_file(const std::filesystem::path& path, VolumeHeader& told);
+
+/// As read_image, which is this without what is told.
+Image read_told(const std::filesystem::path& path, VolumeHeader& told);
 
 /// Reads header and voxels of a file that holds the whole volume.
 Image read_volume(itk::ImageIOBase& io, const std::filesystem::path& path);
