@@ -29,8 +29,7 @@ Failure describe_failure() {
 
 int run_command(int argc, const char* const* argv) {
   CLI::App app(
-      "Plans which guidewire, pushed in at which angle, reaches a vessel with the least force.\n"
-      "Research use only; not a medical device.",
+      "Plans which guidewire to push in, and how. Research use only; not a medical device.",
       "wireplan");
   app.set_version_flag("--version", build_info().at("version").get<std::string>() + " (" +
                                         build_info().at("revision").get<std::string>() + ")");
@@ -42,8 +41,8 @@ int run_command(int argc, const char* const* argv) {
 
   // In the order of the help.
   for (const auto add :
-       {add_run, add_trials, add_report, add_batch, add_cache, add_status, add_check, add_wires,
-        add_compare, add_simulate, add_phantom, add_render, add_bench}) {
+       {add_run, add_trials, add_report, add_batch, add_cache, add_status, add_check, add_inspect,
+        add_wires, add_compare, add_simulate, add_phantom, add_render, add_bench}) {
     add(app, code);
   }
   try {

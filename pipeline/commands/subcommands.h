@@ -14,6 +14,9 @@ void add_report(CLI::App& app, int& code);
 void add_batch(CLI::App& app, int& code);
 void add_status(CLI::App& app, int& code);
 
+// inspect.cpp: what a file holds.
+void add_inspect(CLI::App& app, int& code);
+
 // tool_commands.cpp: what stands by itself.
 void add_cache(CLI::App& app, int& code);
 void add_check(CLI::App& app, int& code);

@@ -1,0 +1,283 @@
+// `wireplan inspect`: what a file or folder holds, as text and JSON, and never whose it is.
+#include <gtest/gtest.h>
+
+#include "pipeline/report/inspect.h"
+#include "tests/dicom.h"
+#include "tests/messages.h"
+#include "tests/pipeline/program.h"
+#include "tests/preprocess/nifti_bytes.h"
+#include "tests/shapes.h"
+
+namespace wireplan::pipeline {
+namespace {
+
+namespace fs = std::filesystem;
+using dicom_files::DicomSlice;
+
+bool holds(const std::string& text, const std::string& part) {
+  return text.find(part) != std::string::npos;
+}
+
+class Inspect : public ::testing::Test {
+ protected:
+  fs::path write(const std::string& name, const std::string& bytes) {
+    fs::create_directories((folder_ / name).parent_path());
+    write_text(bytes, folder_ / name);
+    return folder_ / name;
+  }
+
+  /// Slices 2 mm apart, each in a file of its own.
+  void write_series(const std::string& folder, DicomSlice slice, int count) {
+    for (int k = 0; k < count; ++k) {
+      slice.position.z() = 2.0 * k;
+      slice.first_value = static_cast<std::int16_t>(10 * k);
+      write(folder + "/" + slice.number + "-" + std::to_string(k), dicom_files::dicom(slice));
+    }
+  }
+
+  static void expect_nobody(const std::string& text) {
+    ASSERT_FALSE(text.empty());
+    for (const std::string& word : dicom_files::kPatient) {
+      EXPECT_FALSE(holds(text, word)) << word << " in " << text;
+    }
+  }
+
+  TemporaryFolder folder_;
+};
+
+/// NRRD of 8 bit labels, 4 x 3 x 2 voxels of 10 mm, 12 voxels of 1 and 4 of 2 after 8 of 0.
+std::string label_nrrd(const std::string& more, const std::string& sizes = "4 3 2") {
+  return "NRRD0004\ntype: unsigned char\ndimension: 3\nspace: left-posterior-superior\nsizes: " +
+         sizes +
+         "\nspace directions: (10,0,0) (0,10,0) (0,0,10)\nkinds: domain domain domain\n"
+         "encoding: raw\nspace origin: (0,0,0)\n" +
+         more + "\n" + std::string(8, '\0') + std::string(12, '\1') + std::string(4, '\2');
+}
+
+TEST_F(Inspect, ASeriesIsToldByItsNumberSlicesAndPacking) {
+  DicomSlice slice;
+  slice.description = "Thorax 1.0 B30f";
+  write_series("ct", slice, 6);
+  const Json told = inspect(folder_ / "ct");
+  EXPECT_EQ(told["kind"], "dicom");
+  EXPECT_FALSE(told.contains("refused"));
+  ASSERT_EQ(told["series"].size(), 1U);
+  const Json& series = told["series"][0];
+  EXPECT_EQ(series["number"], "3");
+  EXPECT_EQ(series["description"], "Thorax 1.0 B30f");
+  EXPECT_EQ(series["modality"], "CT");
+  EXPECT_EQ(series["images"], 6);
+  EXPECT_EQ(series["slice_spacing_mm"], 2.0);
+  EXPECT_EQ(series["pixel_spacing_mm"], Json::parse("[0.6, 0.8]"));
+  EXPECT_EQ(series["transfer_syntax"]["uid"], "1.2.840.10008.1.2.1");
+  EXPECT_EQ(series["transfer_syntax"]["name"], "Explicit VR Little Endian");
+  EXPECT_TRUE(series["read"].get<bool>());
+  EXPECT_EQ(told["volume"]["size"], Json::parse("[3, 2, 6]"));
+  EXPECT_EQ(told["volume"]["axes"], "LPS");
+  EXPECT_EQ(told["volume"]["values"], Json::parse("[0, 55]"));
+  const std::string text = inspect_text(told);
+  EXPECT_TRUE(holds(text, "series 3 \"Thorax 1.0 B30f\", CT: the one that wireplan reads")) << text;
+  EXPECT_TRUE(holds(text, "axial slices from feet to head")) << text;
+  EXPECT_TRUE(holds(text, "0 to 55 HU")) << text;
+}
+
+TEST_F(Inspect, OfSeveralSeriesTheOneThatIsReadIsTold) {
+  write_series("two", {}, 6);
+  write_series("two", {.series = "1.2.3.5", .number = "1", .compressed = true}, 1);
+  const Json told = inspect(folder_ / "two");
+  ASSERT_EQ(told["series"].size(), 2U);
+  const Json& scout = told["series"][0];
+  EXPECT_EQ(scout["number"], "1");
+  EXPECT_FALSE(scout["read"].get<bool>());
+  EXPECT_TRUE(scout["slice_spacing_mm"].is_null());
+  EXPECT_TRUE(holds(scout["problem"], "one DICOM slice"));
+  EXPECT_EQ(scout["transfer_syntax"]["uid"], "1.2.840.10008.1.2.5");
+  EXPECT_TRUE(told["series"][1]["read"].get<bool>());
+
+  // with two of a volume's shape none is read
+  write_series("two", {.series = "1.2.3.6", .number = "4"}, 7);
+  const Json refused = inspect(folder_ / "two");
+  ASSERT_EQ(refused["series"].size(), 3U);
+  for (const Json& series : refused["series"]) EXPECT_FALSE(series["read"].get<bool>());
+  EXPECT_TRUE(holds(refused["refused"], "3 DICOM series, expected one"));
+}
+
+TEST_F(Inspect, NobodyIsNamed) {
+  const std::vector<std::string> telling = {
+      "Thorax LOVELACE", "thorax augusta 2", "PATIENT-4711 arch",   "CT 21.03.1954",
+      "from 2026-01-15", "ACC 0815",         "Analytical protocol", "run 15/01/26"};
+  for (std::size_t k = 0; k < telling.size(); ++k) {
+    DicomSlice slice{.series = "1.2.3." + std::to_string(10 + k), .number = std::to_string(k)};
+    slice.description = telling[k];
+    write_series("ct", slice, 6);
+  }
+  const Json told = inspect(folder_ / "ct");
+  ASSERT_EQ(told["series"].size(), telling.size());
+  for (const Json& series : told["series"]) EXPECT_TRUE(series["description"].is_null()) << series;
+  EXPECT_TRUE(told.contains("refused"));  // which lists the series too
+  expect_nobody(inspect_text(told));
+  expect_nobody(told.dump());
+
+  // and by the program, with its log
+  for (const char* arguments : {"inspect ct", "inspect ct --json", "inspect ct/0-0"}) {
+    const Answer answer = run_program(folder_.path(), arguments);
+    EXPECT_EQ(answer.code, 0) << answer.log;
+    expect_nobody(answer.out + answer.log);
+  }
+}
+
+TEST_F(Inspect, ADamagedFileEndsNotWhatIsToldOfTheOthers) {
+  write_series("ct", {}, 6);
+  const std::string whole = dicom_files::dicom({});
+  write("ct/9", whole.substr(0, whole.size() - 3));
+  const Json told = inspect(folder_ / "ct");
+  EXPECT_EQ(told["series"][0]["images"], 6);
+  EXPECT_TRUE(holds(told["refused"], "damaged or cut short"));
+}
+
+TEST_F(Inspect, OneDicomFileIsToldAndRefused) {
+  const Json told = inspect(write("slice", dicom_files::dicom({})));
+  ASSERT_EQ(told["series"].size(), 1U);
+  EXPECT_FALSE(told["series"][0]["read"].get<bool>());
+  EXPECT_TRUE(holds(told["refused"], "a single DICOM file"));
+}
+
+TEST_F(Inspect, UnitsOfANiftiAreTold) {
+  preprocess::NiftiHeader header;
+  header.units = 3;
+  const Json told = inspect(write("ct.nii", preprocess::nifti(header)));
+  EXPECT_EQ(told["format"], "NIfTI-1");
+  EXPECT_EQ(told["kind"], "image");
+  EXPECT_EQ(told["header"]["length_unit"], "um");
+  EXPECT_EQ(told["header"]["mm_per_unit"], 1e-3);
+  EXPECT_EQ(told["header"]["stored_as"], "int16");
+  EXPECT_EQ(told["header"]["placed_by"], "sform");
+  EXPECT_NEAR(told["volume"]["spacing_mm"][2].get<double>(), 4e-3, 1e-9);  // float in the file
+  EXPECT_EQ(told["volume"]["values"], Json::parse("[0, 23]"));
+  const std::string text = inspect_text(told);
+  EXPECT_TRUE(holds(text, "lengths in um, made mm by 0.001; placed by its sform")) << text;
+}
+
+TEST_F(Inspect, WhatACaseRefusesIsToldAsFarAsItsHeaderGoes) {
+  preprocess::NiftiHeader sheared;
+  sheared.rows[1] = 2.0F;
+  const Json told = inspect(write("ct.nii", preprocess::nifti(sheared)));
+  EXPECT_EQ(told["volume"]["size"], Json::parse("[2, 3, 4]"));
+  EXPECT_TRUE(holds(told["refused"], "sheared by")) << told;
+  EXPECT_TRUE(holds(inspect_text(told), "a case refuses it: the axes of the image"));
+
+  const Json cut = inspect(write("cut.nii", preprocess::nifti({}).substr(0, 360)));
+  EXPECT_TRUE(holds(cut["refused"], "damaged or cut short")) << cut;
+  EXPECT_EQ(cut["volume"]["size"], Json::parse("[2, 3, 4]"));
+}
+
+TEST_F(Inspect, LabelsAreToldWithNamesAndVolumes) {
+  const Json told = inspect(write("l.seg.nrrd", label_nrrd("Segment0_LabelValue:=1\n"
+                                                           "Segment0_Layer:=0\n"
+                                                           "Segment0_Name:=Aorta, left: upper\n"
+                                                           "Segment1_LabelValue:=7\n"
+                                                           "Segment1_Name:=empty\n")));
+  EXPECT_EQ(told["kind"], "labels");
+  ASSERT_EQ(told["labels"].size(), 3U) << told;
+  EXPECT_EQ(told["labels"][0]["name"], "Aorta, left: upper");
+  EXPECT_EQ(told["labels"][0]["voxels"], 12);
+  EXPECT_NEAR(told["labels"][0]["volume_ml"].get<double>(), 12.0, 1e-9);
+  EXPECT_TRUE(told["labels"][1]["name"].is_null());
+  EXPECT_EQ(told["labels"][1]["voxels"], 4);
+  EXPECT_EQ(told["labels"][2]["name"], "empty");
+  EXPECT_EQ(told["labels"][2]["voxels"], 0);
+}
+
+TEST_F(Inspect, NrrdAndMetaImageAreToldWithTheirUnits) {
+  const Json nrrd = inspect(write("l.nrrd", label_nrrd("space units: \"cm\" \"cm\" \"cm\"\n")));
+  EXPECT_EQ(nrrd["header"]["length_unit"], "cm");
+  EXPECT_EQ(nrrd["volume"]["spacing_mm"], Json::parse("[100, 100, 100]"));
+  std::string packed = label_nrrd("");
+  packed.replace(packed.find("raw"), 3, "bzip2");
+  const Json refused = inspect(write("b.nrrd", packed));
+  EXPECT_EQ(refused["volume"]["size"], Json::parse("[4, 3, 2]"));
+  EXPECT_TRUE(holds(refused["refused"], "bzip2"));
+
+  const Json meta = inspect(
+      write("ct.mha",
+            "ObjectType = Image\nNDims = 3\nBinaryData = True\nBinaryDataByteOrderMSB = False\n"
+            "TransformMatrix = 0 1 0 0 0 -1 -1 0 0\nOffset = 1 2 3\nElementSpacing = 1 1 2\n"
+            "DistanceUnits = cm\nDimSize = 2 2 2\nElementType = MET_UCHAR\n"
+            "ElementDataFile = LOCAL\n" +
+                std::string("\x01\x05\x02\x60\x03\x07\x04\x08", 8)));
+  EXPECT_EQ(meta["format"], "MetaImage");
+  EXPECT_EQ(meta["kind"], "image");
+  EXPECT_EQ(meta["header"]["length_unit"], "cm");
+  EXPECT_EQ(meta["volume"]["spacing_mm"], Json::parse("[10, 10, 20]"));
+  EXPECT_TRUE(holds(meta["volume"]["orientation"], "sagittal")) << meta;
+}
+
+TEST_F(Inspect, ASurfaceIsToldInEveryUnit) {
+  // a tube of radius 4 mm and length 60 mm in metres
+  Surface tube = shapes::straight_tube(4.0, 60.0, 1.0);
+  tube.vertices *= 1e-3;
+  write_stl(tube, folder_ / "tube.stl");
+  const Json told = inspect(folder_ / "tube.stl");
+  const Json& surface = told["surface"];
+  EXPECT_EQ(told["format"], "STL");
+  EXPECT_EQ(surface["triangles"], tube.triangles.cols());
+  EXPECT_EQ(surface["pieces"], 1);
+  EXPECT_EQ(surface["closed_pieces"], 1);
+  EXPECT_EQ(surface["fitting_units"], Json::parse(R"(["m"])"));
+  EXPECT_TRUE(surface["frame"].is_null());
+  EXPECT_EQ(surface["openings"].size(), 2U);
+  EXPECT_NEAR(surface["openings"][0]["radius_mm"].get<double>(), 4.0, 0.4);  // its rim is wall
+  const std::string text = inspect_text(told);
+  EXPECT_TRUE(holds(text, "as m ")) << text;
+  EXPECT_TRUE(holds(text, ": plausible for a vessel")) << text;
+
+  Surface open = shapes::straight_tube(4.0, 60.0, 1.0);
+  open.triangles.conservativeResize(Eigen::NoChange, open.triangles.cols() / 2);
+  write_stl(open, folder_ / "open.stl");
+  const Json half = inspect(folder_ / "open.stl");
+  EXPECT_EQ(half["surface"]["closed_pieces"], 0);
+}
+
+TEST_F(Inspect, WhatCannotBeToldIsOneErrorOfExitCodeTwo) {
+  write("notes.txt", "no image");
+  write("broken.nii.gz", "no image");
+  write("broken.stl", "no surface");
+  write("labels/a.nii.gz", "x");
+  write("labels/b.nii.gz", "y");
+  const std::vector<std::pair<std::string, std::string>> expected = {
+      {"missing", "missing: no such file or folder; expected a folder of DICOM files"},
+      {"notes.txt", "notes.txt: not a file that wireplan reads; expected a folder of DICOM files"},
+      {"broken.nii.gz", "not a NIfTI image, or damaged"},
+      {"broken.stl", "broken.stl"},
+      {"labels", "it holds other files that are read one by one: 2 .nii.gz"}};
+  for (const auto& [name, words] : expected) {
+    const Answer answer = run_program(folder_.path(), "inspect " + name);
+    EXPECT_EQ(answer.code, 2) << name;
+    EXPECT_EQ(answer.out, "");
+    EXPECT_TRUE(holds(answer.log, words)) << answer.log;
+  }
+}
+
+TEST_F(Inspect, ItsJsonKeepsToTheSchema) {
+  write_series("ct", {}, 6);
+  write_series("ct", {.series = "1.2.3.5", .number = "1"}, 1);
+  write("l.seg.nrrd", label_nrrd("Segment0_LabelValue:=1\nSegment0_Name:=aorta\n"));
+  write("layers.seg.nrrd", label_nrrd("Segment0_Layer:=1\nSegment0_Name:=aorta\n", "4 3 9"));
+  write("ct.nii", preprocess::nifti({}));
+  write("cut.nii", preprocess::nifti({}).substr(0, 360));
+  write_stl(shapes::straight_tube(4.0, 60.0, 1.0), folder_ / "tube.stl");
+  fs::create_directory(folder_ / "told");
+  for (const std::string name :
+       {"ct", "ct/1-0", "l.seg.nrrd", "layers.seg.nrrd", "ct.nii", "cut.nii", "tube.stl"}) {
+    const Json told = inspect(folder_ / name);
+    write_json(told, folder_ / "told" / (fs::path(name).filename().string() + ".json"));
+    EXPECT_FALSE(inspect_text(told).empty());
+  }
+  const Answer answer = run_program(folder_.path(), "inspect ct --json");
+  ASSERT_EQ(answer.code, 0) << answer.log;
+  EXPECT_EQ(Json::parse(answer.out)["schema"], kInspectSchema);
+  expect_follows_schemas(folder_ / "told");
+}
+
+}  // namespace
+}  // namespace wireplan::pipeline
