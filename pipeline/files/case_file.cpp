@@ -12,6 +12,7 @@
 
 #include "pipeline/files/access_limits_file.h"
 #include "pipeline/files/catalogue.h"
+#include "pipeline/files/markups_file.h"
 
 namespace wireplan::pipeline {
 namespace {
@@ -448,6 +449,8 @@ Case read_case(const std::filesystem::path& path, const std::vector<std::string>
   for (const std::string& override_text : overrides) apply_override(file, override_text);
 
   Problems problems(input.file.string());
+  resolve_markups(file, input.file.parent_path(), problems);
+  problems.throw_if_any();
   JsonReader root(file, "", problems);
   root.text("schema", std::nullopt);
   input.name = read_name(root, input.file);

@@ -47,6 +47,20 @@ class CaseFile : public testing::Test {
     return read_case(write("case.json", json.dump()), overrides);
   }
 
+  /// The case with the points of these accesses and targets in a file of markups.
+  Json marked_points(Json json, const std::vector<std::string>& places) const {
+    Json controls = Json::array();
+    for (const std::string& place : places) {
+      Json& end = json[Json::json_pointer(place)];
+      controls.push_back({{"label", place}, {"position", end["point_mm"]}});
+      end.erase("point_mm");
+      end["point"] = {{"markups", "points.mrk.json"}, {"label", place}};
+    }
+    const Json list = {{"coordinateSystem", "LPS"}, {"controlPoints", controls}};
+    write("points.mrk.json", Json{{"markups", Json::array({list})}}.dump());
+    return json;
+  }
+
   /// What read_case says; empty where it accepts.
   std::string problem(const Json& json, const std::vector<std::string>& overrides = {}) const {
     try {

@@ -407,16 +407,29 @@ TEST_F(CaseFile, CodeAndSchemaAgreeOnKeysLimitsAndRequirements) {
   Json other_order = listed_case();
   std::swap(other_order["targets"][0], other_order["targets"][1]);
   SchemaWalk of_sections(schema, other_order, told);
+  Json marked = full_case(surface_case()), marked_lists = listed_case();
+  SchemaWalk of_marked(schema, marked_points(std::move(marked), {"/access", "/target"}), told);
+  of_marked.visit(schema, "", "");
+  SchemaWalk of_marked_lists(
+      schema, marked_points(std::move(marked_lists), {"/accesses/0", "/targets/0"}), told);
+  of_marked_lists.visit(schema, "", "");
   of_volume.visit(schema, "", "");
   of_surface.visit(schema, "", "");
   of_lists.visit(schema, "", "");
   of_sections.visit(schema, "", "");
   EXPECT_GE(of_volume.limits, 50) << "limits held against the code";
 
+  for (const char* end : {"access", "target"}) {  // one of two keys is required
+    Json without = section;
+    without[end].erase("point_mm");
+    expect_mentions(problem(without), {std::string(end) + ".point_mm is missing"});
+  }
+
   // Nothing of the schema was passed over.
   std::set<std::string> known, visited = of_volume.visited;
   list_properties(schema, schema, "", known);
-  for (const SchemaWalk* walk : {&of_surface, &of_lists, &of_sections}) {
+  for (const SchemaWalk* walk :
+       {&of_surface, &of_lists, &of_sections, &of_marked, &of_marked_lists}) {
     visited.insert(walk->visited.begin(), walk->visited.end());
   }
   EXPECT_EQ(known, visited);

@@ -1,0 +1,236 @@
+#include "pipeline/files/markups_file.h"
+
+#include <algorithm>
+#include <array>
+#include <cctype>
+#include <cmath>
+#include <cstdlib>
+#include <fstream>
+#include <iterator>
+#include <sstream>
+
+namespace wireplan::pipeline {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr const char* kExpected = "expected markups of 3D Slicer (.mrk.json or .fcsv)";
+constexpr double kFarthestMm = 1e6;
+
+/// What turns a point of the frame into LPS. Old files number them.
+Vec3 signs_of_frame(const std::string& frame, const std::string& place) {
+  if (frame == "LPS" || frame == "1") return {1.0, 1.0, 1.0};
+  if (frame == "RAS" || frame == "0") return {-1.0, -1.0, 1.0};
+  throw Error(place + ": its coordinate system is " + frame +
+              ", expected LPS or RAS; save it again from 3D Slicer");
+}
+
+void require_place(const Vec3& point, const std::string& label, const std::string& place) {
+  if (point.allFinite() && point.cwiseAbs().maxCoeff() <= kFarthestMm) return;
+  throw Error(place + ": the point \"" + label +
+              "\" has no three numbers of a place in mm; save it again from 3D Slicer");
+}
+
+/// Of an element that may be missing or of another type.
+std::string text_under(const Json& object, const char* key) {
+  const auto found = object.find(key);
+  if (found == object.end()) return {};
+  if (found->is_string()) return found->get<std::string>();
+  return found->is_number_integer() ? found->dump() : std::string();
+}
+
+void append_markup(const Json& markup, const std::string& place, std::vector<MarkupPoint>& points) {
+  const std::string frame = text_under(markup, "coordinateSystem");
+  const Vec3 signs = signs_of_frame(frame.empty() ? "LPS" : frame, place);  // as the schema has it
+  const std::string unit = text_under(markup, "coordinateUnits");
+  if (!unit.empty() && unit != "mm") {
+    throw Error(place + ": its coordinates are in " + unit + ", expected mm");
+  }
+  const auto controls = markup.find("controlPoints");
+  if (controls == markup.end() || !controls->is_array()) return;
+  for (const Json& control : *controls) {
+    if (!control.is_object()) throw Error(place + ": a control point is no object; " + kExpected);
+    const std::string status = text_under(control, "positionStatus");
+    if (!status.empty() && status != "defined") continue;  // not placed yet
+    MarkupPoint point{.label = text_under(control, "label"), .point = Vec3::Constant(NAN)};
+    const auto position = control.find("position");
+    if (position != control.end() && position->is_array() && position->size() == 3) {
+      for (std::size_t k = 0; k < 3; ++k) {
+        if ((*position)[k].is_number()) {
+          point.point[static_cast<Eigen::Index>(k)] = (*position)[k].get<double>();
+        }
+      }
+    }
+    require_place(point.point, point.label, place);
+    point.point = signs.cwiseProduct(point.point);
+    points.push_back(std::move(point));
+  }
+}
+
+std::vector<MarkupPoint> read_markups_json(const std::string& text, const std::string& place) {
+  const Json file = Json::parse(text, nullptr, /*allow_exceptions=*/false);
+  const auto markups = file.is_object() ? file.find("markups") : file.end();
+  if (!file.is_object() || markups == file.end() || !markups->is_array()) {
+    throw Error(place + ": no markups, or damaged; " + kExpected);
+  }
+  std::vector<MarkupPoint> points;
+  for (const Json& markup : *markups) {
+    if (!markup.is_object()) throw Error(place + ": a markup is no object; " + kExpected);
+    append_markup(markup, place, points);
+  }
+  return points;
+}
+
+/// The cells of a line of a table, with quotes taken off.
+std::vector<std::string> cells_of(const std::string& line) {
+  std::vector<std::string> cells(1);
+  bool quoted = false;
+  for (const char c : line) {
+    if (c == '"') {
+      quoted = !quoted;
+    } else if (c == ',' && !quoted) {
+      cells.emplace_back();
+    } else if (c != '\r') {
+      cells.back() += c;
+    }
+  }
+  return cells;
+}
+
+/// id, x, y, z, orientation (4), visible, selected, locked, label, description, node; the frame in
+/// a comment above, RAS where it is not told.
+std::vector<MarkupPoint> read_fcsv(const std::string& text, const std::string& place) {
+  constexpr std::size_t kLabel = 11;
+  std::istringstream lines(text);
+  std::string frame = "RAS";
+  std::vector<MarkupPoint> points;
+  bool known = false;
+  for (std::string line; std::getline(lines, line);) {
+    if (line.empty() || line == "\r") continue;
+    if (line.front() == '#') {
+      known = known || line.find("Markups fiducial file") != std::string::npos;
+      const std::size_t key = line.find("CoordinateSystem"), equals = line.find('=');
+      if (key == std::string::npos || equals == std::string::npos) continue;
+      std::istringstream(line.substr(equals + 1)) >> frame;
+      continue;
+    }
+    const std::vector<std::string> cells = cells_of(line);
+    if (!known || cells.size() <= kLabel) {
+      throw Error(place + ": no table of fiducials, or damaged; " + kExpected);
+    }
+    MarkupPoint point{.label = cells[kLabel], .point = Vec3::Constant(NAN)};
+    for (std::size_t k = 0; k < 3; ++k) {
+      char* end = nullptr;
+      const double number = std::strtod(cells[k + 1].c_str(), &end);
+      if (end != cells[k + 1].c_str() && *end == '\0') {
+        point.point[static_cast<Eigen::Index>(k)] = number;
+      }
+    }
+    require_place(point.point, point.label, place);
+    points.push_back(std::move(point));
+  }
+  const Vec3 signs = signs_of_frame(frame, place);
+  for (MarkupPoint& point : points) point.point = signs.cwiseProduct(point.point).eval();
+  return points;
+}
+
+/// The labels of a file, for a message.
+std::string list_labels(const std::vector<MarkupPoint>& points) {
+  constexpr std::size_t kMost = 12;
+  std::string text;
+  for (std::size_t k = 0; k < std::min(points.size(), kMost); ++k) {
+    text += (k == 0 ? "\"" : ", \"") + points[k].label + "\"";
+  }
+  if (points.size() > kMost) text += " and " + std::to_string(points.size() - kMost) + " more";
+  return text;
+}
+
+/// The point that {"markups": FILE, "label": LABEL} names; null after a problem.
+Json find_point(const Json& given, const std::string& key, const fs::path& folder,
+                Problems& problems) {
+  const std::size_t before = problems.count();
+  JsonReader reader(given, key, problems);
+  const std::string name = reader.text("markups", std::nullopt);
+  const std::string label = reader.text("label", "");
+  reader.finish();
+  if (problems.count() > before) return nullptr;
+  std::vector<MarkupPoint> points;
+  try {
+    points = read_markups(folder / name);
+  } catch (const Error& error) {
+    problems.add(key + ".markups", name, "a file of markups", error.what());
+    return nullptr;
+  }
+  std::vector<MarkupPoint> named = points;
+  std::erase_if(
+      named, [&](const MarkupPoint& point) { return reader.has("label") && point.label != label; });
+  if (named.size() == 1) return to_json(named.front().point);
+  if (points.empty()) {
+    problems.add(key + ".markups", name, "a file with points that are placed");
+  } else if (!reader.has("label")) {
+    problems.add(key + ".label", "missing", "one of the labels of " + name, list_labels(points));
+  } else {
+    std::vector<std::string> labels;
+    for (const MarkupPoint& point : points) labels.push_back(point.label);
+    const std::string near = nearest_name(label, labels);
+    problems.add(
+        key + ".label",
+        "\"" + label + "\"" +
+            (named.empty() ? "" : ", which " + std::to_string(named.size()) + " points have"),
+        named.empty() ? "one of the labels of " + name : "the label of one point of " + name,
+        list_labels(points) +
+            (named.empty() && !near.empty() ? "; did you mean \"" + near + "\"?" : ""));
+  }
+  return nullptr;
+}
+
+/// Of one access or target.
+void resolve_end(Json& end, const std::string& key, const fs::path& folder, Problems& problems) {
+  if (!end.is_object() || !end.contains("point") || !end["point"].is_object()) return;
+  if (end.contains("point_mm")) {
+    problems.add(key + ".point", "given beside " + key + ".point_mm", "one of the two");
+    return;
+  }
+  const Json point = find_point(end["point"], key + ".point", folder, problems);
+  end.erase("point");
+  end["point_mm"] = point;
+}
+
+}  // namespace
+
+std::vector<MarkupPoint> read_markups(const fs::path& path) {
+  std::ifstream stream(path, std::ios::binary);
+  if (!fs::is_regular_file(path) || !stream) {
+    throw Error(path.string() + ": no such file; " + kExpected);
+  }
+  const std::string text(std::istreambuf_iterator<char>(stream), {});
+  std::string ending = path.extension().string();
+  std::transform(ending.begin(), ending.end(), ending.begin(),
+                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  if (ending == ".fcsv") return read_fcsv(text, path.string());
+  return read_markups_json(text, path.string());
+}
+
+void resolve_markups(Json& file, const fs::path& folder, Problems& problems) {
+  if (!file.is_object()) return;
+  const auto in_list = [](Json& owner, const char* list, const auto& resolve) {
+    if (!owner.contains(list) || !owner[list].is_array()) return;
+    for (std::size_t k = 0; k < owner[list].size(); ++k) {
+      resolve(owner[list][k], list + ("[" + std::to_string(k) + "]"));
+    }
+  };
+  const auto resolve = [&](Json& end, const std::string& key) {
+    resolve_end(end, key, folder, problems);
+  };
+  for (const char* one : {"access", "target"}) {
+    if (file.contains(one)) resolve(file[one], one);
+  }
+  in_list(file, "accesses", resolve);
+  in_list(file, "targets", resolve);
+  if (!file.contains("segmentation") || !file["segmentation"].is_object()) return;
+  in_list(file["segmentation"], "seeds_mm", [&](Json& seed, const std::string& key) {
+    if (seed.is_object()) seed = find_point(seed, "segmentation." + key, folder, problems);
+  });
+}
+
+}  // namespace wireplan::pipeline

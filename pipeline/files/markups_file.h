@@ -1,0 +1,27 @@
+#pragma once
+/// Points where people place them: markups of 3D Slicer (.mrk.json, and .fcsv of before) in the
+/// place of a case's numbers.
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "pipeline/files/json_reader.h"
+
+namespace wireplan::pipeline {
+
+struct MarkupPoint {
+  std::string label;
+  Vec3 point = Vec3::Zero();  // LPS                                                      [mm]
+};
+
+/// The points that are placed, of all lists, fiducials and curves alike; the frame is the file's
+/// own (LPS or RAS). Throws `Error` where it is missing, no markups, damaged, or in another unit or
+/// frame.
+std::vector<MarkupPoint> read_markups(const std::filesystem::path& path);
+
+/// Puts "point_mm" in the place of each "point": {"markups": FILE, "label": LABEL} of accesses and
+/// targets, and a point in that of each such object in "segmentation.seeds_mm". Files are sought
+/// from `folder`; the label may be left out where the file has one point.
+void resolve_markups(Json& file, const std::filesystem::path& folder, Problems& problems);
+
+}  // namespace wireplan::pipeline

@@ -1,0 +1,149 @@
+// Points of a case from the markups of 3D Slicer.
+#include <gtest/gtest.h>
+
+#include "pipeline/files/case_file.h"
+#include "pipeline/files/markups_file.h"
+#include "tests/messages.h"
+#include "tests/pipeline/small_case.h"
+
+namespace wireplan::pipeline {
+namespace {
+
+class Markups : public ::testing::Test {
+ protected:
+  void SetUp() override { case_ = write_tube_case(folder_.path()); }
+
+  /// A list of points in the frame, as 3D Slicer 5 writes it.
+  static Json markups(const std::string& frame,
+                      const std::vector<std::pair<std::string, Json>>& points) {
+    Json list = {{"type", "Fiducial"}, {"coordinateSystem", frame}, {"coordinateUnits", "mm"}};
+    for (const auto& [label, position] : points) {
+      list["controlPoints"].push_back(
+          {{"label", label}, {"position", position}, {"positionStatus", "defined"}});
+    }
+    return {{"@schema", "markups-schema-v1.0.3.json#"}, {"markups", Json::array({list})}};
+  }
+
+  void write(const std::string& name, const Json& file) { write_json(file, folder_ / name); }
+
+  /// What reading the case says against it; empty where it reads.
+  std::string refusal() {
+    write("case.json", case_);
+    return message_of([&] { read_case(folder_ / "case.json"); });
+  }
+
+  void point_at(const std::string& end, const Json& point) {
+    case_[end].erase("point_mm");
+    case_[end]["point"] = point;
+  }
+
+  TemporaryFolder folder_;
+  Json case_;
+};
+
+TEST_F(Markups, PointsOfEitherFrameAreThoseOfTheNumbers) {
+  write("case.json", case_);
+  const Case numbers = read_case(folder_ / "case.json");
+  const Vec3 access = numbers.accesses[0].point, target = numbers.targets[0].point;
+  const Vec3 ras(-1.0, -1.0, 1.0);
+  write("lps.mrk.json", markups("LPS", {{"in", to_json(access)}, {"out", to_json(target)}}));
+  write("ras.mrk.json", markups("RAS", {{"only", to_json(ras.cwiseProduct(target).eval())}}));
+  point_at("access", {{"markups", "lps.mrk.json"}, {"label", "in"}});
+  point_at("target", {{"markups", "ras.mrk.json"}});
+  write("case.json", case_);
+  const Case marked = read_case(folder_ / "case.json");
+  EXPECT_EQ(marked.accesses[0].point, access);
+  EXPECT_EQ(marked.targets[0].point, target);
+}
+
+TEST_F(Markups, SeedsAndListsAreResolved) {
+  write("p.mrk.json", markups("RAS", {{"a", {1, 2, 3}}, {"b", {4, 5, 6}}}));
+  Json file =
+      Json::parse(R"({"accesses": [{"name": "x", "point": {"markups": "p.mrk.json", "label": "a"}}],
+      "segmentation": {"seeds_mm": [[7, 8, 9], {"markups": "p.mrk.json", "label": "b"}]}})");
+  Problems problems("FILE");
+  resolve_markups(file, folder_.path(), problems);
+  EXPECT_TRUE(problems.empty());
+  EXPECT_EQ(file["accesses"][0]["point_mm"], Json::parse("[-1.0, -2.0, 3.0]"));
+  EXPECT_FALSE(file["accesses"][0].contains("point"));
+  EXPECT_EQ(file["segmentation"]["seeds_mm"][1], Json::parse("[-4.0, -5.0, 6.0]"));
+}
+
+TEST_F(Markups, OldTablesAreReadInTheirFrame) {
+  const std::string head = "# Markups fiducial file version = 4.11\n";
+  const std::string columns =
+      "# columns = id,x,y,z,ow,ox,oy,oz,vis,sel,lock,label,desc,associatedNodeID\n";
+  const std::string row = "1,10.5,-20,30,0,0,0,1,1,1,0,\"left, upper\",,\n";
+  const Vec3 in_file(10.5, -20.0, 30.0), turned(-10.5, 20.0, 30.0);
+  for (const auto& [frame, expected] :
+       std::vector<std::pair<std::string, Vec3>>{{"# CoordinateSystem = LPS\n", in_file},
+                                                 {"# CoordinateSystem = 1\n", in_file},
+                                                 {"# CoordinateSystem = RAS\n", turned},
+                                                 {"# CoordinateSystem = 0\r\n", turned},
+                                                 {"", turned}}) {
+    SCOPED_TRACE(frame);
+    write_text(head + frame + columns + row, folder_ / "p.fcsv");
+    const std::vector<MarkupPoint> points = read_markups(folder_ / "p.fcsv");
+    ASSERT_EQ(points.size(), 1U);
+    EXPECT_EQ(points[0].label, "left, upper");
+    EXPECT_EQ(points[0].point, expected);
+  }
+  write_text(head + "# CoordinateSystem = 2\n" + row, folder_ / "p.fcsv");  // voxels
+  EXPECT_NE(message_of([&] { read_markups(folder_ / "p.fcsv"); }).find("expected LPS or RAS"),
+            std::string::npos);
+  write_text("a,b,c\n", folder_ / "p.fcsv");
+  EXPECT_NE(message_of([&] { read_markups(folder_ / "p.fcsv"); }).find("no table of fiducials"),
+            std::string::npos);
+}
+
+TEST_F(Markups, WhatIsWrongIsToldWithFileAndLabels) {
+  write("p.mrk.json",
+        markups("LPS", {{"access", {0, 0, 6}}, {"twice", {1, 1, 1}}, {"twice", {2, 2, 2}}}));
+  const std::string key = (folder_ / "case.json").string() + ": access.point";
+  const auto expect_refusal = [&](const Json& point, const std::string& expected) {
+    point_at("access", point);
+    EXPECT_EQ(refusal(), key + expected);
+  };
+  expect_refusal({{"markups", "p.mrk.json"}, {"label", "acess"}},
+                 ".label is \"acess\", expected one of the labels of p.mrk.json (\"access\", "
+                 "\"twice\", \"twice\"; did you mean \"access\"?)");
+  expect_refusal({{"markups", "p.mrk.json"}},
+                 ".label is missing, expected one of the labels of p.mrk.json (\"access\", "
+                 "\"twice\", \"twice\")");
+  expect_refusal({{"markups", "p.mrk.json"}, {"label", "twice"}},
+                 ".label is \"twice\", which 2 points have, expected the label of one point of "
+                 "p.mrk.json (\"access\", \"twice\", \"twice\")");
+  expect_refusal({{"markups", "q.mrk.json"}},
+                 ".markups is q.mrk.json, expected a file of markups (" +
+                     (folder_ / "q.mrk.json").string() +
+                     ": no such file; expected markups of 3D Slicer (.mrk.json or .fcsv))");
+  write_text("{", folder_ / "q.mrk.json");
+  expect_refusal({{"markups", "q.mrk.json"}},
+                 ".markups is q.mrk.json, expected a file of markups (" +
+                     (folder_ / "q.mrk.json").string() +
+                     ": no markups, or damaged; expected markups of 3D Slicer (.mrk.json or "
+                     ".fcsv))");
+  case_["access"]["point_mm"] = {0, 0, 6};
+  EXPECT_EQ(refusal(), key + " is given beside access.point_mm, expected one of the two");
+}
+
+TEST_F(Markups, PointsThatAreNotPlacedOrNoPlaceAreNotTaken) {
+  Json file = markups("LPS", {{"a", {1, 2, 3}}, {"b", {4, 5, 6}}});
+  file["markups"][0]["controlPoints"][1]["positionStatus"] = "undefined";
+  write("p.mrk.json", file);
+  EXPECT_EQ(read_markups(folder_ / "p.mrk.json").size(), 1U);
+  for (const Json& position :
+       {Json::array({1, 2}), Json::array({1, 2, "x"}), Json::array({1, 2, 1e9}), Json(nullptr)}) {
+    file["markups"][0]["controlPoints"][0]["position"] = position;
+    write("p.mrk.json", file);
+    EXPECT_NE(message_of([&] { read_markups(folder_ / "p.mrk.json"); }).find("the point \"a\""),
+              std::string::npos)
+        << position;
+  }
+  write("p.mrk.json", markups("IJK", {{"a", {1, 2, 3}}}));
+  EXPECT_NE(message_of([&] { read_markups(folder_ / "p.mrk.json"); }).find("is IJK, expected LPS"),
+            std::string::npos);
+}
+
+}  // namespace
+}  // namespace wireplan::pipeline
