@@ -204,6 +204,7 @@ int print_overview(const Case& given, const std::vector<Case>& sections, const f
   }
   const Json overview = build_overview(given.name, reports);
   write_json(overview, output / "report.json");
+  write_whole(overview_csv(overview), output / "sections.csv");
   if (page_missing().empty()) write_whole(build_overview_page(overview), output / "report.html");
   std::cout << describe_overview(overview) << "\n";
   print_files(output);

@@ -1,12 +1,14 @@
 #include "pipeline/report/overview.h"
 
 #include <algorithm>
+#include <array>
 #include <optional>
 #include <tuple>
 #include <utility>
 
 #include "pipeline/files/disk.h"
 #include "pipeline/files/text.h"
+#include "pipeline/files/viewer_files.h"
 #include "pipeline/report/report.h"
 
 namespace wireplan::pipeline {
@@ -148,6 +150,42 @@ Json build_overview(const std::string& name, const std::vector<SectionReport>& s
           {"inputs", first.at("provenance").at("inputs")},
           {"program", first.at("provenance").at("program")},
           {"targets", std::move(targets)}};
+}
+
+std::string overview_csv(const Json& overview) {
+  constexpr std::array kRow = {"access", "folder", "trials", "reached", "safe_plans"};
+  constexpr std::array kPlan = {"wire",
+                                "inclination_deg",
+                                "azimuth_deg",
+                                "roll_deg",
+                                "script",
+                                "score",
+                                "repeats_safe",
+                                "repeats",
+                                "insertion_mm",
+                                "peak_tip_force_n",
+                                "peak_contact_force_n"};
+  std::string table = "target";
+  for (const char* key : kRow) table.append(",").append(key);
+  table += ",verdict";
+  for (const char* key : kPlan) table.append(",").append(key);
+  const Json& any = overview.at("targets").front().at("sections").front().at("access_table");
+  for (const auto& [key, value] : any.items()) table.append(",").append(key);
+  table += "\r\n";
+  for (const Json& target : overview.at("targets")) {
+    for (const Json& row : target.at("sections")) {
+      const Json verdict = row.value("verdict", Json::object()), plan = row.at("best_plan");
+      table += csv_field(target.at("target"));
+      for (const char* key : kRow) table.append(",").append(csv_field(row.at(key)));
+      table.append(",").append(csv_field(verdict.value("answer", Json())));
+      for (const char* key : kPlan) {
+        table.append(",").append(csv_field(plan.is_null() ? Json() : plan.at(key)));
+      }
+      for (const Json& value : row.at("access_table")) table.append(",").append(csv_field(value));
+      table += "\r\n";
+    }
+  }
+  return table;
 }
 
 std::optional<Json> find_overview(const std::filesystem::path& path) {

@@ -22,6 +22,9 @@ struct SectionReport {
 /// best plan's repeats is safe, then by its score. Expects sections of one case.
 Json build_overview(const std::string& name, const std::vector<SectionReport>& sections);
 
+/// The same as a table: a row per section, for spreadsheets.
+std::string overview_csv(const Json& overview);
+
 /// The overview in a file; nothing where the file holds no overview.
 std::optional<Json> find_overview(const std::filesystem::path& path);
 

@@ -134,7 +134,7 @@ TEST_F(Faults, AnArtifactThatVanishesBetweenStagesIsNamedAndMadeAgain) {
   RunOptions options;
   options.cache = cache();
   options.on_stage = [&](const StageOutcome& outcome) {
-    if (outcome.stage == "wall") fs::remove_all(cache() / "surface");
+    if (outcome.stage == "centerline") fs::remove_all(cache() / "surface");
   };
   try {
     run_stages(given, options);

@@ -143,6 +143,10 @@ TEST_F(Sections, ARunGivesOneOverviewWithAllAccessesOfEachTarget) {
     }
   }
   EXPECT_TRUE(serves_all_targets(*overview));
+  const std::string csv = read_text(out / "sections.csv");
+  EXPECT_EQ(csv, overview_csv(*overview));
+  EXPECT_EQ(std::count(csv.begin(), csv.end(), '\n'), 5) << "heads and four sections";
+  EXPECT_NE(csv.find("\n\"far\",\"from above\",\"from-above--far\","), std::string::npos) << csv;
   EXPECT_EQ(compare_reports({out / "report.json"}), compare_reports(files));
   expect_follows_schemas(out);
 }

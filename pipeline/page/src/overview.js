@@ -49,7 +49,7 @@ const targetSection = (target, k) => {
 
 export const showOverview = (overview) => {
   document.title = `${shown(overview.name)}: wireplan overview`;
-  document.documentElement.classList.add("print-all");
+  document.documentElement.classList.add("print-all", "overview");
   document.getElementById("page").append(
     el("header", {},
       el("h1", {}, "Guidewire plans: ", el("bdi", {}, shown(overview.name))),
