@@ -14,6 +14,12 @@ std::string two_digits(double value) {
   return text;
 }
 
+std::string two_decimals(double value) {
+  char text[64];
+  std::snprintf(text, sizeof text, "%.2f", value);
+  return text;
+}
+
 std::string one_decimal(double value) {
   char text[64];
   std::snprintf(text, sizeof text, "%.1f", value);

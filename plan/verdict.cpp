@@ -346,7 +346,7 @@ class Weighing {
     find(too_wide ? Answer::kFeasibleWithRisk : Answer::kFeasible,
          "The sheath of " + three_digits(sheath.device) +
              (sheath.assumed ? " mm (assumed) is " : " mm is ") +
-             two_digits(sheath.device / sheath.lumen) +
+             two_decimals(sheath.device / sheath.lumen) +
              " times as wide as the narrowest lumen in the first " +
              whole_millimetres(way.sheath_length) + " (" + three_digits(sheath.lumen) + " mm); " +
              (too_wide ? "it must be below " : "below ") + four_digits(sheath.max_ratio) +

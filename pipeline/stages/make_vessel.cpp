@@ -228,9 +228,10 @@ void make_surface(Workspace& work, const fs::path& folder) {
   if (given.surface_input) add_mends(mends, figures);
   figures["openings"] = openings_json(preprocess::find_openings(surface));
   if (check.euler_number != 2) {
-    figures["warnings"].push_back("surface: it has " +
-                                  std::to_string((2 - check.euler_number) / 2) +
-                                  " handles (Euler number " + std::to_string(check.euler_number) +
+    const auto handles = (2 - check.euler_number) / 2;
+    figures["warnings"].push_back("surface: it has " + std::to_string(handles) +
+                                  (handles == 1 ? " handle" : " handles") + " (Euler number " +
+                                  std::to_string(check.euler_number) +
                                   "): arteries that touch or loop; look whether the loop is real");
   }
   write_figures(figures, folder);

@@ -13,7 +13,7 @@ const thresholds = (from, [mild, moderate, severe]) =>
 
 const passageRow = (what, row) => [
   what,
-  `least lumen ${mm(row.lumen_diameter_mm)}, ${mm(row.at_mm)} from the access at ${place(row.place_mm)}`,
+  `least lumen ${mm(row.lumen_diameter_mm)} (sphere inside ${mm(row.inscribed_diameter_mm)}), ${mm(row.at_mm)} from the access at ${place(row.place_mm)}`,
   `device over lumen below ${number(row.max_ratio)}`,
   `${row.fits ? "fits" : "does not fit"}: ${mm(row.device_diameter_mm)} in ${mm(row.lumen_diameter_mm)} is ${number(row.ratio)}`,
   shown(row.source),

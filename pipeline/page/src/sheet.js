@@ -89,8 +89,8 @@ const planTable = ({report, trials}) => {
 // ---- Access.
 const gradeText = (grade) => (grade === "none" ? "no finding" : grade);
 
-const passageRow = (what, row) => [what, `lumen of ${mm(row.lumen_diameter_mm)} at its narrowest, ${along(row.at_mm)} in`,
-  `${mm(row.device_diameter_mm)}, ratio ${two(row.ratio)}`, `below ${number(row.max_ratio)}`, row.fits ? "fits" : "does not fit"];
+const passageRow = (what, row) => [what, `lumen of ${mm(row.lumen_diameter_mm)} at its narrowest (sphere inside ${mm(row.inscribed_diameter_mm)}), ${along(row.at_mm)} in`,
+  `${mm(row.device_diameter_mm)}, ratio ${number(Number(row.ratio.toFixed(2)))}`, `below ${number(row.max_ratio)}`, row.fits ? "fits" : "does not fit"];
 
 const accessTable = ({anatomy}) => {
   if (!anatomy) return block("access", "Access", el("p", {}, "Not measured in this report."));
