@@ -6,6 +6,16 @@
 
 namespace wireplan::plan {
 
+namespace {
+
+std::string printed(const char* pattern, double value) {
+  char text[64];
+  std::snprintf(text, sizeof text, pattern, value);
+  return text;
+}
+
+}  // namespace
+
 std::string two_digits(double value) {
   const double size = std::max(std::abs(value), 1e-4);
   const int decimals = std::clamp(1 - static_cast<int>(std::floor(std::log10(size))), 0, 4);
@@ -14,28 +24,9 @@ std::string two_digits(double value) {
   return text;
 }
 
-std::string two_decimals(double value) {
-  char text[64];
-  std::snprintf(text, sizeof text, "%.2f", value);
-  return text;
-}
-
-std::string one_decimal(double value) {
-  char text[64];
-  std::snprintf(text, sizeof text, "%.1f", value);
-  return text;
-}
-
-std::string three_digits(double value) {
-  char text[64];
-  std::snprintf(text, sizeof text, "%.3g", value);
-  return text;
-}
-
-std::string four_digits(double value) {
-  char text[64];
-  std::snprintf(text, sizeof text, "%.4g", value);
-  return text;
-}
+std::string two_decimals(double value) { return printed("%.2f", value); }
+std::string one_decimal(double value) { return printed("%.1f", value); }
+std::string three_digits(double value) { return printed("%.3g", value); }
+std::string four_digits(double value) { return printed("%.4g", value); }
 
 }  // namespace wireplan::plan

@@ -11,8 +11,6 @@
 #include <chrono>
 #include <csignal>
 #include <cstdlib>
-#include <fstream>
-#include <iterator>
 #include <sstream>
 #include <string>
 #include <system_error>
@@ -36,11 +34,6 @@ constexpr std::chrono::milliseconds kBetweenLooks(50);
 
 bool is_program(const fs::path& file) {
   return fs::is_regular_file(file) && ::access(file.c_str(), X_OK) == 0;
-}
-
-std::string all_of(const fs::path& file) {
-  std::ifstream stream(file, std::ios::binary);
-  return {std::istreambuf_iterator<char>(stream), {}};
 }
 
 /// A folder that is removed with all in it at the end of the scope.
@@ -163,7 +156,7 @@ fs::path print_sheet(const fs::path& report, const fs::path& folder) {
                 ": is not there, expected the page beside its report; run the case again with a "
                 "wireplan that makes pages (built with the packages nodejs and npm)");
   }
-  if (all_of(page).find("sheet-title") == std::string::npos) {
+  if (read_if_there(page).find("sheet-title") == std::string::npos) {
     throw Error(page.string() +
                 ": has no sheet to print, an earlier wireplan made it; run the case again");
   }
@@ -171,7 +164,7 @@ fs::path print_sheet(const fs::path& report, const fs::path& folder) {
   const TemporaryFolder own;
   const fs::path pdf = own.path() / "sheet.pdf";
   const bool done = run_silently(browser_words(browser, page, pdf, own.path() / "profile"));
-  const std::string bytes = fs::is_regular_file(pdf) ? all_of(pdf) : "";
+  const std::string bytes = read_if_there(pdf);
   if (!done || !bytes.starts_with("%PDF")) {
     throw Error(browser.string() + ": printed no PDF of " + page.string() +
                 " within a minute, expected a Chromium that runs without a display; name another "
