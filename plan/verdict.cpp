@@ -285,8 +285,10 @@ class Weighing {
       const std::string text = merit(other);
       if (text.empty()) continue;
       const auto id = static_cast<std::size_t>(other.trial);
-      change("Plan " + std::to_string(k + 1) + " in its place (" +
-             describe(known_.study, known_.plan.candidates[id]) + "): " + what + text + ".");
+      std::string sentence = "Plan " + std::to_string(k + 1) + " in its place (";
+      sentence.append(describe(known_.study, known_.plan.candidates[id]));
+      sentence.append("): ").append(what).append(text).append(".");
+      change(std::move(sentence));
       return;
     }
   }
