@@ -22,11 +22,11 @@ constexpr double kFurther = 2.0;     // along the path: worth going on from     
 constexpr int kDirections = 8;       // of the tip
 constexpr double kPull = 6.0;        // pulled back between two tries to push on ...           [mm]
 constexpr int kPulls = 3;            // ... so many times
-constexpr int kBeam = 3;             // branches that are gone on from
+constexpr int kBeam = 3;             // attempts that are gone on from
 constexpr std::size_t kKept = 3;     // scripts per start
 
 /// A script on its way, and what came of it.
-struct Branch {
+struct Attempt {
   std::vector<Move> moves;  // before the last push
   double progress = 0.0;    // along the path                                              [mm]
   double depth = 0.0;       // at which it came so far                                     [mm]
@@ -65,20 +65,20 @@ class Search {
         trial_(study.wires[static_cast<std::size_t>(start.wire)], make_introducer(study, start),
                study.goal, vessel, study.insertion) {}
 
-  std::vector<Branch> run(int most_turns) {
+  std::vector<Attempt> run(int most_turns) {
     trial_.save(begin_);
-    std::vector<Branch> front(1), found;
+    std::vector<Attempt> front(1), found;
     front[0] = push_on({}, nullptr);
     for (int turns = 0; turns < most_turns && found.empty(); ++turns) {
-      std::vector<Branch> next;
-      for (const Branch& branch : front) expand(branch, next);
-      std::stable_sort(next.begin(), next.end(), [](const Branch& a, const Branch& b) {
+      std::vector<Attempt> next;
+      for (const Attempt& attempt : front) expand(attempt, next);
+      std::stable_sort(next.begin(), next.end(), [](const Attempt& a, const Attempt& b) {
         if (a.reached != b.reached) return a.reached;
         if (a.reached) return a.peak_force < b.peak_force;
         return a.progress > b.progress;
       });
-      for (const Branch& branch : next) {
-        if (branch.reached && found.size() < kKept) found.push_back(branch);
+      for (const Attempt& attempt : next) {
+        if (attempt.reached && found.size() < kKept) found.push_back(attempt);
       }
       next.resize(std::min<std::size_t>(next.size(), kBeam));
       front = std::move(next);
@@ -90,11 +90,11 @@ class Search {
  private:
   /// Pushes from where the trial is until it ends or goes astray; what came of `moves` and this.
   /// Where `stops` is given, keeps states along the way.
-  Branch push_on(const std::vector<Move>& moves, std::vector<Stop>* stops) {
+  Attempt push_on(const std::vector<Move>& moves, std::vector<Stop>* stops) {
     ++branches_;
-    Branch branch{.moves = moves, .progress = progress_here(), .depth = trial_.depth()};
+    Attempt attempt{.moves = moves, .progress = progress_here(), .depth = trial_.depth()};
     double last_stop = -kMarkEvery;
-    while (trial_.depth() - branch.depth < std::max(kAstray, stops != nullptr ? kMarksOn : 0.0)) {
+    while (trial_.depth() - attempt.depth < std::max(kAstray, stops != nullptr ? kMarksOn : 0.0)) {
       if (stops != nullptr && trial_.depth() > 0.0 && trial_.depth() - last_stop >= kMarkEvery) {
         last_stop = trial_.depth();
         stops->push_back({{}, last_stop});
@@ -102,16 +102,16 @@ class Search {
       }
       if (!trial_.step({.push = step_})) break;
       const double here = progress_here();
-      if (here > branch.progress) {
-        branch.progress = here;
-        branch.depth = trial_.depth();
+      if (here > attempt.progress) {
+        attempt.progress = here;
+        attempt.depth = trial_.depth();
       }
     }
-    branch.reached = trial_.reached();
+    attempt.reached = trial_.reached();
     for (const simulate::Push& push : trial_.pushes()) {
-      branch.peak_force = std::max(branch.peak_force, push.peak_contact_force);
+      attempt.peak_force = std::max(attempt.peak_force, push.peak_contact_force);
     }
-    return branch;
+    return attempt;
   }
 
   double progress_here() const {
@@ -119,34 +119,35 @@ class Search {
     return preprocess::find_progress(trial_.pushes().back().tip, path_);
   }
 
-  /// Tries turns, and pulls after them, round where the branch left the path. Keeps what came
+  /// Tries turns, and pulls after them, round where the attempt left the path. Keeps what came
   /// further.
-  void expand(const Branch& branch, std::vector<Branch>& kept) {
-    // The branch again, with the states of its last push.
+  void expand(const Attempt& attempt, std::vector<Attempt>& kept) {
+    // The attempt again, with the states of its last push.
     trial_.restore(begin_);
-    const std::vector<Move>& before = branch.moves;
+    const std::vector<Move>& before = attempt.moves;
     for (const Move& move : before) trial_.make(move);
     if (trial_.ended()) return;
     std::vector<Stop> stops;
     const double from = trial_.depth();
     push_on(before, &stops);
     for (const Stop& stop : stops) {
-      if (stop.depth < branch.depth - kMarksBack || stop.depth > branch.depth + kMarksOn) continue;
+      if (stop.depth < attempt.depth - kMarksBack || stop.depth > attempt.depth + kMarksOn)
+        continue;
       std::vector<Move> moves = before;
       if (stop.depth > from) moves = joined(moves, {.push = stop.depth - from});
       for (int k = 1; k < kDirections; ++k) {
         if (cancelled_ && cancelled_()) return;
         const double angle = 2.0 * kPi * (k <= kDirections / 2 ? k : k - kDirections) / kDirections;
         trial_.restore(stop.mark);
-        try_turn(joined(moves, {.turn = angle}), branch, stop.depth > branch.depth, kept);
+        try_turn(joined(moves, {.turn = angle}), attempt, stop.depth > attempt.depth, kept);
       }
     }
   }
 
   /// From a state, the last of the moves, a turn; then pushes on, and where `pull`, pulls back and
   /// pushes on instead.
-  void try_turn(std::vector<Move> moves, const Branch& parent, bool pull,
-                std::vector<Branch>& kept) {
+  void try_turn(std::vector<Move> moves, const Attempt& parent, bool pull,
+                std::vector<Attempt>& kept) {
     trial_.make(moves.back());
     if (trial_.ended()) return;
     Trial::Mark turned;
@@ -160,8 +161,8 @@ class Search {
         moves = joined(moves, back);
         trial_.save(turned);
       }
-      Branch branch = push_on(moves, nullptr);
-      if (branch.reached || branch.progress > parent.progress + kFurther) kept.push_back(branch);
+      Attempt attempt = push_on(moves, nullptr);
+      if (attempt.reached || attempt.progress > parent.progress + kFurther) kept.push_back(attempt);
       trial_.restore(turned);
     }
   }
@@ -204,7 +205,7 @@ std::vector<int> choose_starts(const Study& study, const std::vector<Candidate>&
 Manoeuvres find_manoeuvres(const Study& study, const std::vector<Candidate>& starts,
                            const Centerline& path, const simulate::VesselModel& vessel,
                            int most_turns, const BatchOptions& options) {
-  std::vector<std::vector<Branch>> found(starts.size());
+  std::vector<std::vector<Attempt>> found(starts.size());
   std::vector<long> branches(starts.size(), 0);
   for_each_slot(
       static_cast<int>(starts.size()),
@@ -218,9 +219,9 @@ Manoeuvres find_manoeuvres(const Study& study, const std::vector<Candidate>& sta
   Manoeuvres all;
   for (std::size_t k = 0; k < starts.size(); ++k) {
     all.branches += branches[k];
-    for (const Branch& branch : found[k]) {
+    for (const Attempt& attempt : found[k]) {
       Candidate candidate = starts[k];
-      candidate.moves = branch.moves;
+      candidate.moves = attempt.moves;
       all.found.push_back(std::move(candidate));
       all.starts.push_back(static_cast<int>(k));
     }

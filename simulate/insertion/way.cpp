@@ -30,7 +30,7 @@ constexpr double kEndWidth = 2.0;       // radii beside its axis at most
 constexpr double kForkSpan = 3.0;       // behind a fork, where its vessels are compared  [mm]
 constexpr double kStumpRadii = 4.0;     // a shorter branch is a sac or a stump
 
-std::string millimetres(double value) {
+std::string whole_millimetres(double value) {
   char text[32];
   std::snprintf(text, sizeof text, "%.0f mm", value);
   return text;
@@ -134,15 +134,15 @@ std::optional<std::string> Way::find_detour(const Eigen::Ref<const Eigen::Matrix
     }
     const double back = furthest - place.arc;
     if (off == 0.0 && back > std::max(kRunsBack, kRunsBackRadii * place.radius)) {
-      return "it runs back along the way by " + millimetres(back) + " at " +
+      return "it runs back along the way by " + whole_millimetres(back) + " at " +
              place_text(wire.col(i)) + " mm";
     }
     furthest = std::max(furthest, place.arc);
   }
   if (off == 0.0) return std::nullopt;
   const std::string name = name_at(off_at);
-  return "it lies " + millimetres(off) + " outside of the way at " + place_text(off_at) + " mm" +
-         (name.empty() ? "" : ", in " + name);
+  return "it lies " + whole_millimetres(off) + " outside of the way at " + place_text(off_at) +
+         " mm" + (name.empty() ? "" : ", in " + name);
 }
 
 bool Way::is_wider(int branch, const Place& fork) const {
@@ -172,18 +172,18 @@ std::optional<Astray> Way::find_astray(const Vec3& tip) const {
   if (on_way.arc > leaves) {
     const std::string where =
         in_branch_of_way ? "went on in " + name + ", " : "is in " + name + ", which comes ";
-    return Astray{true, "it " + where + millimetres(on_way.arc - leaves) +
+    return Astray{true, "it " + where + whole_millimetres(on_way.arc - leaves) +
                             " beyond the place where the way leaves branch " +
                             std::to_string(on_way.branch + 1)};
   }
   if (in_branch_of_way) return std::nullopt;
   if (is_wider(left, on_way)) {
     return Astray{true, "it went on in " + name + ", the wider vessel where the way leaves it " +
-                            millimetres(on_way.arc) + " along branch " +
+                            whole_millimetres(on_way.arc) + " along branch " +
                             std::to_string(on_way.branch + 1)};
   }
   return Astray{false, "it is in " + name + ", which leaves the way " +
-                           millimetres(leaves - on_way.arc) + " before " +
+                           whole_millimetres(leaves - on_way.arc) + " before " +
                            (on_way.branch == target_branch_
                                 ? "the target"
                                 : "the way leaves branch " + std::to_string(on_way.branch + 1))};
