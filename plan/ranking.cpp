@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <tuple>
 #include <utility>
 
 #include "plan/number_text.h"
@@ -67,9 +68,26 @@ double mean_score(const RepeatedPlan& plan, std::size_t count) {
   return sum / static_cast<double>(count);
 }
 
+double safe_part(const RepeatedPlan& plan) {
+  const auto safe = std::count_if(plan.repeats.begin(), plan.repeats.end(),
+                                  [](const Repeat& repeat) { return repeat.safe; });
+  return static_cast<double>(safe) / static_cast<double>(plan.repeats.size());
+}
+
+/// Of a plan without repeats: the median of those that have them; 1 where none has.
+double typical_safe_part(const std::vector<RankedPlan>& plans,
+                         const std::vector<RepeatedPlan>& repeated) {
+  std::vector<double> parts;
+  for (const RankedPlan& plan : plans) {
+    const RepeatedPlan* own = find_repeated(repeated, plan.trial);
+    if (own != nullptr) parts.push_back(safe_part(*own));
+  }
+  return parts.empty() ? 1.0 : find_spread(parts).median;
+}
+
 void sort_plans(std::vector<RankedPlan>& plans) {
   const auto key = [](const RankedPlan& plan) {
-    return std::pair(plan.expected_score, plan.trial);
+    return std::tuple(-plan.expected_safe, plan.expected_score, plan.trial);
   };
   std::sort(plans.begin(), plans.end(),
             [&](const RankedPlan& a, const RankedPlan& b) { return key(a) < key(b); });
@@ -178,7 +196,9 @@ std::string compare_with_first(const RankedPlan& plan, const RankedPlan& first,
                      compare_forces(metrics[plan.trial].peak_contact_force,
                                     metrics[first.trial].peak_contact_force) +
                      " the first plan";
-  if (plan.score.total > first.score.total) {
+  if (plan.robust_score && plan.expected_safe < first.expected_safe) {
+    text += "; behind it because it is safe less often";
+  } else if (plan.score.total > first.score.total) {
     text += std::string("; behind it mostly by ") + largest->name;
   } else if (first.robust_score) {
     text += "; behind it under the perturbations alone";
@@ -426,8 +446,10 @@ Ranking rank(const Study& study, const std::vector<Candidate>& candidates,
 
   // The order, and then all that is said relative to the others.
   const Shifts all = find_shifts(ranking.plans, findings.repeated, 0);
+  const double typical_safe = typical_safe_part(ranking.plans, findings.repeated);
   for (RankedPlan& plan : ranking.plans) {
     const RepeatedPlan* own = find_repeated(findings.repeated, plan.trial);
+    plan.expected_safe = own == nullptr ? typical_safe : safe_part(*own);
     plan.expected_score =
         own == nullptr
             ? plan.score.total + all.typical

@@ -87,7 +87,8 @@ struct RankedPlan {
   std::optional<double> position_error;  // from halving the elements; empty if not known   [mm]
   std::optional<double> tip_error;       // as that, of the tip alone                       [mm]
   std::optional<double> robust_score;    // mean over its repeats; empty without them
-  double expected_score = 0.0;           // the same over as many as any plan has, see rank()
+  double expected_safe = 1.0;            // part of its repeats in which it is safe, see rank()
+  double expected_score = 0.0;           // mean over as many repeats as any plan has, see rank()
   std::vector<int> tied_with;            // trials that cannot be told from it, best first
   std::string sentence;                  // why it stands here
 };
@@ -123,10 +124,12 @@ struct Findings {
 
 /// Orders the plans, and says which of them are tied.
 ///
-/// Order: by the mean score over all repeats, in which one that is not safe costs 1; equals by
-/// index of the candidate. A plan with fewer repeats than others, or none, stands by what this mean
-/// is expected to be: the mean over the repeats it has (its own score without any) plus what the
-/// repeats that it lacks typically add, which is the median over the plans that have them.
+/// Order: by the part of its repeats in which a plan is safe; then by the mean score over all
+/// repeats, in which one that is not safe costs 1; equals by index of the candidate. A plan without
+/// repeats stands as if it were safe as often as those with them, in the median. Fewer repeats than
+/// others, or none, count in the score as it is expected to be: the mean over the repeats it has
+/// (its own score without any) plus what the repeats that it lacks typically add, which is the
+/// median over the plans that have them.
 ///
 /// Ties: two plans are tied
 ///   - if their scores differ by no more than the sum of their errors; or

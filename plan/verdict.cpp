@@ -202,11 +202,6 @@ class Weighing {
     if (too_few) doubts_.push_back("the repeats are too few to tell how often it stays safe");
     if (too_few) change("More than " + count_of(count, "repeat") + ", to know the share better.");
     if (!too_low) return;
-    offer_other(first, "safe in ", [&](const RankedPlan& other) {
-      const RepeatedPlan* own = repeats_of(other.trial);
-      const bool better = own != nullptr && safe_share(*own) >= rules_.safe_share;
-      return better ? safe_of(*own) : std::string();
-    });
     Endings failed;
     for (const RepeatedTrials& own : known_.plan.repeated) {
       if (own.trial != first.trial) continue;

@@ -128,19 +128,27 @@ std::string list_wire_table(const std::vector<Json>& reports) {
   return format_table(rows);
 }
 
+/// As it orders plans within a report; reports from before it did have that of the repeats alone.
+double expected_success_rate(const Json& plan) {
+  const Json& own = plan.at("success_rate");
+  return plan.value("expected_success_rate", own.is_number() ? own.get<double>() : 1.0);
+}
+
 std::string list_best_plans(const std::vector<Json>& reports) {
   struct Place {
-    double score;  // that orders plans within a report
+    double failed, score;  // that order plans within a report
     std::size_t report, rank;
   };
   std::vector<Place> places;
   for (std::size_t k = 0; k < reports.size(); ++k) {
     const Json& ranking = reports[k].at("ranking");
     for (std::size_t r = 0; r < ranking.size(); ++r)
-      places.push_back({ranking[r].at("expected_score"), k, r});
+      places.push_back(
+          {1.0 - expected_success_rate(ranking[r]), ranking[r].at("expected_score"), k, r});
   }
   std::sort(places.begin(), places.end(), [](const Place& a, const Place& b) {
-    return std::tie(a.score, a.report, a.rank) < std::tie(b.score, b.report, b.rank);
+    return std::tie(a.failed, a.score, a.report, a.rank) <
+           std::tie(b.failed, b.score, b.report, b.rank);
   });
   if (places.size() > kPlansListed) places.resize(kPlansListed);
 

@@ -268,6 +268,7 @@ Json ranked_json(const ReportInput& input, std::size_t k) {
                                {"margin", plan.score.margin}});
   row.put("score_error", plan.score_error);
   put_repeats(row, input, plan.trial);
+  row.put("expected_success_rate", plan.expected_safe);
   row.put("expected_score", plan.expected_score);
   row.put("tied_with", plan.tied_with);
   row.put("sentence", plan.sentence);

@@ -86,6 +86,17 @@ TEST_F(Compare, PutsThePlansOfOnePatientInOneOrder) {
   EXPECT_TRUE(has(text, "not tried")) << "each wire in one report alone";
 }
 
+TEST_F(Compare, PutsPlansFirstThatAreSafeMoreOften) {
+  Json often = report_of("soft", 0.4);
+  often["ranking"][0]["success_rate"] = 1.0;  // as of a report that tells no expected rate
+  Json better = report_of("stiff", 0.3);
+  better["ranking"][0]["expected_success_rate"] = 0.75;
+  const std::string text = compared({better, often});
+  const std::size_t list = text.find("Their best plans");
+  ASSERT_NE(list, std::string::npos);
+  EXPECT_LT(text.find("soft, 10/90/0 deg", list), text.find("stiff, 10/90/0 deg", list)) << text;
+}
+
 TEST_F(Compare, PutsAWireOfManyPatientsInOneRow) {
   const std::string text =
       compared({report_of("soft", 0.4), report_of("soft", 0.6, "b"), report_of("soft", 0.5, "c")});

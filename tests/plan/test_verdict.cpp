@@ -171,21 +171,6 @@ TEST(Verdict, OfALowShareTellsReachedRepeatsAndWhatWouldMendThem) {
   EXPECT_TRUE(tells(verdict.changes, "1 of 5 failed repeats press the tip on the wall"));
 }
 
-TEST(Verdict, OffersAPlanThatIsSafeMoreOften) {
-  WhatIsKnown bench = WhatIsKnown::good();
-  bench.plan.repeated.clear();
-  bench.repeat(0, 14, 2);
-  bench.add(Outcome::kReached).peak_contact_force = 3.0;
-  bench.repeat(2, 16);
-  bench.plan.repeated[1].trials[0].metrics.peak_contact_force = 3.0;
-  for (Measured& trial : bench.plan.repeated[1].trials) trial.metrics.peak_contact_force = 3.0;
-  const Verdict verdict = bench.verdict();
-  EXPECT_EQ(verdict.answer, Answer::kFeasibleWithRisk);
-  EXPECT_TRUE(tells(verdict.changes,
-                    "Plan 2 in its place (straight, inclination 0 deg, azimuth 0 deg, roll 0 "
-                    "deg): safe in 16 of 16."));
-}
-
 TEST(Verdict, WithoutRepeatsIsUnsure) {
   WhatIsKnown bench = WhatIsKnown::good();
   bench.plan.repeated.clear();
