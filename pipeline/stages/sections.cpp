@@ -63,11 +63,9 @@ std::vector<std::optional<Artifact>> make_lines(const std::vector<Case>& section
     lines.emplace_back();
     try {
       lines.back() = make_line(sections[k], options, k == 0);
-    } catch (const DiskError&) {
-      throw;
-    } catch (const Error& error) {
+    } catch (const StageError& error) {
+      if (error.stage != "centerline") throw;  // of all sections
       const std::string text = error.what();
-      if (text.find("stage centerline") == std::string::npos) throw;  // of all sections
       if (problems.find(text) == std::string::npos)
         problems += (problems.empty() ? "" : "\n") + text;
     }

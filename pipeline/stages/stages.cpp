@@ -111,7 +111,7 @@ auto act_for(const Stage& stage, Workspace& work, const Act& act) {
   } catch (const DiskError& error) {
     throw DiskError(in_context(work, stage.name, error.what()));
   } catch (const Error& error) {
-    throw Error(in_context(work, stage.name, error.what()));
+    throw StageError(stage.name, in_context(work, stage.name, error.what()));
   }
 }
 

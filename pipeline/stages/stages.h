@@ -63,9 +63,15 @@ struct RunResult {
   std::optional<FileLock> use;      // they stay in the cache as long as this
 };
 
-/// Throws `Error` for what a stage says of the world, with case file and stage named, or for a
-/// stage name that the case does not have; `Interrupted` where the user stopped it. What was
-/// finished by then is in the store.
+/// What a stage says of the world; the text names case file and stage.
+class StageError : public Error {
+ public:
+  StageError(std::string of, const std::string& text) : Error(text), stage(std::move(of)) {}
+  const std::string stage;
+};
+
+/// Throws `StageError`; `Error` for a stage name that the case does not have; `Interrupted` where
+/// the user stopped it. What was finished by then is in the store.
 RunResult run_stages(const Case& given, const RunOptions& options);
 
 /// The same for other stages than those of stages_of().
