@@ -26,6 +26,7 @@
 #include "pipeline/files/text.h"
 #include "pipeline/report/overview.h"
 #include "pipeline/report/report.h"
+#include "pipeline/report/verdict_json.h"
 #include "pipeline/stages/stages.h"
 
 namespace wireplan::pipeline {
@@ -313,6 +314,7 @@ class BatchRun {
                 {"exit_code", patient.exit_code},
                 {"reason", patient.reason.empty() ? Json(nullptr) : Json(patient.reason)},
                 {"report", nullptr},
+                {"verdict", nullptr},
                 {"summary", nullptr},
                 {"best_plan", nullptr}};
     if (patient.outcome != "planned" && patient.outcome != "no_plan") return row;
@@ -323,7 +325,8 @@ class BatchRun {
       return row;
     }
     const Json report = read_report(options_.output / name);
-    row["summary"] = describe_best(report);
+    row["verdict"] = report.at("verdict").at("answer");
+    row["summary"] = answer_of(report) + "; " + describe_best(report);
     if (report.at("ranking").empty()) return row;
     const Json& best = report.at("ranking").front();
     for (const char* key :
