@@ -449,8 +449,7 @@ Case read_case(const std::filesystem::path& path, const std::vector<std::string>
   for (const std::string& override_text : overrides) apply_override(file, override_text);
 
   Problems problems(input.file.string());
-  resolve_markups(file, input.file.parent_path(), problems);
-  problems.throw_if_any();
+  resolve_points(file, input.file.parent_path(), problems);
   JsonReader root(file, "", problems);
   root.text("schema", std::nullopt);
   input.name = read_name(root, input.file);

@@ -7,7 +7,11 @@
 #include <cstdlib>
 #include <fstream>
 #include <iterator>
+#include <optional>
 #include <sstream>
+
+#include "pipeline/files/case_file.h"
+#include "preprocess/volume/image.h"
 
 namespace wireplan::pipeline {
 namespace {
@@ -145,56 +149,109 @@ std::string list_labels(const std::vector<MarkupPoint>& points) {
   return text;
 }
 
-/// The point that {"markups": FILE, "label": LABEL} names; null after a problem.
-Json find_point(const Json& given, const std::string& key, const fs::path& folder,
-                Problems& problems) {
-  const std::size_t before = problems.count();
-  JsonReader reader(given, key, problems);
-  const std::string name = reader.text("markups", std::nullopt);
-  const std::string label = reader.text("label", "");
-  reader.finish();
-  if (problems.count() > before) return nullptr;
-  std::vector<MarkupPoint> points;
-  try {
-    points = read_markups(folder / name);
-  } catch (const Error& error) {
-    problems.add(key + ".markups", name, "a file of markups", error.what());
-    return nullptr;
+/// Points of a case in the place of objects that say where they are.
+class PointFinder {
+ public:
+  PointFinder(const Json& file, const fs::path& folder, Problems& problems)
+      : folder_(folder), problems_(problems) {
+    const bool has_volume = file.contains("volume") && file["volume"].is_object();
+    if (has_volume && file["volume"].value("path", Json()).is_string()) {
+      volume_ = resolve_path(file["volume"]["path"], folder);
+    }
   }
-  std::vector<MarkupPoint> named = points;
-  std::erase_if(
-      named, [&](const MarkupPoint& point) { return reader.has("label") && point.label != label; });
-  if (named.size() == 1) return to_json(named.front().point);
-  if (points.empty()) {
-    problems.add(key + ".markups", name, "a file with points that are placed");
-  } else if (!reader.has("label")) {
-    problems.add(key + ".label", "missing", "one of the labels of " + name, list_labels(points));
-  } else {
-    std::vector<std::string> labels;
-    for (const MarkupPoint& point : points) labels.push_back(point.label);
-    const std::string near = nearest_name(label, labels);
-    problems.add(
-        key + ".label",
-        "\"" + label + "\"" +
-            (named.empty() ? "" : ", which " + std::to_string(named.size()) + " points have"),
-        named.empty() ? "one of the labels of " + name : "the label of one point of " + name,
-        list_labels(points) +
-            (named.empty() && !near.empty() ? "; did you mean \"" + near + "\"?" : ""));
-  }
-  return nullptr;
-}
 
-/// Of one access or target.
-void resolve_end(Json& end, const std::string& key, const fs::path& folder, Problems& problems) {
-  if (!end.is_object() || !end.contains("point") || !end["point"].is_object()) return;
-  if (end.contains("point_mm")) {
-    problems.add(key + ".point", "given beside " + key + ".point_mm", "one of the two");
-    return;
+  /// Of one access or target.
+  void resolve_end(Json& end, const std::string& key) {
+    if (!end.is_object() || !end.contains("point") || !end["point"].is_object()) return;
+    if (end.contains("point_mm")) {
+      problems_.add(key + ".point", "given beside " + key + ".point_mm", "one of the two");
+    } else {
+      end["point_mm"] = find(end["point"], key + ".point");
+    }
+    end.erase("point");
   }
-  const Json point = find_point(end["point"], key + ".point", folder, problems);
-  end.erase("point");
-  end["point_mm"] = point;
-}
+
+  Json find(const Json& given, const std::string& key) {
+    const std::size_t before = problems_.count();
+    JsonReader reader(given, key, problems_);
+    const std::optional<Vec3> point =
+        given.contains("ijk") ? find_voxel(reader, before) : find_markup(reader, before);
+    if (point) return to_json(*point);
+    // Apart from every other point.
+    return to_json(Vec3(1000.0 * static_cast<double>(problems_.count()), 0.0, 0.0));
+  }
+
+ private:
+  std::optional<Vec3> find_markup(JsonReader& reader, std::size_t problems_before) {
+    const std::string name = reader.text("markups", std::nullopt);
+    const std::string label = reader.text("label", "");
+    reader.finish();
+    if (problems_.count() > problems_before) return {};
+    std::vector<MarkupPoint> points;
+    try {
+      points = read_markups(folder_ / name);
+    } catch (const Error& error) {
+      problems_.add(reader.path_of("markups"), name, "a file of markups", error.what());
+      return {};
+    }
+    std::vector<MarkupPoint> named = points;
+    std::erase_if(named, [&](const MarkupPoint& point) {
+      return reader.has("label") && point.label != label;
+    });
+    if (named.size() == 1) return named.front().point;
+    if (points.empty()) {
+      problems_.add(reader.path_of("markups"), name, "a file with points that are placed");
+    } else if (!reader.has("label")) {
+      problems_.add(reader.path_of("label"), "missing", "one of the labels of " + name,
+                    list_labels(points));
+    } else {
+      std::vector<std::string> labels;
+      for (const MarkupPoint& point : points) labels.push_back(point.label);
+      const std::string near = nearest_name(label, labels);
+      problems_.add(
+          reader.path_of("label"),
+          "\"" + label + "\"" +
+              (named.empty() ? "" : ", which " + std::to_string(named.size()) + " points have"),
+          named.empty() ? "one of the labels of " + name : "the label of one point of " + name,
+          list_labels(points) +
+              (named.empty() && !near.empty() ? "; did you mean \"" + near + "\"?" : ""));
+    }
+    return {};
+  }
+
+  std::optional<Vec3> find_voxel(JsonReader& reader, std::size_t problems_before) {
+    const Vec3 ijk = reader.point("ijk", std::nullopt);
+    reader.finish();
+    if (problems_.count() > problems_before) return {};
+    const std::string key = reader.path_of("ijk"), given = to_json(ijk).dump();
+    if (volume_.empty()) {
+      problems_.add(key, given, "a case with volume.path",
+                    "a surface has no voxels; give point_mm");
+      return {};
+    }
+    try {
+      if (!grid_) grid_ = preprocess::read_image(volume_).grid;
+    } catch (const Error& error) {
+      problems_.add(key, given, "voxels of a volume that can be read", error.what());
+      return {};
+    }
+    Vec3 last = Vec3::Zero();
+    for (std::size_t k = 0; k < 3; ++k) {
+      last[static_cast<Eigen::Index>(k)] = grid_->size[k] - 1.0;
+    }
+    if (((ijk.array() < -0.5) || (ijk.array() > last.array() + 0.5)).any()) {
+      problems_.add(key, given, "voxels from [0, 0, 0] to " + Json(to_json(last)).dump(),
+                    "so many the volume has; they count from 0");
+      return {};
+    }
+    return grid_->lps_from_ijk(ijk);
+  }
+
+  const fs::path& folder_;
+  Problems& problems_;
+  fs::path volume_;  // empty without one
+  std::optional<preprocess::Grid> grid_;
+};
 
 }  // namespace
 
@@ -211,17 +268,16 @@ std::vector<MarkupPoint> read_markups(const fs::path& path) {
   return read_markups_json(text, path.string());
 }
 
-void resolve_markups(Json& file, const fs::path& folder, Problems& problems) {
+void resolve_points(Json& file, const fs::path& folder, Problems& problems) {
   if (!file.is_object()) return;
+  PointFinder finder(file, folder, problems);
   const auto in_list = [](Json& owner, const char* list, const auto& resolve) {
     if (!owner.contains(list) || !owner[list].is_array()) return;
     for (std::size_t k = 0; k < owner[list].size(); ++k) {
       resolve(owner[list][k], list + ("[" + std::to_string(k) + "]"));
     }
   };
-  const auto resolve = [&](Json& end, const std::string& key) {
-    resolve_end(end, key, folder, problems);
-  };
+  const auto resolve = [&](Json& end, const std::string& key) { finder.resolve_end(end, key); };
   for (const char* one : {"access", "target"}) {
     if (file.contains(one)) resolve(file[one], one);
   }
@@ -229,7 +285,7 @@ void resolve_markups(Json& file, const fs::path& folder, Problems& problems) {
   in_list(file, "targets", resolve);
   if (!file.contains("segmentation") || !file["segmentation"].is_object()) return;
   in_list(file["segmentation"], "seeds_mm", [&](Json& seed, const std::string& key) {
-    if (seed.is_object()) seed = find_point(seed, "segmentation." + key, folder, problems);
+    if (seed.is_object()) seed = finder.find(seed, "segmentation." + key);
   });
 }
 

@@ -1,6 +1,6 @@
 #pragma once
-/// Points where people place them: markups of 3D Slicer (.mrk.json, and .fcsv of before) in the
-/// place of a case's numbers.
+/// Points where people place them: markups of 3D Slicer (.mrk.json, and .fcsv of before) and voxels
+/// of the volume, in the place of a case's numbers.
 #include <filesystem>
 #include <string>
 #include <vector>
@@ -19,9 +19,13 @@ struct MarkupPoint {
 /// frame.
 std::vector<MarkupPoint> read_markups(const std::filesystem::path& path);
 
-/// Puts "point_mm" in the place of each "point": {"markups": FILE, "label": LABEL} of accesses and
-/// targets, and a point in that of each such object in "segmentation.seeds_mm". Files are sought
-/// from `folder`; the label may be left out where the file has one point.
-void resolve_markups(Json& file, const std::filesystem::path& folder, Problems& problems);
+/// Puts "point_mm" in the place of each "point" of accesses and targets, and a point in that of
+/// each object in "segmentation.seeds_mm". Such an object is one of
+///   {"markups": FILE, "label": LABEL}   sought from `folder`; the label may be left out where the
+///                                       file has one point
+///   {"ijk": [I, J, K]}                  of the case's volume, counted from 0 as read_image's Grid
+///                                       does, parts of voxels too; the volume is read for it
+/// After a problem some other point stands in its place, so that all else can be told too.
+void resolve_points(Json& file, const std::filesystem::path& folder, Problems& problems);
 
 }  // namespace wireplan::pipeline

@@ -3,6 +3,7 @@
 
 #include "pipeline/files/case_file.h"
 #include "pipeline/files/markups_file.h"
+#include "preprocess/volume/image.h"
 #include "tests/messages.h"
 #include "tests/pipeline/small_case.h"
 
@@ -62,7 +63,7 @@ TEST_F(Markups, SeedsAndListsAreResolved) {
       Json::parse(R"({"accesses": [{"name": "x", "point": {"markups": "p.mrk.json", "label": "a"}}],
       "segmentation": {"seeds_mm": [[7, 8, 9], {"markups": "p.mrk.json", "label": "b"}]}})");
   Problems problems("FILE");
-  resolve_markups(file, folder_.path(), problems);
+  resolve_points(file, folder_.path(), problems);
   EXPECT_TRUE(problems.empty());
   EXPECT_EQ(file["accesses"][0]["point_mm"], Json::parse("[-1.0, -2.0, 3.0]"));
   EXPECT_FALSE(file["accesses"][0].contains("point"));
@@ -125,6 +126,57 @@ TEST_F(Markups, WhatIsWrongIsToldWithFileAndLabels) {
                      ".fcsv))");
   case_["access"]["point_mm"] = {0, 0, 6};
   EXPECT_EQ(refusal(), key + " is given beside access.point_mm, expected one of the two");
+}
+
+/// A volume that is turned 90 degrees round z, with voxels of (0.5, 0.8, 3) mm.
+preprocess::Grid write_turned_volume(const std::filesystem::path& file) {
+  preprocess::Image image;
+  image.grid.size = {20, 30, 10};
+  image.grid.spacing = {0.5, 0.8, 3.0};
+  image.grid.origin = {-10.0, 20.0, 5.0};
+  image.grid.direction << 0, -1, 0, 1, 0, 0, 0, 0, 1;
+  image.values.assign(image.grid.voxels(), 0.0F);
+  preprocess::write_image(image, file);
+  return image.grid;
+}
+
+TEST_F(Markups, VoxelsAreThoseOfTheVolume) {
+  write_turned_volume(folder_ / "ct.nrrd");
+  Json file = Json::parse(R"({"volume": {"path": "ct.nrrd"},
+      "access": {"point": {"ijk": [0, 0, 0]}}, "targets": [{"point": {"ijk": [4, 10, 2.5]}}],
+      "segmentation": {"seeds_mm": [{"ijk": [19, 29, 9]}]}})");
+  Problems problems("FILE");
+  resolve_points(file, folder_.path(), problems);
+  EXPECT_TRUE(problems.empty());
+  // By hand: i runs along y, j along -x.
+  EXPECT_EQ(file["access"]["point_mm"], Json::parse("[-10.0, 20.0, 5.0]"));
+  EXPECT_EQ(file["targets"][0]["point_mm"], Json::parse("[-18.0, 22.0, 12.5]"));
+  EXPECT_NEAR(file["segmentation"]["seeds_mm"][0][0].get<double>(), -10.0 - 29 * 0.8, 1e-9);
+  EXPECT_NEAR(file["segmentation"]["seeds_mm"][0][1].get<double>(), 20.0 + 19 * 0.5, 1e-9);
+}
+
+TEST_F(Markups, VoxelsThatAreNoneAreToldWithAllElse) {
+  write_turned_volume(folder_ / "ct.nrrd");
+  case_.erase("surface");
+  case_["volume"] = {{"path", "ct.nrrd"}};
+  case_["friction"] = -1;
+  point_at("access", {{"ijk", {20, 0, 0}}});
+  const std::string both = refusal();
+  EXPECT_TRUE(both.find("access.point.ijk is [20.0,0.0,0.0], expected voxels from [0, 0, 0] to "
+                        "[19.0,29.0,9.0]") != std::string::npos &&
+              both.find("friction") != std::string::npos)
+      << both;
+  EXPECT_EQ(both.find("point_mm"), std::string::npos) << both;
+  case_["friction"] = 0.1;
+  write_text("", folder_ / "ct.nrrd");
+  EXPECT_NE(refusal().find("expected voxels of a volume that can be read"), std::string::npos);
+  case_["access"]["point"] = {{"ijk", {1, 2}}};
+  EXPECT_NE(refusal().find("access.point.ijk is [1,2]"), std::string::npos) << refusal();
+}
+
+TEST_F(Markups, ASurfaceHasNoVoxels) {
+  point_at("access", {{"ijk", {1, 2, 3}}});
+  EXPECT_NE(refusal().find("expected a case with volume.path"), std::string::npos) << refusal();
 }
 
 TEST_F(Markups, PointsThatAreNotPlacedOrNoPlaceAreNotTaken) {
