@@ -17,4 +17,8 @@ inline std::string message_of(const std::function<void()>& action) {
   return "no error";
 }
 
+inline bool holds(const std::string& text, const std::string& part) {
+  return text.find(part) != std::string::npos;
+}
+
 }  // namespace wireplan

@@ -42,7 +42,7 @@ int run_command(int argc, const char* const* argv) {
   // In the order of the help.
   for (const auto add :
        {add_run, add_trials, add_report, add_batch, add_cache, add_status, add_check, add_inspect,
-        add_wires, add_compare, add_simulate, add_phantom, add_render, add_bench}) {
+        add_new, add_wires, add_compare, add_simulate, add_phantom, add_render, add_bench}) {
     add(app, code);
   }
   try {

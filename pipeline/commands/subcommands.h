@@ -14,8 +14,9 @@ void add_report(CLI::App& app, int& code);
 void add_batch(CLI::App& app, int& code);
 void add_status(CLI::App& app, int& code);
 
-// inspect.cpp: what a file holds.
+// inspect.cpp: what a file holds. new_case.cpp: a case for it.
 void add_inspect(CLI::App& app, int& code);
+void add_new(CLI::App& app, int& code);
 
 // tool_commands.cpp: what stands by itself.
 void add_cache(CLI::App& app, int& code);

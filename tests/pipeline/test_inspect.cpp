@@ -14,10 +14,6 @@ namespace {
 namespace fs = std::filesystem;
 using dicom_files::DicomSlice;
 
-bool holds(const std::string& text, const std::string& part) {
-  return text.find(part) != std::string::npos;
-}
-
 class Inspect : public ::testing::Test {
  protected:
   fs::path write(const std::string& name, const std::string& bytes) {

@@ -1,0 +1,242 @@
+#include "pipeline/commands/new_case.h"
+
+#include <algorithm>
+#include <cctype>
+#include <cmath>
+#include <iostream>
+#include <memory>
+#include <optional>
+
+#include "pipeline/commands/commands.h"
+#include "pipeline/commands/subcommands.h"
+#include "pipeline/files/case_file.h"
+#include "pipeline/files/disk.h"
+#include "pipeline/files/markups_file.h"
+#include "pipeline/files/text.h"
+#include "pipeline/report/inspect.h"
+#include "preprocess/volume/image.h"
+
+namespace wireplan::pipeline {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr double kBloodHu = 100.0;  // with contrast it has more
+constexpr const char* kMarkups = "points.mrk.json";
+constexpr const char* kWires = R"(["glidewire-angled", "amplatz-stiff", "amplatz-stiff-angled"])";
+
+/// As a case file in the folder names it.
+std::string path_from(const fs::path& folder, const fs::path& file) {
+  return fs::proximate(fs::weakly_canonical(file), fs::weakly_canonical(folder)).generic_string();
+}
+
+/// The folder's name, of characters that the name of a case may have.
+std::string case_name(const fs::path& folder) {
+  std::string name = fs::weakly_canonical(folder).filename().string();
+  for (char& c : name) {
+    if (std::isalnum(static_cast<unsigned char>(c)) == 0 && c != '-' && c != '_') c = '-';
+  }
+  return name.empty() ? "case" : name;
+}
+
+bool begins_as(const std::string& label, const std::string& word) {
+  return label.size() >= word.size() &&
+         std::equal(word.begin(), word.end(), label.begin(), [](char a, char b) {
+           return a == std::tolower(static_cast<unsigned char>(b));
+         });
+}
+
+/// "ct.nrrd: image, NRRD, 512 x 512 x 119 voxels of 0.74 x 0.74 x 1.6 mm"
+std::string volume_line(const fs::path& path, const preprocess::Image& image) {
+  const preprocess::Grid& grid = image.grid;
+  return path.filename().string() + ": " +
+         (image.modality.empty() ? std::string("a volume") : image.modality) +
+         format(" of %d x %d x %d voxels of %.3g x %.3g x %.3g mm", grid.size[0], grid.size[1],
+                grid.size[2], grid.spacing[0], grid.spacing[1], grid.spacing[2]);
+}
+
+class CaseMaker {
+ public:
+  explicit CaseMaker(const NewCase& given) : given_(given) {}
+
+  NewCaseAnswer write() {
+    const fs::path file = given_.folder / "case.json";
+    if (fs::exists(file)) {
+      throw Error(file.string() + ": is there already; give another folder, or delete it");
+    }
+    read_volume();
+    case_ = {{"schema", "wireplan.case/1"},
+             {"name", case_name(given_.folder)},
+             {"volume", {{"path", path_from(given_.folder, given_.volume)}}}};
+    if (given_.markups.empty()) {
+      ask_for_points();
+    } else {
+      take_points(read_markups(given_.markups));
+    }
+    case_["wires"] = Json::parse(kWires);
+    fs::create_directories(given_.folder);
+    write_json(case_, file);
+    if (answer_.missing.empty()) check(file);
+    write_whole(readme(), given_.folder / "README.md");
+    return std::move(answer_);
+  }
+
+ private:
+  void read_volume() {
+    const Json told = inspect(given_.volume);
+    const std::string path = given_.volume.string(), kind = told.at("kind");
+    if (kind == "surface" || kind == "labels") {
+      throw Error(path + ": holds " + (kind == "labels" ? "labels" : "a surface") +
+                  ", expected a CT; write the case by hand as README.md shows it");
+    }
+    image_ = preprocess::read_image(given_.volume);
+    answer_.found.push_back(volume_line(given_.volume, image_));
+    told_ = inspect_text(told);
+  }
+
+  void ask_for_points() {
+    for (const char* end : {"access", "target"}) {
+      case_[end] = {{"point", {{"markups", kMarkups}, {"label", end}}}};
+    }
+    answer_.missing.push_back(
+        std::string("Two points in the lumen: in 3D Slicer load the volume, place them, name them "
+                    "\"access\" and \"target\", and save them as ") +
+        (given_.folder / kMarkups).string() + ".");
+  }
+
+  void take_points(const std::vector<MarkupPoint>& points) {
+    for (const MarkupPoint& point : points) tell_point(point);
+    std::vector<std::string> accesses, targets, others;
+    for (const MarkupPoint& point : points) {
+      (begins_as(point.label, "access")   ? accesses
+       : begins_as(point.label, "target") ? targets
+                                          : others)
+          .push_back(point.label);
+    }
+    if (points.size() == 2 && others.size() == 2) {
+      accesses = {others[0]};
+      targets = {others[1]};
+      others.clear();
+      answer_.found.push_back("\"" + accesses[0] + "\" is taken as the access, \"" + targets[0] +
+                              "\" as the target");
+    }
+    put_ends("access", "accesses", accesses);
+    put_ends("target", "targets", targets);
+    for (const std::string& label : others) {
+      answer_.found.push_back("\"" + label +
+                              "\" is not used: neither \"access\" nor \"target\" begins its name");
+    }
+  }
+
+  void tell_point(const MarkupPoint& point) {
+    const preprocess::Grid& grid = image_.grid;
+    const Vec3 ijk = grid.ijk_from_lps(point.point);
+    std::string line =
+        "\"" + point.label + "\" at (" +
+        format("%.1f, %.1f, %.1f) mm LPS, ", point.point.x(), point.point.y(), point.point.z());
+    std::array<int, 3> voxel{};
+    for (std::size_t k = 0; k < 3; ++k) {
+      const double index = std::round(ijk[static_cast<Eigen::Index>(k)]);
+      if (!(index >= 0.0 && index < grid.size[k])) {
+        answer_.found.push_back(line + "outside of the volume");
+        answer_.missing.push_back("The point \"" + point.label +
+                                  "\" inside the volume: it lies outside; place it again.");
+        return;
+      }
+      voxel[k] = static_cast<int>(index);
+    }
+    const double value = image_.values[grid.index(voxel[0], voxel[1], voxel[2])];
+    line += format("voxel (%d, %d, %d): %.0f", voxel[0], voxel[1], voxel[2], value);
+    line += image_.modality == "CT" ? " HU" : "";
+    if (value < kBloodHu) line += ", less than blood with contrast has; is it in the lumen?";
+    answer_.found.push_back(line);
+  }
+
+  /// `one` for a single label; the list with names for several.
+  void put_ends(const std::string& one, const std::string& list,
+                const std::vector<std::string>& labels) {
+    const std::string markups = path_from(given_.folder, given_.markups);
+    const auto point = [&](const std::string& label) {
+      return Json{{"markups", markups}, {"label", label}};
+    };
+    if (labels.size() > 1) {
+      for (const std::string& label : labels) {
+        case_[list].push_back({{"name", label}, {"point", point(label)}});
+      }
+      return;
+    }
+    case_[one]["point"] = point(labels.empty() ? one : labels.front());
+    if (labels.empty()) {
+      answer_.missing.push_back("A point named \"" + one + "\" in " + given_.markups.string() +
+                                ", in the lumen.");
+    }
+  }
+
+  void check(const fs::path& file) {
+    try {
+      read_case(file);
+    } catch (const DiskError&) {
+      throw;
+    } catch (const Error& error) {
+      answer_.missing.emplace_back(error.what());
+    }
+  }
+
+  std::string readme() const {
+    const std::string name = case_.at("name");
+    std::string text = "# " + name + "\nA case of wireplan. Research use only.\n\n";
+    text += "## What was found\n```\n" + told_ + "```\n";
+    for (const std::string& line : answer_.found) text += "- " + line + "\n";
+    text += "\n## What is missing\n";
+    for (const std::string& line : answer_.missing) text += "- " + line + "\n";
+    if (answer_.missing.empty()) text += "Nothing.\n";
+    return text + R"(
+## What case.json says
+| key | what it is |
+|---|---|
+| `volume` | the CT, from this folder |
+| `access`, `target` | where the wires go in and where to, in the lumen; `accesses`, `targets` are lists of both, with names. `"point": {"markups": FILE, "label": NAME}` is a point of 3D Slicer, `{"ijk": [I, J, K]}` a voxel, `"point_mm"` three numbers in LPS |
+| `wires` | of the catalogue (`wireplan wires` lists it) or of your own |
+
+All other keys have defaults; `pipeline/schemas/case.schema.json` explains each.
+
+## To do
+```
+wireplan check .
+wireplan run .
+```
+)";
+  }
+
+  const NewCase& given_;
+  preprocess::Image image_;
+  std::string told_;  // of the volume
+  Json case_;
+  NewCaseAnswer answer_;
+};
+
+}  // namespace
+
+NewCaseAnswer write_new_case(const NewCase& given) { return CaseMaker(given).write(); }
+
+void add_new(CLI::App& app, int& code) {
+  const auto given = std::make_shared<NewCase>();
+  CLI::App* command = app.add_subcommand("new", "Write the folder of a case for a CT");
+  command->add_option("DIR", given->folder, "Folder of the case")->required();
+  command->add_option("--volume", given->volume, "Folder of DICOM files, NIfTI, NRRD or MetaImage")
+      ->required();
+  command->add_option("--markups", given->markups,
+                      "Points of 3D Slicer (.mrk.json, .fcsv), named access and target");
+  command->footer(
+      "Writes DIR/case.json and DIR/README.md, and says what was found and what is missing.\n"
+      "Example: wireplan new patient-7 --volume ct.nii.gz --markups points.mrk.json");
+  command->callback([&code, given] {
+    const NewCaseAnswer answer = write_new_case(*given);
+    for (const std::string& line : answer.found) std::cout << "found: " << line << "\n";
+    for (const std::string& line : answer.missing) std::cout << "missing: " << line << "\n";
+    std::cout << "case: " << (given->folder / "case.json").string() << "\n";
+    code = kDone;
+  });
+}
+
+}  // namespace wireplan::pipeline
