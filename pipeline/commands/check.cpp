@@ -20,7 +20,8 @@ void check_volume(const Case& given, Problems& problems) {
                  "configure with -DWIREPLAN_IMAGING=ON");
     return;
   }
-  const preprocess::Grid grid = preprocess::read_image(given.volume->path).grid;
+  const preprocess::Grid grid =
+      preprocess::read_image(given.volume->path, given.volume->series).grid;
   const auto expect_inside = [&](const std::string& key, const Vec3& point) {
     if (!contains(grid, point)) {
       problems.add(key, to_json(point).dump(), "a point inside the volume",

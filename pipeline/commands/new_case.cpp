@@ -68,6 +68,7 @@ class CaseMaker {
     case_ = {{"schema", "wireplan.case/1"},
              {"name", case_name(given_.folder)},
              {"volume", {{"path", path_from(given_.folder, given_.volume)}}}};
+    if (!given_.series.empty()) case_["volume"]["series"] = given_.series;
     if (given_.markups.empty()) {
       ask_for_points();
     } else {
@@ -89,7 +90,7 @@ class CaseMaker {
       throw Error(path + ": holds " + (kind == "labels" ? "labels" : "a surface") +
                   ", expected a CT; write the case by hand as README.md shows it");
     }
-    image_ = preprocess::read_image(given_.volume);
+    image_ = preprocess::read_image(given_.volume, given_.series);
     answer_.found.push_back(volume_line(given_.volume, image_));
     told_ = inspect_text(told);
   }
@@ -225,6 +226,7 @@ void add_new(CLI::App& app, int& code) {
   command->add_option("DIR", given->folder, "Folder of the case")->required();
   command->add_option("--volume", given->volume, "Folder of DICOM files, NIfTI, NRRD or MetaImage")
       ->required();
+  command->add_option("--series", given->series, "Of a DICOM folder, by number or description");
   command->add_option("--markups", given->markups,
                       "Points of 3D Slicer (.mrk.json, .fcsv), named access and target");
   command->footer(

@@ -9,6 +9,7 @@ namespace wireplan::pipeline {
 struct NewCase {
   std::filesystem::path folder;   // is made where it is not there
   std::filesystem::path volume;   // as of a case
+  std::string series;             // of a DICOM folder, by number or description; may be empty
   std::filesystem::path markups;  // of 3D Slicer; may be empty
 };
 

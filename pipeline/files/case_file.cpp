@@ -102,6 +102,7 @@ VolumeInput read_volume(JsonReader reader, const std::filesystem::path& folder) 
   volume.given = reader.text("path", std::nullopt);
   volume.path = resolve_path(volume.given, folder);
   expect_exists(reader, "path", volume.given, volume.path, "an image file or a DICOM folder");
+  volume.series = reader.text("series", "");
   reader.finish();
   return volume;
 }
@@ -351,6 +352,7 @@ Json input_json(const Case& input) {
     Json seeds = Json::array();
     for (const Vec3& seed : segmentation.seeds) seeds.push_back(to_json(seed));
     json["volume"] = {{"path", input.volume->given}};
+    if (!input.volume->series.empty()) json["volume"]["series"] = input.volume->series;
     const auto value = [](const std::optional<double>& given) {
       return given ? Json(*given) : Json(nullptr);
     };

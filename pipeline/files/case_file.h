@@ -23,6 +23,7 @@ namespace wireplan::pipeline {
 struct VolumeInput {
   std::filesystem::path path;
   std::string given;
+  std::string series;  // of a DICOM folder, by number or description; empty: see read_image
 };
 
 struct SurfaceInput {

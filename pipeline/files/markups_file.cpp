@@ -157,6 +157,8 @@ class PointFinder {
     const bool has_volume = file.contains("volume") && file["volume"].is_object();
     if (has_volume && file["volume"].value("path", Json()).is_string()) {
       volume_ = resolve_path(file["volume"]["path"], folder);
+      const Json series = file["volume"].value("series", Json(""));
+      if (series.is_string()) series_ = series;
     }
   }
 
@@ -230,7 +232,7 @@ class PointFinder {
       return {};
     }
     try {
-      if (!grid_) grid_ = preprocess::read_image(volume_).grid;
+      if (!grid_) grid_ = preprocess::read_image(volume_, series_).grid;
     } catch (const Error& error) {
       problems_.add(key, given, "voxels of a volume that can be read", error.what());
       return {};
@@ -250,6 +252,7 @@ class PointFinder {
   const fs::path& folder_;
   Problems& problems_;
   fs::path volume_;  // empty without one
+  std::string series_;
   std::optional<preprocess::Grid> grid_;
 };
 

@@ -45,7 +45,13 @@ std::string dotted(const std::string& pointer) {
 
 std::string stage_key_text(const Stage& stage, const Workspace& work) {
   std::vector<KeyLine> lines = {{"stage", stage.name}, {"version", std::to_string(stage.version)}};
-  if (stage.reads_input) lines.push_back({"input file", work.input_sha256});
+  if (stage.reads_input) {
+    lines.push_back({"input file", work.input_sha256});
+    const std::optional<VolumeInput>& volume = work.given().volume;
+    if (volume && !volume->series.empty()) {
+      lines.push_back({"parameter volume.series", volume->series});
+    }
+  }
   for (const std::string& earlier : stage.after) {
     lines.push_back(
         {"input " + earlier, work.has(earlier) ? work.artifact(earlier).contents() : kNotMade});

@@ -94,7 +94,7 @@ Json Workspace::figures(const std::string& stage) const {
 }
 
 const preprocess::Image& Workspace::image() {
-  if (!image_) image_ = preprocess::read_image(input);
+  if (!image_) image_ = preprocess::read_image(input, given_.volume->series);
   return *image_;
 }
 

@@ -67,7 +67,7 @@ VolumeDescription describe_volume(const fs::path& path) {
   std::optional<Image> image;
   std::optional<Error> refused;
   try {
-    image = read_told(path, told.header);
+    image = read_told(path, "", told.header);
   } catch (const DiskError&) {
     throw;  // the file is not to blame
   } catch (const Error& error) {

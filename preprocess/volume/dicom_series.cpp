@@ -200,11 +200,16 @@ bool has_volume_shape(const Series& series) {
   return series.size() >= kLeast && stack(origins_of(series), series.front().grid).problem.empty();
 }
 
-Error several_series(const fs::path& folder, std::vector<Series> all) {
+Error several_series(const fs::path& folder, const std::string& wanted, std::vector<Series> all) {
   std::stable_sort(all.begin(), all.end(),
                    [](const Series& a, const Series& b) { return a.size() > b.size(); });
   std::ostringstream text;
-  text << folder.string() << ": " << all.size() << " DICOM series, expected one:";
+  text << folder.string() << ": " << all.size() << " DICOM series, ";
+  if (wanted.empty()) {
+    text << "expected one:";
+  } else {
+    text << "expected one of the number or description \"" << wanted << "\":";
+  }
   for (const Series& series : all) {
     const Slice& first = series.front();
     text << " number " << (first.series_number.empty() ? "unknown" : first.series_number);
@@ -217,27 +222,35 @@ Error several_series(const fs::path& folder, std::vector<Series> all) {
     }
     text << ";";
   }
-  text << " put the one to plan on into a folder of its own";
+  text << " name the one to plan on by \"series\" in the case's volume, or put it into a folder of "
+          "its own";
   return Error(text.str());
 }
 
-/// The series to read: the only one, or the one that alone has a volume's shape; the end where
-/// there is none.
-std::vector<Series>::iterator find_chosen(std::vector<Series>& all) {
-  if (all.size() == 1) return all.begin();
-  const auto found = std::find_if(all.begin(), all.end(), has_volume_shape);
-  const bool alone = std::count_if(all.begin(), all.end(), has_volume_shape) == 1;
-  return alone ? found : all.end();
+/// The series to read, of those that are wanted: the only one, or the one that alone has a volume's
+/// shape; the end where there is none.
+std::vector<Series>::iterator find_chosen(std::vector<Series>& all, const std::string& wanted) {
+  const auto only = [&](const auto& fits) {
+    const auto found = std::find_if(all.begin(), all.end(), fits);
+    return std::count_if(all.begin(), all.end(), fits) == 1 ? found : all.end();
+  };
+  const auto is_wanted = [&](const Series& series) {
+    const Slice& first = series.front();
+    return wanted.empty() || first.series_number == wanted || first.description == wanted;
+  };
+  const auto found = only(is_wanted);
+  if (found != all.end()) return found;
+  return only([&](const Series& series) { return is_wanted(series) && has_volume_shape(series); });
 }
 
-Series choose_series(const fs::path& folder, std::vector<Series> all) {
+Series choose_series(const fs::path& folder, const std::string& wanted, std::vector<Series> all) {
   if (all.empty()) {
     throw Error(folder.string() +
                 ": a folder without DICOM images (folders inside it are not searched); " +
                 kFormats);
   }
-  const auto found = find_chosen(all);
-  if (found == all.end()) throw several_series(folder, std::move(all));
+  const auto found = find_chosen(all, wanted);
+  if (found == all.end()) throw several_series(folder, wanted, std::move(all));
   return std::move(*found);
 }
 
@@ -411,11 +424,12 @@ void send_header(const Send& send, const Grid& grid, std::string modality) {
 }
 
 /// Sends the grid of the folder's series and what made it, then its values slice by slice.
-void send_dicom_folder(const fs::path& folder, const Send& send, const At& at) {
+void send_dicom_folder(const fs::path& folder, const std::string& wanted, const Send& send,
+                       const At& at) {
   at(folder.string());
   std::vector<Series> all;
   find_series(folder, at, all);
-  Series slices = choose_series(folder, std::move(all));
+  Series slices = choose_series(folder, wanted, std::move(all));
   Slice& first = slices.front();
   at(first.file.string());
   require_hounsfield(first.unit, first.modality, folder);
@@ -511,7 +525,7 @@ std::vector<SeriesDescription> describe_dicom(const fs::path& path) {
           } catch (const Error&) {
             // read_image tells it; what was found until then is described
           }
-          const auto read = fs::is_directory(path) ? find_chosen(all) : all.end();
+          const auto read = fs::is_directory(path) ? find_chosen(all, "") : all.end();
           const std::size_t count = all.size();
           send(&count, sizeof count);
           for (auto series = all.begin(); series != all.end(); ++series) {
@@ -541,11 +555,11 @@ std::vector<SeriesDescription> describe_dicom(const fs::path& path) {
 
 /// In a process of its own, since distributions build GDCM with assertions, and those end the
 /// process on some values that a damaged header holds.
-Image read_dicom_folder(const fs::path& folder) {
+Image read_dicom_folder(const fs::path& folder, const std::string& series) {
   Image image;
   run_apart(
       [&](const Send& send, const At& at) {
-        call_itk(folder, damaged("DICOM"), [&] { send_dicom_folder(folder, send, at); });
+        call_itk(folder, damaged("DICOM"), [&] { send_dicom_folder(folder, series, send, at); });
       },
       [&](const Receive& receive) {
         image.grid = receive_grid(receive);

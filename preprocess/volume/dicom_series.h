@@ -7,8 +7,9 @@
 
 namespace wireplan::preprocess {
 
-/// The one series of the folder, its slices sorted by position. Throws `Error` as read_image tells.
-Image read_dicom_folder(const std::filesystem::path& folder);
+/// The one series of the folder, or that of this number or description, its slices sorted by
+/// position. Throws `Error` as read_image tells.
+Image read_dicom_folder(const std::filesystem::path& folder, const std::string& series);
 
 /// All series of the folder, or of the one DICOM file, up to a file that is damaged.
 std::vector<SeriesDescription> describe_dicom(const std::filesystem::path& path);

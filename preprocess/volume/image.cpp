@@ -70,7 +70,7 @@ void write_nrrd(const Grid& grid, const void* voxels, itk::IOComponentEnum type,
 
 bool reads_volumes() { return true; }
 
-Image read_told(const fs::path& path, VolumeHeader& told) {
+Image read_told(const fs::path& path, const std::string& series, VolumeHeader& told) {
   std::error_code unknown;
   if (!fs::exists(path, unknown)) {
     throw Error(path.string() + ": no such file or folder; " + kFormats);
@@ -79,7 +79,10 @@ Image read_told(const fs::path& path, VolumeHeader& told) {
   Image image;
   if (fs::is_directory(path, unknown)) {
     told.format = "DICOM";
-    image = call_itk(path, damaged("DICOM"), [&] { return read_dicom_folder(path); });
+    image = call_itk(path, damaged("DICOM"), [&] { return read_dicom_folder(path, series); });
+  } else if (!series.empty()) {
+    throw Error(path.string() + ": series \"" + series +
+                "\" of a file, expected a folder of DICOM files; a file holds one volume");
   } else {
     image = read_file(path, told);
   }
@@ -87,9 +90,9 @@ Image read_told(const fs::path& path, VolumeHeader& told) {
   return image;
 }
 
-Image read_image(const fs::path& path) {
+Image read_image(const fs::path& path, const std::string& series) {
   VolumeHeader told;
-  return read_told(path, told);
+  return read_told(path, series, told);
 }
 
 void write_image(const Image& image, const fs::path& path) {

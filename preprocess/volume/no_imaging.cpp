@@ -15,7 +15,7 @@ namespace {
 
 }  // namespace
 
-Image read_image(const std::filesystem::path&) { refuse(); }
+Image read_image(const std::filesystem::path&, const std::string&) { refuse(); }
 void write_image(const Image&, const std::filesystem::path&) { refuse(); }
 void write_mask(const Mask&, const std::filesystem::path&) { refuse(); }
 Mask read_mask(const std::filesystem::path&) { refuse(); }

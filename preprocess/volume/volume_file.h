@@ -12,7 +12,7 @@ namespace wireplan::preprocess {
 Image read_file(const std::filesystem::path& path, VolumeHeader& told);
 
 /// As read_image, which is this without what is told.
-Image read_told(const std::filesystem::path& path, VolumeHeader& told);
+Image read_told(const std::filesystem::path& path, const std::string& series, VolumeHeader& told);
 
 /// Reads header and voxels of a file that holds the whole volume.
 Image read_volume(itk::ImageIOBase& io, const std::filesystem::path& path);

@@ -12,10 +12,12 @@
 #include <map>
 #include <set>
 #include <string>
+#include <tuple>
 
 #include "pipeline/files/case_file.h"
 #include "pipeline/files/catalogue.h"
 #include "pipeline/files/scene_file.h"
+#include "preprocess/volume/image.h"
 #include "tests/pipeline/case_texts.h"
 #include "tests/pipeline/small_case.h"
 
@@ -413,6 +415,21 @@ TEST_F(CaseFile, CodeAndSchemaAgreeOnKeysLimitsAndRequirements) {
   SchemaWalk of_marked_lists(
       schema, marked_points(std::move(marked_lists), {"/accesses/0", "/targets/0"}), told);
   of_marked_lists.visit(schema, "", "");
+
+  preprocess::write_image({.grid = {.size = {4, 4, 90}}, .values = std::vector<float>(4 * 4 * 90)},
+                          folder_ / "ct.nrrd");
+  Json voxels = full_case(volume_case()), voxel_lists = full_case(volume_case());
+  for (const auto& [end, list, k] :
+       {std::tuple("access", "accesses", 3), std::tuple("target", "targets", 80)}) {
+    voxels[end].erase("point_mm");
+    voxels[end]["point"] = {{"ijk", {1, 2, k}}};
+    voxel_lists.erase(end);
+    voxel_lists[list] = Json::array({voxels[end]});
+    voxel_lists[list][0]["name"] = end;
+  }
+  SchemaWalk of_voxels(schema, voxels, told), of_voxel_lists(schema, voxel_lists, told);
+  of_voxels.visit(schema, "", "");
+  of_voxel_lists.visit(schema, "", "");
   of_volume.visit(schema, "", "");
   of_surface.visit(schema, "", "");
   of_lists.visit(schema, "", "");
@@ -428,8 +445,8 @@ TEST_F(CaseFile, CodeAndSchemaAgreeOnKeysLimitsAndRequirements) {
   // Nothing of the schema was passed over.
   std::set<std::string> known, visited = of_volume.visited;
   list_properties(schema, schema, "", known);
-  for (const SchemaWalk* walk :
-       {&of_surface, &of_lists, &of_sections, &of_marked, &of_marked_lists}) {
+  for (const SchemaWalk* walk : {&of_surface, &of_lists, &of_sections, &of_marked, &of_marked_lists,
+                                 &of_voxels, &of_voxel_lists}) {
     visited.insert(walk->visited.begin(), walk->visited.end());
   }
   EXPECT_EQ(known, visited);

@@ -42,7 +42,7 @@ class NewCaseTest : public ::testing::Test {
   }
 
   NewCaseAnswer make(const fs::path& markups = {}) {
-    return write_new_case({folder_ / "anna", folder_ / "scan/ct.nrrd", markups});
+    return write_new_case({folder_ / "anna", folder_ / "scan/ct.nrrd", "", markups});
   }
 
   TemporaryFolder folder_;

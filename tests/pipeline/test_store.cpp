@@ -375,7 +375,7 @@ TEST_F(RerunMatrix, OfACaseThatStartsFromASurface) {
 TEST_F(RerunMatrix, OfACaseThatStartsFromAVolume) {
   Json file = case_with_every_list_of_one(folder_.path());
   for (const char* name : {"ct.nrrd", "other.nrrd"}) write_text("values", folder_ / name);
-  file["volume"] = {{"path", "ct.nrrd"}};
+  file["volume"] = {{"path", "ct.nrrd"}, {"series", "7"}};
   file["surface"] = {{"edge_length_mm", 1.5}};
   file["segmentation"] = {{"lower_hu", 150},
                           {"upper_hu", 500},
@@ -384,6 +384,7 @@ TEST_F(RerunMatrix, OfACaseThatStartsFromAVolume) {
                           {"neck_opening_mm", 0}};
   auto table = common_table();
   table["/volume/path"] = {"report"};
+  table["/volume/series"] = {"volume", "segment", "surface", "anatomy", "report"};
   for (const char* key : {"lower_hu", "upper_hu", "seeds_mm/0/0", "seeds_mm/0/1", "seeds_mm/0/2",
                           "smoothing_mm", "neck_opening_mm"}) {
     table[std::string("/segmentation/") + key] = {"segment", "report"};
@@ -396,6 +397,7 @@ TEST_F(RerunMatrix, OfACaseThatStartsFromAVolume) {
   }
   Json changes = common_changes();
   changes["/volume/path"] = "other.nrrd";
+  changes["/volume/series"] = "8";
   expect_reruns(file, table, changes);
 }
 

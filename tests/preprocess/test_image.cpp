@@ -15,6 +15,7 @@
 #include "preprocess/volume/dicom_check.h"
 #include "preprocess/volume/image.h"
 #include "tests/dicom.h"
+#include "tests/messages.h"
 #include "tests/preprocess/image_file.h"
 #include "tests/preprocess/nifti_bytes.h"
 
@@ -292,6 +293,20 @@ TEST_F(DicomFolder, SeveralSeriesAreListedByNumberOfSlices) {
           "number 1 has 2 images"))
       << error;
   EXPECT_FALSE(has(error, "LOVELACE") || has(error, "1.2.3.")) << error;
+}
+
+TEST_F(DicomFolder, ASeriesIsChosenByNumberOrDescription) {
+  write_series({0.0, 1.5}, {.series = "1.2.3.1", .number = "1", .description = "portal"});
+  write_series({0.0, 1.5, 3.0}, {.series = "1.2.3.2", .number = "2", .description = "arterial"});
+  EXPECT_EQ(read_image(folder_, "1").grid.size[2], 2);
+  EXPECT_EQ(read_image(folder_, "arterial").grid.size[2], 3);
+  const std::string error = message_of([&] { read_image(folder_, "3"); });
+  EXPECT_TRUE(has(error, "2 DICOM series, expected one of the number or description \"3\":"))
+      << error;
+  EXPECT_TRUE(has(error, "number 2 (arterial) has 3 images")) << error;
+  write_image({.grid = {.size = {2, 2, 2}}, .values = std::vector<float>(8)}, folder_ / "a.nrrd");
+  EXPECT_TRUE(has(message_of([&] { read_image(folder_ / "a.nrrd", "1"); }),
+                  "expected a folder of DICOM files; a file holds one volume"));
 }
 
 TEST_F(DicomFolder, TiltedGantryIsAnError) {
