@@ -18,14 +18,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// ITK and GDCM print warnings that may quote a header; what matters of them becomes an Error.
-void silence_libraries() {
-  itk::Object::GlobalWarningDisplayOff();
-  gdcm::Trace::DebugOff();
-  gdcm::Trace::WarningOff();
-  gdcm::Trace::ErrorOff();
-}
-
 void require_finite(const Image& image, const fs::path& path) {
   const auto bad = std::count_if(image.values.begin(), image.values.end(),
                                  [](float v) { return !std::isfinite(v); });
@@ -69,6 +61,13 @@ void write_nrrd(const Grid& grid, const void* voxels, itk::IOComponentEnum type,
 }  // namespace
 
 bool reads_volumes() { return true; }
+
+void silence_libraries() {
+  itk::Object::GlobalWarningDisplayOff();
+  gdcm::Trace::DebugOff();
+  gdcm::Trace::WarningOff();
+  gdcm::Trace::ErrorOff();
+}
 
 Image read_told(const fs::path& path, const std::string& series, VolumeHeader& told) {
   std::error_code unknown;

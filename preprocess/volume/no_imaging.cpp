@@ -1,6 +1,7 @@
 // In the place of image.cpp where wireplan is built without ITK.
 #include "preprocess/volume/describe.h"
 #include "preprocess/volume/image.h"
+#include "preprocess/volume/labels.h"
 
 namespace wireplan::preprocess {
 
@@ -19,6 +20,7 @@ Image read_image(const std::filesystem::path&, const std::string&) { refuse(); }
 void write_image(const Image&, const std::filesystem::path&) { refuse(); }
 void write_mask(const Mask&, const std::filesystem::path&) { refuse(); }
 Mask read_mask(const std::filesystem::path&) { refuse(); }
+LabelVolume read_labels(const std::filesystem::path&, const LabelChoice&, const Grid*) { refuse(); }
 VolumeDescription describe_volume(const std::filesystem::path&) { refuse(); }
 
 }  // namespace wireplan::preprocess

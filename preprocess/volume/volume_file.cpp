@@ -305,7 +305,23 @@ void tell_nrrd(const std::map<std::string, std::string>& fields, const fs::path&
   if (sizes >> size[0] >> size[1] >> size[2]) told.size = size;
 }
 
-Image read_nrrd(const fs::path& path, VolumeHeader& told) {
+/// Volumes whose voxels have several values, one for each of these.
+std::vector<Image> read_values(itk::ImageIOBase& io, const fs::path& path) {
+  constexpr unsigned kMost = 250;
+  const std::size_t count = io.GetNumberOfComponents();
+  const Grid grid = header_grid(io, path);
+  require_volume(grid, path);
+  if (count > kMost) throw several_values(io.GetNumberOfComponents(), path);
+  std::vector<float> values;
+  append_voxels(io, path, values);
+  if (values.size() != count * grid.voxels()) throw Error(path.string() + ": " + damaged("NRRD"));
+  std::vector<Image> layers(count, {.grid = grid, .values = std::vector<float>(grid.voxels())});
+  for (std::size_t n = 0; n < values.size(); ++n) layers[n % count].values[n / count] = values[n];
+  return layers;
+}
+
+/// All values of a voxel where `layered`, and else one.
+std::vector<Image> read_nrrd(const fs::path& path, VolumeHeader& told, bool layered) {
   const std::string no_image = std::string("not a NRRD image, or damaged; ") + kFormats;
   const std::map<std::string, std::string> fields = nrrd_fields(path);
   tell_nrrd(fields, path, told);
@@ -325,10 +341,20 @@ Image read_nrrd(const fs::path& path, VolumeHeader& told) {
     told.mm_per_unit = mm;
     tell_header(*io, told);
   });
-  Image image = call_itk(path, damaged("NRRD"), [&] { return read_volume(*io, path); });
-  image.grid.spacing *= mm;
-  image.grid.origin *= mm;
-  return image;
+  std::vector<Image> layers = call_itk(path, damaged("NRRD"), [&] {
+    return layered && io->GetNumberOfComponents() > 1 ? read_values(*io, path)
+                                                      : std::vector{read_volume(*io, path)};
+  });
+  for (Image& layer : layers) {
+    layer.grid.spacing *= mm;
+    layer.grid.origin *= mm;
+  }
+  return layers;
+}
+
+bool ends_with(const fs::path& path, const char* one, const char* other) {
+  const std::string name = lower_case(path.filename().string());
+  return name.ends_with(one) || name.ends_with(other);
 }
 
 }  // namespace
@@ -342,18 +368,22 @@ Image read_volume(itk::ImageIOBase& io, const fs::path& path) {
 }
 
 Image read_file(const fs::path& path, VolumeHeader& told) {
-  const std::string name = lower_case(path.filename().string());
-  const auto ends_with = [&](const char* one, const char* other) {
-    return name.ends_with(one) || name.ends_with(other);
-  };
-  if (ends_with(".nii", ".nii.gz")) return read_nifti(path, told);
-  if (ends_with(".nrrd", ".nhdr")) return read_nrrd(path, told);
-  if (ends_with(".mha", ".mhd")) return read_meta(path, told);
+  if (ends_with(path, ".nii", ".nii.gz")) return read_nifti(path, told);
+  if (ends_with(path, ".nrrd", ".nhdr")) return std::move(read_nrrd(path, told, false).front());
+  if (ends_with(path, ".mha", ".mhd")) return read_meta(path, told);
   if (check_dicom(path) != DicomForm::kNone) {
     throw Error(path.string() +
                 ": a single DICOM file; give the folder that holds the whole series");
   }
   throw Error(path.string() + ": not an image that wireplan reads; " + kFormats);
+}
+
+std::vector<Image> read_layers(const fs::path& path, VolumeHeader& told) {
+  if (ends_with(path, ".nrrd", ".nhdr") && fs::is_regular_file(path)) {
+    silence_libraries();
+    return read_nrrd(path, told, true);
+  }
+  return {read_told(path, told)};
 }
 
 }  // namespace wireplan::preprocess

@@ -1,0 +1,291 @@
+#include "preprocess/volume/label_frame.h"
+
+#include <Eigen/LU>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+
+#include "preprocess/volume/voxels.h"
+
+namespace wireplan::preprocess {
+namespace {
+
+constexpr double kTolerance = 0.1;  // of a voxel
+constexpr double kAside = 1e-6;     // of a voxel: to no side of a tie
+
+bool is_identity(const Mat3& m) { return (m - Mat3::Identity()).cwiseAbs().maxCoeff() < 1e-3; }
+
+std::string text_of(double value) {
+  return number_text(std::abs(value) < 5e-4 ? 0.0 : std::round(value * 1000.0) / 1000.0);
+}
+
+/// Grids that hold the same centres, in whatever order of axes and slices.
+bool same_centres(const Grid& a, const Grid& b) {
+  for (int corner = 0; corner < 8; ++corner) {
+    const Vec3 ijk((corner & 1) * (a.size[0] - 1), (corner >> 1 & 1) * (a.size[1] - 1),
+                   (corner >> 2) * (a.size[2] - 1));
+    const Vec3 there = b.ijk_from_lps(a.lps_from_ijk(ijk));
+    for (int axis = 0; axis < 3; ++axis) {
+      const double end = b.size[axis] - 1;
+      if (std::min(std::abs(there[axis]), std::abs(there[axis] - end)) > kTolerance) return false;
+    }
+  }
+  return a.voxels() == b.voxels();
+}
+
+// ---- edges of labels in the volume
+// ---------------------------------------------------------------
+
+/// A voxel's centre just inside a label's edge, and one as far outside [mm].
+struct EdgePair {
+  Vec3 inside, outside;
+};
+
+/// At most so many pairs, evenly taken from all of the edge.
+std::vector<EdgePair> edge_pairs(const Grid& grid, const std::vector<std::uint8_t>& classes) {
+  constexpr std::size_t kMost = 3000;
+  std::vector<EdgePair> all;
+  const std::array<std::size_t, 3> stride = {1, grid.index(0, 1, 0), grid.index(0, 0, 1)};
+  for (int k = 2; k + 3 < grid.size[2]; ++k) {
+    for (int j = 2; j + 3 < grid.size[1]; ++j) {
+      for (int i = 2; i + 3 < grid.size[0]; ++i) {
+        const std::size_t n = grid.index(i, j, k);
+        for (int axis = 0; axis < 3; ++axis) {
+          const bool here = classes[n] != 0, next = classes[n + stride[axis]] != 0;
+          if (here == next) continue;
+          Vec3 low(i, j, k), high(i, j, k);
+          low[axis] -= 1.0;
+          high[axis] += 2.0;
+          const Vec3 a = grid.lps_from_ijk(low), b = grid.lps_from_ijk(high);
+          all.push_back(here ? EdgePair{a, b} : EdgePair{b, a});
+        }
+      }
+    }
+  }
+  if (all.size() <= kMost) return all;
+  std::vector<EdgePair> some;
+  for (std::size_t k = 0; k < kMost; ++k) some.push_back(all[k * all.size() / kMost]);
+  return some;
+}
+
+/// The volume's values, held between what counts as dark and as bright: 0 to 600 HU in a CT, so
+/// that neither lungs nor metal weigh; elsewhere between its median and its brightest.
+class Brightness {
+ public:
+  explicit Brightness(const Image& image) : image_(image) {
+    constexpr float kAir = -500.0F;
+    const bool ct = image.modality == "CT" ||
+                    (image.modality.empty() &&
+                     *std::min_element(image.values.begin(), image.values.end()) < kAir);
+    if (ct) return;
+    std::vector<float> some;
+    const std::size_t step = std::max<std::size_t>(1, image.values.size() / 100000);
+    for (std::size_t n = 0; n < image.values.size(); n += step) some.push_back(image.values[n]);
+    std::sort(some.begin(), some.end());
+    low_ = static_cast<double>(some[some.size() / 2]);
+    high_ = std::max(low_ + 1e-6, static_cast<double>(some[some.size() * 995 / 1000]));
+  }
+
+  std::optional<double> at(const Vec3& point) const {
+    const std::optional<Voxel> voxel = nearest_voxel(image_.grid, point);
+    if (!voxel) return {};
+    const auto value = static_cast<double>(image_.values[index_of(image_.grid, *voxel)]);
+    return (std::clamp(value, low_, high_) - low_) / (high_ - low_) * kScale;
+  }
+
+  /// Mean step inward over the edge, as the change moves it [HU].
+  double contrast(const std::vector<EdgePair>& pairs, const FrameChange& change) const {
+    constexpr double kMost = 200.0;
+    double sum = 0.0;
+    for (const EdgePair& pair : pairs) {
+      const auto inside = at(change.linear * pair.inside + change.shift),
+                 outside = at(change.linear * pair.outside + change.shift);
+      if (inside && outside) sum += std::clamp(*inside - *outside, -kMost, kMost);
+    }
+    return pairs.empty() ? 0.0 : sum / static_cast<double>(pairs.size());
+  }
+
+ private:
+  static constexpr double kScale = 600.0;
+  const Image& image_;
+  double low_ = 0.0, high_ = kScale;
+};
+
+/// Mirrored along the grid's axes round its middle; x, y or both negated.
+std::vector<FrameChange> mirrored(const Grid& grid) {
+  const Vec3 middle =
+      grid.lps_from_ijk(0.5 * Vec3(grid.size[0] - 1, grid.size[1] - 1, grid.size[2] - 1));
+  std::vector<FrameChange> changes;
+  for (int which = 1; which < 8; ++which) {
+    const Vec3 signs((which & 1) != 0 ? -1 : 1, (which & 2) != 0 ? -1 : 1,
+                     (which & 4) != 0 ? -1 : 1);
+    const Mat3 m = grid.direction * signs.asDiagonal() * grid.direction.transpose();
+    changes.push_back({m, middle - m * middle});
+    if (which < 4) changes.push_back({Mat3(signs.asDiagonal()), Vec3::Zero()});
+  }
+  return changes;
+}
+
+/// The best shift by up to 20 mm: on every second voxel at first, then round the best.
+FrameChange best_shift(const Grid& grid, const Brightness& brightness,
+                       const std::vector<EdgePair>& pairs) {
+  constexpr double kReach = 20.0, kPerMm = 0.1;
+  FrameChange best;
+  double most = brightness.contrast(pairs, best);
+  std::vector<EdgePair> few;
+  for (std::size_t k = 0; k < pairs.size(); k += 5) few.push_back(pairs[k]);
+  const auto try_shifts = [&](const Vec3& around, double reach, double step,
+                              const std::vector<EdgePair>& on) {
+    most = -std::numeric_limits<double>::infinity();
+    const int n = static_cast<int>(std::lround(reach / step));
+    Vec3 found = around;
+    for (int k = -n; k <= n; ++k) {
+      for (int j = -n; j <= n; ++j) {
+        for (int i = -n; i <= n; ++i) {
+          const FrameChange change{Mat3::Identity(), around + step * Vec3(i, j, k)};
+          // Along a straight vessel all are alike: then the shortest.
+          const double here = brightness.contrast(on, change) - kPerMm * change.shift.norm();
+          if (here <= most) continue;
+          most = here;
+          found = change.shift;
+        }
+      }
+    }
+    best.shift = found;
+  };
+  const double voxel = std::cbrt(grid.spacing.prod()), coarse = std::max(2.0, 2.0 * voxel);
+  try_shifts(Vec3::Zero(), kReach, coarse, few);
+  try_shifts(best.shift, coarse, 0.5 * coarse, pairs);
+  return best;
+}
+
+}  // namespace
+
+std::string describe_change(const FrameChange& change) {
+  const Vec3& t = change.shift;
+  const auto triple = [](const Vec3& v) {
+    return "(" + text_of(v.x()) + ", " + text_of(v.y()) + ", " + text_of(v.z()) + ")";
+  };
+  if (is_identity(change.linear)) return "shifted by " + triple(t) + " mm";
+  const bool signs = (change.linear.cwiseAbs() - Mat3::Identity()).cwiseAbs().maxCoeff() < 1e-3;
+  std::string text;
+  for (int axis = 0; axis < 3; ++axis) {
+    const std::string name(1, "xyz"[axis]);
+    if (signs && change.linear(axis, axis) > 0.0 && std::abs(t[axis]) < 1e-3) continue;
+    if (!text.empty()) text += ", ";
+    if (signs) {
+      text += name + "' = " + text_of(t[axis]) + (change.linear(axis, axis) < 0.0 ? " - " : " + ") +
+              name;
+    } else {
+      text += name + "' = (" + text_of(change.linear(axis, 0)) + ", " +
+              text_of(change.linear(axis, 1)) + ", " + text_of(change.linear(axis, 2)) +
+              ") . p + " + text_of(t[axis]);
+    }
+  }
+  if (!signs) return "turned by " + text + " in LPS mm";
+  std::string axes;
+  for (int axis = 0; axis < 3; ++axis) {
+    if (change.linear(axis, axis) < 0.0)
+      axes += (axes.empty() ? "" : " and ") + std::string(1, "xyz"[axis]);
+  }
+  return "mirrored in " + axes + ": " + text + " in LPS mm";
+}
+
+std::optional<FrameChange> find_contradiction(const Grid& labels, const Grid& volume) {
+  if (labels.size != volume.size || same_centres(labels, volume)) return {};
+  if (((labels.spacing - volume.spacing).array().abs() > 1e-3 * volume.spacing.array()).any()) {
+    return {};
+  }
+  FrameChange change;
+  change.linear = volume.direction * labels.direction.transpose();
+  change.shift = volume.origin - change.linear * labels.origin;
+  return change;
+}
+
+bool shares_lattice(const Grid& from, const Grid& to) {
+  const Mat3 step = to.spacing.cwiseInverse().asDiagonal() * to.direction.transpose() *
+                    from.direction * from.spacing.asDiagonal();
+  const Vec3 start = to.ijk_from_lps(from.origin);
+  const double longest = *std::max_element(from.size.begin(), from.size.end());
+  const Mat3 whole = step.array().round().matrix();
+  return ((start.array() - start.array().round()).abs() < kTolerance).all() &&
+         (whole.cwiseAbs().rowwise().sum().array() == 1.0).all() &&
+         (step - whole).cwiseAbs().maxCoeff() * longest < kTolerance;
+}
+
+std::vector<std::uint8_t> onto_grid(const Grid& to, const Grid& from,
+                                    const std::vector<std::uint8_t>& classes) {
+  expects(classes.size() == from.voxels());
+  std::vector<std::uint8_t> result(to.voxels(), 0);
+  const bool aligned = shares_lattice(from, to);
+#pragma omp parallel for schedule(static)
+  for (int k = 0; k < to.size[2]; ++k) {
+    std::array<std::uint8_t, 8> label{};
+    std::array<double, 8> weight{};
+    for (int j = 0; j < to.size[1]; ++j) {
+      for (int i = 0; i < to.size[0]; ++i) {
+        Vec3 p = from.ijk_from_lps(to.lps_from_ijk(Vec3(i, j, k)));
+        // Half way between two centres, as where spacings are multiples, one side of a vessel gains
+        // what the other loses.
+        p = aligned ? p.array().round().matrix().eval() : (p.array() + kAside).matrix().eval();
+        const Vec3 low = p.array().floor().matrix(), part = p - low;
+        std::size_t found = 0;
+        double inside = 0.0;
+        for (int corner = 0; corner < 8; ++corner) {
+          double share = 1.0;
+          Voxel v{};
+          bool there = true;
+          for (int axis = 0; axis < 3; ++axis) {
+            const int up = corner >> axis & 1;
+            share *= up != 0 ? part[axis] : 1.0 - part[axis];
+            const double at = low[axis] + up;
+            there = there && at >= 0.0 && at < from.size[axis];
+            v[axis] = there ? static_cast<int>(at) : 0;
+          }
+          if (!there || share == 0.0) continue;
+          const std::uint8_t one = classes[index_of(from, v)];
+          if (one == 0) continue;
+          inside += share;
+          std::size_t at = 0;
+          while (at < found && label[at] != one) ++at;
+          if (at == found) {
+            label[found] = one;
+            weight[found++] = 0.0;
+          }
+          weight[at] += share;
+        }
+        if (inside < 0.5) continue;
+        const auto largest =
+            std::max_element(weight.begin(), weight.begin() + static_cast<std::ptrdiff_t>(found));
+        result[to.index(i, j, k)] = label[static_cast<std::size_t>(largest - weight.begin())];
+      }
+    }
+  }
+  return result;
+}
+
+std::optional<FrameChange> find_better_frame(const Image& image,
+                                             const std::vector<std::uint8_t>& classes,
+                                             double& contrast) {
+  expects(classes.size() == image.grid.voxels());
+  // Seen well: a mean step of a fifth of the usual contrast. As they lie: less than a third of it.
+  constexpr double kSeen = 80.0, kPart = 0.35;
+  const std::vector<EdgePair> pairs = edge_pairs(image.grid, classes);
+  const Brightness brightness(image);
+  contrast = brightness.contrast(pairs, {});
+  if (contrast >= kSeen) return {};
+  std::vector<FrameChange> changes = mirrored(image.grid);
+  changes.push_back(best_shift(image.grid, brightness, pairs));
+  std::optional<FrameChange> best;
+  double most = kSeen;
+  for (const FrameChange& change : changes) {
+    const double here = brightness.contrast(pairs, change);
+    if (here < most || contrast > kPart * here) continue;
+    most = here;
+    best = change;
+  }
+  return best;
+}
+
+}  // namespace wireplan::preprocess

@@ -1,0 +1,45 @@
+#pragma once
+/// Whether labels lie where the volume that they were drawn in does, and how they come onto its
+/// grid.
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "preprocess/volume/image.h"
+
+namespace wireplan::preprocess {
+
+/// Moves points of the labels to the volume: p_volume = linear * p_labels + shift.
+struct FrameChange {
+  Mat3 linear = Mat3::Identity();
+  Vec3 shift = Vec3::Zero();  //                                                           [mm]
+};
+
+/// "shifted by (0, 10, 0) mm", "mirrored in y: y' = 12.5 - y", and else the matrix.
+std::string describe_change(const FrameChange& change);
+
+/// Of a grid of labels with the volume's sizes and spacings that holds other places: what would
+/// bring one onto the other. Empty where the grids agree (to a tenth of a voxel; the order of axes
+/// and slices may differ), and where they are of different sizes, so that each may be right.
+std::optional<FrameChange> find_contradiction(const Grid& labels, const Grid& volume);
+
+/// Whether every centre of `from` is one of `to`, or would be if `to` went on, to a tenth of a
+/// voxel.
+bool shares_lattice(const Grid& from, const Grid& to);
+
+/// Classes (0, or 1 + an index) on another grid. A voxel is inside where trilinear weights of all
+/// classes round its centre sum to a half, and of the class with the largest of them.
+std::vector<std::uint8_t> onto_grid(const Grid& to, const Grid& from,
+                                    const std::vector<std::uint8_t>& classes);
+
+/// Looks in the volume for the labels' edges: contrast is brighter inside. Returns the change under
+/// which they are seen well where they are not as they lie: mirrored along the grid's axes, x and y
+/// negated (RAS and LPS mixed up), or shifted by up to 20 mm. Empty where they are seen as they lie
+/// and where they are seen nowhere. `contrast` is set to the mean step inward across the edge as
+/// they lie [HU].
+std::optional<FrameChange> find_better_frame(const Image& image,
+                                             const std::vector<std::uint8_t>& classes,
+                                             double& contrast);
+
+}  // namespace wireplan::preprocess
