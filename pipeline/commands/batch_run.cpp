@@ -134,7 +134,7 @@ double machine_gb() {
 double input_bytes_of(const BatchCase& given) {
   try {
     const Case input = read_case(given.path);
-    const fs::path path = input.volume ? input.volume->path : input.surface_input->path;
+    const fs::path path = input_path(input);
     if (fs::is_regular_file(path)) return static_cast<double>(fs::file_size(path));
     double bytes = 0.0;
     for (const fs::directory_entry& entry : fs::recursive_directory_iterator(path)) {

@@ -1,5 +1,6 @@
 #include "pipeline/commands/check.h"
 
+#include "pipeline/stages/makers.h"
 #include "preprocess/surface/surface.h"
 #include "preprocess/surface/surface_repair.h"
 #include "preprocess/volume/image.h"
@@ -14,14 +15,14 @@ bool contains(const preprocess::Grid& grid, const Vec3& point) {
   return (ijk.array() >= -0.5).all() && (ijk.array() < size - 0.5).all();
 }
 
-void check_volume(const Case& given, Problems& problems) {
+void check_volume(const Case& given, Problems& problems, std::vector<std::string>& told) {
   if (!preprocess::reads_volumes()) {
     problems.add("volume.path", given.volume->given, "a surface: this wireplan has no imaging",
                  "configure with -DWIREPLAN_IMAGING=ON");
     return;
   }
-  const preprocess::Grid grid =
-      preprocess::read_image(given.volume->path, given.volume->series).grid;
+  const preprocess::Image image = preprocess::read_image(given.volume->path, given.volume->series);
+  const preprocess::Grid& grid = image.grid;
   const auto expect_inside = [&](const std::string& key, const Vec3& point) {
     if (!contains(grid, point)) {
       problems.add(key, to_json(point).dump(), "a point inside the volume",
@@ -32,6 +33,7 @@ void check_volume(const Case& given, Problems& problems) {
   for (std::size_t k = 0; k < given.segmentation.seeds.size(); ++k) {
     expect_inside("segmentation.seeds_mm[" + std::to_string(k) + "]", given.segmentation.seeds[k]);
   }
+  if (given.labels && problems.empty()) told = check_labels(given, &image);
 }
 
 std::vector<std::string> check_surface_file(const Case& given, Problems& problems) {
@@ -54,7 +56,8 @@ std::vector<std::string> check_surface_file(const Case& given, Problems& problem
 std::vector<std::string> check_input(const Case& given) {
   Problems problems(given.file.string());
   std::vector<std::string> mended;
-  if (given.volume) check_volume(given, problems);
+  if (given.volume) check_volume(given, problems, mended);
+  if (given.labels && !given.volume) mended = check_labels(given, nullptr);
   if (given.surface_input) mended = check_surface_file(given, problems);
   problems.throw_if_any();
   return mended;

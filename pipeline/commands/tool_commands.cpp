@@ -71,22 +71,22 @@ std::string schema_of(const fs::path& path) {
 
 int check_file(const std::string& path, const std::vector<std::string>& overrides) {
   const std::string schema = schema_of(path);
-  const auto print_mended = [](const std::vector<std::string>& lines) {
-    for (const std::string& line : lines) std::cout << "  mended: " << line << "\n";
+  const auto print_told = [](const std::vector<std::string>& lines, const char* before) {
+    for (const std::string& line : lines) std::cout << "  " << before << line << "\n";
   };
   if (schema.rfind("wireplan.scene/", 0) == 0) {
     const std::vector<std::string> mended = check_scene_vessel(read_scene(path));
     std::cout << path << ": the scene is in order\n";
-    print_mended(mended);
+    print_told(mended, "mended: ");
   } else if (schema.rfind("wireplan.phantom/", 0) == 0) {
     read_phantom_spec(path);
     std::cout << path << ": the description is in order\n";
   } else {
     const Case given = read_case(path, overrides);
-    const std::vector<std::string> mended = check_input(given);
+    const std::vector<std::string> told = check_input(given);
     std::cout << given.file.string() << ": the case is in order, "
               << plan::list_candidates(given.study).size() << " trials\n";
-    print_mended(mended);
+    print_told(told, given.labels ? "" : "mended: ");  // labels are told as the stage tells them
   }
   return kDone;
 }

@@ -80,23 +80,6 @@ std::string read_name(JsonReader& root, const std::filesystem::path& file) {
   return name;
 }
 
-void expect_exists(JsonReader& reader, const std::string& key, const std::string& given,
-                   const std::filesystem::path& path, const std::string& expected) {
-  std::error_code unreachable;  // a folder on the way may not be searched: told as absent
-  if (given.empty() || std::filesystem::exists(path, unreachable)) return;
-  std::string remedy = "relative paths count from the file that gives them";
-  if (given.find(kDataVariable) != std::string::npos) {
-    const bool is_set = std::getenv("WIREPLAN_DATA") != nullptr;
-    remedy = is_set ? "the environment variable WIREPLAN_DATA names the data folder"
-                    : "the environment variable WIREPLAN_DATA is not set, so the data folder is "
-                      "../shared/data beside the checkout";
-  } else if (given.find("${") != std::string::npos) {
-    remedy = "${WIREPLAN_DATA} is the only variable of a path";
-  }
-  reader.problems().add(reader.path_of(key), "\"" + given + "\"", expected + " at " + path.string(),
-                        remedy);
-}
-
 VolumeInput read_volume(JsonReader reader, const std::filesystem::path& folder) {
   VolumeInput volume;
   volume.given = reader.text("path", std::nullopt);
@@ -107,22 +90,26 @@ VolumeInput read_volume(JsonReader reader, const std::filesystem::path& folder) 
   return volume;
 }
 
-/// The entry of the pipeline: a volume, or a surface that has a path.
+/// The entry of the pipeline: a volume, labels or both, or a surface that has a path.
 void read_inputs(JsonReader& root, Case& input) {
   const std::filesystem::path folder = input.file.parent_path();
   JsonReader surface = root.object("surface", false);
   input.surface.edge_length_mm = surface.number("edge_length_mm", input.surface.edge_length_mm,
                                                 {.min = 0.1, .max = 10.0}, "given in m?");
-  const bool has_volume = root.has("volume");
+  const bool has_volume = root.has("volume"), has_labels = root.has("labels");
   bool has_surface = false;
   for (const char* key : {"path", "unit", "frame"}) has_surface |= surface.has(key);
   if (has_volume && has_surface) {
     root.problems().add("surface.path", "given beside volume", "one of the two",
                         "a case enters either at a volume or at a surface");
-  } else if (!has_volume && !has_surface) {
-    root.problems().add("volume", "missing", "volume.path or surface.path",
-                        "a case enters either at a volume or at a surface");
+  } else if (has_labels && has_surface) {
+    root.problems().add("surface.path", "given beside labels", "one of the two",
+                        "labels are made a surface; delete either");
+  } else if (!has_volume && !has_surface && !has_labels) {
+    root.problems().add("volume", "missing", "volume.path, labels.path or surface.path",
+                        "a case enters at a volume, at labels or at a surface");
   }
+  if (has_labels) input.labels = read_labels_input(root.object("labels", true), folder);
   if (has_volume) {
     input.volume = read_volume(root.object("volume", true), folder);
   } else if (has_surface) {
@@ -132,6 +119,12 @@ void read_inputs(JsonReader& root, Case& input) {
 }
 
 void read_segmentation(JsonReader& root, Case& input) {
+  if (input.labels && root.has("segmentation")) {
+    root.problems().add("segmentation", "given beside labels", "none",
+                        "labels are the lumen, and no band is looked for; delete either");
+    root.raw("segmentation");
+    return;
+  }
   if (!input.volume) {
     if (root.has("segmentation") && input.surface_input) {
       root.problems().add("segmentation", "given with a surface as input", "none",
@@ -348,11 +341,15 @@ Json robustness_json(const Case& input) {
 Json input_json(const Case& input) {
   Json json;
   if (input.volume) {
+    json["volume"] = {{"path", input.volume->given}};
+    if (!input.volume->series.empty()) json["volume"]["series"] = input.volume->series;
+  }
+  if (input.labels) {
+    json["labels"] = labels_json(*input.labels);
+  } else if (input.volume) {
     const preprocess::SegmentOptions& segmentation = input.segmentation;
     Json seeds = Json::array();
     for (const Vec3& seed : segmentation.seeds) seeds.push_back(to_json(seed));
-    json["volume"] = {{"path", input.volume->given}};
-    if (!input.volume->series.empty()) json["volume"]["series"] = input.volume->series;
     const auto value = [](const std::optional<double>& given) {
       return given ? Json(*given) : Json(nullptr);
     };
@@ -384,7 +381,30 @@ std::filesystem::path resolve_path(const std::string& given, const std::filesyst
             : std::filesystem::path(WIREPLAN_SOURCE_DIR).parent_path() / "shared" / "data";
     text.replace(variable, kDataVariable.size(), data.string());
   }
-  return (folder / text).lexically_normal();
+  const std::filesystem::path path = (folder / text).lexically_normal();
+  return path.has_filename() ? path : path.parent_path();  // "folder/" is "folder"
+}
+
+void expect_exists(JsonReader& reader, const std::string& key, const std::string& given,
+                   const std::filesystem::path& path, const std::string& expected) {
+  std::error_code unreachable;  // a folder on the way may not be searched: told as absent
+  if (given.empty() || std::filesystem::exists(path, unreachable)) return;
+  std::string remedy = "relative paths count from the file that gives them";
+  if (given.find(kDataVariable) != std::string::npos) {
+    const bool is_set = std::getenv("WIREPLAN_DATA") != nullptr;
+    remedy = is_set ? "the environment variable WIREPLAN_DATA names the data folder"
+                    : "the environment variable WIREPLAN_DATA is not set, so the data folder is "
+                      "../shared/data beside the checkout";
+  } else if (given.find("${") != std::string::npos) {
+    remedy = "${WIREPLAN_DATA} is the only variable of a path";
+  }
+  reader.problems().add(reader.path_of(key), "\"" + given + "\"", expected + " at " + path.string(),
+                        remedy);
+}
+
+const std::filesystem::path& input_path(const Case& given) {
+  if (given.volume) return given.volume->path;
+  return given.surface_input ? given.surface_input->path : given.labels->path;
 }
 
 SurfaceInput read_surface_input(JsonReader& reader, const std::filesystem::path& folder) {
@@ -452,6 +472,9 @@ Case read_case(const std::filesystem::path& path, const std::vector<std::string>
 
   Problems problems(input.file.string());
   resolve_points(file, input.file.parent_path(), problems);
+  const std::size_t of_points = problems.count();
+  resolve_branches(file, input.file.parent_path(), problems);
+  if (problems.count() > of_points) problems.throw_if_any();  // their places are not known
   JsonReader root(file, "", problems);
   root.text("schema", std::nullopt);
   input.name = read_name(root, input.file);

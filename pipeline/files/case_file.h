@@ -10,6 +10,7 @@
 
 #include "pipeline/files/access_target_file.h"
 #include "pipeline/files/json_reader.h"
+#include "pipeline/files/labels_file.h"
 #include "plan/anatomy/access_limits.h"
 #include "plan/make_plan.h"
 #include "preprocess/segment/segment.h"
@@ -44,8 +45,9 @@ using plan::Manoeuvring;
 struct Case {
   std::filesystem::path file;  // the case file itself
   std::string name;
-  std::optional<VolumeInput> volume;  // exactly one of volume and surface_input is given
-  std::optional<SurfaceInput> surface_input;
+  std::optional<VolumeInput> volume;          // a surface alone, or one of the others or both:
+  std::optional<SurfaceInput> surface_input;  // labels are the lumen of the volume beside them
+  std::optional<LabelsInput> labels;
   preprocess::SegmentOptions segmentation;  // of a volume; seeds besides the access point
   preprocess::SurfaceOptions surface;
   WallInput wall;
@@ -60,7 +62,7 @@ struct Case {
   plan::Limits limits;
   plan::Weights weights;
   /// Where unknowns.lumen is 0 the stages that repeat choose it: half a voxel if the input is a
-  /// volume, 0.25 mm if it is a surface.
+  /// volume or labels, 0.25 mm if it is a surface.
   plan::RobustnessOptions robustness;
   bool exhaustive = false;  // all candidates are run in full, none is only scouted
 };
@@ -89,6 +91,13 @@ Json case_parameters(const Case& input);
 /// A path of a case or scene file: ${WIREPLAN_DATA} is the environment's, and else ../shared/data
 /// beside the checkout; what is relative counts from `folder`.
 std::filesystem::path resolve_path(const std::string& given, const std::filesystem::path& folder);
+
+/// Adds a problem where nothing is at the path that stands under the key.
+void expect_exists(JsonReader& reader, const std::string& key, const std::string& given,
+                   const std::filesystem::path& path, const std::string& expected);
+
+/// Where the case starts: its volume, surface or, without a volume, labels.
+const std::filesystem::path& input_path(const Case& given);
 
 /// Reads {"path", "unit", "frame"} and checks that the file is there; unit and frame may be left
 /// out for VTP alone, which is ours and in mm LPS. Leaves other keys to the caller.

@@ -8,6 +8,7 @@
 #include <set>
 #include <vector>
 
+#include "pipeline/files/labels_file.h"
 #include "pipeline/files/text.h"
 #include "preprocess/surface/surface_describe.h"
 #include "preprocess/volume/describe.h"
@@ -101,7 +102,7 @@ Json series_json(const preprocess::SeriesDescription& series) {
   return told;
 }
 
-Json volume_json(const preprocess::VolumeDescription& given) {
+Json volume_json(const preprocess::VolumeDescription& given, const fs::path& path) {
   const preprocess::VolumeHeader& header = given.header;
   Json told = {{"kind", given.holds_labels ? "labels" : "image"}, {"format", header.format}};
   if (header.format == "DICOM") {
@@ -125,13 +126,16 @@ Json volume_json(const preprocess::VolumeDescription& given) {
   }
   if (given.holds_labels) {
     const double voxel = given.grid->spacing.prod() / kMm3PerMl;
+    const std::map<int, std::string> table =
+        header.segments.empty() ? find_label_table(path) : std::map<int, std::string>{};
     told["labels"] = Json::array();
     for (const preprocess::LabelDescription& label : given.labels) {
       if (label.value == 0) continue;  // what is around
-      told["labels"].push_back({{"value", label.value},
-                                {"name", told_or_null(label.name)},
-                                {"voxels", label.voxels},
-                                {"volume_ml", voxel * static_cast<double>(label.voxels)}});
+      told["labels"].push_back(
+          {{"value", label.value},
+           {"name", told_or_null(table.contains(label.value) ? table.at(label.value) : label.name)},
+           {"voxels", label.voxels},
+           {"volume_ml", voxel * static_cast<double>(label.voxels)}});
     }
   } else if (!header.segments.empty()) {
     for (const preprocess::NamedSegment& segment : header.segments) {
@@ -203,7 +207,7 @@ Json inspect(const fs::path& path) {
   } else if (folder || is_volume(ending) ||
              preprocess::check_dicom(path) != preprocess::DicomForm::kNone) {
     try {
-      body = volume_json(preprocess::describe_volume(path));
+      body = volume_json(preprocess::describe_volume(path), path);
     } catch (const DiskError&) {
       throw;
     } catch (const Error& error) {

@@ -209,7 +209,10 @@ std::string inspect_text(const Json& told) {
   }
   if (told.contains("surface")) text += columns(surface_lines(told["surface"]));
   if (told.contains("refused")) {
-    text += "a case refuses it: " + told["refused"].get<std::string>() + "\n";
+    const bool segments = told.contains("segments");
+    text += (segments ? "as its volume a case refuses it: " : "a case refuses it: ") +
+            told["refused"].get<std::string>() +
+            (segments ? "; its segments may be a case's labels" : "") + "\n";
   }
   return text;
 }

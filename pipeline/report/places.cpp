@@ -59,7 +59,8 @@ Slices cut_vessel_slices(const preprocess::Image& image, const SlicedVessel& ves
                          const Json& segment, const std::vector<double>& peak_force) {
   // The lumen's mean bright, as far below the threshold as above it; never past the values there
   // are.
-  const double threshold = segment.at("band").at("lower_hu");
+  const double threshold =
+      segment.contains("band") ? segment.at("band").at("lower_hu") : segment.at("edge_hu");
   const double span = 2.0 * (segment.at("mean_hu").get<double>() - threshold);
   const auto [least, most] = std::minmax_element(image.values.begin(), image.values.end());
   SliceOptions options;

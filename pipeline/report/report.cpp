@@ -111,7 +111,11 @@ Json provenance_json(const ReportInput& input) {
     }
   }
   Row row;
-  row.put("inputs", Json::array({{{"name", input.input_name}, {"sha256", input.input_sha256}}}));
+  Json inputs = Json::array({{{"name", input.input_name}, {"sha256", input.input_sha256}}});
+  if (!input.labels_name.empty()) {
+    inputs.push_back({{"name", input.labels_name}, {"sha256", input.labels_sha256}});
+  }
+  row.put("inputs", std::move(inputs));
   row.put("parameters_sha256", hash_text(input.parameters.dump()));
   row.put("program", build_info());
   row.put("seed", input.robustness.at("seed"));
@@ -124,7 +128,9 @@ Json provenance_json(const ReportInput& input) {
 
 void put_figures(Row& row, const char* key, const Json& figures, const char* stage) {
   if (!figures.contains(stage)) {
-    row.put_optional(key, {}, "the case enters at a surface");
+    row.put_optional(key, {},
+                     figures.contains("segment") ? "the case enters at labels without a volume"
+                                                 : "the case enters at a surface");
     return;
   }
   Json values = figures.at(stage);
@@ -341,6 +347,9 @@ Json artifacts_json(const ReportInput& input) {
     files.push_back({{"file", file}, {"content", content}});
   };
   if (input.figures.contains("segment")) add("mask.nrrd", "segmented lumen");
+  if (input.parameters.contains("labels")) {
+    add("classes.nrrd", "which of the labels each voxel of the lumen has, by their order");
+  }
   add("surface.vtp", "inner surface of the vessel");
   add("centerline.vtp", "path from access to target, with its radius");
   add("wall.vtu", "tetrahedra of the wall");

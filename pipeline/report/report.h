@@ -20,18 +20,19 @@ inline constexpr const char* kOlderReportSchema = "wireplan.report/1";
 inline constexpr std::size_t kPlansShown = 5;
 
 struct ReportInput {
-  std::string name;                      // of the case
-  std::string input_name, input_sha256;  // of the volume or surface: no folder names
-  Json parameters;                       // of the case, after defaults
-  std::vector<std::string> stages;       // that were run or found, in order
-  Json figures;                          // per stage name, what its figures.json holds
-  plan::Study study;                     // as the trials used it
-  plan::Plan plan;                       // what was simulated, and ...
-  plan::Judgement judgement;             // ... what that is worth by the case's limits and weights
-  plan::Verdict verdict;                 // for who decides
-  std::vector<std::string> warnings;     // besides those in the figures
-  Json robustness;                       // of repeats_json.h
-  Json timing;                           // all that differs between equal runs
+  std::string name;                        // of the case
+  std::string input_name, input_sha256;    // of the volume, surface or labels: no folder names
+  std::string labels_name, labels_sha256;  // of labels beside a volume; empty where there are none
+  Json parameters;                         // of the case, after defaults
+  std::vector<std::string> stages;         // that were run or found, in order
+  Json figures;                            // per stage name, what its figures.json holds
+  plan::Study study;                       // as the trials used it
+  plan::Plan plan;                         // what was simulated, and ...
+  plan::Judgement judgement;          // ... what that is worth by the case's limits and weights
+  plan::Verdict verdict;              // for who decides
+  std::vector<std::string> warnings;  // besides those in the figures
+  Json robustness;                    // of repeats_json.h
+  Json timing;                        // all that differs between equal runs
 };
 
 Json build_report(const ReportInput& input);

@@ -11,7 +11,10 @@ namespace {
 
 /// Why calcium cannot be told from the case's input; empty where it can.
 std::string calcium_unknown(Workspace& work, const plan::AccessLimits& limits) {
-  if (!work.given().volume) return "the case starts from a surface, which shows no calcium";
+  if (!work.given().volume) {
+    return std::string("the case starts from ") + (work.given().labels ? "labels" : "a surface") +
+           ", which shows no calcium";
+  }
   const std::string& modality = work.image().modality;
   if (!modality.empty() && modality != "CT") return "the volume is no CT";
   const double lumen = work.figures("segment").at("mean_hu").get<double>();

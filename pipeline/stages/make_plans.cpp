@@ -20,6 +20,9 @@ using Until = plan::PlanOptions::Until;
 constexpr double kVoxelPart = 0.5, kSurfaceOffset = 0.25;
 
 double choose_lumen_offset(const Workspace& work) {
+  if (!work.has("volume") && work.given().labels) {
+    return work.figures("segment").at("radius_error_mm").get<double>();
+  }
   if (!work.has("volume")) return kSurfaceOffset;
   const Json spacing = work.figures("volume").at("spacing_mm");
   double product = 1.0;

@@ -100,7 +100,11 @@ ReportInput describe_run(Workspace& work) {
   // The values that stages chose where the case left them open.
   report.parameters = work.parameters;
   report.parameters["insertion"]["length_mm"] = report.study.insertion.length;
-  if (work.has("segment")) {
+  if (work.given().labels && work.given().volume) {
+    report.labels_name = work.given().labels->path.filename().string();
+    report.labels_sha256 = work.labels_sha256;
+  }
+  if (work.has("segment") && !work.given().labels) {
     const Json& band = report.figures.at("segment").at("band");
     for (const char* key : {"lower_hu", "upper_hu", "smoothing_mm", "neck_opening_mm"}) {
       report.parameters["segmentation"][key] = band.at(key);

@@ -97,19 +97,20 @@ Json line_figures(const Centerline& line) {
 }
 
 // The whole tree: files for viewers, and a list of its branches.
-Json write_tree(const std::vector<preprocess::Branch>& tree, const fs::path& folder) {
+Json write_tree(const std::vector<preprocess::Branch>& tree, const std::vector<std::string>& names,
+                const fs::path& folder) {
   std::vector<Centerline> lines;
   std::vector<NamedCurve> curves;
   Json branches = Json::array();
   for (std::size_t k = 0; k < tree.size(); ++k) {
     const Centerline& line = tree[k].line;
-    const std::string name = "branch " + std::to_string(k + 1);
+    const std::string& name = names[k];
     lines.push_back(line);
     curves.push_back({name, line.points});
     Json branch = {
         {"name", name},
-        {"parent",
-         tree[k].parent < 0 ? Json(nullptr) : Json("branch " + std::to_string(tree[k].parent + 1))},
+        {"parent", tree[k].parent < 0 ? Json(nullptr)
+                                      : Json(names[static_cast<std::size_t>(tree[k].parent)])},
         {"parent_arc_mm", tree[k].parent_arc},
         {"start_mm", to_json(Vec3(line.points.col(0)))},
         {"end_mm", to_json(Vec3(line.points.col(line.points.cols() - 1)))}};
@@ -201,9 +202,10 @@ void make_surface(Workspace& work, const fs::path& folder) {
     mends = std::move(repaired.mends);
     surface = preprocess::remesh(surface, given.surface.edge_length_mm);
   } else {
-    surface = preprocess::surface_from_image(
-        work.image(), preprocess::read_mask(work.artifact("segment").folder / "mask.nrrd"),
-        given.surface, &fit);
+    const preprocess::Mask mask =
+        preprocess::read_mask(work.artifact("segment").folder / "mask.nrrd");
+    surface = given.volume ? preprocess::surface_from_image(work.image(), mask, given.surface, &fit)
+                           : preprocess::surface_from_mask(mask, given.surface);
     work.drop_image();
   }
   const preprocess::SurfaceCheck check = preprocess::check_surface(surface);
@@ -255,7 +257,8 @@ void make_centerline(Workspace& work, const fs::path& folder) {
   Json figures = figures_of("centerline");
   figures.update(line_figures(line));
   figures["target_lumen_radius_mm"] = line.radius(line.radius.size() - 1);
-  figures["branches"] = write_tree(preprocess::find_tree(surface, study.access), folder);
+  const std::vector<preprocess::Branch> tree = preprocess::find_tree(surface, study.access);
+  figures["branches"] = write_tree(tree, name_branches(work, tree), folder);
   write_figures(figures, folder);
 }
 

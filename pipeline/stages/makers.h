@@ -3,8 +3,10 @@
 /// stages.h.
 #include <filesystem>
 #include <string>
+#include <vector>
 
 #include "pipeline/stages/workspace.h"
+#include "preprocess/centerline/centerline.h"
 
 namespace wireplan::pipeline {
 
@@ -15,6 +17,7 @@ inline constexpr int kReportVersion = 21;
 /// numbers for the report with a list of warnings.
 void make_volume(Workspace& work, const std::filesystem::path& folder);
 void make_segment(Workspace& work, const std::filesystem::path& folder);
+void make_labels(Workspace& work, const std::filesystem::path& folder);  // segment of labels
 void make_surface(Workspace& work, const std::filesystem::path& folder);
 void make_centerline(Workspace& work, const std::filesystem::path& folder);
 void make_anatomy(Workspace& work, const std::filesystem::path& folder);
@@ -23,6 +26,14 @@ void make_trials(Workspace& work, const std::filesystem::path& folder);
 void make_manoeuvres(Workspace& work, const std::filesystem::path& folder);
 void make_plans(Workspace& work, const std::filesystem::path& folder);
 void make_report(Workspace& work, const std::filesystem::path& folder);
+
+/// What stage segment of the case's labels warns of, without a run; throws what it refuses. `image`
+/// is the case's volume, null where it has none.
+std::vector<std::string> check_labels(const Case& given, const preprocess::Image* image);
+
+/// "branch 3", with the labels that it runs through where there are any: "branch 3: aorta > renal".
+std::vector<std::string> name_branches(const Workspace& work,
+                                       const std::vector<preprocess::Branch>& tree);
 
 /// One of several processes' part of a case's trials. They are run in rounds: the scouts of all
 /// candidates (all in full where none are scouted), then probes and full runs that the rounds

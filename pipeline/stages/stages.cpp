@@ -20,6 +20,15 @@ double seconds_since(std::chrono::steady_clock::time_point start) {
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 }
 
+// Of the files and of the names that a table gives.
+std::string hash_labels(const LabelsInput& labels) {
+  const std::string files = hash_input(labels.path);
+  if (labels.choice.table.empty()) return files;
+  Json names = Json::array();
+  for (const auto& [value, name] : labels.choice.table) names.push_back({value, name});
+  return hash_text(files + names.dump());
+}
+
 // One line per value: objects and lists of objects are walked, lists of numbers stay whole.
 void add_parameter(const std::string& name, const Json& value, std::vector<KeyLine>& lines) {
   const bool objects = value.is_array() && !value.empty() && value.front().is_object();
@@ -51,6 +60,9 @@ std::string stage_key_text(const Stage& stage, const Workspace& work) {
     if (volume && !volume->series.empty()) {
       lines.push_back({"parameter volume.series", volume->series});
     }
+  }
+  if (stage.reads_labels && !work.labels_sha256.empty()) {
+    lines.push_back({"labels", work.labels_sha256});
   }
   for (const std::string& earlier : stage.after) {
     lines.push_back(
@@ -128,6 +140,10 @@ Artifact make_artifact(const Stage& stage, const Store& store, const std::string
     if (stage.reads_input && input_stamp(work.input) != work.input_stamp) {
       throw Error(work.input.string() + ": changed while it was read; run again");
     }
+    if (stage.reads_labels && work.given().labels &&
+        input_stamp(work.given().labels->path) != work.labels_stamp) {
+      throw Error(work.given().labels->path.string() + ": changed while it was read; run again");
+    }
   };
   return act_for(stage, work, [&] { return store.commit(stage.name, key_text, make); });
 }
@@ -152,38 +168,70 @@ void read_points(Stage& stage, const Case& given) {
   }
 }
 
-}  // namespace
-
-std::vector<Stage> stages_of(const Case& given) {
-  const bool from_volume = given.volume.has_value();
+/// The stages from labels, with the volume that they were drawn in or without, to the surface.
+std::vector<Stage> stages_from_labels(const Case& given) {
+  const bool in_volume = given.volume.has_value();
   std::vector<Stage> stages;
-  if (from_volume) {
+  if (in_volume) {
     stages.push_back({.name = "volume", .version = 2, .reads_input = true, .make = make_volume});
-    stages.push_back({.name = "segment",
-                      .version = 3,
-                      .reads_input = true,
-                      .parameters = {"/segmentation"},
-                      .make = make_segment});
-    read_points(stages.back(), given);
-    stages.push_back({.name = "surface",
-                      .version = 6,
-                      .reads_input = true,
-                      .after = {"segment"},
-                      .parameters = {"/surface/edge_length_mm"},
-                      .make = make_surface});
-  } else {
+  }
+  stages.push_back({.name = "segment",
+                    .version = 1,
+                    .reads_input = in_volume,
+                    .reads_labels = true,
+                    .make = make_labels});
+  if (!given.labels->choice.values.empty()) read_too(stages.back(), {"/labels/values"});
+  if (!given.labels->choice.names.empty()) read_too(stages.back(), {"/labels/names"});
+  read_points(stages.back(), given);
+  stages.push_back({.name = "surface",
+                    .version = 6,
+                    .reads_input = in_volume,
+                    .after = {"segment"},
+                    .parameters = {"/surface/edge_length_mm"},
+                    .make = make_surface});
+  return stages;
+}
+
+/// The stages from a volume or a surface file to the surface.
+std::vector<Stage> stages_to_surface(const Case& given) {
+  if (given.labels) return stages_from_labels(given);
+  std::vector<Stage> stages;
+  if (!given.volume) {
     stages.push_back({.name = "surface",
                       .version = 5,
                       .reads_input = true,
                       .parameters = {"/surface/unit", "/surface/frame", "/surface/edge_length_mm"},
                       .make = make_surface});
+    return stages;
   }
+  stages.push_back({.name = "volume", .version = 2, .reads_input = true, .make = make_volume});
+  stages.push_back({.name = "segment",
+                    .version = 3,
+                    .reads_input = true,
+                    .parameters = {"/segmentation"},
+                    .make = make_segment});
+  read_points(stages.back(), given);
+  stages.push_back({.name = "surface",
+                    .version = 6,
+                    .reads_input = true,
+                    .after = {"segment"},
+                    .parameters = {"/surface/edge_length_mm"},
+                    .make = make_surface});
+  return stages;
+}
+
+}  // namespace
+
+std::vector<Stage> stages_of(const Case& given) {
+  const bool from_volume = given.volume.has_value(), from_labels = given.labels.has_value();
+  std::vector<Stage> stages = stages_to_surface(given);
   stages.push_back({.name = "centerline",
                     .version = 4,
                     .after = {"surface"},
                     .parameters = {"/access/point_mm", "/target/point_mm"},
                     .make = make_centerline});
   if (given.study.goal.at_section) read_too(stages.back(), {"/target/beyond_mm"});
+  if (from_labels) stages.back().after.emplace_back("segment");  // names of branches
   Stage anatomy{.name = "anatomy",
                 .version = 2,
                 .reads_input = from_volume,
@@ -191,6 +239,8 @@ std::vector<Stage> stages_of(const Case& given) {
                 .parameters = {"/access_limits"},
                 .make = make_anatomy};
   if (from_volume) anatomy.after.push_back("segment");
+  // The voxels tell how well the lumen is known.
+  const char* voxels = from_volume ? "volume" : from_labels ? "segment" : nullptr;
   stages.push_back(anatomy);
   stages.push_back(
       {.name = "wall",
@@ -216,8 +266,8 @@ std::vector<Stage> stages_of(const Case& given) {
   manoeuvres.after.push_back("trials");
   read_too(manoeuvres, {"/manoeuvres"});
   if (given.manoeuvres == Manoeuvring::kWhenNeeded) {
-    // Plans are tried under disturbances; the voxels tell how well the lumen is known.
-    if (from_volume) manoeuvres.after.push_back("volume");
+    // Plans are tried under disturbances.
+    if (voxels != nullptr) manoeuvres.after.emplace_back(voxels);
     read_too(manoeuvres,
              {"/robustness/seed", "/robustness/friction_factor", "/robustness/wall_factor",
               "/robustness/angle_deg", "/robustness/entry_mm", "/robustness/lumen_mm"});
@@ -228,13 +278,14 @@ std::vector<Stage> stages_of(const Case& given) {
   plans.name = "plans";
   plans.version = 2;
   plans.after.insert(plans.after.end(), {"trials", "manoeuvres"});
-  if (from_volume) plans.after.push_back("volume");
+  if (voxels != nullptr) plans.after.emplace_back(voxels);
   read_too(plans, {"/manoeuvres", "/robustness"});
   plans.make = make_plans;
   stages.push_back(plans);
   Stage report{.name = "report",
                .version = kReportVersion,
                .reads_input = true,
+               .reads_labels = true,
                .after = {},
                .parameters = {""},
                .names_program = true,
@@ -249,6 +300,12 @@ Json used_parameters(const Case& given) {
   const auto name_only = [](const fs::path& path) { return path.filename().string(); };
   if (given.volume) parameters["volume"]["path"] = name_only(given.volume->path);
   if (given.surface_input) parameters["surface"]["path"] = name_only(given.surface_input->path);
+  if (given.labels) {
+    parameters["labels"]["path"] = name_only(given.labels->path);
+    if (!given.labels->table_given.empty()) {
+      parameters["labels"]["table"] = name_only(given.labels->table_given);
+    }
+  }
   if (section_name(given).empty()) return parameters;
   const AccessInput& access = given.accesses[given.access];
   const TargetInput& target = given.targets[given.target];
@@ -274,6 +331,10 @@ RunResult run_stages(const Case& given, const RunOptions& options,
   work.parameters = used_parameters(given);
   work.input_stamp = input_stamp(work.input);
   work.input_sha256 = hash_input(work.input);
+  if (given.labels) {
+    work.labels_stamp = input_stamp(given.labels->path);
+    work.labels_sha256 = hash_labels(*given.labels);
+  }
   for (const auto& [name, artifact] : options.beside) work.add(name, artifact);
   for (const Stage& stage : stages) {
     if (options.work.cancelled && options.work.cancelled()) throw Interrupted();

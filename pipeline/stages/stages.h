@@ -16,14 +16,16 @@ namespace wireplan::pipeline {
 struct Stage {
   std::string name;
   int version = 1;                           // raised when its results change
-  bool reads_input = false;                  // the volume or surface that the case names
+  bool reads_input = false;                  // the volume, surface or labels that it starts from
+  bool reads_labels = false;                 // the case's labels, beside a volume or alone
   std::vector<std::string> after = {};       // earlier stages whose artifacts it reads
   std::vector<std::string> parameters = {};  // it reads, as JSON pointers into used_parameters()
   bool names_program = false;                // its artifact tells version and build
   void (*make)(Workspace&, const std::filesystem::path& folder) = nullptr;
 };
 
-/// In the order in which they run; a case that enters at a surface has no volume and no segment.
+/// In the order in which they run; a case that enters at a surface has no volume and no segment,
+/// one that enters at labels alone no volume.
 /// Those up to `surface`, and `wall`, are the same for all sections of a case.
 std::vector<Stage> stages_of(const Case& given);
 

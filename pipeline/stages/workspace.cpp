@@ -80,7 +80,7 @@ Workspace::Workspace(Case given, WorkOptions options, Store store)
       options_(std::move(options)),
       store_(std::move(store)),
       models_(options_.models ? options_.models : std::make_shared<ModelStock>()) {
-  input = given_.volume ? given_.volume->path : given_.surface_input->path;
+  input = input_path(given_);
 }
 
 const Artifact& Workspace::artifact(const std::string& stage) const {

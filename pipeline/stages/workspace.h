@@ -80,9 +80,10 @@ class Workspace {
   /// one push can serve have tangent and length in common.
   const plan::Study& study();
 
-  std::filesystem::path input;  // the volume or surface that the case names
+  std::filesystem::path input;  // the volume, surface or labels that the case starts from
   std::string input_sha256;
   std::string input_stamp;                       // before it was hashed
+  std::string labels_sha256, labels_stamp;       // of the labels; empty where the case has none
   Json parameters;                               // of the case after defaults, without folder names
   std::map<std::string, std::string> key_texts;  // of the stages so far and the one under way
   /// Trials that this process ran or read, by level and candidate.

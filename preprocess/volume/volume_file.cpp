@@ -383,7 +383,7 @@ std::vector<Image> read_layers(const fs::path& path, VolumeHeader& told) {
     silence_libraries();
     return read_nrrd(path, told, true);
   }
-  return {read_told(path, told)};
+  return {read_told(path, "", told)};
 }
 
 }  // namespace wireplan::preprocess

@@ -17,6 +17,7 @@
 #include "pipeline/files/catalogue.h"
 #include "pipeline/files/scene_file.h"
 #include "tests/pipeline/small_case.h"
+#include "tests/preprocess/label_bytes.h"
 
 namespace wireplan::pipeline {
 
@@ -71,6 +72,10 @@ class CaseFile : public testing::Test {
     return "";
   }
 
+  /// At labels, with accesses and targets by the names of branches: one of each and several, each
+  /// at an end and beyond an ostium.
+  std::vector<Json> cases_at_branches() const;
+
   std::string scene_problem(const Json& json) const {
     try {
       read_scene(write("scene.json", json.dump()));
@@ -82,6 +87,44 @@ class CaseFile : public testing::Test {
 
   fs::path folder_;
 };
+
+inline Json volume_case();
+inline Json labels_case();
+inline Json own_wire();
+
+inline std::vector<Json> CaseFile::cases_at_branches() const {
+  write("names.csv", "1,aorta\n2,renal\n");
+  write("tree.nii", preprocess::branched_labels());
+  const Json at_end = {{"branch", "aorta"}, {"end", "inferior"}},
+             beyond = {{"branch", "renal"}, {"beyond_ostium_mm", 10}};
+  std::vector<Json> cases;
+  for (const bool turned : {false, true}) {
+    const Json &from = turned ? beyond : at_end, &to = turned ? at_end : beyond;
+    Json one = labels_case();
+    one["wires"] = Json::array({own_wire()});
+    Json lists = one;
+    lists["accesses"] = Json::array({lists["access"]});
+    lists["targets"] = Json::array({lists["target"]});
+    for (const auto& [end, list] :
+         {std::pair("access", "accesses"), std::pair("target", "targets")}) {
+      lists[list][0]["name"] = end;
+      lists.erase(end);
+    }
+    for (Json* json : {&one, &lists}) {
+      (*json)["labels"] = {{"path", "tree.nii"}, {"values", {1, 2}}, {"table", "names.csv"}};
+    }
+    one["labels"]["names"] = {"aorta", "renal"};
+    for (const auto& [end, branch] :
+         {std::pair(&one["access"], &from), std::pair(&one["target"], &to),
+          std::pair(&lists["accesses"][0], &from), std::pair(&lists["targets"][0], &to)}) {
+      end->erase("point_mm");
+      end->update(*branch);
+    }
+    cases.push_back(one);
+    cases.push_back(lists);
+  }
+  return cases;
+}
 
 inline Json volume_case() {
   return {{"schema", "wireplan.case/1"},
@@ -97,6 +140,15 @@ inline Json surface_case() {
   json.erase("volume");
   json.erase("segmentation");
   json["surface"] = {{"path", "vessel.stl"}, {"unit", "mm"}, {"frame", "LPS"}};
+  return json;
+}
+
+/// At labels alone; the tests write the file.
+inline Json labels_case() {
+  Json json = volume_case();
+  json.erase("volume");
+  json.erase("segmentation");
+  json["labels"] = {{"path", "labels.nii"}, {"names", {"aorta"}}};
   return json;
 }
 
@@ -175,6 +227,22 @@ inline Json listed_case() {
   json["targets"] = Json::array({{{"name", "sac"}, {"point_mm", {1, 2, 100}}, {"radius_mm", 5}},
                                  {{"name", "beyond"}, {"point_mm", {1, 2, 90}}, {"beyond_mm", 10}},
                                  {{"name", "renal"}, {"point_mm", {1, 2, 80}}}});
+  return json;
+}
+
+/// A volume's case whose points are voxels, also as lists of one.
+inline Json voxel_case(bool listed) {
+  Json json = full_case(volume_case());
+  json["volume"].erase("series");  // of a file there is none
+  for (const auto& [end, list] :
+       {std::pair("access", "accesses"), std::pair("target", "targets")}) {
+    json[end]["point"] = {{"ijk", json[end]["point_mm"]}};
+    json[end].erase("point_mm");
+    if (!listed) continue;
+    json[list] = Json::array({json[end]});
+    json[list][0]["name"] = end;
+    json.erase(end);
+  }
   return json;
 }
 

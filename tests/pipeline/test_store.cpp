@@ -401,6 +401,38 @@ TEST_F(RerunMatrix, OfACaseThatStartsFromAVolume) {
   expect_reruns(file, table, changes);
 }
 
+TEST_F(RerunMatrix, OfACaseThatStartsFromLabels) {
+  for (const bool in_volume : {true, false}) {
+    SCOPED_TRACE(in_volume);
+    Json file = case_with_every_list_of_one(folder_.path());
+    fs::remove_all(folder_ / "cache");
+    for (const char* name : {"ct.nrrd", "other.nrrd", "labels.nii", "other.nii"}) {
+      write_text("values", folder_ / name);
+    }
+    for (const char* name : {"names.csv", "other.csv"}) write_text("1,tube\n2,x\n", folder_ / name);
+    if (in_volume) file["volume"] = {{"path", "ct.nrrd"}};
+    file["surface"] = {{"edge_length_mm", 1.5}};
+    file["labels"] = {
+        {"path", "labels.nii"}, {"values", {1}}, {"names", {"tube"}}, {"table", "names.csv"}};
+    auto table = common_table();
+    if (in_volume) table["/volume/path"] = {"report"};
+    table["/labels/path"] = table["/labels/table"] = {"report"};  // their contents count
+    table["/labels/values/0"] = table["/labels/names/0"] = {"segment", "report"};
+    for (const char* end : {"/access/point_mm/", "/target/point_mm/"}) {  // must lie in the labels
+      for (const char* k : {"0", "1", "2"}) {
+        auto& stages = table[std::string(end) + k];
+        stages.insert(stages.begin(), "segment");
+      }
+    }
+    Json changes = common_changes();
+    changes["/volume/path"] = "other.nrrd";
+    changes["/labels/path"] = "other.nii";
+    changes["/labels/table"] = "other.csv";
+    changes["/labels/values/0"] = 2;
+    expect_reruns(file, table, changes);
+  }
+}
+
 TEST_F(StageKeys, AChangeRerunsAlsoWhatReadsWhatItChanges) {
   start_finished();
   run({});

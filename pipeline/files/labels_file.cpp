@@ -1,0 +1,363 @@
+#include "pipeline/files/labels_file.h"
+
+#include <algorithm>
+#include <cctype>
+#include <cmath>
+#include <cstdlib>
+#include <fstream>
+#include <iterator>
+#include <set>
+#include <sstream>
+#include <utility>
+#include <vector>
+
+#include "pipeline/files/case_file.h"
+#include "preprocess/segment/label_places.h"
+
+namespace wireplan::pipeline {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr int kLargestValue = 1000000;
+constexpr const char* kTables =
+    "expected names of label values: a dataset.json, {\"aorta\": 1, ...}, or lines of a value and "
+    "a "
+    "name";
+
+std::string small_name(const fs::path& path) {
+  std::string name = path.filename().string();
+  std::transform(name.begin(), name.end(), name.begin(),
+                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  return name;
+}
+
+/// A whole number from 0; empty where the text is something else.
+std::optional<int> whole_number(const std::string& text) {
+  const bool digits =
+      !text.empty() && text.size() <= 7 &&
+      std::all_of(text.begin(), text.end(), [](unsigned char c) { return std::isdigit(c) != 0; });
+  if (!digits || std::atoi(text.c_str()) > kLargestValue) return {};
+  return std::atoi(text.c_str());
+}
+
+bool is_number(const std::string& text) {
+  char* end = nullptr;
+  std::strtod(text.c_str(), &end);
+  return !text.empty() && *end == '\0';
+}
+
+void add_name(std::map<int, std::string>& table, int value, const std::string& name,
+              const fs::path& path) {
+  const auto [place, is_new] = table.emplace(value, name);
+  if (is_new || place->second == name) return;
+  throw Error(path.string() + ": value " + std::to_string(value) + " is named \"" + place->second +
+              "\" and \"" + name + "\", expected one name; mend the table");
+}
+
+std::map<int, std::string> table_of_json(const std::string& text, const fs::path& path) {
+  const Json file = Json::parse(text, nullptr, false);
+  if (!file.is_object()) throw Error(path.string() + ": no JSON object; " + kTables);
+  const Json& pairs =
+      file.contains("labels") && file.at("labels").is_object() ? file.at("labels") : file;
+  std::map<int, std::string> table;
+  for (const auto& [key, value] : pairs.items()) {
+    const std::optional<int> number = whole_number(key);
+    if (number && value.is_string()) {
+      add_name(table, *number, value.get<std::string>(), path);
+    } else if (value.is_number_integer() && value.get<std::int64_t>() >= 0 &&
+               value.get<std::int64_t>() <= kLargestValue) {
+      add_name(table, value.get<int>(), key, path);
+    } else if (!value.is_array()) {  // a region of nnU-Net is a union of classes, not one
+      throw Error(path.string() + ": \"" + key + "\" is " + value.dump().substr(0, 40) + "; " +
+                  kTables);
+    }
+  }
+  return table;
+}
+
+/// Cells between commas, semicolons or tabs, and else between spaces; what is quoted is one.
+std::vector<std::string> cells_of_line(const std::string& line) {
+  const bool marked = line.find_first_of(",;\t") != std::string::npos;
+  std::vector<std::string> cells(1);
+  bool quoted = false;
+  for (const char c : line) {
+    if (c == '"') {
+      quoted = !quoted;
+    } else if (!quoted && (marked ? c == ',' || c == ';' || c == '\t' : c == ' ')) {
+      cells.emplace_back();
+    } else {
+      cells.back() += c;
+    }
+  }
+  for (std::string& cell : cells) {
+    const std::size_t first = cell.find_first_not_of(" \r"), last = cell.find_last_not_of(" \r");
+    cell = first == std::string::npos ? "" : cell.substr(first, last - first + 1);
+  }
+  std::erase(cells, "");
+  return cells;
+}
+
+std::map<int, std::string> table_of_lines(const std::string& text, const fs::path& path) {
+  std::map<int, std::string> table;
+  std::istringstream lines(text);
+  int number = 0, rows = 0;
+  for (std::string line; std::getline(lines, line);) {
+    ++number;
+    const std::vector<std::string> cells = cells_of_line(line);
+    if (cells.empty() || cells.front().front() == '#') continue;
+    std::optional<int> value;
+    std::string name;
+    for (const std::string& cell : cells) {
+      if (!value) value = whole_number(cell);
+      if (name.empty() && !is_number(cell)) name = cell;
+    }
+    if (++rows == 1 && !value) continue;  // what the columns are
+    if (!value || name.empty()) {
+      throw Error(path.string() + ": line " + std::to_string(number) + " has no value and name; " +
+                  kTables);
+    }
+    add_name(table, *value, name, path);
+  }
+  return table;
+}
+
+/// Without the ending of a volume.
+std::string stem_of(const fs::path& path) {
+  std::string name = path.filename().string();
+  const std::string small = small_name(path);
+  for (const char* ending : {".nii.gz", ".nii", ".seg.nrrd", ".nrrd", ".nhdr", ".mha", ".mhd"}) {
+    if (small.ends_with(ending)) return name.substr(0, name.size() - std::string(ending).size());
+  }
+  return name;
+}
+
+std::vector<int> read_values(JsonReader& reader) {
+  const std::vector<double> numbers = reader.numbers(
+      "values", std::vector<double>{}, {.min = 1.0, .max = static_cast<double>(kLargestValue)});
+  std::vector<int> values;
+  std::set<int> taken;
+  for (std::size_t k = 0; k < numbers.size(); ++k) {
+    const std::string key = reader.path_of("values") + "[" + std::to_string(k) + "]";
+    const int value = static_cast<int>(numbers[k]);
+    if (numbers[k] != std::floor(numbers[k])) {
+      reader.problems().add(key, Json(numbers[k]).dump(), "a whole number");
+    } else if (!taken.insert(value).second) {
+      reader.problems().add(key, std::to_string(value) + " again", "each value once");
+    }
+    values.push_back(value);
+  }
+  return values;
+}
+
+std::vector<std::string> read_names(JsonReader& reader) {
+  std::vector<std::string> names;
+  if (!reader.has("names")) return names;
+  const Json& list = reader.raw("names");
+  if (!list.is_array() || list.empty()) {
+    reader.problems().add(reader.path_of("names"), list.dump(),
+                          "a list of names of classes, at least one");
+    return names;
+  }
+  std::set<std::string> taken;
+  for (std::size_t k = 0; k < list.size(); ++k) {
+    const std::string key = reader.path_of("names") + "[" + std::to_string(k) + "]";
+    const std::string name = list[k].is_string() ? list[k].get<std::string>() : "";
+    if (name.empty() || name.find_first_of("/\\") != std::string::npos) {
+      reader.problems().add(key, list[k].dump(), "the name of a class, a text without '/'");
+    } else if (!taken.insert(name).second) {
+      reader.problems().add(key, list[k].dump() + " again", "each name once");
+    }
+    names.push_back(name);
+  }
+  return names;
+}
+
+/// Accesses and targets that name a branch, by their keys.
+std::vector<std::pair<std::string, Json*>> ends_with_branches(Json& file) {
+  std::vector<std::pair<std::string, Json*>> ends;
+  const auto add = [&](Json& end, const std::string& key) {
+    if (end.is_object() && end.contains("branch")) ends.emplace_back(key, &end);
+  };
+  if (!file.is_object()) return ends;
+  for (const char* one : {"access", "target"}) {
+    if (file.contains(one)) add(file[one], one);
+  }
+  for (const char* list : {"accesses", "targets"}) {
+    if (!file.contains(list) || !file[list].is_array()) continue;
+    for (std::size_t k = 0; k < file[list].size(); ++k) {
+      add(file[list][k], list + ("[" + std::to_string(k) + "]"));
+    }
+  }
+  return ends;
+}
+
+/// The labels as one piece, by whose names places are told.
+struct NamedLumen {
+  preprocess::LabelMask mask;
+  std::vector<preprocess::LabelClass> classes;
+};
+
+/// The point of {"branch", "beyond_ostium_mm" or "end"}, to a hundredth of a millimetre; null after
+/// a problem.
+Json find_named_point(JsonReader& reader, const NamedLumen& lumen) {
+  Problems& problems = reader.problems();
+  const std::size_t before = problems.count();
+  const std::string name = reader.text("branch", std::nullopt);
+  std::vector<std::string> names;
+  for (const preprocess::LabelClass& one : lumen.classes) names.push_back(one.name);
+  const auto found = std::find(names.begin(), names.end(), name);
+  if (found == names.end() && problems.count() == before) {
+    std::string list;
+    for (const std::string& one : names) list += (list.empty() ? "" : ", ") + one;
+    const std::string nearest = nearest_name(name, names);
+    problems.add(reader.path_of("branch"), "\"" + name + "\"", "a chosen class of labels: " + list,
+                 nearest.empty() ? "" : "did you mean \"" + nearest + "\"?");
+  }
+  for (const char* other : {"point_mm", "point"}) {
+    if (reader.has(other)) {
+      problems.add(reader.path_of(other), "given beside branch", "one of the two");
+    }
+  }
+  const bool beyond = reader.has("beyond_ostium_mm"), at_end = reader.has("end");
+  if (beyond == at_end) {
+    problems.add(reader.path_of("branch"), "\"" + name + "\"",
+                 beyond ? "beyond_ostium_mm or end, not both"
+                        : "a place in it: beyond_ostium_mm, or end (distal; of the trunk superior "
+                          "or inferior)");
+  }
+  double distance = 0.0;
+  std::string end = "distal";
+  if (beyond) {
+    distance =
+        reader.number("beyond_ostium_mm", std::nullopt, {.min = 0.0, .max = 1000.0}, "given in m?");
+  }
+  if (at_end) end = reader.choice("end", std::nullopt, {"distal", "superior", "inferior"});
+  if (problems.count() > before) return nullptr;
+  using preprocess::BranchEnd;
+  const BranchEnd which = end == "distal"     ? BranchEnd::kDistal
+                          : end == "superior" ? BranchEnd::kSuperior
+                                              : BranchEnd::kInferior;
+  try {
+    const preprocess::LabelledWay way = preprocess::find_labelled_way(
+        lumen.mask, lumen.classes, static_cast<std::size_t>(found - names.begin()));
+    const Vec3 point = beyond ? preprocess::find_beyond_ostium(way, distance, name)
+                              : preprocess::find_end(lumen.mask, way, which, name);
+    return to_json(Vec3((100.0 * point).array().round() / 100.0));
+  } catch (const Error& error) {
+    problems.add(reader.path_of(beyond ? "beyond_ostium_mm" : "end"),
+                 beyond ? Json(distance).dump() : "\"" + end + "\"", "a place in the branch",
+                 error.what());
+    return nullptr;
+  }
+}
+
+}  // namespace
+
+std::map<int, std::string> read_label_table(const fs::path& path) {
+  std::ifstream stream(path, std::ios::binary);
+  if (!fs::is_regular_file(path) || !stream) {
+    throw Error(path.string() + ": no such file; " + kTables);
+  }
+  const std::string text(std::istreambuf_iterator<char>(stream), {});
+  const std::map<int, std::string> table =
+      small_name(path).ends_with(".json") ? table_of_json(text, path) : table_of_lines(text, path);
+  if (table.empty()) throw Error(path.string() + ": holds no names; " + kTables);
+  return table;
+}
+
+std::map<int, std::string> find_label_table(const fs::path& labels) {
+  if (fs::is_directory(labels)) return {};
+  const fs::path folder = fs::absolute(labels).parent_path();
+  std::vector<fs::path> places;
+  for (const char* ending : {".json", ".csv", ".tsv", ".txt", ".ctbl"}) {
+    places.push_back(folder / (stem_of(labels) + ending));
+  }
+  places.push_back(folder / "dataset.json");
+  places.push_back(folder.parent_path() / "dataset.json");
+  for (const fs::path& place : places) {
+    if (!fs::is_regular_file(place)) continue;
+    try {
+      return read_label_table(place);
+    } catch (const Error&) {  // of that name, but no table
+    }
+  }
+  return {};
+}
+
+LabelsInput read_labels_input(JsonReader reader, const fs::path& folder) {
+  const std::size_t problems_before = reader.problems().count();
+  LabelsInput labels;
+  labels.given = reader.text("path", std::nullopt);
+  labels.path = resolve_path(labels.given, folder);
+  expect_exists(reader, "path", labels.given, labels.path,
+                "a volume of labels or a folder with one file per class");
+  labels.choice.values = read_values(reader);
+  labels.choice.names = read_names(reader);
+  const std::size_t values = labels.choice.values.size(), names = labels.choice.names.size();
+  if (values > 0 && names > 0 && values != names) {
+    reader.problems().add(reader.path_of("names"), std::to_string(names) + " names",
+                          "as many as labels.values, which has " + std::to_string(values),
+                          "beside values the names are theirs, one each; to choose by name, leave "
+                          "the values out");
+  }
+  labels.table_given = reader.text("table", "");
+  const bool table_beside_folder = !labels.table_given.empty() && fs::is_directory(labels.path);
+  if (table_beside_folder) {
+    reader.problems().add(reader.path_of("table"), "\"" + labels.table_given + "\"",
+                          "none with a folder", "the classes of a folder are named by its files");
+  }
+  reader.finish();
+  if (reader.problems().count() > problems_before) return labels;
+  if (labels.table_given.empty()) {
+    labels.choice.table = find_label_table(labels.path);
+    return labels;
+  }
+  try {
+    labels.choice.table = read_label_table(resolve_path(labels.table_given, folder));
+  } catch (const Error& error) {
+    reader.problems().add(reader.path_of("table"), "\"" + labels.table_given + "\"",
+                          "a table of names", error.what());
+  }
+  return labels;
+}
+
+void resolve_branches(Json& file, const fs::path& folder, Problems& problems) {
+  const std::vector<std::pair<std::string, Json*>> ends = ends_with_branches(file);
+  if (ends.empty()) return;
+  JsonReader root(file, "", problems);
+  if (!root.has("labels")) {
+    problems.add(ends.front().first + ".branch", ends.front().second->at("branch").dump(),
+                 "labels in the case, whose classes have names", "give a point_mm without them");
+    return;
+  }
+  const std::size_t problems_before = problems.count();
+  const LabelsInput labels = read_labels_input(root.object("labels", true), folder);
+  if (problems.count() > problems_before) return;
+  std::optional<NamedLumen> lumen;
+  try {
+    preprocess::LabelVolume read = preprocess::read_labels(labels.path, labels.choice);
+    lumen = NamedLumen{preprocess::merge_labels(read), std::move(read.classes)};
+  } catch (const DiskError&) {
+    throw;
+  } catch (const Error& error) {
+    problems.add("labels", "\"" + labels.given + "\"", "labels that can be read", error.what());
+    return;
+  }
+  for (const auto& [key, end] : ends) {
+    JsonReader reader(*end, key, problems);
+    const Json point = find_named_point(reader, *lumen);
+    for (const char* used : {"branch", "beyond_ostium_mm", "end"}) end->erase(used);
+    (*end)["point_mm"] = point;
+  }
+}
+
+Json labels_json(const LabelsInput& labels) {
+  Json json = {{"path", labels.given}};
+  if (!labels.choice.values.empty()) json["values"] = labels.choice.values;
+  if (!labels.choice.names.empty()) json["names"] = labels.choice.names;
+  if (!labels.table_given.empty()) json["table"] = labels.table_given;
+  return json;
+}
+
+}  // namespace wireplan::pipeline

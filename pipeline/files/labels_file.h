@@ -1,0 +1,40 @@
+#pragma once
+/// The key `labels` of a case, a segmentation that somebody else made, and tables of label names.
+#include <filesystem>
+#include <map>
+#include <optional>
+#include <string>
+
+#include "pipeline/files/json_reader.h"
+#include "preprocess/volume/labels.h"
+
+namespace wireplan::pipeline {
+
+/// As VolumeInput: paths resolved, and as the case file gives them.
+struct LabelsInput {
+  std::filesystem::path path;  // a file, or a folder with one file per class
+  std::string given;
+  std::string table_given;  // empty where the case names no table
+  preprocess::LabelChoice choice;
+};
+
+/// Names of values, from nnU-Net's dataset.json, another JSON object of names and values (either
+/// way round), or lines of text with a value and a name: CSV, 3D Slicer's colour tables, ITK-SNAP's
+/// label descriptions. Throws `Error` where it is none of these, or a value has two names.
+std::map<int, std::string> read_label_table(const std::filesystem::path& path);
+
+/// The table beside a file of labels: of its name, ending in .json, .csv, .tsv, .txt or .ctbl, or a
+/// dataset.json in its folder or the one above. Empty where there is none that can be read.
+std::map<int, std::string> find_label_table(const std::filesystem::path& labels);
+
+/// Reads {"path", "values", "names", "table"}; paths are sought from `folder`.
+LabelsInput read_labels_input(JsonReader reader, const std::filesystem::path& folder);
+
+/// Puts "point_mm" in the place of "branch" and where in it, "beyond_ostium_mm" or "end", of
+/// accesses and targets. The labels that the case names are read for it, from `folder`.
+void resolve_branches(Json& file, const std::filesystem::path& folder, Problems& problems);
+
+/// As the file has them.
+Json labels_json(const LabelsInput& labels);
+
+}  // namespace wireplan::pipeline

@@ -1,0 +1,300 @@
+// The stage segment of a case that enters at labels: they become the mask.
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <vector>
+
+#include "pipeline/files/text.h"
+#include "pipeline/stages/makers.h"
+#include "preprocess/segment/label_growth.h"
+#include "preprocess/segment/label_mask.h"
+#include "preprocess/segment/segment.h"
+#include "preprocess/volume/label_frame.h"
+#include "preprocess/volume/voxels.h"
+
+namespace wireplan::pipeline {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr double kMm3PerMl = 1000.0;
+constexpr double kKnownTo = 0.5;  // of a voxel: how well labels know where the wall is
+
+std::string shown_place(const Vec3& p) {
+  return format("(%.1f, %.1f, %.1f) mm", p.x(), p.y(), p.z());
+}
+
+double voxel_side(const preprocess::Grid& grid) { return std::cbrt(grid.spacing.prod()); }
+
+/// Refuses labels whose edges the volume shows elsewhere; tells where it shows none.
+void compare_with_volume(const Case& given, const preprocess::Image& image,
+                         const preprocess::LabelVolume& labels, Json& figures) {
+  constexpr double kHardlySeen = 30.0;
+  double contrast = 0.0;
+  const std::optional<preprocess::FrameChange> better =
+      preprocess::find_better_frame(image, labels.class_of, contrast);
+  figures["edge_contrast_hu"] = contrast;
+  const fs::path& path = given.labels->path;
+  if (better) {
+    throw Error(path.string() +
+                ": the volume does not show the labels' edges where they lie (a mean step of " +
+                format("%.0f", contrast) +
+                " HU), but does with the labels moved, expected labels in the volume's frame "
+                "(they would fit " +
+                preprocess::describe_change(*better) +
+                "; export them again with this volume, or mend their header)");
+  }
+  if (contrast < kHardlySeen) {
+    figures["warnings"].push_back(
+        "segment: the volume hardly shows the labels' edges (a mean step of " +
+        format("%.0f", contrast) +
+        " HU inward): are they of this volume, and is there contrast in the arteries? Look at the "
+        "slices");
+  }
+}
+
+void tell_labels(const preprocess::LabelVolume& labels, const preprocess::LabelMask& made,
+                 Json& figures) {
+  const double voxel = labels.grid.spacing.prod();
+  const auto name = [&](std::size_t k) { return labels.classes.at(k).name; };
+  const auto tell = [&](const std::string& line) { figures["warnings"].push_back(line); };
+  figures["classes"] = Json::array();
+  for (const preprocess::LabelClass& one : labels.classes) {
+    figures["classes"].push_back(
+        {{"name", one.name},
+         {"value", one.value},
+         {"voxels", one.voxels},
+         {"volume_ml", voxel / kMm3PerMl * static_cast<double>(one.voxels)}});
+  }
+  for (const std::string& line : labels.resampled) tell("segment: " + line);
+  figures["overlaps"] = Json::array();
+  for (const preprocess::LabelOverlap& both : labels.overlaps) {
+    figures["overlaps"].push_back(
+        {{"first", name(both.first)}, {"second", name(both.second)}, {"voxels", both.voxels}});
+    tell("segment: labels " + name(both.first) + " and " + name(both.second) + " overlap in " +
+         std::to_string(both.voxels) + " voxels, which count as " + name(both.first));
+  }
+  figures["bridges"] = Json::array();
+  for (const preprocess::Bridge& bridge : made.bridges) {
+    figures["bridges"].push_back({{"from", name(bridge.from)},
+                                  {"to", name(bridge.to)},
+                                  {"place_mm", to_json(bridge.place)},
+                                  {"length_mm", bridge.length_mm},
+                                  {"radius_mm", bridge.radius_mm}});
+    tell("segment: bridged a gap of " + format("%.1f", bridge.length_mm) + " mm between " +
+         name(bridge.from) + " and " + name(bridge.to) + " at " + shown_place(bridge.place) + ", " +
+         format("%.1f", bridge.radius_mm) + " mm in radius; look whether the vessel goes on there");
+  }
+  figures["left_out"] = Json::array();
+  constexpr std::size_t kMostTold = 5;
+  for (const preprocess::LostPiece& piece : made.lost) {
+    figures["left_out"].push_back({{"of", name(piece.of)},
+                                   {"place_mm", to_json(piece.place)},
+                                   {"gap_mm", piece.gap_mm},
+                                   {"volume_mm3", piece.volume_mm3}});
+    if (figures["left_out"].size() > kMostTold) continue;
+    tell("segment: a piece of " + name(piece.of) + ", " +
+         format("%.2g", piece.volume_mm3 / kMm3PerMl) + " ml at " + shown_place(piece.place) +
+         ", is left out: " + format("%.1f", piece.gap_mm) +
+         " mm part it from the rest, and only gaps below 5 mm are bridged");
+  }
+  figures["left_out_specks_mm3"] = made.lost_specks_mm3;
+}
+
+double reach_beside(const preprocess::Grid& grid) { return std::max(3.0, 2.0 * voxel_side(grid)); }
+
+/// Arteries to accesses and targets that the labels lack, from the volume.
+void grow_to_points(const Case& given, const preprocess::Image& image,
+                    const preprocess::LabelVolume& labels, preprocess::LabelMask& made,
+                    Json& figures) {
+  std::string problems;
+  figures["grown"] = Json::array();
+  for (const auto& [key, point] : end_points(given)) {
+    if (preprocess::compute_distance(made.mask, point) <= reach_beside(labels.grid)) continue;
+    try {
+      const preprocess::Growth growth = preprocess::grow_to(image, point, made);
+      const std::string& name = labels.classes.at(growth.from).name;
+      figures["grown"].push_back({{"toward", key},
+                                  {"from", name},
+                                  {"start_mm", to_json(growth.start)},
+                                  {"length_mm", growth.length_mm},
+                                  {"radius_mm", growth.radius_mm},
+                                  {"volume_mm3", growth.volume_mm3}});
+      figures["warnings"].push_back(
+          "segment: " + key + " lies beyond the labels: " + name +
+          " was grown from the volume by " + format("%.1f", growth.length_mm) + " mm (" +
+          format("%.2g", growth.volume_mm3 / kMm3PerMl) + " ml, at the least " +
+          format("%.1f", growth.radius_mm) + " mm in radius) from " + shown_place(growth.start) +
+          " on; look at it in the slices");
+    } catch (const DiskError&) {
+      throw;
+    } catch (const Error& error) {
+      problems += (problems.empty() ? "" : "\n") + key + " is " + to_json(point).dump() +
+                  ", outside the labels, and no artery leads there from them in the volume, "
+                  "expected a point in an artery (" +
+                  error.what() + ")";
+    }
+  }
+  if (!problems.empty()) throw Error(problems);
+}
+
+/// Every access and target must lie in the mask, or so near that the surface may hold it; all that
+/// do not are told, each with what is nearest.
+void require_points_inside(const Case& given, const preprocess::LabelVolume& labels,
+                           const preprocess::LabelMask& made) {
+  const double reach = reach_beside(labels.grid);
+  std::string problems;
+  for (const auto& [key, point] : end_points(given)) {
+    const double distance = preprocess::compute_distance(made.mask, point);
+    if (distance <= reach) continue;
+    std::string why =
+        "give a point inside them, in mm and LPS, or choose the class that it lies in";
+    for (const preprocess::LostPiece& piece : made.lost) {
+      const preprocess::LabelClass& of = labels.classes.at(piece.of);
+      const preprocess::Grid& grid = labels.grid;
+      const Vec3 ijk = grid.ijk_from_lps(point).array().round().matrix();
+      const Eigen::Array3d size(grid.size[0], grid.size[1], grid.size[2]);
+      if ((ijk.array() < 0.0).any() || (ijk.array() >= size).any()) continue;
+      const std::size_t n =
+          grid.index(static_cast<int>(ijk[0]), static_cast<int>(ijk[1]), static_cast<int>(ijk[2]));
+      if (labels.class_of[n] != piece.of + 1) continue;
+      why = "it lies in " + of.name + ", of which a piece is " + format("%.1f", piece.gap_mm) +
+            " mm from the rest at " + shown_place(piece.place) +
+            ": draw what is missing between them, or take another point";
+      break;
+    }
+    problems += (problems.empty() ? "" : "\n") + key + " is " + to_json(point).dump() + ", " +
+                format("%.1f", distance) + " mm outside the labels, expected a point inside (" +
+                why + ")";
+  }
+  if (!problems.empty()) throw Error(problems);
+}
+
+/// Means of the volume inside the mask, and on both sides of its edge [HU].
+void tell_values(const preprocess::Image& image, const preprocess::Mask& mask, Json& figures) {
+  double sum = 0.0, count = 0.0, edge = 0.0, faces = 0.0;
+  for (std::size_t n = 0; n < mask.labels.size(); ++n) {
+    if (mask.labels[n] == 0) continue;
+    const auto value = static_cast<double>(image.values[n]);
+    sum += value;
+    count += 1.0;
+    preprocess::for_each_face_neighbour(mask.grid, n, [&](std::size_t m) {
+      if (mask.labels[m] != 0) return;
+      edge += 0.5 * (value + static_cast<double>(image.values[m]));
+      faces += 1.0;
+    });
+  }
+  figures["mean_hu"] = sum / count;
+  figures["edge_hu"] = faces > 0.0 ? edge / faces : sum / count;
+}
+
+/// The case's labels as one piece, with all that is to be told of them.
+struct LabelledLumen {
+  preprocess::LabelVolume labels;
+  preprocess::LabelMask made;
+  Json figures;
+};
+
+LabelledLumen find_lumen(const Case& given, const preprocess::Image* image) {
+  LabelledLumen lumen{.labels = preprocess::read_labels(given.labels->path, given.labels->choice,
+                                                        image != nullptr ? &image->grid : nullptr),
+                      .made = {},
+                      .figures = figures_of("segment")};
+  Json& figures = lumen.figures;
+  if (image != nullptr) compare_with_volume(given, *image, lumen.labels, figures);
+  lumen.made = preprocess::merge_labels(lumen.labels);
+  tell_labels(lumen.labels, lumen.made, figures);
+  if (image != nullptr) grow_to_points(given, *image, lumen.labels, lumen.made, figures);
+  require_points_inside(given, lumen.labels, lumen.made);
+  const preprocess::Grid& grid = lumen.labels.grid;
+  figures["volume_mm3"] = lumen.made.volume_mm3;
+  figures["touches_border"] = lumen.made.touches_border;
+  if (image != nullptr) {
+    tell_values(*image, lumen.made.mask, figures);
+  } else {
+    const double error = kKnownTo * voxel_side(grid);
+    figures["spacing_mm"] = to_json(grid.spacing);
+    figures["radius_error_mm"] = error;
+    figures["warnings"].push_back(
+        "segment: without a volume the wall is known to half a voxel: every radius may be " +
+        format("%.2g", error) +
+        " mm more or less; the disturbances draw of it as far as the thinnest wire allows "
+        "(robustness.lumen_mm states another)");
+  }
+  if (lumen.made.touches_border) {
+    figures["warnings"].push_back(
+        "segment: the vessel touches the border of the volume and is closed there by a flat cap");
+  }
+  return lumen;
+}
+
+/// Where on a branch its parent's lumen ends, about.
+double start_of_own(const std::vector<preprocess::Branch>& tree, std::size_t k) {
+  if (tree[k].parent < 0) return 0.0;
+  const Centerline& parent = tree[static_cast<std::size_t>(tree[k].parent)].line;
+  Eigen::Index nearest = 0;
+  (parent.arc_length.array() - tree[k].parent_arc).abs().minCoeff(&nearest);
+  return std::min(1.2 * parent.radius(nearest), 0.8 * tree[k].line.arc_length.tail<1>().value());
+}
+
+/// The classes that a branch runs through, in order, each for 5 mm or a fifth of it.
+std::string classes_along(const preprocess::Image& classes, const Json& names,
+                          const Centerline& line, double from) {
+  constexpr double kLeastMm = 5.0, kLeastPart = 0.2;
+  std::vector<std::pair<std::size_t, double>> lengths;  // class, length; in order of appearance
+  double all = 0.0;
+  for (Eigen::Index k = 1; k < line.arc_length.size(); ++k) {
+    if (line.arc_length(k) < from) continue;
+    const double step = line.arc_length(k) - line.arc_length(k - 1);
+    all += step;
+    const auto voxel = preprocess::nearest_voxel(classes.grid, line.points.col(k));
+    const auto value =
+        voxel ? static_cast<std::size_t>(classes.values[preprocess::index_of(classes.grid, *voxel)])
+              : 0;
+    if (value == 0) continue;
+    auto found = std::find_if(lengths.begin(), lengths.end(),
+                              [&](const auto& one) { return one.first == value; });
+    if (found == lengths.end()) found = lengths.insert(found, {value, 0.0});
+    found->second += step;
+  }
+  std::string text;
+  for (const auto& [value, length] : lengths) {
+    if (length < std::min(kLeastMm, kLeastPart * all)) continue;
+    text += (text.empty() ? "" : " > ") + names.at(value - 1).at("name").get<std::string>();
+  }
+  return text;
+}
+
+}  // namespace
+
+std::vector<std::string> name_branches(const Workspace& work,
+                                       const std::vector<preprocess::Branch>& tree) {
+  std::vector<std::string> names;
+  for (std::size_t k = 0; k < tree.size(); ++k) names.push_back("branch " + std::to_string(k + 1));
+  if (!work.given().labels) return names;
+  const preprocess::Image classes =
+      preprocess::read_image(work.artifact("segment").folder / "classes.nrrd");
+  const Json told = work.figures("segment").at("classes");
+  for (std::size_t k = 0; k < tree.size(); ++k) {
+    const std::string along = classes_along(classes, told, tree[k].line, start_of_own(tree, k));
+    if (!along.empty()) names[k] += ": " + along;
+  }
+  return names;
+}
+
+std::vector<std::string> check_labels(const Case& given, const preprocess::Image* image) {
+  return find_lumen(given, image).figures.at("warnings").get<std::vector<std::string>>();
+}
+
+void make_labels(Workspace& work, const fs::path& folder) {
+  const LabelledLumen lumen =
+      find_lumen(work.given(), work.given().volume ? &work.image() : nullptr);
+  const auto& [labels, made, figures] = lumen;
+  preprocess::write_mask(made.mask, folder / "mask.nrrd");
+  preprocess::write_image(
+      {.grid = labels.grid, .values = {made.class_of.begin(), made.class_of.end()}},
+      folder / "classes.nrrd");
+  write_figures(figures, folder);
+}
+
+}  // namespace wireplan::pipeline

@@ -1,0 +1,123 @@
+// Cases that enter at labels: the key, tables of names, places by a branch's name.
+#include <gtest/gtest.h>
+
+#include "pipeline/files/labels_file.h"
+#include "tests/messages.h"
+#include "tests/pipeline/case_texts.h"
+#include "tests/preprocess/label_bytes.h"
+
+namespace wireplan::pipeline {
+namespace {
+
+using LabelTable = CaseFile;
+
+TEST_F(LabelTable, IsReadFromEveryKindOfFile) {
+  const std::map<int, std::string> expected = {{1, "aorta"}, {7, "renal left"}};
+  const std::vector<std::pair<std::string, std::string>> files = {
+      {"dataset.json", R"({"name": "x", "labels": {"aorta": 1, "renal left": 7}})"},
+      {"old.json", R"({"labels": {"1": "aorta", "7": "renal left"}})"},
+      {"plain.json", R"({"1": "aorta", "7": "renal left"})"},
+      {"turned.json", R"({"aorta": 1, "renal left": 7, "both": [1, 7]})"},
+      {"t.csv", "value,name\n1,aorta\n7,renal left\n"},
+      {"t.tsv", "aorta\t1\nrenal left\t7\r\n"},
+      {"snap.txt", "# ITK-SnAP\n1 255 0 0 1 1 1 \"aorta\"\n7 0 255 0 1 1 1 \"renal left\"\n"},
+      {"slicer.ctbl", "# Color\n1 aorta 255 0 0 255\n\n7 \"renal left\" 0 255 0 255\n"}};
+  for (const auto& [name, text] : files) {
+    SCOPED_TRACE(name);
+    EXPECT_EQ(read_label_table(write(name, text)), expected);
+  }
+}
+
+TEST_F(LabelTable, ThatIsNoneIsRefused) {
+  const auto refusal = [&](const std::string& name, const std::string& text) {
+    return message_of([&] { read_label_table(write(name, text)); });
+  };
+  expect_mentions(refusal("a.json", "[1]"), {"a.json: no JSON object"});
+  expect_mentions(refusal("b.json", R"({"a": 0.5})"), {"\"a\" is 0.5"});
+  expect_mentions(refusal("c.csv", "1,a\n2\n"), {"line 2 has no value and name"});
+  expect_mentions(refusal("d.csv", "1,a\n1,b\n"), {"value 1 is named \"a\" and \"b\""});
+  expect_mentions(refusal("e.csv", "# nothing\n"), {"holds no names"});
+}
+
+TEST_F(LabelTable, IsFoundBesideTheLabelsOrAbove) {
+  fs::create_directories(folder_ / "labelsTr");
+  EXPECT_TRUE(find_label_table(folder_ / "labelsTr" / "p.nii.gz").empty());
+  write("dataset.json", R"({"labels": {"above": 1}})");
+  EXPECT_EQ(find_label_table(folder_ / "labelsTr" / "p.nii.gz").at(1), "above");
+  write("labelsTr/p.json", R"({"Modality": "CT"})");  // beside it, but of something else
+  EXPECT_EQ(find_label_table(folder_ / "labelsTr" / "p.nii.gz").at(1), "above");
+  write("labelsTr/p.txt", "1 own\n");
+  EXPECT_EQ(find_label_table(folder_ / "labelsTr" / "p.nii.gz").at(1), "own");
+}
+
+using LabelsCase = CaseFile;
+
+TEST_F(LabelsCase, NamesEachMistakeWithItsRemedy) {
+  write("labels.nii", "");
+  const auto told = [&](const Json& labels) {
+    Json json = labels_case();
+    json["labels"] = labels;
+    return problem(json);
+  };
+  expect_mentions(told({{"values", {1}}}), {"labels.path is missing"});
+  expect_mentions(told({{"path", "none.nii"}}), {"labels.path is \"none.nii\"", "none.nii"});
+  expect_mentions(
+      told({{"path", "labels.nii"}, {"values", {1.5, 2, 2}}}),
+      {"labels.values[0] is 1.5, expected a whole number", "labels.values[2] is 2 again"});
+  expect_mentions(told({{"path", "labels.nii"}, {"names", {"a", "a", 3, "b/c"}}}),
+                  {"labels.names[1] is \"a\" again", "labels.names[2] is 3", "labels.names[3]"});
+  expect_mentions(told({{"path", "labels.nii"}, {"values", {1, 2}}, {"names", {"a"}}}),
+                  {"labels.names is 1 names", "labels.values, which has 2"});
+  expect_mentions(told({{"path", "labels.nii"}, {"table", "none.csv"}}),
+                  {"labels.table is \"none.csv\"", "no such file"});
+  Json json = labels_case();
+  json["segmentation"] = {{"lower_hu", 100}, {"upper_hu", 200}};
+  expect_mentions(problem(json), {"segmentation is given beside labels"});
+  json = surface_case();
+  json["labels"] = {{"path", "labels.nii"}};
+  expect_mentions(problem(json), {"surface.path is given beside labels"});
+  json = labels_case();
+  json["target"] = {{"branch", "renal"}, {"beyond_ostium_mm", 5}};
+  json.erase("labels");
+  json["volume"] = {{"path", "ct.nrrd"}};
+  expect_mentions(problem(json), {"target.branch is \"renal\", expected labels in the case"});
+}
+
+TEST_F(LabelsCase, FindsPlacesByTheBranchTheyLieIn) {
+  if (!preprocess::reads_volumes()) GTEST_SKIP() << "built without imaging";
+  write("tree.nii", preprocess::branched_labels());
+  Json json = labels_case();
+  json["labels"] = {{"path", "tree.nii"}, {"values", {1, 2}}, {"names", {"aorta", "renal"}}};
+  json["access"] = {{"branch", "aorta"}, {"end", "inferior"}};
+  json["target"] = {{"branch", "renal"}, {"beyond_ostium_mm", 10}};
+  Case given = read(json);
+  // The trunk's middle, its radius above the lower end; 10 mm beyond the wall, in the middle. Both
+  // to the thickness of the layers whose middles are taken, 1.5 voxels.
+  EXPECT_LT((given.accesses[0].point - Vec3(12, 12, 4.5)).norm(), 1.5)
+      << given.accesses[0].point.transpose();
+  EXPECT_LT((given.targets[0].point - Vec3(27, 12, 30)).norm(), 1.5)
+      << given.targets[0].point.transpose();
+  json["access"]["end"] = "superior";
+  json["target"] = {{"branch", "renal"}, {"end", "distal"}};
+  given = read(json);
+  EXPECT_LT((given.accesses[0].point - Vec3(12, 12, 55)).norm(), 1.5);
+  EXPECT_LT((given.targets[0].point - Vec3(37, 12, 30)).norm(), 1.5)
+      << given.targets[0].point.transpose();
+
+  const auto told = [&](const Json& target) {
+    json["target"] = target;
+    return problem(json);
+  };
+  expect_mentions(told({{"branch", "renl"}, {"end", "distal"}}),
+                  {"target.branch is \"renl\"", "aorta, renal", "did you mean \"renal\"?"});
+  expect_mentions(told({{"branch", "renal"}}), {"a place in it: beyond_ostium_mm, or end"});
+  expect_mentions(told({{"branch", "renal"}, {"beyond_ostium_mm", 90}}),
+                  {"target.beyond_ostium_mm is 90", "ends 21.5 mm", "beyond its ostium"});
+  expect_mentions(told({{"branch", "renal"}, {"end", "inferior"}}), {"expected its distal end"});
+  expect_mentions(told({{"branch", "aorta"}, {"beyond_ostium_mm", 3}}), {"is the trunk"});
+  expect_mentions(told({{"branch", "renal"}, {"end", "distal"}, {"point_mm", {1, 2, 3}}}),
+                  {"target.point_mm is given beside branch"});
+}
+
+}  // namespace
+}  // namespace wireplan::pipeline
