@@ -59,6 +59,26 @@ std::vector<std::string> names_below(const fs::path& folder) try {
               "), expected a readable folder; check the path and its permissions");
 }
 
+/// The file with the voxels that a header of MetaImage (.mhd) or NRRD (.nhdr) names; empty where it
+/// names none, or several.
+fs::path data_of_header(const fs::path& header) {
+  const std::string ending = header.extension().string();
+  if (ending != ".mhd" && ending != ".nhdr") return {};
+  std::ifstream stream(header, std::ios::binary);
+  const std::string_view key = ending == ".mhd" ? "ElementDataFile" : "data file";
+  for (std::string line; std::getline(stream, line) && !line.empty();) {
+    const std::size_t mark = line.find_first_of("=:");
+    if (mark == std::string::npos || !line.starts_with(key)) continue;
+    const std::size_t first = line.find_first_not_of(" \t", mark + 1);
+    if (first == std::string::npos) return {};
+    const fs::path data =
+        header.parent_path() / line.substr(first, line.find_last_not_of(" \t\r") + 1 - first);
+    std::error_code unknown;
+    return fs::is_regular_file(data, unknown) ? data : fs::path();
+  }
+  return {};
+}
+
 std::string hash_folder(const fs::path& folder) {
   const std::vector<std::string> names = names_below(folder);
   Sha256 sum;
@@ -99,13 +119,17 @@ std::string hash_file(const fs::path& file) {
 }
 
 std::string hash_input(const fs::path& path) {
-  return fs::is_directory(path) ? hash_folder(path) : hash_file(path);
+  if (fs::is_directory(path)) return hash_folder(path);
+  const fs::path data = data_of_header(path);
+  return data.empty() ? hash_file(path) : hash_text(hash_file(path) + hash_file(data));
 }
 
 std::string input_stamp(const fs::path& path) {
   std::vector<std::string> names = {""};
   if (fs::is_directory(path)) names = names_below(path);
   std::string stamp;
+  const fs::path data = fs::is_directory(path) ? fs::path() : data_of_header(path);
+  if (!data.empty()) stamp = input_stamp(data);
   for (const std::string& name : names) {
     const fs::path file = name.empty() ? path : path / name;
     struct stat status {};
