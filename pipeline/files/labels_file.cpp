@@ -49,6 +49,12 @@ bool is_number(const std::string& text) {
 
 void add_name(std::map<int, std::string>& table, int value, const std::string& name,
               const fs::path& path) {
+  try {
+    static_cast<void>(Json(name).dump());
+  } catch (const Json::exception&) {
+    throw Error(path.string() + ": the name of value " + std::to_string(value) +
+                " is no UTF-8; save the table as UTF-8");
+  }
   const auto [place, is_new] = table.emplace(value, name);
   if (is_new || place->second == name) return;
   throw Error(path.string() + ": value " + std::to_string(value) + " is named \"" + place->second +
@@ -106,11 +112,18 @@ std::map<int, std::string> table_of_lines(const std::string& text, const fs::pat
     ++number;
     const std::vector<std::string> cells = cells_of_line(line);
     if (cells.empty() || cells.front().front() == '#') continue;
+    // Value and name begin the line, in either order. Without marks a name goes on to the next
+    // number.
+    const bool marked = line.find_first_of(",;\t") != std::string::npos;
     std::optional<int> value;
     std::string name;
-    for (const std::string& cell : cells) {
-      if (!value) value = whole_number(cell);
-      if (name.empty() && !is_number(cell)) name = cell;
+    for (std::size_t k = 0; k < cells.size(); ++k) {
+      if (!value && (!marked || k < 2)) value = whole_number(cells[k]);
+      if (is_number(cells[k])) {
+        if (!name.empty()) break;
+      } else if (name.empty() || !marked) {
+        name += (name.empty() ? "" : " ") + cells[k];
+      }
     }
     if (++rows == 1 && !value) continue;  // what the columns are
     if (!value || name.empty()) {
@@ -133,8 +146,10 @@ std::string stem_of(const fs::path& path) {
 }
 
 std::vector<int> read_values(JsonReader& reader) {
+  const std::size_t problems_before = reader.problems().count();
   const std::vector<double> numbers = reader.numbers(
       "values", std::vector<double>{}, {.min = 1.0, .max = static_cast<double>(kLargestValue)});
+  if (reader.problems().count() > problems_before) return {};
   std::vector<int> values;
   std::set<int> taken;
   for (std::size_t k = 0; k < numbers.size(); ++k) {
@@ -214,10 +229,9 @@ Json find_named_point(JsonReader& reader, const NamedLumen& lumen) {
     problems.add(reader.path_of("branch"), "\"" + name + "\"", "a chosen class of labels: " + list,
                  nearest.empty() ? "" : "did you mean \"" + nearest + "\"?");
   }
-  for (const char* other : {"point_mm", "point"}) {
-    if (reader.has(other)) {
-      problems.add(reader.path_of(other), "given beside branch", "one of the two");
-    }
+  if (reader.has("point_mm")) {  // of "point" too by now
+    problems.add(reader.path_of("branch"), "given beside a point", "one of the two");
+    reader.raw("point_mm");
   }
   const bool beyond = reader.has("beyond_ostium_mm"), at_end = reader.has("end");
   if (beyond == at_end) {
@@ -276,7 +290,8 @@ std::map<int, std::string> find_label_table(const fs::path& labels) {
   places.push_back(folder / "dataset.json");
   places.push_back(folder.parent_path() / "dataset.json");
   for (const fs::path& place : places) {
-    if (!fs::is_regular_file(place)) continue;
+    std::error_code unknown;
+    if (!fs::is_regular_file(place, unknown)) continue;
     try {
       return read_label_table(place);
     } catch (const Error&) {  // of that name, but no table
@@ -315,6 +330,7 @@ LabelsInput read_labels_input(JsonReader reader, const fs::path& folder) {
   }
   try {
     labels.choice.table = read_label_table(resolve_path(labels.table_given, folder));
+    labels.choice.table_wins = true;
   } catch (const Error& error) {
     reader.problems().add(reader.path_of("table"), "\"" + labels.table_given + "\"",
                           "a table of names", error.what());

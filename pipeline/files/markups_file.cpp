@@ -233,6 +233,8 @@ class PointFinder {
     }
     try {
       if (!grid_) grid_ = preprocess::read_image(volume_, series_).grid;
+    } catch (const DiskError&) {
+      throw;
     } catch (const Error& error) {
       problems_.add(key, given, "voxels of a volume that can be read", error.what());
       return {};

@@ -85,6 +85,9 @@ void tell_labels(const preprocess::LabelVolume& labels, const preprocess::LabelM
          name(bridge.from) + " and " + name(bridge.to) + " at " + shown_place(bridge.place) + ", " +
          format("%.1f", bridge.radius_mm) + " mm in radius; look whether the vessel goes on there");
   }
+  for (const preprocess::LabelClass& one : labels.classes) {
+    if (one.voxels == 0) tell("segment: nothing of " + one.name + " is left on the volume's grid");
+  }
   figures["left_out"] = Json::array();
   constexpr std::size_t kMostTold = 5;
   for (const preprocess::LostPiece& piece : made.lost) {
@@ -111,6 +114,7 @@ void grow_to_points(const Case& given, const preprocess::Image& image,
   figures["grown"] = Json::array();
   for (const auto& [key, point] : end_points(given)) {
     if (preprocess::compute_distance(made.mask, point) <= reach_beside(labels.grid)) continue;
+    if (!image.modality.empty() && image.modality != "CT") continue;  // is told to lie outside
     try {
       const preprocess::Growth growth = preprocess::grow_to(image, point, made);
       const std::string& name = labels.classes.at(growth.from).name;

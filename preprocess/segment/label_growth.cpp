@@ -60,13 +60,19 @@ Growth grow_to(const Image& image, const Vec3& point, LabelMask& labels) {
 
   // What of the way lies beyond the labels.
   std::size_t first = 0;
+  bool touched = false;
   Growth growth;
   for (std::size_t k = 0; k < way.size(); ++k) {
     if (!nearest_voxel(grid, way[k]) || labels.mask.labels[voxel_of(way[k])] == 0) continue;
     first = k;
+    touched = true;
     growth.from = labels.class_of[voxel_of(way[k])] - 1U;
   }
-  expects(!way.empty());
+  if (!touched) {
+    throw Error("the way to " + place_text(point) +
+                " mm runs beside the labels, expected one that leaves them; draw the artery "
+                "between, or choose its class too");
+  }
   growth.start = way[first];
   growth.radius_mm = kWidest;
 

@@ -54,6 +54,18 @@ Labels mark(const Part& part, const std::vector<std::size_t>& voxels) {
   return marked;
 }
 
+/// Those with a face neighbour that is not among them, as marked.
+std::vector<std::size_t> border_of(const Grid& grid, const std::vector<std::size_t>& voxels,
+                                   const Labels& marked) {
+  std::vector<std::size_t> border;
+  for (const std::size_t n : voxels) {
+    bool outside = false;
+    for_each_face_neighbour(grid, n, [&](std::size_t m) { outside = outside || marked[m] == 0; });
+    if (outside) border.push_back(n);
+  }
+  return border;
+}
+
 /// How wide the labels are round a point: the largest inscribed radius of `labels` within `reach`
 /// of it, to the faces of the outermost voxels [mm].
 double width_near(const Part& part, const std::vector<float>& depth, const Labels& labels,
@@ -86,9 +98,9 @@ double free_way(const Grid& grid, const Vec3& a, const Vec3& b) {
   return std::max(0.0, 1.0 - 2.0 * part_in_voxel) * length;
 }
 
-/// The gap of the piece, given how far each voxel is from the joined ones.
+/// The gap of the piece, given how far each voxel is from the joined ones, and their border.
 Gap find_gap(const Part& part, const PieceOfLabels& piece, std::size_t index,
-             const std::vector<float>& away, const std::vector<std::size_t>& joined) {
+             const std::vector<float>& away, const std::vector<std::size_t>& border) {
   Gap gap{.piece = index};
   float least = std::numeric_limits<float>::infinity();
   for (const std::size_t n : piece.voxels) least = std::min(least, away[n]);
@@ -110,7 +122,7 @@ Gap find_gap(const Part& part, const PieceOfLabels& piece, std::size_t index,
     gap.to = p;
   }
   distance = std::numeric_limits<double>::infinity();
-  for (const std::size_t n : joined) {
+  for (const std::size_t n : border) {
     const Vec3 p = center_of(part.grid, n);
     const double here = (p - gap.to).norm();
     if (here >= distance) continue;
@@ -148,12 +160,11 @@ void fill_bridge(Part& part, const Gap& gap, double radius, std::uint8_t as,
 
 Part cut_part(const LabelVolume& labels, double margin) {
   Part part;
-  const Voxel none = {0, 0, 0};
-  Voxel seed = none;
   const auto first = std::find_if(labels.class_of.begin(), labels.class_of.end(),
                                   [](auto one) { return one != 0; });
   expects(first != labels.class_of.end());
-  seed = voxel_at(labels.grid, static_cast<std::size_t>(first - labels.class_of.begin()));
+  const Voxel seed =
+      voxel_at(labels.grid, static_cast<std::size_t>(first - labels.class_of.begin()));
   part.box = grown(bounding_box(labels.grid, labels.class_of, {seed, seed}), margin, labels.grid);
   part.grid = cropped(labels.grid, part.box);
   part.class_of = crop_values(labels.grid, part.box, labels.class_of);
@@ -178,6 +189,10 @@ void fill_closed(Part& part) {
   }
 }
 
+/// A ball of so many voxels round any point on a space diagonal holds face neighbours all along it:
+/// sqrt(2 / 3) and a little.
+constexpr double kThroughFaces = 0.85;
+
 /// Joins pieces to the first, and tells of those that stay alone.
 void join_pieces(Part& part, std::vector<PieceOfLabels> pieces, double most_gap, LabelMask& made) {
   const double voxel = part.grid.spacing.prod();
@@ -193,27 +208,27 @@ void join_pieces(Part& part, std::vector<PieceOfLabels> pieces, double most_gap,
   const std::vector<float> depth =
       pieces.empty() ? std::vector<float>{} : distance_to(0, part.grid, inside);
   while (!pieces.empty()) {
-    const std::vector<float> away = distance_to(1, part.grid, mark(part, joined));
-    std::vector<float> nearest;
-    for (const PieceOfLabels& piece : pieces) {
-      float least = std::numeric_limits<float>::infinity();
-      for (const std::size_t n : piece.voxels) least = std::min(least, away[n]);
-      nearest.push_back(least);
+    const Labels marked = mark(part, joined);
+    const std::vector<float> away = distance_to(1, part.grid, marked);
+    const std::vector<std::size_t> border = border_of(part.grid, joined, marked);
+    std::vector<Gap> gaps;
+    for (std::size_t k = 0; k < pieces.size(); ++k) {
+      gaps.push_back(find_gap(part, pieces[k], k, away, border));
     }
-    const auto which = static_cast<std::size_t>(std::min_element(nearest.begin(), nearest.end()) -
-                                                nearest.begin());
-    const Gap gap = find_gap(part, pieces[which], which, away, joined);
+    const Gap gap = *std::min_element(
+        gaps.begin(), gaps.end(), [](const Gap& a, const Gap& b) { return a.free_mm < b.free_mm; });
     if (gap.free_mm >= most_gap) {
-      for (std::size_t k = 0; k < pieces.size(); ++k) {
-        const Gap other = find_gap(part, pieces[k], k, away, joined);
-        made.lost.push_back({pieces[k].of, other.to, other.free_mm,
-                             voxel * static_cast<double>(pieces[k].voxels.size())});
-        for (const std::size_t n : pieces[k].voxels) part.class_of[n] = 0;
+      for (const Gap& other : gaps) {
+        const PieceOfLabels& piece = pieces[other.piece];
+        made.lost.push_back(
+            {piece.of, other.to, other.free_mm, voxel * static_cast<double>(piece.voxels.size())});
+        for (const std::size_t n : piece.voxels) part.class_of[n] = 0;
       }
       return;
     }
+    const std::size_t which = gap.piece;
     const double reach = std::max(3.0, 2.0 * part.grid.spacing.maxCoeff());
-    const double radius = std::max(0.8 * part.grid.spacing.maxCoeff(),
+    const double radius = std::max(kThroughFaces * part.grid.spacing.maxCoeff(),
                                    std::min(width_near(part, depth, inside, gap.from, reach),
                                             width_near(part, depth, inside, gap.to, reach)));
     const std::uint8_t from = part.class_of[gap.from_voxel];

@@ -35,10 +35,15 @@ Contacts count_contacts(const LabelMask& labels, std::size_t classes) {
   return found;
 }
 
+/// The class with most voxels.
+std::size_t trunk_of(const Contacts& contacts) {
+  return static_cast<std::size_t>(std::max_element(contacts.voxels.begin(), contacts.voxels.end()) -
+                                  contacts.voxels.begin());
+}
+
 /// -1 for the trunk, and for what nothing joins to it.
 int find_parent(const Contacts& contacts, std::size_t index) {
-  const auto trunk = static_cast<std::size_t>(
-      std::max_element(contacts.voxels.begin(), contacts.voxels.end()) - contacts.voxels.begin());
+  const std::size_t trunk = trunk_of(contacts);
   std::vector<int> steps(contacts.classes, -1);
   std::vector<std::size_t> queue = {trunk};
   steps[trunk] = 0;
@@ -220,6 +225,11 @@ LabelledWay find_labelled_way(const LabelMask& labels, const std::vector<LabelCl
   }
   LabelledWay way;
   way.parent = find_parent(contacts, index);
+  if (way.parent < 0 && index != trunk_of(contacts)) {
+    throw Error(classes[index].name +
+                " touches the other labels at edges alone, expected a branch that joins one of "
+                "them; give a point_mm");
+  }
   const Alone alone = cut_class(labels, index, way.parent);
   std::vector<std::size_t> start = alone.ostium;
   if (way.parent < 0) {  // from one of its two ends that are farthest apart

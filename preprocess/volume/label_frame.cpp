@@ -194,9 +194,10 @@ std::string describe_change(const FrameChange& change) {
 
 std::optional<FrameChange> find_contradiction(const Grid& labels, const Grid& volume) {
   if (labels.size != volume.size || same_centres(labels, volume)) return {};
-  if (((labels.spacing - volume.spacing).array().abs() > 1e-3 * volume.spacing.array()).any()) {
-    return {};
-  }
+  // Spacings that move no voxel of the grid's other end by a tenth are the same.
+  const Eigen::Array3d count(volume.size[0], volume.size[1], volume.size[2]);
+  const Eigen::Array3d off = (labels.spacing - volume.spacing).array().abs() * count;
+  if ((off > kTolerance * volume.spacing.array()).any()) return {};
   FrameChange change;
   change.linear = volume.direction * labels.direction.transpose();
   change.shift = volume.origin - change.linear * labels.origin;

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <limits>
 #include <optional>
+#include <set>
 #include <utility>
 
 #include "preprocess/volume/label_frame.h"
@@ -17,6 +18,7 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr std::size_t kMostClasses = 250;  // class_of holds their numbers in 8 bits
+constexpr float kLargestLabel = 1e6F;
 
 /// All that is wrong, told at once.
 class Complaints {
@@ -46,9 +48,8 @@ std::string quoted_list(const std::vector<std::string>& names) {
 
 /// The first value that is no label; empty where all are whole numbers from 0.
 std::optional<std::size_t> find_no_label(const std::vector<float>& values) {
-  constexpr float kLargest = 1e6F;
   const auto bad = std::find_if(values.begin(), values.end(), [](float value) {
-    return !(value >= 0.0F && value <= kLargest) || value != std::floor(value);
+    return !(value >= 0.0F && value <= kLargestLabel) || value != std::floor(value);
   });
   if (bad == values.end()) return {};
   return static_cast<std::size_t>(bad - values.begin());
@@ -96,7 +97,9 @@ std::vector<Known> known_classes(const VolumeHeader& told, const LabelChoice& ch
     const NamedSegment& segment = told.segments[k];
     // 3D Slicer before 4.11 gave no values: a layer for each segment, of 0 and 1.
     const bool old = segment.value == 0;
-    known.push_back({segment.name, old ? 1 : segment.value,
+    const auto renamed = choice.table.find(segment.value);
+    const bool other = choice.table_wins && renamed != choice.table.end();
+    known.push_back({other ? renamed->second : segment.name, old ? 1 : segment.value,
                      old ? k : static_cast<std::size_t>(std::max(0, segment.layer))});
   }
   if (!known.empty()) return known;
@@ -114,17 +117,12 @@ std::vector<std::string> names_of(const std::vector<Known>& known) {
 
 /// Values other than 0 in a layer, ascending.
 std::vector<int> values_in(const Image& layer) {
+  std::vector<bool> seen(static_cast<std::size_t>(kLargestLabel) + 1);
+  for (const float value : layer.values) seen[static_cast<std::size_t>(value)] = true;
   std::vector<int> values;
-  float last = 0.0F;
-  for (const float value : layer.values) {
-    if (value == last) continue;
-    last = value;
-    const int number = static_cast<int>(value);
-    if (number != 0 && std::find(values.begin(), values.end(), number) == values.end()) {
-      values.push_back(number);
-    }
+  for (std::size_t value = 1; value < seen.size(); ++value) {
+    if (seen[value]) values.push_back(static_cast<int>(value));
   }
-  std::sort(values.begin(), values.end());
   return values;
 }
 
@@ -135,13 +133,12 @@ std::vector<std::string> as_text(const std::vector<int>& values) {
 }
 
 std::string values_text(const std::vector<Image>& layers) {
-  std::vector<int> all;
+  std::set<int> found;
   for (const Image& layer : layers) {
-    for (const int value : values_in(layer)) {
-      if (std::find(all.begin(), all.end(), value) == all.end()) all.push_back(value);
-    }
+    const std::vector<int> values = values_in(layer);
+    found.insert(values.begin(), values.end());
   }
-  std::sort(all.begin(), all.end());
+  const std::vector<int> all(found.begin(), found.end());
   return quoted_list(as_text(all));
 }
 
@@ -207,6 +204,18 @@ std::vector<Known> choose_classes(const fs::path& path, const LabelChoice& choic
   return {};
 }
 
+/// Equal voxel by voxel: the first voxel and the end of every axis.
+bool are_same_voxels(const Grid& a, const Grid& b) {
+  if (a.size != b.size) return false;
+  const double most = 0.2 * b.spacing.minCoeff();
+  for (int axis = -1; axis < 3; ++axis) {
+    Vec3 ijk = Vec3::Zero();
+    if (axis >= 0) ijk[axis] = a.size[static_cast<std::size_t>(axis)] - 1;
+    if ((a.lps_from_ijk(ijk) - b.lps_from_ijk(ijk)).norm() >= most) return false;
+  }
+  return true;
+}
+
 /// Puts classes into one volume, one after the other.
 class Merger {
  public:
@@ -220,11 +229,7 @@ class Merger {
     }
     const auto before = static_cast<std::size_t>(
         std::count_if(classes.begin(), classes.end(), [](auto one) { return one != 0; }));
-    const Grid& to = volume_.grid;
-    const bool same =
-        grid.size == to.size && !find_contradiction(grid, to) &&
-        (grid.lps_from_ijk(Vec3::Zero()) - to.origin).norm() < 0.2 * to.spacing.minCoeff();
-    if (!same) classes = moved(path, grid, classes, before);
+    if (!are_same_voxels(grid, volume_.grid)) classes = moved(path, grid, classes, before);
     for (std::size_t n = 0; n < classes.size(); ++n) put(n, classes[n]);
   }
 
@@ -258,10 +263,7 @@ class Merger {
     const Grid& to = volume_.grid;
     const std::string whose = onto_ ? "the volume's" : "that of the first class";
     if (const std::optional<FrameChange> change = find_contradiction(from, to)) {
-      throw Error(path.string() + ": its grid is " +
-                  (onto_ ? "the volume's"
-                         : "that of the first "
-                           "class") +
+      throw Error(path.string() + ": its grid is " + whose +
                   " in size and spacing, but lies elsewhere, expected the same place (" +
                   "it would fit " + describe_change(*change) +
                   "; mend the header of the labels, or give them as they were exported with this "
@@ -388,9 +390,15 @@ void read_class_file(const fs::path& file, std::size_t index, const std::string&
 void read_folder(const fs::path& folder, const LabelChoice& choice, const Grid* onto,
                  LabelVolume& volume) {
   std::map<std::string, std::vector<fs::path>> files;
-  for (const fs::directory_entry& entry : fs::directory_iterator(folder)) {
+  std::error_code refused;
+  for (const fs::directory_entry& entry : fs::directory_iterator(folder, refused)) {
     const std::string name = class_name(entry.path());
-    if (!name.empty() && fs::is_regular_file(entry.path())) files[name].push_back(entry.path());
+    std::error_code unknown;
+    if (!name.empty() && entry.is_regular_file(unknown)) files[name].push_back(entry.path());
+  }
+  if (refused) {
+    throw Error(folder.string() + ": cannot be read (" + refused.message() +
+                "), expected a folder with one file per class; check its permissions");
   }
   std::vector<std::string> there;
   for (const auto& [name, paths] : files) there.push_back(name);

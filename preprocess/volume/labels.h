@@ -17,6 +17,7 @@ struct LabelChoice {
   std::vector<int> values = {};
   std::vector<std::string> names = {};
   std::map<int, std::string> table = {};  // names of values that the file itself does not tell
+  bool table_wins = false;                // over those that it does
 };
 
 /// A chosen class.

@@ -21,7 +21,9 @@ TEST_F(LabelTable, IsReadFromEveryKindOfFile) {
       {"t.csv", "value,name\n1,aorta\n7,renal left\n"},
       {"t.tsv", "aorta\t1\nrenal left\t7\r\n"},
       {"snap.txt", "# ITK-SnAP\n1 255 0 0 1 1 1 \"aorta\"\n7 0 255 0 1 1 1 \"renal left\"\n"},
-      {"slicer.ctbl", "# Color\n1 aorta 255 0 0 255\n\n7 \"renal left\" 0 255 0 255\n"}};
+      {"slicer.ctbl", "# Color\n1 aorta 255 0 0 255\n\n7 \"renal left\" 0 255 0 255\n"},
+      {"spaces.txt", "1 aorta 255 0 0\n7 renal left 0 255 0\n"},
+      {"statistics.csv", "1,aorta,4711\n7,renal left,815\n"}};
   for (const auto& [name, text] : files) {
     SCOPED_TRACE(name);
     EXPECT_EQ(read_label_table(write(name, text)), expected);
@@ -37,6 +39,7 @@ TEST_F(LabelTable, ThatIsNoneIsRefused) {
   expect_mentions(refusal("c.csv", "1,a\n2\n"), {"line 2 has no value and name"});
   expect_mentions(refusal("d.csv", "1,a\n1,b\n"), {"value 1 is named \"a\" and \"b\""});
   expect_mentions(refusal("e.csv", "# nothing\n"), {"holds no names"});
+  expect_mentions(refusal("f.csv", "1,art\xe8re\n"), {"the name of value 1 is no UTF-8"});
 }
 
 TEST_F(LabelTable, IsFoundBesideTheLabelsOrAbove) {
@@ -116,7 +119,7 @@ TEST_F(LabelsCase, FindsPlacesByTheBranchTheyLieIn) {
   expect_mentions(told({{"branch", "renal"}, {"end", "inferior"}}), {"expected its distal end"});
   expect_mentions(told({{"branch", "aorta"}, {"beyond_ostium_mm", 3}}), {"is the trunk"});
   expect_mentions(told({{"branch", "renal"}, {"end", "distal"}, {"point_mm", {1, 2, 3}}}),
-                  {"target.point_mm is given beside branch"});
+                  {"target.branch is given beside a point"});
 }
 
 }  // namespace

@@ -208,6 +208,22 @@ TEST_F(Labels, OfAnotherSpacingAreResampledAndTold) {
   EXPECT_EQ(same, either);
 }
 
+TEST_F(Labels, OfTheSameSizeAndFirstVoxelAreTheVolumesOnlyIfAllAre) {
+  Grid grid = grid_of(), fine = grid_of(Vec3(0.8, 0.8, 1.5));
+  const LabelVolume other = read_labels(write("fine.nii", label_nifti(fine, values_on(fine, tree))),
+                                        {.values = {2}}, &grid);
+  EXPECT_EQ(other.resampled.size(), 1u);
+  // Square, with i and j exchanged round the same first voxel.
+  grid.size[0] = fine.size[0] = 20;
+  fine.spacing = grid.spacing;
+  fine.direction << 0, 1, 0, 1, 0, 0, 0, 0, 1;
+  const LabelVolume turned = read_labels(
+      write("turned.nii", label_nifti(fine, values_on(fine, tree))), {.values = {2}}, &grid);
+  const LabelVolume straight = read_labels(
+      write("grid.nii", label_nifti(grid, values_on(grid, tree))), {.values = {2}}, &grid);
+  EXPECT_EQ(turned.class_of, straight.class_of);
+}
+
 TEST_F(Labels, OfMultiplesOfTheSpacingKeepTheirVolume) {
   // Every second centre of the grid lies half way between two of the coarse one.
   Grid coarse = grid_of(Vec3(2, 2, 3)), grid = grid_of();
@@ -341,6 +357,57 @@ TEST(MergeLabels, LeavesOutWhatIsFurtherAndSpecks) {
     ASSERT_EQ(made.mask.labels[n], labels.class_of[n] == 1 ? 1 : 0);
   }
   EXPECT_TRUE(made.touches_border);
+}
+
+TEST(MergeLabels, JoinsWhatIsLeastApartInLongVoxels) {
+  // Beside the trunk 7 mm are free, above it 4: by the centres the first is nearer.
+  LabelVolume labels;
+  labels.grid = {.size = {60, 20, 12}, .spacing = Vec3(0.5, 0.5, 4), .origin = Vec3(0, 0, 0)};
+  labels.classes = {{"trunk", 1}, {"beside", 2}, {"above", 3}};
+  labels.class_of.assign(labels.grid.voxels(), 0);
+  const auto fill = [&](int i0, int i1, int k0, int k1, std::uint8_t one) {
+    for (int k = k0; k <= k1; ++k) {
+      for (int j = 5; j < 15; ++j) {
+        for (int i = i0; i <= i1; ++i) labels.class_of[labels.grid.index(i, j, k)] = one;
+      }
+    }
+  };
+  fill(0, 20, 0, 4, 1);
+  fill(35, 45, 0, 4, 2);  // 14 voxels of 0.5 mm between
+  fill(5, 15, 6, 9, 3);   // one of 4 mm
+  const LabelMask made = merge_labels(labels);
+  ASSERT_EQ(made.bridges.size(), 1u);
+  EXPECT_EQ(made.bridges[0].to, 2u);
+  EXPECT_NEAR(made.bridges[0].length_mm, 4.0, 1e-9);
+  ASSERT_EQ(made.lost.size(), 1u);
+  EXPECT_EQ(made.lost[0].of, 1u);
+  EXPECT_GE(made.lost[0].gap_mm, 7.0);  // from the middle of its end
+  EXPECT_LE(made.lost[0].gap_mm, 9.0);
+}
+
+TEST(MergeLabels, JoinsThroughFacesWhatTouchesAtACorner) {
+  LabelVolume labels;
+  labels.grid = {.size = {24, 24, 24}};
+  labels.classes = {{"one", 1}, {"other", 2}};
+  labels.class_of.assign(labels.grid.voxels(), 0);
+  for (int n = 0; n < 10; ++n) {  // two thin rods whose ends touch at a corner alone
+    labels.class_of[labels.grid.index(11, 11, 2 + n)] = 1;
+    labels.class_of[labels.grid.index(12, 12, 12 + n)] = 2;
+  }
+  const LabelMask made = merge_labels(labels);
+  std::vector<std::size_t> queue = {made.mask.grid.index(11, 11, 2)};
+  std::vector<bool> seen(made.mask.labels.size());
+  seen[queue[0]] = true;
+  for (std::size_t next = 0; next < queue.size(); ++next) {
+    for (const std::size_t step : {std::size_t{1}, std::size_t{24}, std::size_t{24 * 24}}) {
+      for (const std::size_t m : {queue[next] + step, queue[next] - step}) {
+        if (seen[m] || made.mask.labels[m] == 0) continue;
+        seen[m] = true;
+        queue.push_back(m);
+      }
+    }
+  }
+  EXPECT_TRUE(seen[made.mask.grid.index(12, 12, 21)]);
 }
 
 TEST(MergeLabels, LeavesOnePieceAsItIs) {
