@@ -27,12 +27,14 @@ constexpr const char* kWires = R"(["glidewire-angled", "amplatz-stiff", "amplatz
 
 /// As a case file in the folder names it.
 std::string path_from(const fs::path& folder, const fs::path& file) {
-  return fs::proximate(fs::weakly_canonical(file), fs::weakly_canonical(folder)).generic_string();
+  const auto whole = [](const fs::path& path) { return fs::weakly_canonical(fs::absolute(path)); };
+  return fs::proximate(whole(file), whole(folder)).generic_string();
 }
 
 /// The folder's name, of characters that the name of a case may have.
 std::string case_name(const fs::path& folder) {
-  std::string name = fs::weakly_canonical(folder).filename().string();
+  const fs::path whole = fs::weakly_canonical(fs::absolute(folder));
+  std::string name = (whole.has_filename() ? whole : whole.parent_path()).filename().string();
   for (char& c : name) {
     if (std::isalnum(static_cast<unsigned char>(c)) == 0 && c != '-' && c != '_') c = '-';
   }

@@ -105,6 +105,8 @@ TEST_F(NewCaseTest, TheProgramTellsItAndRefusesWhatIsNoVolume) {
   EXPECT_EQ(good.code, 0) << good.log;
   EXPECT_TRUE(holds(good.out, "found: \"access\" at")) << good.out;
   EXPECT_TRUE(holds(good.out, "case: p/case.json")) << good.out;
+  EXPECT_EQ(read_json(folder_ / "p/case.json", "wireplan.case/1").at("volume").at("path"),
+            "../scan/ct.nrrd");
   EXPECT_EQ(run_program(folder_.path(), "new q --volume scan/nothing.nrrd").code, 2);
   EXPECT_FALSE(fs::exists(folder_ / "q"));
 }
