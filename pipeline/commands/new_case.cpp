@@ -2,10 +2,8 @@
 
 #include <algorithm>
 #include <cctype>
-#include <cmath>
 #include <iostream>
 #include <memory>
-#include <optional>
 
 #include "pipeline/commands/commands.h"
 #include "pipeline/commands/subcommands.h"
@@ -15,6 +13,7 @@
 #include "pipeline/files/text.h"
 #include "pipeline/report/inspect.h"
 #include "preprocess/volume/image.h"
+#include "preprocess/volume/voxels.h"
 
 namespace wireplan::pipeline {
 namespace {
@@ -48,7 +47,7 @@ bool begins_as(const std::string& label, const std::string& word) {
          });
 }
 
-/// "ct.nrrd: image, NRRD, 512 x 512 x 119 voxels of 0.74 x 0.74 x 1.6 mm"
+/// "ct.nrrd: CT of 512 x 512 x 119 voxels of 0.74 x 0.74 x 1.6 mm"
 std::string volume_line(const fs::path& path, const preprocess::Image& image) {
   const preprocess::Grid& grid = image.grid;
   return path.filename().string() + ": " +
@@ -132,24 +131,18 @@ class CaseMaker {
   }
 
   void tell_point(const MarkupPoint& point) {
-    const preprocess::Grid& grid = image_.grid;
-    const Vec3 ijk = grid.ijk_from_lps(point.point);
     std::string line =
         "\"" + point.label + "\" at (" +
         format("%.1f, %.1f, %.1f) mm LPS, ", point.point.x(), point.point.y(), point.point.z());
-    std::array<int, 3> voxel{};
-    for (std::size_t k = 0; k < 3; ++k) {
-      const double index = std::round(ijk[static_cast<Eigen::Index>(k)]);
-      if (!(index >= 0.0 && index < grid.size[k])) {
-        answer_.found.push_back(line + "outside of the volume");
-        answer_.missing.push_back("The point \"" + point.label +
-                                  "\" inside the volume: it lies outside; place it again.");
-        return;
-      }
-      voxel[k] = static_cast<int>(index);
+    const auto voxel = preprocess::nearest_voxel(image_.grid, point.point);
+    if (!voxel) {
+      answer_.found.push_back(line + "outside of the volume");
+      answer_.missing.push_back("The point \"" + point.label +
+                                "\" inside the volume: it lies outside; place it again.");
+      return;
     }
-    const double value = image_.values[grid.index(voxel[0], voxel[1], voxel[2])];
-    line += format("voxel (%d, %d, %d): %.0f", voxel[0], voxel[1], voxel[2], value);
+    const double value = image_.values[preprocess::index_of(image_.grid, *voxel)];
+    line += format("voxel (%d, %d, %d): %.0f", (*voxel)[0], (*voxel)[1], (*voxel)[2], value);
     line += image_.modality == "CT" ? " HU" : "";
     if (value < kBloodHu) line += ", less than blood with contrast has; is it in the lumen?";
     answer_.found.push_back(line);

@@ -1,7 +1,6 @@
 // The stage segment of a case that enters at labels: they become the mask.
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <vector>
 
 #include "pipeline/files/text.h"
@@ -155,13 +154,9 @@ void require_points_inside(const Case& given, const preprocess::LabelVolume& lab
         "give a point inside them, in mm and LPS, or choose the class that it lies in";
     for (const preprocess::LostPiece& piece : made.lost) {
       const preprocess::LabelClass& of = labels.classes.at(piece.of);
-      const preprocess::Grid& grid = labels.grid;
-      const Vec3 ijk = grid.ijk_from_lps(point).array().round().matrix();
-      const Eigen::Array3d size(grid.size[0], grid.size[1], grid.size[2]);
-      if ((ijk.array() < 0.0).any() || (ijk.array() >= size).any()) continue;
-      const std::size_t n =
-          grid.index(static_cast<int>(ijk[0]), static_cast<int>(ijk[1]), static_cast<int>(ijk[2]));
-      if (labels.class_of[n] != piece.of + 1) continue;
+      const auto voxel = preprocess::nearest_voxel(labels.grid, point);
+      if (!voxel) break;
+      if (labels.class_of[preprocess::index_of(labels.grid, *voxel)] != piece.of + 1) continue;
       why = "it lies in " + of.name + ", of which a piece is " + format("%.1f", piece.gap_mm) +
             " mm from the rest at " + shown_place(piece.place) +
             ": draw what is missing between them, or take another point";

@@ -38,15 +38,6 @@ Vec3 middle_near(const Mask& mask, const Vec3& point) {
   return middle;
 }
 
-/// From the point to the nearest voxel outside the mask, at most `reach` [mm].
-double inscribed(const Mask& mask, const Vec3& point, double reach) {
-  double radius = reach;
-  for (const std::size_t n : voxels_in_ball(mask.grid, point, reach)) {
-    if (mask.labels[n] == 0) radius = std::min(radius, (center_of(mask.grid, n) - point).norm());
-  }
-  return radius;
-}
-
 }  // namespace
 
 Growth grow_to(const Image& image, const Vec3& point, LabelMask& labels) {
@@ -80,7 +71,7 @@ Growth grow_to(const Image& image, const Vec3& point, LabelMask& labels) {
   std::vector<std::size_t> start;
   for (std::size_t k = first; k < way.size(); ++k) {
     if (k > first) growth.length_mm += (way[k] - way[k - 1]).norm();
-    const double radius = inscribed(found.mask, way[k], kWidest);
+    const double radius = inscribed_radius(found.mask, way[k], kWidest);
     growth.radius_mm = std::min(growth.radius_mm, radius);
     for (const std::size_t n :
          voxels_in_ball(grid, way[k], kRound * radius + grid.spacing.maxCoeff())) {

@@ -267,4 +267,12 @@ LabelMask merge_labels(const LabelVolume& labels, double most_gap) {
   return made;
 }
 
+double inscribed_radius(const Mask& mask, const Vec3& point, double most) {
+  double radius = most;
+  for (const std::size_t n : voxels_in_ball(mask.grid, point, most)) {
+    if (mask.labels[n] == 0) radius = std::min(radius, (center_of(mask.grid, n) - point).norm());
+  }
+  return radius;
+}
+
 }  // namespace wireplan::preprocess

@@ -44,4 +44,7 @@ inline constexpr std::size_t kLeastPiece = 10;
 /// pieces first. Cavities that are closed in all directions are filled.
 LabelMask merge_labels(const LabelVolume& labels, double most_gap = 5.0);
 
+/// From the point to the nearest voxel outside the mask, at most `most` [mm].
+double inscribed_radius(const Mask& mask, const Vec3& point, double most);
+
 }  // namespace wireplan::preprocess

@@ -202,17 +202,6 @@ Vec3 point_at(const LabelledWay& way, double arc) {
   return way.points[k - 1] + part * (way.points[k] - way.points[k - 1]);
 }
 
-/// The largest ball inside the mask that holds the point, at most 30 mm [mm].
-double radius_at(const LabelMask& labels, const Vec3& point) {
-  constexpr double kMost = 30.0;
-  double radius = kMost;
-  for (const std::size_t n : voxels_in_ball(labels.mask.grid, point, kMost)) {
-    if (labels.mask.labels[n] != 0) continue;
-    radius = std::min(radius, (center_of(labels.mask.grid, n) - point).norm());
-  }
-  return radius;
-}
-
 }  // namespace
 
 LabelledWay find_labelled_way(const LabelMask& labels, const std::vector<LabelClass>& classes,
@@ -283,11 +272,11 @@ Vec3 find_end(const LabelMask& labels, const LabelledWay& way, BranchEnd end,
   const double length = way.arc.back();
   const bool at_front = end == BranchEnd::kSuperior;
   // As wide as a little inward, where the end's own cap is not the nearest wall.
+  constexpr double kWidest = 30.0;
   double inward = std::min(0.5 * length, 2.0 * labels.mask.grid.spacing.maxCoeff());
   for (int k = 0; k < 3; ++k) {
-    inward =
-        std::min(0.5 * length,
-                 radius_at(labels, point_at(way, at_front ? 1.5 * inward : length - 1.5 * inward)));
+    const Vec3 place = point_at(way, at_front ? 1.5 * inward : length - 1.5 * inward);
+    inward = std::min(0.5 * length, inscribed_radius(labels.mask, place, kWidest));
   }
   return point_at(way, at_front ? inward : length - inward);
 }
