@@ -175,7 +175,7 @@ const checkPage = (title, file) => {
     use("tells access, views and lengths where the report has them", async (page) => {
       if (await page.locator("#anatomy").count() === 0) return;
       const text = await page.textContent("#anatomy");
-      assert.match(text, /Sheath, in the first 110\u00a0mm/);
+      assert.match(text, /Sheath, in the first \d+\u00a0mm/);  // a case may ask for another length
       assert.match(text, /Way from access to target/);
       assert.ok(await page.locator("#anatomy table").count() >= 2);
     });
