@@ -3,6 +3,7 @@
 #include <cmath>
 #include <utility>
 
+#include "pipeline/files/text.h"
 #include "pipeline/files/viewer_files.h"
 #include "pipeline/report/report.h"
 #include "pipeline/stages/makers.h"
@@ -204,8 +205,12 @@ void make_surface(Workspace& work, const fs::path& folder) {
   } else {
     const preprocess::Mask mask =
         preprocess::read_mask(work.artifact("segment").folder / "mask.nrrd");
-    surface = given.volume ? preprocess::surface_from_image(work.image(), mask, given.surface, &fit)
-                           : preprocess::surface_from_mask(mask, given.surface);
+    // Who drew the labels also chose how wide the vessel is.
+    const auto width =
+        given.labels ? preprocess::FitWidth::kOfMask : preprocess::FitWidth::kOfImage;
+    surface = given.volume
+                  ? preprocess::surface_from_image(work.image(), mask, given.surface, &fit, width)
+                  : preprocess::surface_from_mask(mask, given.surface);
     work.drop_image();
   }
   const preprocess::SurfaceCheck check = preprocess::check_surface(surface);
@@ -225,7 +230,15 @@ void make_surface(Workspace& work, const fs::path& folder) {
     figures["fit"] = {{"lumen_value", fit.lumen_value},
                       {"outside_value", fit.outside_value},
                       {"mean_shift_mm", fit.mean_shift_mm},
-                      {"fitted_fraction", fit.fitted_fraction}};
+                      {"fitted_fraction", fit.fitted_fraction},
+                      {"beyond_half_mm", fit.beyond_half_mm}};
+  }
+  constexpr double kToldFrom = 0.1;  // mm
+  if (std::abs(fit.beyond_half_mm) > kToldFrom) {
+    figures["warnings"].push_back(
+        "surface: the labels put the wall " + format("%.2f", std::abs(fit.beyond_half_mm)) +
+        (fit.beyond_half_mm > 0.0 ? " mm outside" : " mm inside") +
+        " half of the contrast, where a lumen's edge is; the vessel is kept as wide as they say");
   }
   if (given.surface_input) add_mends(mends, figures);
   figures["openings"] = openings_json(preprocess::find_openings(surface));

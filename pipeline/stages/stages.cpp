@@ -184,7 +184,7 @@ std::vector<Stage> stages_from_labels(const Case& given) {
   if (!given.labels->choice.names.empty()) read_too(stages.back(), {"/labels/names"});
   read_points(stages.back(), given);
   stages.push_back({.name = "surface",
-                    .version = 6,
+                    .version = 7,
                     .reads_input = in_volume,
                     .after = {"segment"},
                     .parameters = {"/surface/edge_length_mm"},

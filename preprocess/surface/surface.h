@@ -42,10 +42,12 @@ struct SurfaceCheck {
 Surface surface_from_mask(const Mask& mask, const SurfaceOptions& options);
 
 /// The same, then fitted to the image before the remesh: its edge lies where the grey value passes
-/// half way between lumen and surroundings, not where the mask's stairs are. Image and mask share
-/// one grid. Fills `statistics` where it is not null.
+/// half way between lumen and surroundings (or as far from there as the mask's edge is in the
+/// median, see `FitWidth`), not where the mask's stairs are. Image and mask share one grid. Fills
+/// `statistics` where it is not null.
 Surface surface_from_image(const Image& image, const Mask& mask, const SurfaceOptions& options,
-                           FitStatistics* statistics = nullptr);
+                           FitStatistics* statistics = nullptr,
+                           FitWidth width = FitWidth::kOfImage);
 
 /// "LPS" or "RAS" where the file says in which frame it is, as 3D Slicer writes it: in the header
 /// of an STL, a comment of a PLY or OBJ, the field SPACE of a VTP. Empty where it does not, or is

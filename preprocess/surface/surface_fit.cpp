@@ -42,6 +42,10 @@ constexpr double kMostMoved = 0.15;
 // The wall round a lumen of this contrast [HU] is soft tissue, at least so bright. An image in
 // other units has no such contrast, or lies above it.
 constexpr double kWallHu = 20.0, kLeastHu = 100.0;
+// Who drew a mask voxel by voxel knew the wall as well as this [voxels].
+constexpr double kKnownTo = 0.5;
+// Fewer vertices with an edge tell nothing of all; chosen.
+constexpr double kLeastSeen = 0.25;
 
 /// Values between voxels.
 class Interpolated {
@@ -179,6 +183,7 @@ class Fit {
     if (levels.contrast() > kLeastHu) levels.outside = levels.outside.cwiseMax(kWallHu);
 
     Edges edges = find_edges(normals, levels);
+    certainty_ = edges.certainty;
     undo_blur(normals, edges);
     if (statistics) {
       statistics->fitted_fraction = static_cast<double>((edges.certainty.array() == 1.0).count()) /
@@ -187,6 +192,21 @@ class Fit {
     // Against noise and gaps: the average of the neighbourhood.
     average(neighbours_, passes_for(levels.reach * unit_, edge_), edges.shift, edges.certainty);
     move(normals, edges.shift);
+  }
+
+  /// Moves the surface back by the median of what it moved where the image shows an edge, and no
+  /// vertex further from where it began than its mask is known; returns that median, outward [mm].
+  double restore_width() {
+    std::vector<double> moved;
+    for (Eigen::Index v = 0; v < total_.size(); ++v) {
+      if (fixed_[v] == 0 && certainty_(v) == 1.0) moved.push_back(total_(v));
+    }
+    const bool seen =
+        static_cast<double>(moved.size()) >= kLeastSeen * static_cast<double>(total_.size());
+    const double back = seen ? -median(std::move(moved)) : 0.0, most = kKnownTo * voxel_;
+    const Eigen::VectorXd beside = (total_ + back * certainty_).cwiseMin(most).cwiseMax(-most);
+    move(area_weighted_normals(fitted_), beside - total_);
+    return back;
   }
 
   const Surface& surface() const { return fitted_; }
@@ -280,17 +300,23 @@ class Fit {
   double voxel_, edge_;  // sizes of the image's voxels and of the surface's edges          [mm]
   double unit_;          // of distances along the normal                                   [mm]
   Surface fitted_;
-  Eigen::VectorXd total_;    // (n) moved so far, outward                                   [mm]
-  std::vector<char> fixed_;  // (n) at the image's border, where the vessel is cut
+  Eigen::VectorXd total_;      // (n) moved so far, outward                                 [mm]
+  Eigen::VectorXd certainty_;  // (n) that of the last round's edges
+  std::vector<char> fixed_;    // (n) at the image's border, where the vessel is cut
 };
 
 }  // namespace
 
-Surface fit_to_image(const Surface& surface, const Image& image, FitStatistics* statistics) {
+Surface fit_to_image(const Surface& surface, const Image& image, FitStatistics* statistics,
+                     FitWidth width) {
   expects(image.values.size() == image.grid.voxels() && surface.triangles.cols() > 0);
   Fit fit(surface, image);
   for (int round = 0; round < kRounds; ++round) fit.round(statistics);
-  if (statistics) statistics->mean_shift_mm = fit.mean_shift();
+  const double beyond = width == FitWidth::kOfMask ? fit.restore_width() : 0.0;
+  if (statistics) {
+    statistics->mean_shift_mm = fit.mean_shift();
+    statistics->beyond_half_mm = beyond;
+  }
   return fit.surface();
 }
 

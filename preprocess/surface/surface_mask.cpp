@@ -157,14 +157,14 @@ Surface surface_from_mask(const Mask& mask, const SurfaceOptions& options) {
 }
 
 Surface surface_from_image(const Image& image, const Mask& mask, const SurfaceOptions& options,
-                           FitStatistics* statistics) {
+                           FitStatistics* statistics, FitWidth width) {
   expects(options.edge_length_mm > 0.0 && image.values.size() == mask.labels.size());
   require_labels(mask);
   const vtkSmartPointer<vtkPolyData> stairs = contour_lps(mask);
   Surface surface;
   for (const double passband : kPassbandsBeforeFit) {
     const Surface base = smoothed(stairs, passband);
-    surface = without_cuts(fit_to_image(base, image, statistics), base);
+    surface = without_cuts(fit_to_image(base, image, statistics, width), base);
     if (is_sound(check_surface(surface))) break;
   }
   return remesh(surface, options.edge_length_mm);
