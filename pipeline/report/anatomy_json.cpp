@@ -14,7 +14,7 @@ constexpr const char* kReportingStandards =
     "limits of the case; by default the reporting standards for iliac arteries (Chaikof et al. "
     "2002), here applied to the whole way";
 
-std::string branch_name(int k) { return "branch " + std::to_string(k + 1); }
+using Tree = std::vector<preprocess::Branch>;
 
 double degrees(double angle) { return angle / kRadPerDeg; }
 
@@ -41,16 +41,18 @@ Json passage_json(const Centerline& way, const Eigen::VectorXd& diameters, doubl
 }
 
 /// The branch that the way turns into within an arm of the bend, if any: its turn makes the angle.
-Json ostium_at(const plan::Corner& bend, const std::vector<plan::Junction>& junctions) {
+Json ostium_at(const plan::Corner& bend, const std::vector<plan::Junction>& junctions,
+               const Tree& tree) {
   for (const plan::Junction& junction : junctions) {
     const bool near = std::abs(junction.arc - bend.arc) < bend.arm;
-    if (junction.taken && near) return branch_name(junction.branch);
+    if (junction.taken && near) return branch_name(tree, junction.branch);
   }
   return nullptr;
 }
 
 Json access_json(const Centerline& way, const Eigen::VectorXd& diameters,
-                 const std::vector<plan::Junction>& junctions, const plan::AccessLimits& limits) {
+                 const std::vector<plan::Junction>& junctions, const Tree& tree,
+                 const plan::AccessLimits& limits) {
   const double length = way.arc_length(way.arc_length.size() - 1);
   Json access;
   access["device"] = passage_json(way, diameters, length, limits.device_diameter, 1.0,
@@ -75,7 +77,7 @@ Json access_json(const Centerline& way, const Eigen::VectorXd& diameters,
                              {"at_mm", bend.arc},
                              {"place_mm", to_json(bend.point)},
                              {"arm_mm", bend.arm},
-                             {"at_ostium_of", ostium_at(bend, junctions)},
+                             {"at_ostium_of", ostium_at(bend, junctions, tree)},
                              {"grade", grade_name(plan::grade_of(bend.angle, limits.angle))},
                              {"thresholds_deg", thresholds},
                              {"source", kReportingStandards}};
@@ -97,15 +99,16 @@ Json projection_json(const plan::Projection& projection) {
           {"branch_foreshortening", projection.branch_foreshortening}};
 }
 
-Json c_arm_json(const std::vector<plan::Junction>& junctions, const plan::ArmLimits& arm) {
+Json c_arm_json(const std::vector<plan::Junction>& junctions, const Tree& tree,
+                const plan::ArmLimits& arm) {
   Json rows = Json::array();
   for (const plan::Junction& junction : junctions) {
     if (!junction.taken) continue;
     const plan::Projections found =
         plan::find_projections(junction.trunk_direction, junction.branch_direction, arm);
     const double cosine = junction.trunk_direction.dot(junction.branch_direction);
-    rows.push_back({{"trunk", branch_name(junction.trunk)},
-                    {"branch", branch_name(junction.branch)},
+    rows.push_back({{"trunk", branch_name(tree, junction.trunk)},
+                    {"branch", branch_name(tree, junction.branch)},
                     {"at_mm", junction.arc},
                     {"place_mm", to_json(junction.point)},
                     {"turn_deg", degrees(std::acos(std::clamp(cosine, -1.0, 1.0)))},
@@ -119,11 +122,11 @@ Json c_arm_json(const std::vector<plan::Junction>& junctions, const plan::ArmLim
 }
 
 Json lengths_json(const Centerline& way, const std::vector<plan::Junction>& junctions,
-                  const plan::AccessLimits& limits) {
+                  const Tree& tree, const plan::AccessLimits& limits) {
   Json places = Json::array();
   for (const plan::Junction& junction : junctions) {
     places.push_back({{"what", junction.taken ? "the way turns into" : "passes"},
-                      {"branch", branch_name(junction.branch)},
+                      {"branch", branch_name(tree, junction.branch)},
                       {"at_mm", junction.arc},
                       {"place_mm", to_json(junction.point)}});
   }
@@ -163,9 +166,9 @@ Json drawn_line(const Centerline& line) {
 Json anatomy_figures(const simulate::Way& way, const Eigen::VectorXd& diameters,
                      const plan::AccessLimits& limits) {
   const std::vector<plan::Junction> junctions = plan::find_junctions(way);
-  return {{"access", access_json(way.path(), diameters, junctions, limits)},
-          {"c_arm", c_arm_json(junctions, limits.arm)},
-          {"lengths", lengths_json(way.path(), junctions, limits)}};
+  return {{"access", access_json(way.path(), diameters, junctions, way.tree(), limits)},
+          {"c_arm", c_arm_json(junctions, way.tree(), limits.arm)},
+          {"lengths", lengths_json(way.path(), junctions, way.tree(), limits)}};
 }
 
 int grade_from(const std::string& name) {

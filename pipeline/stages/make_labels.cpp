@@ -266,19 +266,15 @@ std::string classes_along(const preprocess::Image& classes, const Json& names,
 
 }  // namespace
 
-std::vector<std::string> name_branches(const Workspace& work,
-                                       const std::vector<preprocess::Branch>& tree) {
-  std::vector<std::string> names;
-  for (std::size_t k = 0; k < tree.size(); ++k) names.push_back("branch " + std::to_string(k + 1));
-  if (!work.given().labels) return names;
+void name_branches(const Workspace& work, std::vector<preprocess::Branch>& tree) {
+  if (!work.given().labels) return;
   const preprocess::Image classes =
       preprocess::read_image(work.artifact("segment").folder / "classes.nrrd");
   const Json told = work.figures("segment").at("classes");
   for (std::size_t k = 0; k < tree.size(); ++k) {
     const std::string along = classes_along(classes, told, tree[k].line, start_of_own(tree, k));
-    if (!along.empty()) names[k] += ": " + along;
+    if (!along.empty()) tree[k].name = branch_name(tree, static_cast<int>(k)) + ": " + along;
   }
-  return names;
 }
 
 std::vector<std::string> check_labels(const Case& given, const preprocess::Image* image) {

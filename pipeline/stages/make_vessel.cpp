@@ -98,20 +98,18 @@ Json line_figures(const Centerline& line) {
 }
 
 // The whole tree: files for viewers, and a list of its branches.
-Json write_tree(const std::vector<preprocess::Branch>& tree, const std::vector<std::string>& names,
-                const fs::path& folder) {
+Json write_tree(const std::vector<preprocess::Branch>& tree, const fs::path& folder) {
   std::vector<Centerline> lines;
   std::vector<NamedCurve> curves;
   Json branches = Json::array();
   for (std::size_t k = 0; k < tree.size(); ++k) {
     const Centerline& line = tree[k].line;
-    const std::string& name = names[k];
+    const std::string name = branch_name(tree, static_cast<int>(k));
     lines.push_back(line);
     curves.push_back({name, line.points});
     Json branch = {
         {"name", name},
-        {"parent", tree[k].parent < 0 ? Json(nullptr)
-                                      : Json(names[static_cast<std::size_t>(tree[k].parent)])},
+        {"parent", tree[k].parent < 0 ? Json(nullptr) : Json(branch_name(tree, tree[k].parent))},
         {"parent_arc_mm", tree[k].parent_arc},
         {"start_mm", to_json(Vec3(line.points.col(0)))},
         {"end_mm", to_json(Vec3(line.points.col(line.points.cols() - 1)))}};
@@ -270,8 +268,9 @@ void make_centerline(Workspace& work, const fs::path& folder) {
   Json figures = figures_of("centerline");
   figures.update(line_figures(line));
   figures["target_lumen_radius_mm"] = line.radius(line.radius.size() - 1);
-  const std::vector<preprocess::Branch> tree = preprocess::find_tree(surface, study.access);
-  figures["branches"] = write_tree(tree, name_branches(work, tree), folder);
+  std::vector<preprocess::Branch> tree = preprocess::find_tree(surface, study.access);
+  name_branches(work, tree);
+  figures["branches"] = write_tree(tree, folder);
   write_figures(figures, folder);
 }
 

@@ -31,9 +31,9 @@ void make_report(Workspace& work, const std::filesystem::path& folder);
 /// is the case's volume, null where it has none.
 std::vector<std::string> check_labels(const Case& given, const preprocess::Image* image);
 
-/// "branch 3", with the labels that it runs through where there are any: "branch 3: aorta > renal".
-std::vector<std::string> name_branches(const Workspace& work,
-                                       const std::vector<preprocess::Branch>& tree);
+/// Names the branches by the labels that they run through, where there are any: "branch 3: aorta >
+/// renal".
+void name_branches(const Workspace& work, std::vector<preprocess::Branch>& tree);
 
 /// One of several processes' part of a case's trials. They are run in rounds: the scouts of all
 /// candidates (all in full where none are scouted), then probes and full runs that the rounds

@@ -33,7 +33,8 @@ std::vector<preprocess::Branch> read_tree(const Workspace& work) {
     tree.push_back(
         {.line = std::move(lines[k]),
          .parent = parent == branches.end() ? -1 : static_cast<int>(parent - branches.begin()),
-         .parent_arc = branches[k].at("parent_arc_mm").get<double>()});
+         .parent_arc = branches[k].at("parent_arc_mm").get<double>(),
+         .name = branches[k].at("name").get<std::string>()});
   }
   return tree;
 }

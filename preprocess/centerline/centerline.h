@@ -1,6 +1,7 @@
 #pragma once
 /// Closed surface -> line along the middle of the lumen from access to target, with inscribed
 /// radius.
+#include <string>
 #include <vector>
 
 #include "preprocess/vessel.h"
@@ -34,7 +35,14 @@ struct Branch {
   Centerline line;        // its arc length counts from the parent's middle               [mm]
   int parent = -1;        // index of the branch it leaves; -1: it starts at the root
   double parent_arc = 0;  // where on the parent                                          [mm]
+  std::string name = {};  // as people call it; empty where nobody said
 };
+
+/// How messages, reports and viewers call a branch of a tree: by its name, or "branch 3".
+inline std::string branch_name(const std::vector<Branch>& tree, int k) {
+  const std::string& name = tree.at(static_cast<std::size_t>(k)).name;
+  return name.empty() ? "branch " + std::to_string(k + 1) : name;
+}
 
 /// The middle of the whole lumen that is connected to `root`. Ends are found, not given:
 ///   1. The place that is farthest from the root, and not within 1.5 radii of a line found before,

@@ -175,9 +175,9 @@ void Trial::check_place(std::size_t goal) {
       own.way ? own.way->find_image_end(push.tip, vessel_.lumen) : std::nullopt;
   if (image_end) {
     end_where_it_is(goal, Outcome::kLeftImage,
-                    "the tip came to the end of the imaged vessel, branch " +
-                        std::to_string(*image_end + 1) + ", at " + place_text(push.tip) + " mm" +
-                        after + "; the artery goes on there, the image does not");
+                    "the tip came to the end of the imaged vessel, " +
+                        branch_name(own.way->tree(), *image_end) + ", at " + place_text(push.tip) +
+                        " mm" + after + "; the artery goes on there, the image does not");
   }
 }
 

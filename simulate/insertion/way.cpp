@@ -173,20 +173,20 @@ std::optional<Astray> Way::find_astray(const Vec3& tip) const {
     const std::string where =
         in_branch_of_way ? "went on in " + name + ", " : "is in " + name + ", which comes ";
     return Astray{true, "it " + where + whole_millimetres(on_way.arc - leaves) +
-                            " beyond the place where the way leaves branch " +
-                            std::to_string(on_way.branch + 1)};
+                            " beyond the place where the way leaves " +
+                            branch_name(tree_, on_way.branch)};
   }
   if (in_branch_of_way) return std::nullopt;
   if (is_wider(left, on_way)) {
     return Astray{true, "it went on in " + name + ", the wider vessel where the way leaves it " +
-                            whole_millimetres(on_way.arc) + " along branch " +
-                            std::to_string(on_way.branch + 1)};
+                            whole_millimetres(on_way.arc) + " along " +
+                            branch_name(tree_, on_way.branch)};
   }
   return Astray{false, "it is in " + name + ", which leaves the way " +
                            whole_millimetres(leaves - on_way.arc) + " before " +
                            (on_way.branch == target_branch_
                                 ? "the target"
-                                : "the way leaves branch " + std::to_string(on_way.branch + 1))};
+                                : "the way leaves " + branch_name(tree_, on_way.branch))};
 }
 
 std::optional<int> Way::find_image_end(const Vec3& tip, const Lumen& lumen) const {
@@ -210,7 +210,7 @@ std::optional<int> Way::find_image_end(const Vec3& tip, const Lumen& lumen) cons
 }
 
 std::string Way::name_at(const Vec3& point) const {
-  return tree_.empty() ? std::string() : "branch " + std::to_string(find_branch(point).branch + 1);
+  return tree_.empty() ? std::string() : branch_name(tree_, find_branch(point).branch);
 }
 
 Way::Place Way::find_branch(const Vec3& point) const {

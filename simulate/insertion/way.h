@@ -25,7 +25,7 @@ struct Astray {
   std::string text;        // which vessel, and how far beyond the place where the way leaves
 };
 
-/// Immutable. Branches are named by their numbers in the tree: "branch 1" is the first.
+/// Immutable. Branches are called as `preprocess::branch_name` says.
 class Way {
  public:
   /// Expects a path of two points or more from access to target. `tree` has all branches of the
@@ -61,7 +61,7 @@ class Way {
   /// what lies before the target.
   std::optional<int> find_image_end(const Vec3& tip, const Lumen& lumen) const;
 
-  /// "branch 3", of the vessel that a point is in; empty without a tree.
+  /// Of the vessel that a point is in, "branch 3" for one; empty without a tree.
   std::string name_at(const Vec3& point) const;
 
  private:
