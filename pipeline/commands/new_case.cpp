@@ -9,10 +9,13 @@
 #include "pipeline/commands/subcommands.h"
 #include "pipeline/files/case_file.h"
 #include "pipeline/files/disk.h"
+#include "pipeline/files/labels_file.h"
 #include "pipeline/files/markups_file.h"
 #include "pipeline/files/text.h"
 #include "pipeline/report/inspect.h"
+#include "pipeline/stages/makers.h"
 #include "preprocess/volume/image.h"
+#include "preprocess/volume/labels.h"
 #include "preprocess/volume/voxels.h"
 
 namespace wireplan::pipeline {
@@ -56,6 +59,33 @@ std::string volume_line(const fs::path& path, const preprocess::Image& image) {
                 grid.size[2], grid.spacing[0], grid.spacing[1], grid.spacing[2]);
 }
 
+bool has_word(const std::string& name, const std::string& word) {
+  const auto equal = [](char a, char b) {
+    return std::tolower(static_cast<unsigned char>(a)) == b;
+  };
+  return std::search(name.begin(), name.end(), word.begin(), word.end(), equal) != name.end();
+}
+
+/// Whether the name of a class is an artery's, as segmentation tools and people call them.
+bool is_artery(const std::string& name) {
+  for (const char* word :
+       {"vein", "vena", "venous", "portal", "false", "thromb", "wall", "head", "neck", "nerve",
+        "muscle", "iliacus", "crest", "bone", "plaque", "calci"}) {
+    if (has_word(name, word)) return false;
+  }
+  for (const char* word : {"aort", "arter", "iliac", "femoral", "carotid", "subclavian", "celiac",
+                           "brachiocephalic_trunk", "brachiocephalic trunk", "mesenteric"}) {
+    if (has_word(name, word)) return true;
+  }
+  return false;
+}
+
+/// "aorta (113 ml)"
+std::string class_text(const preprocess::ListedClass& one) {
+  return (one.name.empty() ? "label " + std::to_string(one.value) : one.name) +
+         format(" (%.3g ml)", one.volume_mm3 / 1000.0);
+}
+
 class CaseMaker {
  public:
   explicit CaseMaker(const NewCase& given) : given_(given) {}
@@ -65,12 +95,20 @@ class CaseMaker {
     if (fs::exists(file)) {
       throw Error(file.string() + ": is there already; give another folder, or delete it");
     }
-    read_volume();
-    case_ = {{"schema", "wireplan.case/1"},
-             {"name", case_name(given_.folder)},
-             {"volume", {{"path", path_from(given_.folder, given_.volume)}}}};
-    if (!given_.series.empty()) case_["volume"]["series"] = given_.series;
-    if (given_.markups.empty()) {
+    if (!given_.series.empty() && given_.volume.empty()) {
+      throw Error("--series " + given_.series +
+                  ": given without --volume, expected both; it chooses of a folder of DICOM files");
+    }
+    case_ = {{"schema", "wireplan.case/1"}, {"name", case_name(given_.folder)}};
+    if (!given_.volume.empty()) {
+      read_volume();
+      case_["volume"]["path"] = path_from(given_.folder, given_.volume);
+      if (!given_.series.empty()) case_["volume"]["series"] = given_.series;
+    }
+    if (!given_.labels.empty()) read_classes();
+    if (given_.markups.empty() && arteries_.size() > 1) {
+      propose_branches();
+    } else if (given_.markups.empty()) {
       ask_for_points();
     } else {
       take_points(read_markups(given_.markups));
@@ -96,12 +134,71 @@ class CaseMaker {
     told_ = inspect_text(told);
   }
 
+  /// The classes of the labels, those of them that are arteries by their names, and what is missing
+  /// where none is.
+  void read_classes() {
+    const std::string path = given_.labels.string();
+    const preprocess::LabelListing listing =
+        preprocess::list_labels(given_.labels, find_label_table(given_.labels));
+    std::string all, chosen;
+    for (const preprocess::ListedClass& one : listing.classes) {
+      if (one.voxels == 0) continue;
+      all += (all.empty() ? "" : ", ") + class_text(one);
+      if (!is_artery(one.name)) continue;
+      chosen += (chosen.empty() ? "" : ", ") + one.name;
+      arteries_.push_back(one);
+    }
+    if (all.empty()) {
+      throw Error(path +
+                  ": holds no class with a voxel, expected labels of arteries; give another "
+                  "file or folder");
+    }
+    answer_.found.push_back(given_.labels.filename().string() + ": labels " + all);
+    Json& labels = case_["labels"];
+    labels["path"] = path_from(given_.folder, given_.labels);
+    const bool one_file = !fs::is_directory(given_.labels);
+    if (listing.classes.size() == 1 && one_file) return;  // it is the lumen, whatever it is called
+    labels["names"] = Json::array();
+    for (const preprocess::ListedClass& one : arteries_) labels["names"].push_back(one.name);
+    if (!arteries_.empty()) {
+      answer_.found.push_back("by their names these are arteries, and labels.names has them: " +
+                              chosen);
+    } else {
+      answer_.missing.push_back(
+          std::string("The classes that are arteries, none of which has an artery's name: as "
+                      "labels.names") +
+          (one_file ? ", or by number as labels.values in its place." : "."));
+    }
+  }
+
+  /// From the largest artery's lower end, or an iliac's or femoral's, to the smallest.
+  void propose_branches() {
+    const auto smaller = [](const auto& a, const auto& b) { return a.volume_mm3 < b.volume_mm3; };
+    const auto trunk = std::max_element(arteries_.begin(), arteries_.end(), smaller);
+    const auto from = std::find_if(arteries_.begin(), arteries_.end(), [](const auto& one) {
+      return has_word(one.name, "iliac") || has_word(one.name, "femoral");
+    });
+    const auto access = from == arteries_.end() ? trunk : from;
+    auto target = arteries_.end();
+    for (auto one = arteries_.begin(); one != arteries_.end(); ++one) {
+      if (one == access || one == trunk) continue;
+      if (target == arteries_.end() || smaller(*one, *target)) target = one;
+    }
+    if (target == arteries_.end()) target = trunk;
+    case_["access"] = {{"branch", access->name}, {"end", access == trunk ? "inferior" : "distal"}};
+    case_["target"] = {{"branch", target->name}, {"end", target == trunk ? "superior" : "distal"}};
+    answer_.found.push_back("proposed, for you to change: the access at the " +
+                            case_["access"]["end"].get<std::string>() + " end of " + access->name +
+                            ", the target at the " + case_["target"]["end"].get<std::string>() +
+                            " end of " + target->name);
+  }
+
   void ask_for_points() {
     for (const char* end : {"access", "target"}) {
       case_[end] = {{"point", {{"markups", kMarkups}, {"label", end}}}};
     }
     answer_.missing.push_back(
-        std::string("Two points in the lumen: in 3D Slicer load the volume, place them, name them "
+        std::string("Two points in the lumen: in 3D Slicer load the images, place them, name them "
                     "\"access\" and \"target\", and save them as ") +
         (given_.folder / kMarkups).string() + ".");
   }
@@ -133,7 +230,9 @@ class CaseMaker {
   void tell_point(const MarkupPoint& point) {
     std::string line =
         "\"" + point.label + "\" at (" +
-        format("%.1f, %.1f, %.1f) mm LPS, ", point.point.x(), point.point.y(), point.point.z());
+        format("%.1f, %.1f, %.1f) mm LPS", point.point.x(), point.point.y(), point.point.z());
+    if (given_.volume.empty()) return answer_.found.push_back(line);
+    line += ", ";
     const auto voxel = preprocess::nearest_voxel(image_.grid, point.point);
     if (!voxel) {
       answer_.found.push_back(line + "outside of the volume");
@@ -170,7 +269,11 @@ class CaseMaker {
 
   void check(const fs::path& file) {
     try {
-      read_case(file);
+      const Case made = read_case(file);
+      if (!made.labels) return;
+      for (const std::string& told : check_labels(made, made.volume ? &image_ : nullptr)) {
+        answer_.found.push_back(told);
+      }
     } catch (const DiskError&) {
       throw;
     } catch (const Error& error) {
@@ -181,7 +284,8 @@ class CaseMaker {
   std::string readme() const {
     const std::string name = case_.at("name");
     std::string text = "# " + name + "\nA case of wireplan. Research use only.\n\n";
-    text += "## What was found\n```\n" + told_ + "```\n";
+    text += "## What was found\n";
+    if (!told_.empty()) text += "```\n" + told_ + "```\n";
     for (const std::string& line : answer_.found) text += "- " + line + "\n";
     text += "\n## What is missing\n";
     for (const std::string& line : answer_.missing) text += "- " + line + "\n";
@@ -191,7 +295,8 @@ class CaseMaker {
 | key | what it is |
 |---|---|
 | `volume` | the CT, from this folder |
-| `access`, `target` | where the wires go in and where to, in the lumen; `accesses`, `targets` are lists of both, with names. `"point": {"markups": FILE, "label": NAME}` is a point of 3D Slicer, `{"ijk": [I, J, K]}` a voxel, `"point_mm"` three numbers in LPS |
+| `labels` | somebody's segmentation in its place or beside it; `names` are the classes that are arteries |
+| `access`, `target` | where the wires go in and where to, in the lumen; `accesses`, `targets` are lists of both, with names. `"point": {"markups": FILE, "label": NAME}` is a point of 3D Slicer, `{"ijk": [I, J, K]}` a voxel, `"point_mm"` three numbers in LPS; with labels `"branch": NAME` with `"end"` or `"beyond_ostium_mm"` |
 | `wires` | of the catalogue (`wireplan wires` lists it) or of your own |
 
 All other keys have defaults; `pipeline/schemas/case.schema.json` explains each.
@@ -206,7 +311,8 @@ wireplan run .
 
   const NewCase& given_;
   preprocess::Image image_;
-  std::string told_;  // of the volume
+  std::string told_;                               // of the volume
+  std::vector<preprocess::ListedClass> arteries_;  // of the labels, by their names
   Json case_;
   NewCaseAnswer answer_;
 };
@@ -217,17 +323,21 @@ NewCaseAnswer write_new_case(const NewCase& given) { return CaseMaker(given).wri
 
 void add_new(CLI::App& app, int& code) {
   const auto given = std::make_shared<NewCase>();
-  CLI::App* command = app.add_subcommand("new", "Write the folder of a case for a CT");
+  CLI::App* command = app.add_subcommand("new", "Write the folder of a case for a CT or labels");
   command->add_option("DIR", given->folder, "Folder of the case")->required();
-  command->add_option("--volume", given->volume, "Folder of DICOM files, NIfTI, NRRD or MetaImage")
-      ->required();
+  command->add_option("--volume", given->volume, "Folder of DICOM files, NIfTI, NRRD or MetaImage");
   command->add_option("--series", given->series, "Of a DICOM folder, by number or description");
   command->add_option("--markups", given->markups,
                       "Points of 3D Slicer (.mrk.json, .fcsv), named access and target");
+  command->add_option("--labels", given->labels,
+                      "A volume of labels, a .seg.nrrd, or a folder with one file per class");
   command->footer(
       "Writes DIR/case.json and DIR/README.md, and says what was found and what is missing.\n"
       "Example: wireplan new patient-7 --volume ct.nii.gz --markups points.mrk.json");
   command->callback([&code, given] {
+    if (given->volume.empty() && given->labels.empty()) {
+      throw CLI::RequiredError("--volume or --labels");
+    }
     const NewCaseAnswer answer = write_new_case(*given);
     for (const std::string& line : answer.found) std::cout << "found: " << line << "\n";
     for (const std::string& line : answer.missing) std::cout << "missing: " << line << "\n";

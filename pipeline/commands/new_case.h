@@ -8,9 +8,10 @@ namespace wireplan::pipeline {
 
 struct NewCase {
   std::filesystem::path folder;   // is made where it is not there
-  std::filesystem::path volume;   // as of a case
+  std::filesystem::path volume;   // as of a case; may be empty where there are labels
   std::string series;             // of a DICOM folder, by number or description; may be empty
   std::filesystem::path markups;  // of 3D Slicer; may be empty
+  std::filesystem::path labels;   // somebody's segmentation; may be empty
 };
 
 /// In sentences.
@@ -21,8 +22,9 @@ struct NewCaseAnswer {
 
 /// Writes case.json, which reads as a case once nothing is missing, and README.md, which says what
 /// was found, what is missing and what the keys mean. Points are access and target by their names,
-/// or in this order where there are two. Throws `Error` where there is a case.json already, and for
-/// a volume or markups that a case would refuse.
+/// or in this order where there are two. Of labels the classes are taken whose names are
+/// an artery's; without markups, access and target are proposed by branch. Throws `Error` where
+/// there is a case.json already, and for a volume or markups that a case would refuse.
 NewCaseAnswer write_new_case(const NewCase& given);
 
 }  // namespace wireplan::pipeline

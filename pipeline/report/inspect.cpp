@@ -13,6 +13,7 @@
 #include "preprocess/surface/surface_describe.h"
 #include "preprocess/volume/describe.h"
 #include "preprocess/volume/dicom_check.h"
+#include "preprocess/volume/labels.h"
 
 namespace wireplan::pipeline {
 namespace {
@@ -102,6 +103,52 @@ Json series_json(const preprocess::SeriesDescription& series) {
   return told;
 }
 
+Json class_row(int value, const std::string& name, std::size_t voxels, double mm3) {
+  return {{"value", value},
+          {"name", told_or_null(name)},
+          {"voxels", voxels},
+          {"volume_ml", mm3 / kMm3PerMl}};
+}
+
+Json classes_json(const std::vector<preprocess::ListedClass>& classes) {
+  Json rows = Json::array();
+  const bool layered =
+      std::any_of(classes.begin(), classes.end(),
+                  [](const preprocess::ListedClass& one) { return one.layer > 0; });
+  for (const preprocess::ListedClass& one : classes) {
+    rows.push_back(class_row(one.value, one.name, one.voxels, one.volume_mm3));
+    if (layered) rows.back()["layer"] = one.layer;
+  }
+  return rows;
+}
+
+/// A file of several layers, which is no volume but may be labels; null where it is none.
+Json layers_json(const fs::path& path) {
+  try {
+    return classes_json(preprocess::list_labels(path, {}).classes);
+  } catch (const DiskError&) {
+    throw;
+  } catch (const Error&) {
+    return nullptr;
+  }
+}
+
+/// A folder with one file per class; null where it is none.
+Json label_folder_json(const fs::path& folder) {
+  preprocess::LabelListing listing;
+  try {
+    listing = preprocess::list_labels(folder, {});
+  } catch (const DiskError&) {
+    throw;
+  } catch (const Error&) {
+    return nullptr;
+  }
+  if (listing.classes.empty()) return nullptr;
+  Json told = {{"kind", "labels"}, {"format", "folder"}, {"labels", classes_json(listing.classes)}};
+  if (listing.others > 0) told["other_volumes"] = listing.others;
+  return told;
+}
+
 Json volume_json(const preprocess::VolumeDescription& given, const fs::path& path) {
   const preprocess::VolumeHeader& header = given.header;
   Json told = {{"kind", given.holds_labels ? "labels" : "image"}, {"format", header.format}};
@@ -125,19 +172,22 @@ Json volume_json(const preprocess::VolumeDescription& given, const fs::path& pat
     }
   }
   if (given.holds_labels) {
-    const double voxel = given.grid->spacing.prod() / kMm3PerMl;
+    const double voxel = given.grid->spacing.prod();
     const std::map<int, std::string> table =
         header.segments.empty() ? find_label_table(path) : std::map<int, std::string>{};
     told["labels"] = Json::array();
     for (const preprocess::LabelDescription& label : given.labels) {
       if (label.value == 0) continue;  // what is around
       told["labels"].push_back(
-          {{"value", label.value},
-           {"name", told_or_null(table.contains(label.value) ? table.at(label.value) : label.name)},
-           {"voxels", label.voxels},
-           {"volume_ml", voxel * static_cast<double>(label.voxels)}});
+          class_row(label.value, table.contains(label.value) ? table.at(label.value) : label.name,
+                    label.voxels, voxel * static_cast<double>(label.voxels)));
     }
   } else if (!header.segments.empty()) {
+    if (Json rows = layers_json(path); !rows.is_null()) {
+      told["kind"] = "labels";
+      told["labels"] = std::move(rows);
+      return told;
+    }
     for (const preprocess::NamedSegment& segment : header.segments) {
       told["segments"].push_back(
           {{"value", segment.value}, {"layer", segment.layer}, {"name", segment.name}});
@@ -211,7 +261,8 @@ Json inspect(const fs::path& path) {
     } catch (const DiskError&) {
       throw;
     } catch (const Error& error) {
-      throw Error(error.what() + (folder ? other_files(path) : std::string()));
+      if (folder) body = label_folder_json(path);
+      if (body.is_null()) throw Error(error.what() + (folder ? other_files(path) : std::string()));
     }
   } else {
     throw Error(path.string() + ": not a file that wireplan reads; " + kRead);

@@ -118,7 +118,8 @@ Lines volume_lines(const Json& told) {
 std::string labels_text(const Json& labels) {
   std::vector<std::vector<std::string>> rows = {{"  label", "name", "voxels", "ml"}};
   for (const Json& label : labels) {
-    rows.push_back({"  " + std::to_string(label["value"].get<int>()), text_or(label["name"], "-"),
+    const std::string layer = label.contains("layer") ? " in layer " + label["layer"].dump() : "";
+    rows.push_back({"  " + label["value"].dump() + layer, text_or(label["name"], "-"),
                     std::to_string(label["voxels"].get<std::size_t>()),
                     format("%.3f", label["volume_ml"].get<double>())});
   }
@@ -194,12 +195,17 @@ std::string inspect_text(const Json& told) {
     text += ", " + std::to_string(series.size()) + " series\n";
     for (const Json& one : series) text += series_text(one);
   } else {
-    text += kind == "labels"  ? ", a volume of labels\n"
-            : kind == "image" ? ", a volume\n"
-                              : " surface\n";
+    text += told["format"] == "folder" ? " of labels, one file per class\n"
+            : kind == "labels"         ? ", a volume of labels\n"
+            : kind == "image"          ? ", a volume\n"
+                                       : " surface\n";
   }
   if (told.contains("volume")) text += columns(volume_lines(told));
   if (told.contains("labels")) text += labels_text(told["labels"]);
+  if (told.contains("other_volumes")) {
+    text +=
+        columns({{"other volumes", told["other_volumes"].dump() + ", which are no single class"}});
+  }
   if (told.contains("segments")) {
     for (const Json& segment : told["segments"]) {
       text += columns({{"segment", std::to_string(segment["value"].get<int>()) + " in layer " +

@@ -115,14 +115,21 @@ std::vector<std::string> names_of(const std::vector<Known>& known) {
   return names;
 }
 
+/// How many voxels of a layer have each value other than 0.
+std::map<int, std::size_t> count_labels(const Image& layer) {
+  std::vector<std::size_t> seen(static_cast<std::size_t>(kLargestLabel) + 1);
+  for (const float value : layer.values) ++seen[static_cast<std::size_t>(value)];
+  std::map<int, std::size_t> counts;
+  for (std::size_t value = 1; value < seen.size(); ++value) {
+    if (seen[value] > 0) counts[static_cast<int>(value)] = seen[value];
+  }
+  return counts;
+}
+
 /// Values other than 0 in a layer, ascending.
 std::vector<int> values_in(const Image& layer) {
-  std::vector<bool> seen(static_cast<std::size_t>(kLargestLabel) + 1);
-  for (const float value : layer.values) seen[static_cast<std::size_t>(value)] = true;
   std::vector<int> values;
-  for (std::size_t value = 1; value < seen.size(); ++value) {
-    if (seen[value]) values.push_back(static_cast<int>(value));
-  }
+  for (const auto& [value, count] : count_labels(layer)) values.push_back(value);
   return values;
 }
 
@@ -387,8 +394,8 @@ void read_class_file(const fs::path& file, std::size_t index, const std::string&
   merger.add(file, layer.grid, std::move(mask));
 }
 
-void read_folder(const fs::path& folder, const LabelChoice& choice, const Grid* onto,
-                 LabelVolume& volume) {
+/// The volumes of a folder by the names of their classes.
+std::map<std::string, std::vector<fs::path>> find_class_files(const fs::path& folder) {
   std::map<std::string, std::vector<fs::path>> files;
   std::error_code refused;
   for (const fs::directory_entry& entry : fs::directory_iterator(folder, refused)) {
@@ -400,12 +407,18 @@ void read_folder(const fs::path& folder, const LabelChoice& choice, const Grid* 
     throw Error(folder.string() + ": cannot be read (" + refused.message() +
                 "), expected a folder with one file per class; check its permissions");
   }
-  std::vector<std::string> there;
-  for (const auto& [name, paths] : files) there.push_back(name);
-  if (there.empty()) {
+  if (files.empty()) {
     throw Error(folder.string() +
                 ": holds no volumes, expected one file per class (.nii.gz, .nii, .nrrd, .mha)");
   }
+  return files;
+}
+
+void read_folder(const fs::path& folder, const LabelChoice& choice, const Grid* onto,
+                 LabelVolume& volume) {
+  const std::map<std::string, std::vector<fs::path>> files = find_class_files(folder);
+  std::vector<std::string> there;
+  for (const auto& [name, paths] : files) there.push_back(name);
   Complaints wrong;
   if (!choice.values.empty()) {
     wrong.add(folder.string() + ": labels.values is given for a folder, expected labels.names: " +
@@ -438,7 +451,49 @@ void read_folder(const fs::path& folder, const LabelChoice& choice, const Grid* 
   merger.finish();
 }
 
+/// The classes of a file: those that it or `table` names, and other values that occur.
+std::vector<ListedClass> list_file(const fs::path& path, const std::map<int, std::string>& table) {
+  VolumeHeader told;
+  const std::vector<Image> layers = read_checked(path, told);
+  const std::vector<Known> known = known_classes(told, {.table = table});
+  std::vector<ListedClass> classes;
+  for (std::size_t l = 0; l < layers.size(); ++l) {
+    std::map<int, std::size_t> counts = count_labels(layers[l]);
+    std::map<int, std::string> names;
+    for (const Known& one : known) {
+      if (one.layer != l) continue;
+      names[one.value] = one.name;
+      if (!told.segments.empty()) counts.try_emplace(one.value, 0);
+    }
+    const double voxel = layers[l].grid.spacing.prod();
+    for (const auto& [value, count] : counts) {
+      classes.push_back({names.contains(value) ? names.at(value) : "", value, static_cast<int>(l),
+                         count, voxel * static_cast<double>(count)});
+    }
+  }
+  return classes;
+}
+
 }  // namespace
+
+LabelListing list_labels(const fs::path& path, const std::map<int, std::string>& table) {
+  if (!fs::is_directory(path)) return {.classes = list_file(path, table)};
+  LabelListing listing;
+  for (const auto& [name, files] : find_class_files(path)) {
+    try {
+      std::vector<ListedClass> classes = list_file(files.front(), {});
+      if (classes.empty()) classes.emplace_back();
+      if (classes.size() > 1 || files.size() > 1) throw Error(name + ": no single class");
+      classes.front().name = name;
+      listing.classes.push_back(classes.front());
+    } catch (const DiskError&) {
+      throw;
+    } catch (const Error&) {
+      ++listing.others;
+    }
+  }
+  return listing;
+}
 
 LabelVolume read_labels(const fs::path& path, const LabelChoice& choice, const Grid* onto) {
   expects(choice.values.empty() || choice.names.empty() ||

@@ -50,4 +50,22 @@ struct LabelVolume {
 LabelVolume read_labels(const std::filesystem::path& path, const LabelChoice& choice,
                         const Grid* onto = nullptr);
 
+struct ListedClass {
+  std::string name;  // empty where none is known
+  int value = 0;     // in its file
+  int layer = 0;     // of a .seg.nrrd; its values count in it alone
+  std::size_t voxels = 0;
+  double volume_mm3 = 0.0;
+};
+
+/// What a file or folder holds, for people who ask which classes there are.
+struct LabelListing {
+  std::vector<ListedClass> classes;  // of a file by layer and value, of a folder by name
+  int others = 0;                    // files of a folder that hold no single class
+};
+
+/// `table` names values as LabelChoice::table does. Throws `Error` where nothing can be told.
+LabelListing list_labels(const std::filesystem::path& path,
+                         const std::map<int, std::string>& table);
+
 }  // namespace wireplan::preprocess

@@ -21,6 +21,9 @@ void write_image(const Image&, const std::filesystem::path&) { refuse(); }
 void write_mask(const Mask&, const std::filesystem::path&) { refuse(); }
 Mask read_mask(const std::filesystem::path&) { refuse(); }
 LabelVolume read_labels(const std::filesystem::path&, const LabelChoice&, const Grid*) { refuse(); }
+LabelListing list_labels(const std::filesystem::path&, const std::map<int, std::string>&) {
+  refuse();
+}
 VolumeDescription describe_volume(const std::filesystem::path&) { refuse(); }
 
 }  // namespace wireplan::preprocess

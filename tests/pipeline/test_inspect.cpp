@@ -5,6 +5,7 @@
 #include "tests/dicom.h"
 #include "tests/messages.h"
 #include "tests/pipeline/program.h"
+#include "tests/preprocess/label_bytes.h"
 #include "tests/preprocess/nifti_bytes.h"
 #include "tests/shapes.h"
 
@@ -182,6 +183,40 @@ TEST_F(Inspect, LabelsAreToldWithNamesAndVolumes) {
   EXPECT_EQ(told["labels"][1]["voxels"], 4);
   EXPECT_EQ(told["labels"][2]["name"], "empty");
   EXPECT_EQ(told["labels"][2]["voxels"], 0);
+}
+
+TEST_F(Inspect, LayersAndFoldersOfLabelsAreToldWithNamesAndVolumes) {
+  const preprocess::Grid grid{.size = {4, 3, 2}, .spacing = Vec3(10, 10, 10)};
+  std::vector<std::uint8_t> one(24, 0), other(24, 0);
+  std::fill(one.begin(), one.begin() + 12, std::uint8_t{1});
+  std::fill(other.begin() + 6, other.begin() + 9, std::uint8_t{1});
+  const Json layers = inspect(
+      write("layers.seg.nrrd",
+            preprocess::label_nrrd(grid, {one, other}, {{"aorta", 1, 0}, {"left renal", 1, 1}})));
+  EXPECT_EQ(layers["kind"], "labels");
+  ASSERT_EQ(layers["labels"].size(), 2U) << layers;
+  EXPECT_EQ(
+      layers["labels"][1],
+      Json(
+          {{"value", 1}, {"name", "left renal"}, {"voxels", 3}, {"volume_ml", 3.0}, {"layer", 1}}));
+  EXPECT_TRUE(holds(inspect_text(layers), "1 in layer 1")) << inspect_text(layers);
+
+  fs::create_directory(folder_ / "classes");
+  write("classes/aorta.nii", preprocess::label_nifti(grid, one));
+  write("classes/liver.nii", preprocess::label_nifti(grid, std::vector<std::uint8_t>(24, 0)));
+  write("classes/ct.nii", preprocess::label_nifti(grid, std::vector<float>(24, -1000.0F)));
+  const Json folder = inspect(folder_ / "classes");
+  EXPECT_EQ(folder["kind"], "labels");
+  EXPECT_EQ(folder["other_volumes"], 1);
+  ASSERT_EQ(folder["labels"].size(), 2U) << folder;
+  EXPECT_EQ(folder["labels"][0]["name"], "aorta");
+  EXPECT_EQ(folder["labels"][0]["volume_ml"], 12.0);
+  EXPECT_EQ(folder["labels"][1]["voxels"], 0);
+  EXPECT_TRUE(holds(inspect_text(folder), "folder of labels, one file per class"));
+  fs::create_directory(folder_ / "shown");
+  write_json(layers, folder_ / "shown/layers.json");
+  write_json(folder, folder_ / "shown/folder.json");
+  expect_follows_schemas(folder_ / "shown");
 }
 
 TEST_F(Inspect, NrrdAndMetaImageAreToldWithTheirUnits) {

@@ -6,6 +6,7 @@
 #include "preprocess/volume/image.h"
 #include "tests/messages.h"
 #include "tests/pipeline/program.h"
+#include "tests/preprocess/label_bytes.h"
 
 namespace wireplan::pipeline {
 namespace {
@@ -42,7 +43,7 @@ class NewCaseTest : public ::testing::Test {
   }
 
   NewCaseAnswer make(const fs::path& markups = {}) {
-    return write_new_case({folder_ / "anna", folder_ / "scan/ct.nrrd", "", markups});
+    return write_new_case({folder_ / "anna", folder_ / "scan/ct.nrrd", "", markups, /*labels=*/{}});
   }
 
   TemporaryFolder folder_;
@@ -109,6 +110,111 @@ TEST_F(NewCaseTest, TheProgramTellsItAndRefusesWhatIsNoVolume) {
             "../scan/ct.nrrd");
   EXPECT_EQ(run_program(folder_.path(), "new q --volume scan/nothing.nrrd").code, 2);
   EXPECT_FALSE(fs::exists(folder_ / "q"));
+}
+
+/// A trunk along k and a branch along i, one file per class.
+void write_classes(const fs::path& folder, const preprocess::Grid& grid) {
+  const auto write = [&](const std::string& name, const auto& holds_voxel) {
+    std::vector<std::uint8_t> values;
+    for (int k = 0; k < grid.size[2]; ++k) {
+      for (int j = 0; j < grid.size[1]; ++j) {
+        for (int i = 0; i < grid.size[0]; ++i) values.push_back(holds_voxel(i, j, k) ? 1 : 0);
+      }
+    }
+    write_text(preprocess::label_nifti(grid, values), folder / (name + ".nii"));
+  };
+  fs::create_directories(folder);
+  write("aorta", [](int i, int j, int) { return std::hypot(i - 6, j - 10) < 4.5; });
+  write("renal_artery_left",
+        [](int i, int j, int k) { return i > 9 && i < 28 && std::hypot(j - 10, k - 15) < 2.5; });
+  write("portal_vein_and_splenic_vein", [](int i, int j, int) { return i > 32 && j > 16; });
+  write("kidney_left", [](int, int, int) { return false; });
+}
+
+TEST_F(NewCaseTest, OfLabelsAloneIsACase) {
+  const preprocess::Grid grid{.size = {36, 20, 30}};
+  write_classes(folder_ / "classes", grid);
+  const NewCase given{.folder = folder_ / "anna",
+                      .volume = {},
+                      .series = {},
+                      .markups = {},
+                      .labels = folder_ / "classes"};
+  const NewCaseAnswer answer = write_new_case(given);
+  EXPECT_TRUE(answer.missing.empty()) << answer.missing.front();
+  const Case read = read_case(folder_ / "anna");
+  EXPECT_FALSE(read.volume);
+  EXPECT_EQ(read.labels->choice.names, (std::vector<std::string>{"aorta", "renal_artery_left"}));
+  const std::string readme = read_text(folder_ / "anna/README.md");
+  EXPECT_TRUE(holds(readme, "portal_vein_and_splenic_vein (") && !holds(readme, "kidney"))
+      << readme;
+  EXPECT_TRUE(holds(readme,
+                    "the access at the inferior end of aorta, the target at the distal end "
+                    "of renal_artery_left"))
+      << readme;
+  EXPECT_NEAR(read.targets[0].point.x(), 26.0, 2.5);
+  EXPECT_NEAR(read.accesses[0].point.z(), 4.0, 3.0);
+}
+
+TEST_F(NewCaseTest, NamesOfArteriesAreKnownHoweverTheyAreWritten) {
+  const preprocess::Grid grid{.size = {36, 20, 30}};
+  write_classes(folder_ / "classes", grid);
+  fs::rename(folder_ / "classes/aorta.nii", folder_ / "classes/Aorta.nii");
+  fs::rename(folder_ / "classes/renal_artery_left.nii", folder_ / "classes/Left Iliac Artery.nii");
+  fs::rename(folder_ / "classes/portal_vein_and_splenic_vein.nii",
+             folder_ / "classes/Femoral_Head.nii");
+  NewCase given{.folder = folder_ / "anna",
+                .volume = {},
+                .series = {},
+                .markups = {},
+                .labels = folder_ / "classes"};
+  write_new_case(given);
+  const Case read = read_case(folder_ / "anna");
+  EXPECT_EQ(read.labels->choice.names, (std::vector<std::string>{"Aorta", "Left Iliac Artery"}));
+  EXPECT_NEAR(read.accesses[0].point.x(), 26.0, 2.5) << "from the groin";
+
+  // Points outside of the labels are missing; a series is one of a volume.
+  given.folder = folder_ / "berta";
+  given.markups = points({{"access", Vec3(6, 10, 3)}, {"target", Vec3(34, 3, 3)}});
+  const NewCaseAnswer outside = write_new_case(given);
+  ASSERT_EQ(outside.missing.size(), 1u);
+  EXPECT_TRUE(holds(outside.missing[0], "target.point_mm") &&
+              holds(outside.missing[0], "outside the labels"))
+      << outside.missing[0];
+  EXPECT_TRUE(holds(outside.found.back(), "\"target\" at (34.0, 3.0, 3.0) mm LPS"))
+      << outside.found.back();
+  given.series = "3";
+  given.folder = folder_ / "clara";
+  EXPECT_TRUE(holds(message_of([&] { write_new_case(given); }), "--series 3: given without"));
+}
+
+TEST_F(NewCaseTest, OfLabelsWithoutNamesSaysSo) {
+  const preprocess::Grid grid{.size = {12, 12, 12}};
+  std::vector<std::uint8_t> values(grid.voxels(), 0);
+  for (std::size_t n = 0; n < values.size(); ++n) values[n] = n % 12 < 4 ? 2 : n % 12 < 8 ? 5 : 0;
+  write_text(preprocess::label_nifti(grid, values), folder_ / "scan/seg.nii");
+  NewCase given{.folder = folder_ / "anna",
+                .volume = {},
+                .series = {},
+                .markups = {},
+                .labels = folder_ / "scan/seg.nii"};
+  const NewCaseAnswer answer = write_new_case(given);
+  EXPECT_TRUE(holds(answer.found.front(), "labels label 2 (0.576 ml), label 5 (0.576 ml)"))
+      << answer.found.front();
+  ASSERT_EQ(answer.missing.size(), 2u);
+  EXPECT_TRUE(holds(answer.missing[0], "labels.values")) << answer.missing[0];
+
+  write_text("value,name\n2,aorta\n5,liver\n", folder_ / "scan/seg.csv");
+  given.folder = folder_ / "berta";
+  given.markups = points({{"access", Vec3(1, 6, 2)}, {"target", Vec3(1, 6, 10)}});
+  EXPECT_TRUE(write_new_case(given).missing.empty());
+  EXPECT_EQ(read_case(folder_ / "berta").labels->choice.names, std::vector<std::string>{"aorta"});
+
+  given.folder = folder_ / "clara";
+  given.labels = folder_ / "scan/none.nii";
+  EXPECT_TRUE(holds(message_of([&] { write_new_case(given); }), "no such file"));
+  const Answer neither = run_program(folder_.path(), "new dora");
+  EXPECT_EQ(neither.code, 2);
+  EXPECT_TRUE(holds(neither.log, "--volume or --labels")) << neither.log;
 }
 
 }  // namespace
