@@ -57,11 +57,11 @@ check_tidy() {
 
 run_suite() { ctest --preset "$1" --parallel "$(nproc)" "${@:2}"; }
 
-# The program alone: a surface is planned on, a volume refused, a report without a page is told. All
-# else is built of the same sources in the same way as in the release.
+# The preset is configured, and the program linked with what stands in the place of ITK's and Node's parts: a surface is planned
+# on, a volume refused, a report without a page is told. All else is built of the same sources in the same way as in the release.
 check_surface_only() {
-  bash tests/build.sh surface-only wireplan || return 1
-  local program=build/surface-only/pipeline/wireplan out=build/surface-only/out status=0
+  cmake --preset surface-only --log-level=NOTICE >/dev/null || return 1
+  local program=build/release/tests/wireplan_bare out=build/surface-only/out status=0
   "$program" simulate cases/s-tube/scene.json -o "$out/scene" || return 1
   local told
   told=$("$program" check cases/abdomen 2>&1) || status=$?
@@ -122,10 +122,8 @@ check_pages() {
     echo "not run: the reports have no page (see their warnings)"
     return 0
   fi
-  local status=0
-  WIREPLAN_PAGE_MODULES=$PWD/build/release/pipeline/page \
-    node tests/page/test_page.mjs "${pages[@]}" || status=$?
-  ((status == 0 || status == 77))  # 77: no browser, which it says
+  printf '%s\0' "${pages[@]}" | WIREPLAN_PAGE_MODULES=$PWD/build/release/pipeline/page \
+    xargs -0 -n 1 -P "$(nproc)" bash -c 'node tests/page/test_page.mjs "$1" || (($? == 77))' -  # 77: no browser, which it says
 }
 
 # The workflow for clusters, by Snakemake alone and on a Slurm of this machine.

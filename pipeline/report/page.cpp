@@ -1,7 +1,5 @@
 #include "pipeline/report/page.h"
 
-#include <page_template.h>
-
 #include <algorithm>
 #include <bit>
 #include <cmath>
@@ -145,7 +143,7 @@ void fill(std::string& page, const std::string& mark, const std::string& text) {
 }
 
 std::string fill_template(const Json& report, const Json& scene, const Json& timing) {
-  std::string page = kPageTemplate;
+  std::string page = page_template();
   // The report, which holds names of others' choosing, comes last: no mark is looked for in it.
   fill(page, "%WIREPLAN_TIMING%", embed_json(timing));
   fill(page, "%WIREPLAN_SCENE%", embed_json(scene));
@@ -168,9 +166,7 @@ PageTrial page_trial(const simulate::TrialResult& trial) {
   return kept;
 }
 
-std::string page_missing() { return kPageMissing; }
-
-std::string page_template_sha256() { return hash_text(kPageTemplate); }
+std::string page_template_sha256() { return hash_text(page_template()); }
 
 std::string build_page(const Json& report, const PageInput& input) {
   expects(page_missing().empty() && input.trials.size() == report.at("trials").size() &&

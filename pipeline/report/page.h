@@ -43,7 +43,9 @@ struct PageInput {
   std::string picture_png;       // the vessel, for browsers without 3D
 };
 
-/// Why this program cannot make pages; empty where it can.
+/// What stands in page_template.cpp, or in no_page.cpp in its place: the template, with marks where
+/// the report goes, and why this program cannot make pages; empty where it can.
+std::string page_template();
 std::string page_missing();
 
 /// SHA-256 of the template, for keys: another template makes another page.
