@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "pipeline/files/plan_file.h"
+#include "pipeline/files/text.h"
 #include "pipeline/files/trial_file.h"
 #include "pipeline/stages/makers.h"
 #include "pipeline/stages/plan_artifact.h"
@@ -156,7 +157,16 @@ void make_plans(Workspace& work, const fs::path& folder) {
   StoredTrials log(work);
   const plan::Plan plan = plan_until(work, Until::kEnd, log);
   for (const int id : plan.attempts) log.place_attempt(id, folder);
-  write_figures(figures_of("plans"), folder);
+  Json figures = figures_of("plans");
+  const double known = plan_options(work, Until::kEnd).robustness.unknowns.lumen,
+               drawn = plan.robustness.unknowns.lumen;
+  if (!plan.repeated.empty() && known > drawn) {
+    figures["warnings"].push_back(
+        "plans: the wall may be off by " + format("%.2g", known) +
+        " mm, but the repeats move it by at most " + format("%.2g", drawn) +
+        " mm (0.8 of the thinnest wire's radius), so fewer of them may fail than really would");
+  }
+  write_figures(figures, folder);
   write_plan(plan, folder);
 }
 

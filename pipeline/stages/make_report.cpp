@@ -94,6 +94,8 @@ ReportInput describe_run(Workspace& work) {
     report.stages.push_back(stage);
     report.figures[stage] = work.figures(stage);
   }
+  const Json of_plans = work.figures("plans");
+  for (const Json& told : of_plans.at("warnings")) report.warnings.push_back(told);
 
   report.verdict = decide(work, report);
 

@@ -130,6 +130,7 @@ TEST_F(LabelsRun, EndsInAReportThatFollowsItsSchema) {
   EXPECT_TRUE(holds(warnings, "a piece of other") && holds(warnings, "is left out: 9.0 mm"))
       << warnings;
   EXPECT_TRUE(holds(warnings, "every radius may be 0.5 mm more or less")) << warnings;
+  EXPECT_TRUE(holds(warnings, "but the repeats move it by at most 0.36 mm")) << warnings;
   // As far as the wire leaves room for it (plan/make_plan.cpp); of a surface it would be 0.25.
   EXPECT_GT(report.at("robustness").at("unknowns").at("lumen_mm").get<double>(), 0.3);
   const Json& vessel = report.at("vessel");
