@@ -286,20 +286,24 @@ void require_whole_dicom(itk::GDCMImageIO& io, const fs::path& file) {
   reader.SetFileName(path.c_str());
   const bool found = reader.ReadUpToTag(pixels, {pixels});
   const gdcm::TransferSyntax syntax = reader.GetFile().GetHeader().GetDataSetTransferSyntax();
+  const std::uintmax_t size = fs::file_size(path);
+  const double values = count_values(io);
   if (syntax == gdcm::TransferSyntax::DeflatedExplicitVRLittleEndian) {
-    return;  // positions are those of the inflated file, and zlib notices
+    // positions are those of the inflated file, and zlib notices
+    return require_room(values, static_cast<double>(size), kMostDeflated, "DICOM", file);
   }
 
   // what lies between where the pixels start and the end of the file
-  const std::uintmax_t at = reader.GetStreamCurrentPosition(), size = fs::file_size(path);
+  constexpr double kMostPacked = 3e4;  // by JPEG 2000 and JPEG-LS where all is one value; chosen
+  const std::uintmax_t at = reader.GetStreamCurrentPosition();
   bool whole = found && at >= 4 && at <= size;
+  const double stored = whole ? static_cast<double>(size - at) : 0.0;
   if (whole && syntax.IsEncapsulated()) {
     std::ifstream stream(path, std::ios::binary);
-    whole = fragments_are_whole(stream, at, size);
+    whole = fragments_are_whole(stream, at, size) && values <= kMostPacked * stored;
   } else if (whole) {
     const double bits = std::strtod(dicom_value(io, "0028|0100").c_str(), nullptr);
-    whole = static_cast<double>(size - at) >=
-            bits / 8.0 * static_cast<double>(io.GetImageSizeInPixels());
+    whole = stored >= (bits > 0.0 ? bits : 8.0) / 8.0 * values;
   }
   if (!whole) {
     throw Error(file.string() + ": " + damaged("DICOM"));
@@ -370,7 +374,14 @@ Stack stack_frames(const Slice& slice, const std::vector<DicomFrame>& frames,
   }
   const DicomFrame& first = frames.front();
   std::vector<Vec3> origins;
+  const auto axes_of = [](const DicomFrame& frame) {
+    Mat3 axes;
+    axes << frame.right, frame.down, frame.right.cross(frame.down);
+    return axes;
+  };
   for (const DicomFrame& frame : frames) {
+    require_place(Vec3(frame.along_row, frame.along_column, 1.0), frame.position, axes_of(frame),
+                  folder);
     const bool like_first = (frame.right - first.right).norm() < 1e-3 &&
                             (frame.down - first.down).norm() < 1e-3 &&
                             std::abs(frame.along_row / first.along_row - 1.0) < 1e-3 &&
@@ -385,9 +396,7 @@ Stack stack_frames(const Slice& slice, const std::vector<DicomFrame>& frames,
   }
   Grid grid = slice.grid;
   grid.spacing = Vec3(first.along_row, first.along_column, 1.0);
-  Mat3 axes;
-  axes << first.right, first.down, first.right.cross(first.down);
-  grid.direction = orthonormal_direction(axes, folder);
+  grid.direction = orthonormal_direction(axes_of(first), folder);
   return stack(origins, grid);
 }
 

@@ -96,7 +96,7 @@ Mat3 orthonormal_direction(const Mat3& direction, const fs::path& path) {
   return nearest;
 }
 
-Grid header_grid(const itk::ImageIOBase& io, const fs::path& path) {
+Grid header_grid(const itk::ImageIOBase& io, const fs::path& path, double mm_per_unit) {
   Grid grid;
   Mat3 direction;
   for (unsigned axis = 0; axis < 3; ++axis) {
@@ -107,8 +107,8 @@ Grid header_grid(const itk::ImageIOBase& io, const fs::path& path) {
                   " voxels; the file is damaged");
     }
     grid.size[axis] = static_cast<int>(size);
-    grid.spacing[axis] = exists ? io.GetSpacing(axis) : 1.0;
-    grid.origin[axis] = exists ? io.GetOrigin(axis) : 0.0;
+    grid.spacing[axis] = mm_per_unit * (exists ? io.GetSpacing(axis) : 1.0);
+    grid.origin[axis] = mm_per_unit * (exists ? io.GetOrigin(axis) : 0.0);
     const std::vector<double> column =
         exists ? io.GetDirection(axis)
                : std::vector<double>();  // ITK's default writes past its end
@@ -116,13 +116,39 @@ Grid header_grid(const itk::ImageIOBase& io, const fs::path& path) {
       direction(row, axis) = row < column.size() ? column[row] : (row == axis ? 1.0 : 0.0);
     }
   }
-  if (!grid.spacing.allFinite() || grid.spacing.minCoeff() <= 0.0 || !grid.origin.allFinite() ||
-      !direction.allFinite()) {
-    throw Error(path.string() + ": voxel spacing " + to_text(grid.spacing) + " mm at origin " +
-                to_text(grid.origin) + " mm, expected positive and finite values; mend the header");
-  }
+  require_place(grid.spacing, grid.origin, direction, path);
   grid.direction = orthonormal_direction(direction, path);
   return grid;
+}
+
+void require_place(const Vec3& spacing, const Vec3& origin, const Mat3& direction,
+                   const fs::path& path) {
+  constexpr double kFar = 1e6, kLeast = 1e-6;  // a kilometre, a nanometre
+  const auto lies_in = [](const auto& values, double least, double most) {
+    return std::all_of(values.begin(), values.end(), [&](double v) {
+      return std::abs(v) >= least && std::abs(v) <= most;  // neither for what is no number
+    });
+  };
+  if (lies_in(spacing, kLeast, kFar) && spacing.minCoeff() > 0.0 && lies_in(origin, 0.0, kFar) &&
+      direction.allFinite()) {
+    return;
+  }
+  throw Error(path.string() + ": voxel spacing " + to_text(spacing) + " mm at origin " +
+              to_text(origin) +
+              " mm, expected positive spacing and a place within a kilometre; mend the header");
+}
+
+double count_values(const itk::ImageIOBase& io) {
+  double count = io.GetNumberOfComponents();
+  for (unsigned axis = 0; axis < io.GetNumberOfDimensions(); ++axis) {
+    count *= static_cast<double>(io.GetDimensions(axis));
+  }
+  return count;
+}
+
+void require_room(double needed, double stored, double most_packed, const std::string& format,
+                  const fs::path& path) {
+  if (needed > most_packed * stored) throw Error(path.string() + ": " + damaged(format));
 }
 
 void tell_header(const itk::ImageIOBase& io, VolumeHeader& told) {
@@ -177,7 +203,11 @@ void append_voxels(itk::ImageIOBase& io, const fs::path& path, std::vector<float
   io.SetIORegion(region);
   std::vector<char> bytes(static_cast<std::size_t>(io.GetImageSizeInBytes()));
   io.Read(bytes.data());
+  append_numbers(io, bytes, path, values);
+}
 
+void append_numbers(const itk::ImageIOBase& io, const std::vector<char>& bytes,
+                    const fs::path& path, std::vector<float>& values) {
   switch (io.GetComponentType()) {
     case itk::IOComponentEnum::UCHAR:
       return append_as<unsigned char>(bytes, values);

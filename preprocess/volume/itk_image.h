@@ -51,7 +51,23 @@ Error several_volumes(std::int64_t count, const std::filesystem::path& path);
 Error unknown_values(const std::filesystem::path& path);
 
 /// Size and placement from a header that has been read; axes beyond the third are ignored.
-Grid header_grid(const itk::ImageIOBase& io, const std::filesystem::path& path);
+Grid header_grid(const itk::ImageIOBase& io, const std::filesystem::path& path,
+                 double mm_per_unit = 1.0);
+
+/// Refuses a grid whose spacing or origin [mm] is no number, not positive or far from any patient.
+void require_place(const Vec3& spacing, const Vec3& origin, const Mat3& direction,
+                   const std::filesystem::path& path);
+
+/// How many values a header promises, as its sizes say, be they sound or not.
+double count_values(const itk::ImageIOBase& io);
+
+/// Deflate packs 1032 to 1 at most.
+inline constexpr double kMostDeflated = 1040.0;
+
+/// Refuses voxels of `needed` bytes where so many are stored, each for `most_packed` of them: room
+/// is taken only for what a file can hold, whatever a damaged header promises.
+void require_room(double needed, double stored, double most_packed, const std::string& format,
+                  const std::filesystem::path& path);
 
 /// Sizes, spacing and type of voxels as they stand in a header, sound or not.
 void tell_header(const itk::ImageIOBase& io, VolumeHeader& told);
@@ -63,6 +79,10 @@ void require_scalar_volume(const itk::ImageIOBase& io, const Grid& grid,
 /// Reads the voxels of the file whose header `io` has read and appends them.
 void append_voxels(itk::ImageIOBase& io, const std::filesystem::path& path,
                    std::vector<float>& values);
+
+/// Appends the numbers of the type that `io` has read of its header.
+void append_numbers(const itk::ImageIOBase& io, const std::vector<char>& bytes,
+                    const std::filesystem::path& path, std::vector<float>& values);
 
 /// Each value times the slope plus the intercept.
 void scale_values(double slope, double intercept, std::vector<float>& values);

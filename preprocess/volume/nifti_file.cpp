@@ -1,85 +1,22 @@
 #include "preprocess/volume/nifti_file.h"
 
-#include <zlib.h>
-
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <array>
 #include <bit>
 #include <cmath>
 #include <cstdint>
-#include <fstream>
 #include <map>
 #include <utility>
 #include <vector>
 
+#include "preprocess/volume/byte_stream.h"
 #include "preprocess/volume/volume_file.h"
 
 namespace wireplan::preprocess {
 namespace {
 
 namespace fs = std::filesystem;
-
-/// The bytes of a file one after another, inflated where it is compressed (RFC 1952, members behind
-/// one another). zlib's gzread does not tell a file whose last bytes are missing from a whole one.
-class ByteStream {
- public:
-  explicit ByteStream(const fs::path& path) : file_(path, std::ios::binary) {
-    packed_ = file_.get() == 0x1F && file_.get() == 0x8B;
-    file_.clear();
-    file_.seekg(0);
-    constexpr int kGzip = 16 + MAX_WBITS;
-    expects(inflateInit2(&inflater_, kGzip) == Z_OK);
-  }
-  ~ByteStream() { inflateEnd(&inflater_); }
-  ByteStream(const ByteStream&) = delete;
-  ByteStream& operator=(const ByteStream&) = delete;
-
-  /// False where fewer bytes are left, or they are damaged.
-  bool read(void* bytes, std::size_t count) {
-    if (!packed_) {
-      file_.read(static_cast<char*>(bytes), static_cast<std::streamsize>(count));
-      return static_cast<std::size_t>(file_.gcount()) == count;
-    }
-    inflater_.next_out = static_cast<unsigned char*>(bytes);
-    inflater_.avail_out = static_cast<unsigned>(count);
-    while (inflater_.avail_out > 0) {
-      if (!inflate_more()) return false;
-    }
-    return true;
-  }
-
-  /// Whether what was compressed ends as it should; what lies behind is not looked at.
-  bool ends_whole() {
-    std::array<unsigned char, 4096> rest{};
-    while (packed_ && !at_end_) {
-      inflater_.next_out = rest.data();
-      inflater_.avail_out = static_cast<unsigned>(rest.size());
-      if (!inflate_more()) return false;
-    }
-    return true;
-  }
-
- private:
-  bool inflate_more() {
-    if (inflater_.avail_in == 0) {
-      file_.read(reinterpret_cast<char*>(buffer_.data()),
-                 static_cast<std::streamsize>(buffer_.size()));
-      inflater_.next_in = buffer_.data();
-      inflater_.avail_in = static_cast<unsigned>(file_.gcount());
-      if (inflater_.avail_in == 0) return false;
-    }
-    if (at_end_ && inflateReset(&inflater_) != Z_OK) return false;  // the next member
-    const int result = inflate(&inflater_, Z_NO_FLUSH);
-    at_end_ = result == Z_STREAM_END;
-    return result == Z_OK || at_end_;
-  }
-
-  std::ifstream file_;
-  bool packed_ = false, at_end_ = false;
-  z_stream inflater_{};
-  std::array<unsigned char, std::size_t{1} << 16U> buffer_{};
-};
 
 /// Where a version of the format keeps what a volume needs, and how wide it is (nifti1.h,
 /// nifti2.h).
@@ -375,20 +312,13 @@ Image read_nifti(const fs::path& path, VolumeHeader& told) {
   // open.
   const double start = std::max(offset, static_cast<double>(header.layout().header + 4));
   constexpr double kFarthest = 1e8;
-  std::vector<unsigned char> extensions;
-  if (start < kFarthest) {
-    extensions.resize(static_cast<std::size_t>(start) -
-                      static_cast<std::size_t>(header.layout().header));
-  }
-  if (extensions.empty() || !file.read(extensions.data(), extensions.size())) {
+  const auto between = start - static_cast<double>(header.layout().header);
+  if (!(start < kFarthest) || !file.skip(static_cast<std::size_t>(between))) {
     throw damaged_nifti(path);
   }
-  // No room is taken for more than such a file can hold: deflate packs 1032 to 1 at most.
-  constexpr double kMostPacked = 1040.0;
-  if (static_cast<double>(image.grid.voxels()) >
-      kMostPacked * static_cast<double>(fs::file_size(path))) {
-    throw damaged_nifti(path);
-  }
+  require_room(static_cast<double>(image.grid.voxels()),  // of a byte at least
+               static_cast<double>(fs::file_size(path)), file.packed() ? kMostDeflated : 1.0,
+               "NIfTI", path);
   image.values.resize(image.grid.voxels());
   if (!read_values(header, file, path, image.values) || !file.ends_whole()) {
     throw damaged_nifti(path);

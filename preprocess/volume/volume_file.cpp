@@ -5,6 +5,7 @@
 #include <Eigen/Eigenvalues>  // before ITK, which would bring in its own older copy
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cctype>
 #include <cmath>
 #include <cstdio>
@@ -19,6 +20,7 @@
 
 #include "itkMetaImageIO.h"
 #include "itkNrrdImageIO.h"
+#include "preprocess/volume/byte_stream.h"
 #include "preprocess/volume/dicom_check.h"
 #include "preprocess/volume/nifti_file.h"
 
@@ -74,6 +76,11 @@ struct MetaHeader {
   double mm = 1.0;         // of a unit of length
 };
 
+Error voxels_in_list(const fs::path& path, const std::string& ending) {
+  return Error(path.string() + ": its voxels lie in a list of files, expected them in one; " +
+               "save the volume as one " + ending + " file");
+}
+
 std::string trimmed(const std::string& text) {
   const std::size_t first = text.find_first_not_of(" \t\r"), last = text.find_last_not_of(" \t\r");
   return first == std::string::npos ? "" : text.substr(first, last - first + 1);
@@ -128,8 +135,7 @@ MetaHeader read_meta_header(const fs::path& path, const std::string& no_image) {
     if (key == "ElementDataFile") {
       header.data_file = value;
       if (value.starts_with("LIST") || value.find('%') != std::string::npos) {
-        throw Error(path.string() + ": its voxels lie in a list of files, expected them in one; " +
-                    "save the volume as one .mha file");
+        throw voxels_in_list(path, ".mha");
       }
       const fs::path elsewhere = fs::absolute(path).parent_path() / value;
       line = key + " = " + (value == "LOCAL" ? value : elsewhere.string());
@@ -148,21 +154,73 @@ MetaHeader read_meta_header(const fs::path& path, const std::string& no_image) {
   return header;
 }
 
-/// MetaIO only prints a line when a file is cut short.
-void require_whole_meta(const itk::ImageIOBase& io, const MetaHeader& header,
+/// The size of the file beside a header that holds its voxels [bytes].
+double size_beside(const fs::path& header, const std::string& name) {
+  const fs::path file = header.parent_path() / name;
+  std::error_code unknown;
+  if (fs::is_regular_file(file, unknown)) {
+    const auto size = fs::file_size(file, unknown);
+    if (!unknown) return static_cast<double>(size);
+  }
+  throw Error(header.string() + ": its voxels lie in " + name +
+              ", which is no file that can be read; put it where the header names it, or save the "
+              "volume as one file");
+}
+
+/// Refuses a header that promises more than there is.
+void require_whole_meta(const itk::MetaImageIO& io, const MetaHeader& header, const MetaImage& meta,
                         const fs::path& path) {
-  const double needed =
-      header.packed > 0.0 ? header.packed : static_cast<double>(io.GetImageSizeInBytes());
-  const fs::path elsewhere = path.parent_path() / header.data_file;
-  double stored = std::numeric_limits<double>::infinity();  // no such file: ITK says so
-  if (header.data_file == "LOCAL") {
-    stored = static_cast<double>(fs::file_size(path)) - static_cast<double>(header.end);
-  } else if (fs::is_regular_file(elsewhere)) {
-    stored = static_cast<double>(fs::file_size(elsewhere));
+  const double stored = header.data_file == "LOCAL" ? static_cast<double>(fs::file_size(path)) -
+                                                          static_cast<double>(header.end)
+                                                    : size_beside(path, header.data_file);
+  const double values = count_values(io), bytes = values * io.GetComponentSize();
+  if (!meta.BinaryData()) {
+    return require_room(2.0 * values - 1.0, stored, 1.0, "MetaImage", path);  // digit, space
   }
-  if (stored < needed && io.GetFileType() == itk::IOFileEnum::Binary) {
-    throw Error(path.string() + ": " + damaged("MetaImage"));
+  if (!meta.CompressedData()) return require_room(bytes, stored, 1.0, "MetaImage", path);
+  require_room(header.packed, stored, 1.0, "MetaImage", path);
+  require_room(bytes, stored, kMostDeflated, "MetaImage", path);
+}
+
+/// Reads the voxels of a header that was read. MetaIO prints a line where they are cut short or
+/// damaged, or where it is not told the size of what is compressed, and returns zeros.
+Image read_meta_voxels(const itk::MetaImageIO& io, const MetaHeader& header, const MetaImage& meta,
+                       const fs::path& path) {
+  Image image;
+  image.grid = header_grid(io, path, header.mm);
+  require_scalar_volume(io, image.grid, path);
+  const bool local = header.data_file == "LOCAL";
+  const fs::path file = local ? path : path.parent_path() / header.data_file;
+  std::vector<char> bytes(static_cast<std::size_t>(io.GetImageSizeInBytes()));
+  std::streamoff start = local ? header.end : 0;
+  if (meta.HeaderSize() > 0) start = meta.HeaderSize();
+  if (meta.HeaderSize() == -1) {  // the voxels end the file
+    start = static_cast<std::streamoff>(fs::file_size(file)) -
+            (meta.CompressedData() ? static_cast<std::streamoff>(header.packed)
+                                   : static_cast<std::streamoff>(bytes.size()));
   }
+  const auto require = [&](bool sound) {
+    if (!sound) throw Error(path.string() + ": " + damaged("MetaImage"));
+  };
+  if (!meta.BinaryData()) {
+    std::ifstream text(file);
+    text.seekg(start);
+    for (std::size_t n = 0; n < image.grid.voxels(); ++n) {
+      double value = 0.0;
+      require(static_cast<bool>(text >> value));
+      image.values.push_back(static_cast<float>(value));
+    }
+    return image;
+  }
+  ByteStream stream(file, start, meta.CompressedData());
+  require(stream.read(bytes.data(), bytes.size()) && stream.ends_whole());
+  if (meta.BinaryDataByteOrderMSB() != (std::endian::native == std::endian::big)) {
+    const auto size = static_cast<std::ptrdiff_t>(io.GetComponentSize());
+    for (auto at = bytes.begin(); at != bytes.end(); at += size) std::reverse(at, at + size);
+  }
+  append_numbers(io, bytes, path, image.values);
+  require(image.values.size() == image.grid.voxels());
+  return image;
 }
 
 /// A file of a name that nobody else has, gone at the end.
@@ -191,21 +249,18 @@ Image read_meta(const fs::path& path, VolumeHeader& told) {
   const std::string no_image = std::string("not a MetaImage image, or damaged; ") + kFormats;
   const MetaHeader header =
       call_itk(path, no_image, [&] { return read_meta_header(path, no_image); });
-  std::optional<TemporaryFile> copy;  // without the lines that MetaIO is not to see
+  std::optional<TemporaryFile> copy;  // of the lines that MetaIO is to see, where there are others
   if (header.has_more) {
     copy.emplace(path.extension().string());
-    std::ifstream from(path, std::ios::binary);
-    from.seekg(header.end);
     std::ofstream to(copy->path(), std::ios::binary);
     to << header.lines;
-    if (header.data_file == "LOCAL") to << from.rdbuf();
     if (!to.flush()) {
       throw DiskError(copy->path().string() + ": cannot be written; make room there or set TMPDIR");
     }
   }
   const itk::MetaImageIO::Pointer io = itk::MetaImageIO::New();
-  const fs::path& file = copy ? copy->path() : path;
   call_itk(path, no_image, [&] {
+    const fs::path& file = copy ? copy->path() : path;
     io->SetFileName(file.string());
     if (!io->CanReadFile(file.c_str())) throw Error(path.string() + ": " + no_image);
     io->ReadImageInformation();
@@ -213,31 +268,40 @@ Image read_meta(const fs::path& path, VolumeHeader& told) {
     told.length_unit = header.unit;
     told.mm_per_unit = header.mm;
     tell_header(*io, told);
-    require_whole_meta(*io, header, path);
   });
-  Image image = call_itk(path, damaged("MetaImage"), [&] { return read_volume(*io, path); });
-  image.grid.spacing *= header.mm;
-  image.grid.origin *= header.mm;
-
-  // ITK does not apply the scale.
-  const auto* header_of_io = io->GetMetaImagePointer();
-  scale_values(header_of_io->ElementToIntensityFunctionSlope(),
-               header_of_io->ElementToIntensityFunctionOffset(), image.values);
+  const MetaImage& meta = *io->GetMetaImagePointer();
+  require_whole_meta(*io, header, meta, path);
+  Image image = call_itk(path, damaged("MetaImage"),
+                         [&] { return read_meta_voxels(*io, header, meta, path); });
+  scale_values(meta.ElementToIntensityFunctionSlope(), meta.ElementToIntensityFunctionOffset(),
+               image.values);
   return image;
 }
 
-/// The fields of an NRRD's header, "name: value", in small letters; none where it is no NRRD.
-std::map<std::string, std::string> nrrd_fields(const fs::path& path) {
+/// The fields of an NRRD's header, "name: value", in small letters but for the name of a file; none
+/// where it is no NRRD. NrrdIO writes a line that it does not understand into 1024 characters of
+/// its stack, so long ones are refused: all but comments, what somebody adds as "key:=value", and
+/// "content", which is taken as it is.
+std::map<std::string, std::string> nrrd_fields(const fs::path& path, const std::string& no_image) {
+  constexpr std::size_t kMost = 10000, kLongest = 500;  // lines, characters
   std::map<std::string, std::string> fields;
   std::ifstream file(path, std::ios::binary);
   std::string line;
+  const auto require = [&](bool sound) {
+    if (!sound) throw Error(path.string() + ": " + no_image);
+  };
   if (!std::getline(file, line) || !line.starts_with("NRRD")) return fields;
-  constexpr std::size_t kMost = 10000;  // lines
-  while (fields.size() < kMost && std::getline(file, line) && !trimmed(line).empty()) {
+  require(line.size() <= kLongest);
+  while (std::getline(file, line) && !trimmed(line).empty()) {
     const std::size_t colon = line.find(": ");
-    if (line.front() == '#' || colon == std::string::npos) continue;
-    fields[lower_case(trimmed(line.substr(0, colon)))] =
-        lower_case(trimmed(line.substr(colon + 2)));
+    const bool added = line.find(":=") < colon;
+    if (line.front() == '#') continue;
+    std::string name = lower_case(trimmed(line.substr(0, colon)));
+    require(fields.size() < kMost && (line.size() <= kLongest || added || name == "content"));
+    if (colon == std::string::npos) continue;
+    if (name == "datafile") name = "data file";
+    const std::string value = trimmed(line.substr(colon + 2));
+    fields[name] = name == "data file" ? value : lower_case(value);
   }
   return fields;
 }
@@ -261,6 +325,25 @@ double nrrd_unit(const std::map<std::string, std::string>& fields, const fs::pat
                 ", expected one of mm, cm, m, um for all axes; mend the header");
   }
   return *scales.begin();
+}
+
+/// Refuses places beyond any patient's: where an axis is longer than a number can be, ITK says 1
+/// mm.
+void require_near(const std::map<std::string, std::string>& fields, const fs::path& path) {
+  constexpr double kFar = 1e6;  // a kilometre in mm; in m beyond all bounds
+  for (const char* key : {"space directions", "space origin"}) {
+    const auto found = fields.find(key);
+    if (found == fields.end()) continue;
+    std::string text = found->second;
+    std::replace_if(
+        text.begin(), text.end(), [](char c) { return c == '(' || c == ')' || c == ','; }, ' ');
+    std::istringstream words(text);
+    for (std::string word; words >> word;) {
+      if (word == "none" || std::abs(std::strtod(word.c_str(), nullptr)) <= kFar) continue;
+      throw Error(path.string() + ": " + key + " has " + word.substr(0, 40) +
+                  ", expected numbers within a kilometre; mend the header");
+    }
+  }
 }
 
 /// The segments that 3D Slicer names in a header ("Segment0_Name:=aorta").
@@ -306,10 +389,10 @@ void tell_nrrd(const std::map<std::string, std::string>& fields, const fs::path&
 }
 
 /// Volumes whose voxels have several values, one for each of these.
-std::vector<Image> read_values(itk::ImageIOBase& io, const fs::path& path) {
+std::vector<Image> read_values(itk::ImageIOBase& io, const fs::path& path, double mm_per_unit) {
   constexpr unsigned kMost = 250;
   const std::size_t count = io.GetNumberOfComponents();
-  const Grid grid = header_grid(io, path);
+  const Grid grid = header_grid(io, path, mm_per_unit);
   require_volume(grid, path);
   if (count > kMost) throw several_values(io.GetNumberOfComponents(), path);
   std::vector<float> values;
@@ -320,18 +403,44 @@ std::vector<Image> read_values(itk::ImageIOBase& io, const fs::path& path) {
   return layers;
 }
 
+/// The file beside the header that holds the voxels; empty where they lie behind the header. Lists
+/// are refused: NrrdIO prints numbers into names as the header tells it to.
+std::string nrrd_data_file(const std::map<std::string, std::string>& fields, const fs::path& path) {
+  const auto found = fields.find("data file");
+  if (found == fields.end()) return {};
+  if (lower_case(found->second).starts_with("list") ||
+      found->second.find('%') != std::string::npos) {
+    throw voxels_in_list(path, ".nrrd");
+  }
+  return found->second;
+}
+
+/// NrrdIO takes the room that a header asks for, however few bytes are stored.
+void require_whole_nrrd(const itk::ImageIOBase& io, const std::string& encoding, double stored,
+                        const fs::path& path) {
+  const double values = count_values(io), bytes = values * io.GetComponentSize();
+  if (encoding.starts_with("gz")) return require_room(bytes, stored, kMostDeflated, "NRRD", path);
+  const bool text = encoding == "ascii" || encoding == "text" || encoding == "txt";
+  require_room(text ? 2.0 * values - 1.0 : bytes, stored, 1.0, "NRRD", path);  // digit, space
+}
+
 /// All values of a voxel where `layered`, and else one.
 std::vector<Image> read_nrrd(const fs::path& path, VolumeHeader& told, bool layered) {
   const std::string no_image = std::string("not a NRRD image, or damaged; ") + kFormats;
-  const std::map<std::string, std::string> fields = nrrd_fields(path);
+  const std::map<std::string, std::string> fields = nrrd_fields(path, no_image);
   tell_nrrd(fields, path, told);
   static const std::set<std::string> kEncodings = {"raw",  "gzip", "gz", "ascii",
                                                    "text", "txt",  "hex"};
-  const auto encoding = fields.find("encoding");
-  if (encoding != fields.end() && kEncodings.count(encoding->second) == 0) {
-    throw Error(path.string() + ": its voxels are packed with \"" + encoding->second +
+  const auto found = fields.find("encoding");
+  const std::string encoding = found == fields.end() ? "raw" : found->second;
+  if (kEncodings.count(encoding) == 0) {
+    throw Error(path.string() + ": its voxels are packed with \"" + encoding +
                 "\", expected raw or gzip; save it again with gzip, as 3D Slicer does");
   }
+  require_near(fields, path);
+  const std::string beside = nrrd_data_file(fields, path);
+  const double stored =  // bytes; NrrdIO would wait for a pipe
+      beside.empty() ? static_cast<double>(fs::file_size(path)) : size_beside(path, beside);
   const double mm = nrrd_unit(fields, path);
   const itk::NrrdImageIO::Pointer io = itk::NrrdImageIO::New();
   call_itk(path, no_image, [&] {
@@ -341,15 +450,11 @@ std::vector<Image> read_nrrd(const fs::path& path, VolumeHeader& told, bool laye
     told.mm_per_unit = mm;
     tell_header(*io, told);
   });
-  std::vector<Image> layers = call_itk(path, damaged("NRRD"), [&] {
-    return layered && io->GetNumberOfComponents() > 1 ? read_values(*io, path)
-                                                      : std::vector{read_volume(*io, path)};
+  return call_itk(path, damaged("NRRD"), [&] {
+    require_whole_nrrd(*io, encoding, stored, path);
+    return layered && io->GetNumberOfComponents() > 1 ? read_values(*io, path, mm)
+                                                      : std::vector{read_volume(*io, path, mm)};
   });
-  for (Image& layer : layers) {
-    layer.grid.spacing *= mm;
-    layer.grid.origin *= mm;
-  }
-  return layers;
 }
 
 bool ends_with(const fs::path& path, const char* one, const char* other) {
@@ -359,9 +464,9 @@ bool ends_with(const fs::path& path, const char* one, const char* other) {
 
 }  // namespace
 
-Image read_volume(itk::ImageIOBase& io, const fs::path& path) {
+Image read_volume(itk::ImageIOBase& io, const fs::path& path, double mm_per_unit) {
   Image image;
-  image.grid = header_grid(io, path);
+  image.grid = header_grid(io, path, mm_per_unit);
   require_scalar_volume(io, image.grid, path);
   append_voxels(io, path, image.values);
   return image;

@@ -221,7 +221,8 @@ struct Frame {
 };
 
 /// An enhanced CT of frames of 3 x 2 pixels, of values 10 k, 10 k + 1, ... in frame k.
-std::string enhanced(const std::vector<Frame>& frames, bool placed = true) {
+std::string enhanced(const std::vector<Frame>& frames, bool placed = true,
+                     const std::string& spacing = "0.8\\0.6") {
   const std::string ct = "1.2.840.10008.5.1.4.1.1.2.1";
   std::string meta = of(2, 0x01, "OB", std::string("\0\1", 2)) + of(2, 0x02, "UI", ct) +
                      of(2, 0x03, "UI", "1.2.3.9") + of(2, 0x10, "UI", "1.2.840.10008.1.2.1");
@@ -247,7 +248,7 @@ std::string enhanced(const std::vector<Frame>& frames, bool placed = true) {
   }
   const std::string shared =
       sequence(0x20, 0x9116, {of(0x20, 0x37, "DS", "1\\0\\0\\0\\1\\0")}) +
-      sequence(0x28, 0x9110, {of(0x18, 0x50, "DS", "9") + of(0x28, 0x30, "DS", "0.8\\0.6")});
+      sequence(0x28, 0x9110, {of(0x18, 0x50, "DS", "9") + of(0x28, 0x30, "DS", spacing)});
   using dicom_files::short_value;
   return std::string(128, '\0') + "DICM" + of(2, 0, "UL", length) + meta +
          of(0x08, 0x16, "UI", ct) + of(0x08, 0x18, "UI", "1.2.3.9") + of(0x08, 0x60, "CS", "CT") +
@@ -287,6 +288,10 @@ TEST_F(FieldVolume, FramesWithoutPlacesUnevenOrNotInHounsfieldUnitsAreRefused) {
   EXPECT_TRUE(has(read_error(folder_), "uneven slices")) << read_error(folder_);
   write("ct.dcm", enhanced({{.place = 0}, {.place = 1, .unit = "Z_EFF"}, {.place = 2}}));
   EXPECT_TRUE(has(read_error(folder_), "not in HU but, by its rescale type, Z_EFF"));
+  for (const char* spacing : {"-0.8\\-0.6", "0\\0", "1e9\\1e9"}) {
+    write("ct.dcm", enhanced({{.place = 0}, {.place = 1}, {.place = 2}}, true, spacing));
+    EXPECT_TRUE(has(read_error(folder_), "expected positive spacing")) << read_error(folder_);
+  }
 }
 
 TEST_F(FieldVolume, SlicesWithoutTheHeadOfAFileAndWithBytesBehindThePixelsAreRead) {
