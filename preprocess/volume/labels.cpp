@@ -117,7 +117,8 @@ std::vector<std::string> names_of(const std::vector<Known>& known) {
 
 /// How many voxels of a layer have each value other than 0.
 std::map<int, std::size_t> count_labels(const Image& layer) {
-  std::vector<std::size_t> seen(static_cast<std::size_t>(kLargestLabel) + 1);
+  const auto largest = std::max_element(layer.values.begin(), layer.values.end());
+  std::vector<std::size_t> seen(static_cast<std::size_t>(*largest) + 1);
   for (const float value : layer.values) ++seen[static_cast<std::size_t>(value)];
   std::map<int, std::size_t> counts;
   for (std::size_t value = 1; value < seen.size(); ++value) {
