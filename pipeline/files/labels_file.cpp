@@ -75,8 +75,9 @@ std::map<int, std::string> table_of_json(const std::string& text, const fs::path
                value.get<std::int64_t>() <= kLargestValue) {
       add_name(table, value.get<int>(), key, path);
     } else if (!value.is_array()) {  // a region of nnU-Net is a union of classes, not one
-      throw Error(path.string() + ": \"" + key + "\" is " + value.dump().substr(0, 40) + "; " +
-                  kTables);
+      // What is inside may be nested as deep as the file is long, and writing it recurses.
+      const std::string told = value.is_object() ? "an object" : value.dump().substr(0, 40);
+      throw Error(path.string() + ": \"" + key + "\" is " + told + "; " + kTables);
     }
   }
   return table;

@@ -36,6 +36,8 @@ TEST_F(LabelTable, ThatIsNoneIsRefused) {
   };
   expect_mentions(refusal("a.json", "[1]"), {"a.json: no JSON object"});
   expect_mentions(refusal("b.json", R"({"a": 0.5})"), {"\"a\" is 0.5"});
+  const std::string deep = std::string(200000, '[') + std::string(200000, ']');
+  expect_mentions(refusal("deep.json", R"({"a": {"b": )" + deep + "}}"), {"\"a\" is an object"});
   expect_mentions(refusal("c.csv", "1,a\n2\n"), {"line 2 has no value and name"});
   expect_mentions(refusal("d.csv", "1,a\n1,b\n"), {"value 1 is named \"a\" and \"b\""});
   expect_mentions(refusal("e.csv", "# nothing\n"), {"holds no names"});
