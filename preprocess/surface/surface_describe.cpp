@@ -59,7 +59,8 @@ SurfaceDescription describe_surface(const std::filesystem::path& path) {
   if (!pieces.empty() && has_no_border(pieces.front().surface)) {
     const Surface& largest = pieces.front().surface;
     // A long tube has the volume pi r^2 l and the area 2 pi r l.
-    told.usual_radius = 2.0 * std::abs(signed_volume(largest)) / area_of(largest);
+    const double radius = 2.0 * std::abs(signed_volume(largest)) / area_of(largest);
+    if (std::isfinite(radius)) told.usual_radius = radius;  // else it is flat
   }
   for (const char* unit : kLengthUnits) {
     const double mm = unit == std::string("mm") ? 1.0 : unit == std::string("cm") ? 10.0 : kMmPerM;

@@ -269,6 +269,15 @@ TEST_F(Inspect, ASurfaceIsToldInEveryUnit) {
   EXPECT_EQ(half["surface"]["closed_pieces"], 0);
 }
 
+TEST_F(Inspect, ASurfaceTooSmallForItsAreaHasNoRadius) {
+  // 1e-82 squared and squared again is 0, so its area, but not its volume.
+  const Json told = inspect(write("tiny.obj",
+                                  "v 0 0 0\nv 1e-82 0 0\nv 0 1e-82 0\nv 0 0 1e-82\n"
+                                  "f 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n"));
+  EXPECT_EQ(told["surface"]["closed_pieces"], 1);
+  EXPECT_TRUE(told["surface"]["usual_radius"].is_null());
+}
+
 TEST_F(Inspect, WhatCannotBeToldIsOneErrorOfExitCodeTwo) {
   write("notes.txt", "no image");
   write("broken.nii.gz", "no image");
