@@ -121,7 +121,7 @@ class Walker {
     if (depth > kDeepest) return false;
     while (at_ < end) {
       Element element;
-      if (!read_head(explicit_vr, element)) return false;
+      if (!read_head(explicit_vr, element) || at_ > end) return false;
       if (last != 0 && element.tag == last) return element.length == 0;
       if (element.tag >> 16U == kItem >> 16U) return false;
       const bool items = element.vr == "SQ" || element.length == kUndefinedLength;
@@ -145,7 +145,7 @@ class Walker {
     const bool fragments = sequence.tag == kPixelData;
     while (at_ < end) {
       Element item;
-      if (!read_head(explicit_vr, item)) return false;
+      if (!read_head(explicit_vr, item) || at_ > end) return false;
       if (open && item.tag == kSequenceEnd) return item.length == 0;
       if (item.tag != kItem) return false;
       if (item.length == kUndefinedLength) {

@@ -77,6 +77,20 @@ TEST_F(DicomCheck, LengthsBeyondTheEndAndUnknownRepresentationsAreDamage) {
   EXPECT_EQ(form_of(changed), DicomForm::kDamaged);
 }
 
+TEST_F(DicomCheck, AnElementWhoseHeadLeavesItsItemIsDamage) {
+  // An item of 4 bytes, in which a sequence begins whose length counts from beyond it.
+  const std::string item("\xfe\xff\x00\xe0", 4), sequence("\x40\x00\x30\xa7SQ\0\0", 8);
+  const std::string inside = item + std::string("\x04\0\0\0", 4);
+  const std::string beyond = sequence + std::string("\xff\xff\xff\x7f", 4) + item +
+                             std::string("\0\0\x01\0", 4) +
+                             std::string("\x08\0\x60\0CS\xff\x7f", 8);
+  const std::string damaged =
+      sequence + std::string("\x0c\0\0\0", 4) + inside + beyond + std::string(16, '\0');
+  const std::size_t rows = slice_.find(std::string("\x28\x00\x10\x00US", 6));
+  ASSERT_NE(rows, std::string::npos);
+  EXPECT_EQ(form_of(slice_.substr(0, rows) + damaged), DicomForm::kDamaged);
+}
+
 TEST_F(DicomCheck, SamplesPerPixelThatNoImageHasAreDamage) {
   const std::size_t samples = slice_.find(std::string("\x28\x00\x02\x00US", 6));
   ASSERT_NE(samples, std::string::npos);
