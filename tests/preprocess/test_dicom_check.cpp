@@ -20,7 +20,7 @@ class DicomCheck : public testing::Test {
     std::ifstream stream(fs::path(WIREPLAN_SOURCE_DIR) / "tests/fuzz/corpus/dicom/series.dcm",
                          std::ios::binary);
     const std::string two_slices(std::istreambuf_iterator<char>(stream), {});
-    slice_ = two_slices.substr(0, two_slices.size() / 2);
+    slice_ = two_slices.substr(1, two_slices.find("-next-file-") - 1);
   }
   ~DicomCheck() override { fs::remove(file_); }
 
