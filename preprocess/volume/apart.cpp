@@ -6,11 +6,14 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <array>
 #include <cerrno>
 #include <csignal>
+#include <cstdio>
 #include <cstring>
 #include <exception>
+#include <sstream>
 
 #include "preprocess/base.h"
 
@@ -96,11 +99,16 @@ class SharedText {
   char* text_ = nullptr;
 };
 
-/// No words of the library's, no files of its memory, no handlers of the process it was.
+bool is_apart = false;  // in the child: its standard error output is a file in memory
+
+/// No words of the library's where a user sees them, no files of its memory, no handlers of the
+/// process it was.
 void be_quiet() {
-  const int nowhere = ::open("/dev/null", O_WRONLY | O_CLOEXEC);
+  const int nowhere = ::open("/dev/null", O_WRONLY | O_CLOEXEC),
+            memory = ::memfd_create("printed", MFD_CLOEXEC);
   ::dup2(nowhere, STDOUT_FILENO);
-  ::dup2(nowhere, STDERR_FILENO);
+  ::dup2(memory >= 0 ? memory : nowhere, STDERR_FILENO);
+  is_apart = memory >= 0;
   const rlimit none{0, 0};
   ::setrlimit(RLIMIT_CORE, &none);
   for (const int signal : {SIGABRT, SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGALRM}) {
@@ -175,6 +183,29 @@ void run_apart(const std::function<void(const Send&, const At&)>& work,
   if (code == kRefused) throw Error(text);
   if (code != kDone) throw Error(place.get() + ": " + ended);
   expects(all_came);
+}
+
+LastWords::LastWords() : begin_(0) {
+  if (!is_apart) return;
+  std::fflush(stderr);
+  begin_ = ::lseek(STDERR_FILENO, 0, SEEK_END);
+}
+
+std::string LastWords::text() const {
+  if (!is_apart) return {};
+  std::fflush(stderr);
+  std::array<char, 1024> end{};
+  const long size = ::lseek(STDERR_FILENO, 0, SEEK_END),
+             from = std::max(begin_, size - static_cast<long>(end.size()));
+  const ssize_t count = ::pread(STDERR_FILENO, end.data(), end.size(), from);
+  std::istringstream printed(
+      std::string(end.data(), count > 0 ? static_cast<std::size_t>(count) : 0));
+  std::string last;
+  for (std::string line; std::getline(printed, line);) {
+    std::erase_if(line, [](unsigned char c) { return c < ' ' || c > '~'; });
+    if (line.find_first_not_of(' ') != std::string::npos) last = line;
+  }
+  return last.empty() ? last : " (\"" + last + "\")";
 }
 
 }  // namespace wireplan::preprocess

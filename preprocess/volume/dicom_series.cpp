@@ -332,6 +332,7 @@ void append_slice(const Slice& slice, const fs::path& folder, std::vector<float>
   const auto copy = copy_of(slice);
   if (copy) slice.io->SetFileName(copy->path());
   require_whole_dicom(*slice.io, slice.file);
+  const LastWords decoder;
   try {
     append_voxels(*slice.io, folder, values);
   } catch (const Error&) {
@@ -340,9 +341,8 @@ void append_slice(const Slice& slice, const fs::path& folder, std::vector<float>
     const Packing packing = packing_of(slice.io->GetFileName());
     if (!packing.packed) throw;
     throw Error(slice.file.string() + ": its pixels are packed as " + packing.name + " (" +
-                packing.uid +
-                ") and are all there, but GDCM does not unpack them; export the series again, "
-                "uncompressed");
+                packing.uid + ") and are all there, but GDCM does not unpack them" +
+                decoder.text() + "; export the series again, uncompressed");
   }
 }
 

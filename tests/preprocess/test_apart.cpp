@@ -99,6 +99,18 @@ TEST(RunApart, WhatTheWorkPrintsIsDropped) {
   EXPECT_EQ(testing::internal::GetCapturedStdout() + testing::internal::GetCapturedStderr(), "");
 }
 
+TEST(RunApart, WhatALibraryPrintedLastCanBeTold) {
+  EXPECT_EQ(message_where([] {
+              std::cerr << "a patient's name" << std::endl;
+              const LastWords words;
+              const std::string none = words.text();
+              std::fprintf(stderr, "[INFO] start\n\x1b[ERROR] tile\n \n");
+              throw Error("refused" + none + words.text());
+            }),
+            "refused (\"[ERROR] tile\")");
+  EXPECT_EQ(LastWords().text(), "");
+}
+
 TEST(RunApart, WhereNothingMoreIsWantedTheWorkIsLetGoOf) {
   const std::string message = message_of([&] {
     run_apart(
