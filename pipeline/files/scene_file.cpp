@@ -179,6 +179,10 @@ simulate::Support read_support(JsonReader& reader) {
   support.point = reader.point("point_mm", std::nullopt);
   support.direction = reader.direction("direction", Vec3(Vec3::UnitX()));
   support.roll = reader.number("roll_deg", 0.0, {.min = -36000.0, .max = 36000.0}) * kRadPerDeg;
+  if (support.kind == SupportKind::kPinned && support.roll != 0.0) {
+    reader.problems().add(reader.path_of("roll_deg"), reader.raw("roll_deg").dump(), "0",
+                          "a pinned end turns freely; give \"clamped\" or \"guided\"");
+  }
   reader.finish();
   return support;
 }
@@ -312,6 +316,10 @@ void check_method(const simulate::Scene& scene, Problems& problems) {
   const std::string remedy = "with this solver.method; choose newton";
   if (scene.twist == simulate::Twist::kCoupled) {
     problems.add("wire.twist", "\"coupled\"", "\"auto\" or \"decoupled\"", remedy);
+  }
+  if (scene.twist == simulate::Twist::kAuto && simulate::twists_the_wire(scene.supports)) {
+    problems.add("supports", "of different roll_deg", "the same at both held ends",
+                 "with this solver.method; choose newton, or \"twist\": \"decoupled\"");
   }
   if (!scene.wire.straight()) {
     problems.add("wire.sections", "with rest_curvature_per_mm", "a wire straight at rest", remedy);

@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "simulate/equilibrium/problem.h"
+#include "simulate/wire/bend_to.h"
 #include "simulate/wire/quartic.h"
 
 namespace wireplan::simulate {
@@ -71,9 +72,10 @@ double largest_turning_step(const Problem& problem, const Eigen::VectorXd& step)
 
 /// The step with second-order lengthening taken out: each edge gets the direction that the step
 /// gives it, and the length whose tension is the one that the step predicts to first order. Nodes
-/// are laid out anew from the proximal end; what that moves a held distal end by is spread over the
-/// wire. A step that turns stiff edges by an angle a would else stretch them by a^2/2, and Newton
-/// would spend its iterations on undoing that.
+/// are laid out anew from the proximal end; what that moves a held distal end by is taken back by
+/// the least bending where that is a small part of the step, and else, or in a vessel, spread over
+/// the wire. A step that turns stiff edges by an angle a would else stretch them by a^2/2, and
+/// Newton would spend its iterations on undoing that.
 template <int D>
 void turn_edges(const Problem& problem, const RodState& state, const Eigen::VectorXd& step,
                 double s, RodState& trial) {
@@ -100,6 +102,15 @@ void turn_edges(const Problem& problem, const RodState& state, const Eigen::Vect
   }
   const bool held = problem.last < n || problem.distal.hold_along || problem.distal.hold_across;
   if (held) {
+    if (start == 0 && end == n - 1 && problem.contact == nullptr) {
+      double most_turned = 0.0;  // of an edge, to first order                           [rad]
+      for (int i = 0; i < end; ++i) {
+        most_turned = std::max(most_turned, (move(i + 1) - move(i)).norm() * rod.per_length[i]);
+      }
+      const DirectedEnds ends{problem.proximal.tangent.has_value(),
+                              problem.distal.tangent.has_value()};
+      bend_end_to(rod, ends, state.x.col(end) + move(end), most_turned, trial.x);
+    }
     const Vec3 gap = state.x.col(end) + move(end) - trial.x.col(end);
     for (int i = start; i <= end; ++i) trial.x.col(i) += (double(i - start) / (end - start)) * gap;
   }

@@ -5,8 +5,10 @@
 #include <cmath>
 #include <cstdio>
 #include <ctime>
+#include <utility>
 
 #include "simulate/equilibrium/dynamics.h"
+#include "simulate/insertion/end_path.h"
 
 namespace wireplan::simulate {
 
@@ -43,6 +45,12 @@ Eigen::VectorXd edge_lengths(const Scene& scene) {
   }
   return Eigen::Map<const Eigen::VectorXd>(lengths.data(),
                                            static_cast<Eigen::Index>(lengths.size()));
+}
+
+bool twists_the_wire(const std::vector<Support>& supports) {
+  return supports.size() == 2 && supports[0].roll != supports[1].roll &&
+         std::all_of(supports.begin(), supports.end(),
+                     [](const Support& support) { return support.kind != SupportKind::kPinned; });
 }
 
 namespace {
@@ -111,7 +119,9 @@ void set_up(const Scene& scene, Setup& s) {
   const Support* proximal = find_support(scene, WireEnd::kProximal);
   expects(proximal != nullptr);
   s.distal = find_support(scene, WireEnd::kDistal);
-  s.rod = build_rod(scene.wire, edge_lengths(scene), scene.twist == Twist::kCoupled);
+  const bool twisted = scene.twist == Twist::kCoupled ||
+                       (scene.twist == Twist::kAuto && twists_the_wire(scene.supports));
+  s.rod = build_rod(scene.wire, edge_lengths(scene), twisted);
   expects(!(s.rod.twisted && scene.twist == Twist::kDecoupled));
   expects(scene.loads.tip_torque == 0.0 || scene.twist == Twist::kDecoupled);
   const int n = s.rod.nodes();
@@ -151,12 +161,16 @@ void add_vessel(const Scene& scene, Setup& s) {
   s.problem.contact = &*s.contact;
 }
 
-/// Loads and supports at a part of what they will be.
-void apply_part(const Scene& scene, double part, Setup& s) {
-  const int n = s.rod.nodes();
+void apply_loads(const Scene& scene, double part, Setup& s) {
   s.part = part;
   s.load = part * s.full_load;
   if (s.problem.tip_moment) s.problem.tip_moment->size = part * scene.loads.tip_moment.norm();
+}
+
+/// Loads and supports at a part of what they will be.
+void apply_part(const Scene& scene, double part, Setup& s) {
+  const int n = s.rod.nodes();
+  apply_loads(scene, part, s);
   if (s.distal == nullptr) return;
 
   // Every node follows the end in proportion, so that no edge is torn.
@@ -172,14 +186,91 @@ void apply_part(const Scene& scene, double part, Setup& s) {
   transport_frames(before, s.state, 0, n - 2);
   if (!s.problem.distal.hold_roll) return;
 
-  // The turn of the end is spread over the edges as torsion spreads it.
-  const double target = part * (s.distal->roll - s.start_roll), turn = target - s.turned;
+  const double target = part * (s.distal->roll - s.start_roll);
+  spread_turn(s.rod, target - s.turned, s.state);
   s.turned = target;
-  double compliance = 0.0, sum = 0.0;
-  for (int i = 1; i + 1 < n; ++i) compliance += 1.0 / s.rod.twist[i];
-  for (int i = 1; i + 1 < n; ++i) {
-    sum += 1.0 / s.rod.twist[i];
-    s.state.theta[i] += turn * sum / compliance;
+}
+
+// ---------------------------------------------------------------- to a support far away
+
+/// How steps along an EndPath follow from the iterations that they take; all chosen.
+struct PathTuning {
+  int many_iterations = 8;       // of a step: the next one is shorter; with half of them, longer
+  double growth = 1.5;           // from step to step
+  int most_iterations = 30;      // of a step that may still be halved
+  double shortest = 1.0 / 1024;  // part of the way
+  int most_steps = 10;           // of as many iterations as one may take: no halving beyond
+  double same_roll = 1e-9;       // of a held end                                         [rad]
+  int most_corrections = 8;      // of it: each is of second order in the one before
+};
+constexpr PathTuning kPathTuning;
+
+EndPath end_path(const Scene& scene, const Setup& s) {
+  const Support& proximal = *find_support(scene, WireEnd::kProximal);
+  return {s.rod,
+          s.state,
+          {.start_point = proximal.point,
+           .start_is_directed = holds_direction(&proximal),
+           .start_direction = proximal.direction,
+           .point = s.distal->point,
+           .is_directed = holds_direction(s.distal),
+           .slides = s.distal->kind == SupportKind::kGuided,
+           .direction = s.distal->direction,
+           .roll = s.rod.twisted && holds_direction(s.distal) ? s.distal->roll - s.start_roll : 0.0,
+           .plane = scene.plane}};
+}
+
+/// Takes the wire all along the path, in steps that get shorter where they take many iterations.
+NewtonResult follow_path(const Scene& scene, const EndPath& path, Setup& s, SceneResult& result) {
+  const SolverOptions& options = scene.solver;
+  Statics statics;
+  const auto solve = [&](int most_iterations) {
+    const NewtonResult found =
+        statics.solve(s.problem, s.state,
+                      {.residual_tolerance = options.residual_tolerance,
+                       .max_iterations = std::min(most_iterations, options.max_iterations)});
+    result.iterations += found.iterations;
+    result.worst_energy_rise = std::max(result.worst_energy_rise, found.worst_energy_rise);
+    return found;
+  };
+  const auto given_up = [&](const NewtonResult& found, double part) {
+    result.reason = format(
+        "residual %.3g N after %d iterations at %.3g of the way to the distal support, asked for "
+        "%.3g N",
+        found.residual, found.iterations, part, options.residual_tolerance);
+    return found;
+  };
+  const int most_iterations = kPathTuning.most_steps * options.max_iterations;
+  const bool slides = !s.problem.distal.hold_along;
+  EndPath::Progress progress{.now = s.state, .before = s.state};
+  const double longest = std::min(path.longest_step(), 1.0 / options.load_steps);
+  const double shortest = std::min(longest, kPathTuning.shortest);
+  for (double size = longest;;) {
+    const double left = 1.0 - progress.part;
+    const double part = left < 1.01 * size ? 1.0 : progress.part + size;
+    apply_loads(scene, part, s);
+    if (slides) s.problem.distal.axis = path.direction(part);
+    if (s.problem.distal.tangent) s.problem.distal.tangent = path.direction(part);
+    s.state = path.guess(progress, part);
+    NewtonResult found =
+        solve(size <= shortest ? options.max_iterations : kPathTuning.most_iterations);
+    if (!found.converged) {
+      if (size <= shortest || result.iterations > most_iterations) return given_up(found, part);
+      size = std::max(shortest, 0.5 * size);
+      continue;
+    }
+    ++result.steps;
+    for (int k = 0; k < kPathTuning.most_corrections && part == 1.0 && s.rod.twisted; ++k) {
+      if (path.correct_rolls(part, s.state) <= kPathTuning.same_roll) break;
+      found = solve(options.max_iterations);
+    }
+    if (!found.converged) return given_up(found, part);
+    if (part == 1.0) return found;
+    progress.before = std::exchange(progress.now, s.state);
+    progress.part_before = std::exchange(progress.part, part);
+    if (found.iterations > kPathTuning.many_iterations) size /= kPathTuning.growth;
+    if (2 * found.iterations < kPathTuning.many_iterations) size *= kPathTuning.growth;
+    size = std::clamp(size, shortest, longest);
   }
 }
 
@@ -190,7 +281,11 @@ void run_newton(const Scene& scene, Setup& s, SceneResult& result) {
   expects(options.load_steps >= 1);
   Statics statics;
   NewtonResult solve;
-  for (int step = 1; step <= options.load_steps; ++step) {
+  std::optional<EndPath> path;
+  if (s.distal != nullptr && scene.vessel == nullptr) path.emplace(end_path(scene, s));
+  const bool far = path && path->is_far();
+  if (far) solve = follow_path(scene, *path, s, result);
+  for (int step = 1; step <= options.load_steps && !far; ++step) {
     apply_part(scene, static_cast<double>(step) / options.load_steps, s);
     solve = statics.solve(s.problem, s.state,
                           {.residual_tolerance = options.residual_tolerance,
@@ -203,7 +298,7 @@ void run_newton(const Scene& scene, Setup& s, SceneResult& result) {
   }
   result.residual = solve.residual;
   result.outcome = solve.converged ? SceneOutcome::kConverged : SceneOutcome::kNotConverged;
-  if (!solve.converged) {
+  if (!solve.converged && !far) {
     result.reason =
         format("residual %.3g N after %d iterations of load step %d of %d, asked for %.3g N",
                solve.residual, solve.iterations, result.steps, options.load_steps,

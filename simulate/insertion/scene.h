@@ -34,9 +34,13 @@ struct Loads {
   double tip_torque = 0.0;         // about the wire's own axis; decoupled twist only   [N mm]
 };
 
+/// Whether they hold both ends' rolls, and not the same: that twists even a straight wire.
+bool twists_the_wire(const std::vector<Support>& supports);
+
 /// How the wire's twist is found.
 enum class Twist {
-  kAuto,       // coupled where the wire is curved at rest or a strip, else not at all
+  kAuto,       // coupled where the wire is curved at rest or a strip, or where the rolls of two
+               // held ends differ; else not at all
   kCoupled,    // with the shape, by material directors
   kDecoupled,  // beside the shape, which it leaves as it is: paper Eq. (14)-(15)
 };
@@ -47,7 +51,7 @@ struct SolverOptions {
   Method method = Method::kNewton;
   double residual_tolerance = 1e-6;  // largest nodal force out of balance                [N]
   int max_iterations = 200;          // Newton: per load step
-  int load_steps = 1;                // Newton: loads grow in equal steps from 0
+  int load_steps = 1;                // Newton: loads grow in equal steps from 0; see Scene
   double time_step = 1e-3;           // the others: see MotionOptions                     [s]
   double duration = 1.0;             //                                                   [s]
   double damping = 0.0;              // Euler schemes                                     [1/s]
@@ -55,10 +59,14 @@ struct SolverOptions {
 
 /// The wire starts in its rest shape, straight from the proximal support unless it is curved. A
 /// distal support then moves and turns its end to where it is held: in the steps in which the loads
-/// grow, or before the first time step.
+/// grow, or before the first time step. With Newton, no vessel, and a place far from where the
+/// unloaded wire ends, it goes there on an EndPath, in at least as many steps, which get shorter by
+/// themselves.
 ///
 /// The roll of a distal support counts from the director that came there with the wire, carried
-/// along its edges without twist; the roll of the proximal one turns the whole wire at the start.
+/// along its edges without twist, on an EndPath turned with the end; the roll of the proximal one
+/// turns the whole wire at the start. Two whole turns and more may come off a bent wire: it then
+/// passes round its end, and is left with two turns less in the same place.
 struct Scene {
   Wire wire;
   int elements = 20;                   // of equal length along the wire, and
@@ -116,8 +124,8 @@ struct SceneResult {
 
 /// Static equilibrium on the paper's energy. Expects supports that hold the wire against rigid
 /// motion; methods other than Newton's and the decoupled twist expect a wire that is straight at
-/// rest, the former also no coupled twist, tip moment or table, and one load step; the Euler
-/// schemes a mass.
+/// rest, the former also no coupled twist, rolls of two held ends that differ, tip moment or table,
+/// and one load step; the Euler schemes a mass.
 SceneResult run_scene(const Scene& scene);
 
 }  // namespace wireplan::simulate
