@@ -72,14 +72,23 @@ Json contacts_json(const std::vector<simulate::WireContact>& contacts) {
   return rows;
 }
 
-/// Of an insertion: the sum alone is known.
-Json energy_json(const simulate::Push& push) {
+/// Of an insertion after a push.
+Json energy_json(const simulate::Energy& energy) {
   Json json = Json::object();
-  for (const char* term : {"stretch", "bend", "twist", "contact", "wall"}) {
-    put(json, term, std::nan(""), "an insertion gives the sum of its terms alone");
-  }
-  put(json, "total", push.stored_energy);
+  put(json, "stretch", energy.stretch);
+  put(json, "bend", energy.bend);
+  put(json, "twist", energy.twist);
+  put(json, "contact", energy.contact);
+  put(json, "wall", energy.wall);
+  put(json, "total", energy.total());
   return json;
+}
+
+/// What the hand does to the wire after a push, and what became of it at the tip.
+void put_hand(Json& json, const simulate::Push& push, const simulate::PushTerms& terms) {
+  put(json, "push_force_n", push.push_force);
+  put(json, "hub_torque_n_mm", push.hub_torque);
+  put(json, "tip_roll_deg", terms.tip_roll / kRadPerDeg);
 }
 
 void put_work(Json& json, const simulate::Push& push) {
@@ -90,7 +99,8 @@ void put_work(Json& json, const simulate::Push& push) {
 }
 
 /// One row per `every_mm` of insertion, and one for the last push.
-Json history_json(const std::vector<simulate::Push>& pushes, double every_mm) {
+Json history_json(const simulate::TrialResult& result, double every_mm) {
+  const std::vector<simulate::Push>& pushes = result.pushes;
   Json rows = Json::array();
   double next = every_mm, peak = 0.0, peak_tip = 0.0, penetration = 0.0, displacement = 0.0;
   for (std::size_t i = 0; i < pushes.size(); ++i) {
@@ -102,7 +112,7 @@ Json history_json(const std::vector<simulate::Push>& pushes, double every_mm) {
     if (push.insertion < next && i + 1 < pushes.size()) continue;
     Json row;
     put(row, "insertion_mm", push.insertion);
-    put(row, "push_force_n", push.push_force);
+    put_hand(row, push, result.push_terms.at(i));
     put_points(row, "tip_mm", push.tip);
     put(row, "peak_tip_force_n", peak_tip);
     put(row, "peak_contact_force_n", peak);
@@ -111,6 +121,7 @@ Json history_json(const std::vector<simulate::Push>& pushes, double every_mm) {
     put(row, "max_penetration_mm", penetration);
     put(row, "wall_displacement_mm", displacement);
     put_work(row, push);
+    row["energy_n_mm"] = energy_json(result.push_terms.at(i).energy);
     put(row, "residual_n", push.residual);
     row["iterations"] = push.iterations;
     rows.push_back(row);
@@ -163,7 +174,10 @@ Json result_json(const simulate::TrialResult& result, double every_mm, double cp
     displacement = std::max(displacement, push.wall_displacement);
   }
   const simulate::Push last = result.pushes.empty() ? simulate::Push() : result.pushes.back();
-  json["energy_n_mm"] = energy_json(last);
+  const simulate::PushTerms terms =
+      result.push_terms.empty() ? simulate::PushTerms() : result.push_terms.back();
+  json["energy_n_mm"] = energy_json(terms.energy);
+  put_hand(json, last, terms);
   put_work(json, last);
   put(json, "residual_n", residual);
   json["iterations"] = iterations;
@@ -172,7 +186,7 @@ Json result_json(const simulate::TrialResult& result, double every_mm, double cp
   json["contacts"] = contacts_json(result.contacts);
   put(json, "max_penetration_mm", penetration);
   put(json, "max_wall_displacement_mm", displacement);
-  json["history"] = history_json(result.pushes, every_mm);
+  json["history"] = history_json(result, every_mm);
   return json;
 }
 

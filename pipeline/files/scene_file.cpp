@@ -446,6 +446,7 @@ InsertionScene read_insertion_scene(JsonReader& root, const simulate::Scene& wir
   scene.options.friction = vessel.friction;
   scene.options.residual_tolerance = solver.residual_tolerance;
   scene.options.max_iterations = solver.max_iterations;
+  scene.options.record_terms = true;
   scene.has_target = root.has("target");
   scene.goal = read_goal(root, scene.introducer);
   return scene;

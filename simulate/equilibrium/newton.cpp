@@ -105,7 +105,10 @@ class Newton {
     spread_chain(chain_, rod_, state_);
     result_.converged = converged;
     result_.energy = wire_energy_;
-    if (contact_ != nullptr) result_.energy += contact_->energy().contact + contact_->energy().wall;
+    if (contact_ != nullptr) {
+      result_.wall_energy = contact_->energy().wall;
+      result_.energy += contact_->energy().contact + result_.wall_energy;
+    }
     return result_;
   }
 

@@ -11,9 +11,10 @@ struct NewtonOptions {
 };
 
 struct NewtonResult {
-  bool converged = false;  // to the tolerance, or to what rounding allows (see rounding_floor)
-  double residual = 0.0;   //                                              [N]
-  double energy = 0.0;     // all terms                                    [N mm]
+  bool converged = false;    // to the tolerance, or to what rounding allows (see rounding_floor)
+  double residual = 0.0;     //                                              [N]
+  double energy = 0.0;       // all terms                                    [N mm]
+  double wall_energy = 0.0;  // of them, that of the yielding wall          [N mm]
   double worst_energy_rise = 0.0;  // over accepted steps, with the lag (WallContact) that they
                                    // were made with; 0 unless rounding [N mm]
   /// Residual that 64 bit numbers leave in the stiffest element, 8 eps |x| (EA/l + 4 EI/l^3): a

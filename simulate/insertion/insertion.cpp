@@ -138,6 +138,7 @@ std::optional<Push> Insertion::move(double amount, double longest_part, const Pa
     if (solve.converged) {
       record.residual = solve.residual;
       totals_.stored_energy = solve.energy;
+      wall_energy_ = solve.wall_energy;
       settle(depth_ - before->depth, hub_angle_ - before->hub_angle);
       done += now;
       if (std::abs(amount - done) <= 1e-9) break;
@@ -172,6 +173,7 @@ void Insertion::save(Snapshot& snapshot) const {
   snapshot.forces = forces_;
   snapshot.memory = contact_.memory();
   snapshot.totals = totals_;
+  snapshot.wall_energy = wall_energy_;
 }
 
 void Insertion::restore(const Snapshot& snapshot) {
@@ -183,6 +185,7 @@ void Insertion::restore(const Snapshot& snapshot) {
   contact_.restore(snapshot.memory);
   contact_.free_from(depth_);
   totals_ = snapshot.totals;
+  wall_energy_ = snapshot.wall_energy;
   forget_drift();
   bend_at_the_exit();
 }
@@ -466,6 +469,22 @@ void Insertion::add_triangle_forces() {
     double& peak = peak_forces_[triangle];
     peak = std::max(peak, force);
   }
+}
+
+PushTerms Insertion::terms() const {
+  PushTerms terms;
+  Problem wire = problem_;
+  wire.contact = nullptr;  // its energy is known: to sample it anew would change its lag
+  Eigen::Matrix3Xd unused(3, rod_.nodes());
+  terms.energy = Statics::evaluate(wire, state_, unused);
+  terms.energy.wall = wall_energy_;
+  terms.energy.contact = totals_.stored_energy - terms.energy.total();
+  terms.tip_roll = introducer_.roll + hub_angle_;
+  if (!rod_.twisted) return terms;
+  const int last = rod_.nodes() - 2;
+  terms.tip_roll += state_.theta[last] - state_.theta[problem_.first - 1];
+  for (int i = problem_.first; i <= last; ++i) terms.tip_roll += state_.reference_twist[i];
+  return terms;
 }
 
 std::vector<WireContact> Insertion::contacts() {

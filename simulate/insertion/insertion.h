@@ -28,6 +28,16 @@ struct InsertionOptions {
   int max_iterations = 50;           // Newton iterations per solve; see Insertion::push()
   double record_every = 5.0;         // spacing of the stored shapes                     [mm]
   bool map_forces = true;            // whether the wall's triangles remember their peak forces
+  bool record_terms = false;         // whether each push records its energy by term
+};
+
+/// The wire's energy by term after a push, and how its tip is rolled.
+struct PushTerms {
+  Energy energy;
+  /// Of the tip's material director, counted as the hub's roll is and carried along the wire
+  /// without twist: the roll of the hub and all twist between. That of the hub where the wire has
+  /// no twist [rad].
+  double tip_roll = 0.0;
 };
 
 /// The introducer: wire slides along its axis and is free beyond its point.
@@ -93,6 +103,7 @@ class Insertion {
   Eigen::Matrix3Xd free_nodes() const { return state_.x.rightCols(rod_.nodes() - problem_.first); }
   /// (3, n) of the wall on the nodes, after the last move [N].
   const Eigen::Matrix3Xd& forces() const { return forces_; }
+  PushTerms terms() const;  // of the present shape
   /// Contacts of the present shape; nodes counted from the first free one.
   std::vector<WireContact> contacts();
   std::vector<TriangleForce> peak_forces() const;  // over all moves so far, if mapped
@@ -112,6 +123,7 @@ class Insertion {
     Eigen::Matrix3Xd forces;
     WallContact::Memory memory;
     Push totals;
+    double wall_energy = 0.0;
   };
   void save(Snapshot& snapshot) const;
   void restore(const Snapshot& snapshot);
@@ -158,10 +170,11 @@ class Insertion {
   double hub_angle_ = 0.0;      // since the start                                           [rad]
   double last_distance_ = 0.0;  // of the last push; negative: pulled                         [mm]
   std::optional<int> slipped_out_;
-  Push totals_;             // forces of the hand, works and energy so far
-  Eigen::Matrix3Xd path_;   // where the wire ahead of each node was before the last push   [mm]
-  Eigen::Matrix3Xd drift_;  // off that path, per length of push
-  Eigen::Matrix3Xd moved_;  // each node in the last push, per length of it
+  Push totals_;               // forces of the hand, works and energy so far
+  double wall_energy_ = 0.0;  // of the stored energy, in the yielding wall              [N mm]
+  Eigen::Matrix3Xd path_;     // where the wire ahead of each node was before the last push   [mm]
+  Eigen::Matrix3Xd drift_;    // off that path, per length of push
+  Eigen::Matrix3Xd moved_;    // each node in the last push, per length of it
   Eigen::Matrix3Xd forces_, guess_ahead_;
   std::vector<Touch> touches_;
   std::vector<std::int32_t> mapped_;                     // triangle that each contact point was on

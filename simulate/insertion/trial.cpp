@@ -112,6 +112,7 @@ bool Trial::step(const Move& move) {
   }
   if (end_in_sphere(*push)) return false;
   record_.pushes.push_back(*push);
+  if (options_.record_terms) record_.push_terms.push_back(insertion_.terms());
   if (distance <= 0.0) pushing_since_ = record_.pushes.size();
   since_shape_ += std::abs(distance) + std::abs(move.turn) / kTurnPerShape * options_.record_every;
   for (std::size_t k = 0; k < goals_.size(); ++k) {
@@ -317,6 +318,10 @@ std::vector<TrialResult> Trial::finish_all() {
     TrialResult& result = results.emplace_back(std::move(pursuit.end));
     result.terms = record_.terms;
     result.pushes.assign(record_.pushes.data(), record_.pushes.data() + pursuit.pushes);
+    if (options_.record_terms) {
+      result.push_terms.assign(record_.push_terms.data(),
+                               record_.push_terms.data() + pursuit.pushes);
+    }
     result.shapes.insert(result.shapes.begin(), record_.shapes.data(),
                          record_.shapes.data() + pursuit.shapes);
   }
@@ -336,6 +341,7 @@ void Trial::save(Mark& mark) const {
 void Trial::restore(const Mark& mark) {
   insertion_.restore(mark.insertion);
   record_.pushes.resize(mark.pushes);
+  if (options_.record_terms) record_.push_terms.resize(mark.pushes);
   record_.shapes.resize(mark.shapes);
   pushing_since_ = mark.pushing_since;
   since_shape_ = mark.since_shape;

@@ -47,9 +47,10 @@ struct Shape {
 
 struct TrialResult {
   Outcome outcome = Outcome::kFailed;
-  std::string reason;        // one sentence; with the place in mm where it failed
-  std::vector<Push> pushes;  // in the order in which they were made
-  Eigen::Matrix3Xd nodes;    // (3, k) final shape beyond the introducer, proximal to distal
+  std::string reason;                 // one sentence; with the place in mm where it failed
+  std::vector<Push> pushes;           // in the order in which they were made
+  std::vector<PushTerms> push_terms;  // one per push, if recorded
+  Eigen::Matrix3Xd nodes;  // (3, k) final shape beyond the introducer, proximal to distal
   std::vector<WireContact> contacts;       // of the final shape
   std::vector<TriangleForce> peak_forces;  // over all pushes, ascending triangles; if mapped
   std::vector<Shape> shapes;       // every `record_every` of the hand's way, and the final one

@@ -424,7 +424,11 @@ TEST_F(CaseFile, HistoryOfAnInsertionKeepsThePeaksBetweenItsRows) {
     push.stored_energy = 0.5 * i;
     push.friction_work = 0.25 * i;
     push.iterations = 2;
+    push.hub_torque = 0.25 * i;
     result.pushes.push_back(push);
+    result.push_terms.push_back(
+        {.energy = {.bend = 0.25 * i, .twist = 0.125 * i, .contact = 0.125 * i},
+         .tip_roll = 0.5 * kPi});
   }
   result.contacts = {{.node = 3,
                       .part = 0.5,
@@ -445,8 +449,11 @@ TEST_F(CaseFile, HistoryOfAnInsertionKeepsThePeaksBetweenItsRows) {
   EXPECT_EQ(json.at("history")[1].at("wall_displacement_mm"), 0.5);
   EXPECT_EQ(json.at("history")[0].at("energy_released_n_mm"), 1.25);
   EXPECT_EQ(json.at("energy_n_mm").at("total"), 6.0);
-  EXPECT_TRUE(json.at("energy_n_mm").at("bend").is_null());
-  EXPECT_TRUE(json.at("energy_n_mm").at("bend_reason").is_string());
+  EXPECT_EQ(json.at("energy_n_mm").at("bend"), 3.0);
+  EXPECT_EQ(json.at("history")[1].at("energy_n_mm").at("twist"), 1.25);
+  EXPECT_EQ(json.at("hub_torque_n_mm"), 3.0);
+  EXPECT_EQ(json.at("history")[0].at("hub_torque_n_mm"), 1.25);
+  EXPECT_EQ(json.at("tip_roll_deg"), 90.0);
   EXPECT_EQ(json.at("cpu_time_s"), 0.125);
   EXPECT_EQ(json.at("contacts")[0].at("triangle"), 7);
   EXPECT_EQ(json.at("contacts")[0].at("normal_force_n"), to_json(Vec3(3, 0, 4)));

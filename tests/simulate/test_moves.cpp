@@ -156,6 +156,87 @@ TEST(Moves, ATipHeldInABendNeedsTorqueToTurn) {
   EXPECT_EQ(trial.outcome, Outcome::kMissed) << trial.reason;
 }
 
+/// A wire with the rest curvature k in its last `tip`, led along an arc of curvature K: its roll
+/// phi against the arc's plane obeys GJ phi'' = EI k K sin(phi) there, GJ phi'' = 0 before, from
+/// the hub's roll to no torque at the tip. By Runge-Kutta's method, shooting from the tip.
+struct Led {
+  double GJ_shaft = 0.0, GJ_tip = 0.0, EI_tip = 0.0, k = 0.0, tip = 0.0;
+  double arc = 0.0, K = 0.0;  // of the bend, which ends at the tip                [mm], [1/mm]
+
+  /// Roll at the hub, of a shaft of the given length, and the torque there.
+  std::pair<double, double> shoot(double tip_roll, double shaft) const {
+    constexpr int kSteps = 400;
+    const double h = tip / kSteps;
+    double phi = tip_roll, torque = 0.0;  // toward the hub
+    for (int i = 0; i < kSteps; ++i) {
+      const auto slope = [&](double s, double at) {
+        return s < arc ? EI_tip * k * K * std::sin(at) : 0.0;
+      };
+      const double s = i * h, middle = phi + 0.5 * h * torque / GJ_tip;
+      const double torque_middle = torque + 0.5 * h * slope(s, phi);
+      torque += h * slope(s + 0.5 * h, middle);
+      phi += h * torque_middle / GJ_tip;
+    }
+    return {phi + torque * shaft / GJ_shaft, torque};
+  }
+  std::pair<double, double> at_hub(double hub_roll, double shaft) const {  // tip roll, torque
+    double low = 0.0, high = hub_roll;
+    for (int i = 0; i < 60; ++i) {
+      const double middle = 0.5 * (low + high);
+      (shoot(middle, shaft).first < hub_roll ? low : high) = middle;
+    }
+    return {low, shoot(low, shaft).second};
+  }
+};
+
+TEST(Moves, HubTorqueAndTipRollInABendAreThoseOfAPendulum) {
+  // A lumen hardly wider than the wire leads it round 40 mm.
+  const double radius = 40.0, lead_in = 20.0;
+  const VesselModel vessel(shapes::bend_tube(0.53, radius, kPi, lead_in, 20.0, 0.4),
+                           {.grid_spacing = 0.2});
+  const Wire wire = {
+      .name = "led",
+      .radius = 0.5,
+      .sections = {{.length = 60.0,
+                    .bending_stiffness = 20.0,
+                    .twist_stiffness = 15.0,
+                    .rest_curvature = 1.0 / 60.0},
+                   {.length = 200.0, .bending_stiffness = 50.0, .twist_stiffness = 40.0}}};
+  const double depth = 125.0;
+  const Led led{.GJ_shaft = 40.0,
+                .GJ_tip = 15.0,
+                .EI_tip = 20.0,
+                .k = 1.0 / 60.0,
+                .tip = 60.0,
+                .arc = depth + 5.0 - lead_in,
+                .K = 1.0 / radius};
+  InsertionOptions with = options();
+  with.length = depth;
+  with.element_length = 1.0;
+  with.record_terms = true;
+  // The wire's zero roll is anterior, -y; the bend goes to +x, a quarter turn on.
+  for (const double roll : {0.25 * kPi, 0.5 * kPi}) {
+    SCOPED_TRACE(roll);
+    const TrialResult result = run_trial(wire, along_z(0.5 * kPi + roll), kNowhere, vessel, with);
+    ASSERT_EQ(result.outcome, Outcome::kMissed) << result.reason;
+    ASSERT_EQ(result.push_terms.size(), result.pushes.size());
+    const auto [tip_roll, torque] = led.at_hub(roll, depth - led.tip);
+    EXPECT_GT(torque, 0.1);
+    // What the wire's play in the lumen leaves: where it leaves the bend's plane its frames turn.
+    EXPECT_NEAR(result.pushes.back().hub_torque, torque, 0.03 * torque);
+    EXPECT_NEAR(result.push_terms.back().tip_roll - 0.5 * kPi, tip_roll, 0.03 * roll);
+    // Each term by itself, and all that is stored together.
+    const Energy& energy = result.push_terms.back().energy;
+    EXPECT_NEAR(energy.total(), result.pushes.back().stored_energy, 1e-9);
+    EXPECT_GT(energy.twist, 0.5 * torque * torque * (depth - led.tip) / led.GJ_shaft);
+    EXPECT_LT(energy.twist,
+              0.5 * torque * torque * ((depth - led.tip) / led.GJ_shaft + led.tip / led.GJ_tip));
+    EXPECT_GT(energy.bend, 0.5);
+    EXPECT_GE(energy.contact, 0.0);
+    EXPECT_EQ(energy.wall, 0.0);
+  }
+}
+
 TEST(Moves, AStraightRoundWireDoesNotFeelTheHub) {
   const TrialResult pushed = make_moves(straight_wire(), bend(), {{.push = 60.0}}),
                     turned = make_moves(straight_wire(), bend(), {{.push = 60.0}, {.turn = 1.0}});
