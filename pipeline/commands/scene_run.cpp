@@ -176,6 +176,10 @@ SceneAnswer run_insertion_scene(const SceneFile& file, const LoadedVessel& vesse
   if (!scene.has_target && result.outcome == simulate::Outcome::kMissed) {
     result.reason = "all of the wire went in; the scene has no target";
   }
+  for (const auto& [from, to] : result.stuck) {
+    result.reason +=
+        format("; the tip did not advance from %.1f mm of insertion to %.1f mm", from, to);
+  }
 
   write_result(result_json(result, scene.options.record_every, seconds), file, &vessel, folder);
   write_forces(vessel, result.peak_forces, folder);

@@ -186,6 +186,7 @@ Json result_json(const simulate::TrialResult& result, double every_mm, double cp
   json["contacts"] = contacts_json(result.contacts);
   put(json, "max_penetration_mm", penetration);
   put(json, "max_wall_displacement_mm", displacement);
+  if (!result.stuck.empty()) json["stuck_mm"] = result.stuck;
   json["history"] = history_json(result, every_mm);
   return json;
 }

@@ -427,6 +427,7 @@ InsertionScene read_insertion_scene(JsonReader& root, const simulate::Scene& wir
       insertion.number("roll_deg", 0.0, {.min = -360.0, .max = 360.0}) * kRadPerDeg;
   scene.options.length = insertion.number("length_mm", std::nullopt, kAboveZero);
   scene.options.step = insertion.number("step_mm", scene.options.step, kAboveZero);
+  scene.options.push_on = insertion.choice("when_stuck", "stop", {"stop", "push_on"}) == "push_on";
   insertion.finish();
   if (root.problems().empty() && scene.options.length > scene.wire.length()) {
     root.problems().add("insertion.length_mm", Json(scene.options.length).dump(),

@@ -29,6 +29,8 @@ struct InsertionOptions {
   double record_every = 5.0;         // spacing of the stored shapes                     [mm]
   bool map_forces = true;            // whether the wall's triangles remember their peak forces
   bool record_terms = false;         // whether each push records its energy by term
+  bool push_on = false;              // whether a wire whose tip is stuck, or that folds back, is
+                                     // pushed on; see TrialResult::stuck
 };
 
 /// The wire's energy by term after a push, and how its tip is rolled.

@@ -211,6 +211,18 @@ void Trial::check_advance(std::size_t goal, double distance) {
                       " of wire went in, and is at " + place_text(push.tip) + " mm");
 }
 
+/// Whether a wire that does not advance is pushed on all the same; notes where.
+bool Trial::pushed_on(std::size_t goal, double from, double to) {
+  if (!options_.push_on) return false;
+  std::vector<std::pair<double, double>>& stuck = pursuits_[goal].stuck;
+  if (!stuck.empty() && from <= stuck.back().second) {
+    stuck.back().second = to;
+  } else {
+    stuck.emplace_back(from, to);
+  }
+  return true;
+}
+
 /// Ends the trial where the tip does not move on as it is pushed.
 void Trial::check_motion(std::size_t goal) {
   const Push& push = record_.pushes.back();
@@ -221,6 +233,8 @@ void Trial::check_motion(std::size_t goal) {
   const double moved = (push.tip - then.tip).norm();
   const std::optional<Vec3> fold =
       moved < kProlapseMove * went ? insertion_.find_fold() : std::nullopt;
+  const bool halts = fold || moved < kStuckMove;
+  if (halts && pushed_on(goal, then.insertion, push.insertion)) return;
   if (fold) {
     const std::shared_ptr<const Way>& way = goals_[goal].way;
     const std::optional<std::string> detour =
@@ -316,6 +330,7 @@ std::vector<TrialResult> Trial::finish_all() {
                           " from the target at " + place_text(insertion_.tip()) + " mm");
     }
     TrialResult& result = results.emplace_back(std::move(pursuit.end));
+    result.stuck = pursuit.stuck;
     result.terms = record_.terms;
     result.pushes.assign(record_.pushes.data(), record_.pushes.data() + pursuit.pushes);
     if (options_.record_terms) {

@@ -50,6 +50,8 @@ struct TrialResult {
   std::string reason;                 // one sentence; with the place in mm where it failed
   std::vector<Push> pushes;           // in the order in which they were made
   std::vector<PushTerms> push_terms;  // one per push, if recorded
+  /// Where the tip did not advance, if pushed on: wire in the body from and to [mm].
+  std::vector<std::pair<double, double>> stuck;
   Eigen::Matrix3Xd nodes;  // (3, k) final shape beyond the introducer, proximal to distal
   std::vector<WireContact> contacts;       // of the final shape
   std::vector<TriangleForce> peak_forces;  // over all pushes, ascending triangles; if mapped
@@ -102,6 +104,7 @@ class Trial {
     double furthest = 0.0;        // of the tip along the way, since the last other move   [mm]
     double since_furthest = 0.0;  // pushed since then                                     [mm]
     std::optional<Outcome> outcome = {};  // empty as long as the trial goes on for the goal
+    std::vector<std::pair<double, double>> stuck = {};  // see TrialResult
     // Of one that has ended: so much of the record, and the end itself.
     std::size_t pushes = 0, shapes = 0;
     TrialResult end = {};
@@ -125,6 +128,7 @@ class Trial {
   void check_place(std::size_t goal);
   void check_advance(std::size_t goal, double distance);
   void check_motion(std::size_t goal);
+  bool pushed_on(std::size_t goal, double from, double to);
   std::string reached_reason(std::size_t goal) const;
   std::string place_of(int opening) const;
   Shape shape_here() const;

@@ -216,6 +216,36 @@ TEST_F(CommandLine, RefusesASceneWhoseWireEntersOutsideOfTheVessel) {
   }
 }
 
+TEST_F(CommandLine, PushesAStuckWireOnWhereASceneSaysSo) {
+  // A sac of 4 mm radius whose end is round, and so no opening: the tip leans on it.
+  write_stl(shapes::level_set(
+                [](const Vec3& p) {
+                  const Vec3 axis(0.0, 0.0, std::clamp(p.z(), 0.0, 56.0));
+                  return 4.0 - (p - axis).norm();
+                },
+                Vec3(-6.0, -6.0, -6.0), Vec3(6.0, 6.0, 62.0), 1.0),
+            folder_ / "sac.stl");
+  Json scene = tube_scene();
+  scene["wire"]["sections"][0]["length_mm"] = 120;
+  scene["vessel"] = {{"surface", {{"path", "sac.stl"}, {"unit", "mm"}, {"frame", "LPS"}}},
+                     {"friction", 0.3}};
+  scene["insertion"]["direction"] = {0.05, 0, 1};
+  scene["insertion"]["length_mm"] = 110;
+  write_json(scene, folder_ / "scene.json");
+  const Answer stopped = call("simulate scene.json -o stopped");
+  EXPECT_NE(stopped.out.find("stuck: "), std::string::npos) << stopped.out;
+  scene["insertion"]["when_stuck"] = "push_on";
+  write_json(scene, folder_ / "scene.json");
+  const Answer answer = call("simulate scene.json -o on");
+  EXPECT_NE(answer.out.find("the tip did not advance from "), std::string::npos) << answer.out;
+  const Json before = read_json(folder_ / "stopped" / "result.json", "wireplan.result/1");
+  const Json after = read_json(folder_ / "on" / "result.json", "wireplan.result/1");
+  EXPECT_FALSE(before.contains("stuck_mm"));
+  const double end = before.at("history").back().at("insertion_mm");
+  EXPECT_NEAR(after.at("stuck_mm")[0][0].get<double>(), end - 20.0, 1e-9);
+  EXPECT_GT(after.at("history").back().at("insertion_mm").get<double>(), end);
+}
+
 TEST_F(CommandLine, SimulatesABenchWithinAVessel) {
   // Clamped on the tube's axis and pressed sideways against its wall, 4 mm away.
   Json scene = tube_scene();

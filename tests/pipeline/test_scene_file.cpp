@@ -379,6 +379,7 @@ TEST_F(SceneMistakes, AreToldAndWhatIsNotInThisVersion) {
        {"solver.method is not \"newton\"", "no vessel"}},
       {pushed_wire(), "/vessel/surface/path", "none.stl", {"vessel.surface.path", "none.stl"}},
       {pushed_wire(), "/insertion/length_mm", 50, {"insertion.length_mm is 50", "40"}},
+      {pushed_wire(), "/insertion/when_stuck", "push", {"insertion.when_stuck", "\"push_on\""}},
       {pushed_wire(), "/loads/gravity_m_per_s2", {0, 0, -9.81}, {"loads is", "version"}},
       {pushed_wire(), "/supports", Json::array({1}), {"supports is given", "version"}},
   };
@@ -455,6 +456,7 @@ TEST_F(CaseFile, HistoryOfAnInsertionKeepsThePeaksBetweenItsRows) {
   EXPECT_EQ(json.at("history")[0].at("hub_torque_n_mm"), 1.25);
   EXPECT_EQ(json.at("tip_roll_deg"), 90.0);
   EXPECT_EQ(json.at("cpu_time_s"), 0.125);
+  EXPECT_FALSE(json.contains("stuck_mm"));
   EXPECT_EQ(json.at("contacts")[0].at("triangle"), 7);
   EXPECT_EQ(json.at("contacts")[0].at("normal_force_n"), to_json(Vec3(3, 0, 4)));
   EXPECT_EQ(json.at("contacts")[0].at("friction_force_n"), to_json(Vec3(0, 0.5, 0)));

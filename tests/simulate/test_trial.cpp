@@ -158,6 +158,32 @@ TEST(Trial, WireAgainstAnEndIsNamedStuckWithThePlace) {
   }
 }
 
+TEST(Trial, WireAgainstAnEndIsPushedOnWhereAsked) {
+  const VesselModel lumen = straight_lumen(4.0, 60.0);
+  InsertionOptions far = options();
+  far.length = 110.0;
+  far.friction = 0.3;
+  const Goal nowhere{.point = Vec3(0.0, 0.0, 1e3)};
+  const TrialResult stopped =
+      run_trial(straight_wire(50.0), a_little_aslant(), nowhere, lumen, far);
+  ASSERT_EQ(stopped.outcome, Outcome::kStuck) << stopped.reason;
+  EXPECT_TRUE(stopped.stuck.empty());
+  far.push_on = true;
+  const TrialResult on = run_trial(straight_wire(50.0), a_little_aslant(), nowhere, lumen, far);
+  EXPECT_EQ(on.outcome, Outcome::kMissed) << on.reason;
+  EXPECT_NEAR(on.pushes.back().insertion, 110.0, 1e-9);
+  // The same pushes as far as the other went, and then the tip is where it stayed.
+  ASSERT_GT(on.pushes.size(), stopped.pushes.size());
+  for (std::size_t k = 0; k < stopped.pushes.size(); ++k) {
+    EXPECT_EQ(on.pushes[k].tip, stopped.pushes[k].tip);
+  }
+  ASSERT_FALSE(on.stuck.empty());
+  const double end = stopped.pushes.back().insertion;
+  EXPECT_NEAR(on.stuck.front().first, end - 20.0, 1e-9);
+  EXPECT_GE(on.stuck.front().second, end);
+  for (const auto& [from, to] : on.stuck) EXPECT_LT(from + 20.0, to + 1e-9);
+}
+
 TEST(Trial, SoftWireWhoseTipStaysBehindIsNamedProlapsed) {
   // It meets the wall of a wide lumen at 65 degrees, where friction holds its tip; the wire bows
   // and goes on ahead of it.
