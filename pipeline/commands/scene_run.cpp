@@ -22,38 +22,53 @@ namespace fs = std::filesystem;
 /// A scene's vessel, read, checked and ready for a wire.
 struct LoadedVessel {
   Surface surface;
-  Wall wall;                        // of a rigid vessel too: forces are shown on it
-  std::vector<std::string> mended;  // of the file, in sentences
+  Wall wall;                      // of a rigid vessel too: forces are shown on it
+  std::vector<std::string> told;  // of the file and the entry, in sentences
   std::unique_ptr<const simulate::VesselModel> model;
 };
 
-void require_entry_inside(const SceneFile& scene, const Surface& surface) {
-  if (!scene.insertion) return;
+/// Returns a sentence where the wire touches the wall already as it enters, else nothing.
+std::vector<std::string> require_entry_inside(const SceneFile& scene, const Surface& surface) {
+  if (!scene.insertion) return {};
   const Vec3& entry = scene.insertion->introducer.point;
   const preprocess::InsideAnswer answer = preprocess::locate_point(surface, entry);
-  if (answer.inside) return;
+  const double radius = scene.insertion->wire.radius;
+  if (answer.inside && answer.distance >= radius) return {};
+  if (answer.inside) {
+    return {
+        format("insertion.point_mm lies %.2f mm from the wall, nearer than the wire's radius of "
+               "%.2f mm: the introducer presses the wire into the wall",
+               answer.distance, radius)};
+  }
   Problems problems(scene.file.string());
   problems.add("insertion.point_mm", to_json(entry).dump(),
                format("a point inside the vessel; it lies %.1f mm outside", answer.distance),
                "move it, or correct the surface's unit or frame");
   problems.throw_if_any();
+  return {};
 }
 
 /// The surface of a scene's vessel, sound and with the wire's entry in it.
-preprocess::RepairedSurface read_scene_surface(const SceneFile& scene) {
+struct SceneSurface {
+  Surface surface;
+  std::vector<std::string> mended, entry;  // in sentences
+};
+
+SceneSurface read_scene_surface(const SceneFile& scene) {
   const SurfaceInput& file = scene.vessel->surface;
   preprocess::RepairedSurface repaired =
       preprocess::read_sound_surface(file.path, file.unit, file.frame);
-  require_entry_inside(scene, repaired.surface);
-  return repaired;
+  std::vector<std::string> entry = require_entry_inside(scene, repaired.surface);
+  return {std::move(repaired.surface), preprocess::tell_mends(repaired.mends), std::move(entry)};
 }
 
 LoadedVessel load_vessel(const SceneFile& scene) {
   const SceneVessel& given = *scene.vessel;
   LoadedVessel vessel;
-  preprocess::RepairedSurface repaired = read_scene_surface(scene);
-  vessel.surface = std::move(repaired.surface);
-  vessel.mended = preprocess::tell_mends(repaired.mends);
+  SceneSurface read = read_scene_surface(scene);
+  vessel.surface = std::move(read.surface);
+  for (const std::string& line : read.mended) vessel.told.push_back("surface: " + line);
+  vessel.told.insert(vessel.told.end(), read.entry.begin(), read.entry.end());
   vessel.wall = preprocess::extrude_wall(vessel.surface, given.wall.extrusion).wall;
   const simulate::LumenOptions options = simulate::follow(vessel.surface);
   vessel.model = given.wall.elastic
@@ -87,7 +102,7 @@ Json vessel_json(const SceneVessel& given, const LoadedVessel& vessel) {
 
 Json warnings_json(const SceneVessel& given, const LoadedVessel& vessel) {
   Json warnings = Json::array();
-  for (const std::string& line : vessel.mended) warnings.push_back("surface: " + line);
+  for (const std::string& line : vessel.told) warnings.push_back(line);
   if (given.friction == 0.0) {
     warnings.push_back("frictionless (friction is 0): push forces are lower bounds");
   }
@@ -173,6 +188,7 @@ SceneAnswer run_insertion_scene(const SceneFile& file, const LoadedVessel& vesse
   simulate::TrialResult result =
       simulate::run_trial(scene.wire, scene.introducer, scene.goal, *vessel.model, scene.options);
   const double seconds = plan::thread_cpu_seconds() - start;
+  for (simulate::PushTerms& terms : result.push_terms) terms.tip_roll -= scene.roll_zero;
   if (!scene.has_target && result.outcome == simulate::Outcome::kMissed) {
     result.reason = "all of the wire went in; the scene has no target";
   }
@@ -215,7 +231,10 @@ SceneAnswer run_insertion_scene(const SceneFile& file, const LoadedVessel& vesse
 
 std::vector<std::string> check_scene_vessel(const SceneFile& scene) {
   if (!scene.vessel) return {};
-  return preprocess::tell_mends(read_scene_surface(scene).mends);
+  const SceneSurface read = read_scene_surface(scene);
+  std::vector<std::string> lines = read.entry;
+  for (const std::string& line : read.mended) lines.push_back("mended: " + line);
+  return lines;
 }
 
 SceneAnswer run_scene_file(const SceneFile& scene, const fs::path& folder) {

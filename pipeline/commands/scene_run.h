@@ -14,7 +14,7 @@ struct SceneAnswer {
 };
 
 /// Throws Error where the scene's vessel is not sound or its wire would enter outside of it;
-/// returns what was mended, in sentences.
+/// returns in sentences what was mended, and that it touches the wall where it enters.
 std::vector<std::string> check_scene_vessel(const SceneFile& scene);
 
 /// Writes into `folder`: result.json, wire.vtp and wire.png; of an insertion also the shapes on the

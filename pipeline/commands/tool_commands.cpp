@@ -75,9 +75,9 @@ int check_file(const std::string& path, const std::vector<std::string>& override
     for (const std::string& line : lines) std::cout << "  " << before << line << "\n";
   };
   if (schema.rfind("wireplan.scene/", 0) == 0) {
-    const std::vector<std::string> mended = check_scene_vessel(read_scene(path));
+    const std::vector<std::string> told = check_scene_vessel(read_scene(path));
     std::cout << path << ": the scene is in order\n";
-    print_told(mended, "mended: ");
+    print_told(told, "");
   } else if (schema.rfind("wireplan.phantom/", 0) == 0) {
     read_phantom_spec(path);
     std::cout << path << ": the description is in order\n";

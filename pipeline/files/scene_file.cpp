@@ -208,6 +208,15 @@ void check_supports(const std::vector<simulate::Support>& supports, Problems& pr
   }
 }
 
+/// Counts all rolls from where simulate does: that of the distal support is against the proximal's.
+void count_from_anterior(std::vector<simulate::Support>& supports) {
+  double zero = 0.0;
+  for (const simulate::Support& support : supports) {
+    if (support.at == simulate::WireEnd::kProximal) zero = roll_of_anterior(support.direction);
+  }
+  for (simulate::Support& support : supports) support.roll += zero;
+}
+
 simulate::Loads read_loads(JsonReader& root) {
   JsonReader reader = root.object("loads", false);
   simulate::Loads loads;
@@ -362,6 +371,8 @@ simulate::Scene read_bench(JsonReader& root, simulate::Scene scene,
     scene.supports.push_back(read_support(support));
   }
   if (root.problems().empty()) check_supports(scene.supports, root.problems());
+  // The decoupled chain has no directions, and tells its rolls as they were given.
+  if (scene.twist != simulate::Twist::kDecoupled) count_from_anterior(scene.supports);
   scene.loads = read_loads(root);
   if (root.has("plane_normal")) scene.plane = root.direction("plane_normal", std::nullopt);
   scene.solver = read_solver(root);
@@ -423,7 +434,9 @@ InsertionScene read_insertion_scene(JsonReader& root, const simulate::Scene& wir
   JsonReader insertion = root.object("insertion", true);
   scene.introducer.point = insertion.point("point_mm", std::nullopt);
   scene.introducer.direction = insertion.direction("direction", std::nullopt);
+  scene.roll_zero = roll_of_anterior(scene.introducer.direction);
   scene.introducer.roll =
+      scene.roll_zero +
       insertion.number("roll_deg", 0.0, {.min = -360.0, .max = 360.0}) * kRadPerDeg;
   scene.options.length = insertion.number("length_mm", std::nullopt, kAboveZero);
   scene.options.step = insertion.number("step_mm", scene.options.step, kAboveZero);
@@ -463,6 +476,14 @@ double axial_stiffness_from_paper(double stretch_coefficient, double edge_length
 double bending_stiffness_from_paper(double bend_coefficient, double edge_length) {
   const double h = edge_length / kMmPerM;                   // [m]
   return bend_coefficient * h * h * h * kMmPerM * kMmPerM;  // N m^2 -> N mm^2
+}
+
+double roll_of_anterior(const Vec3& direction) {
+  constexpr double kAlongY = 1e-6;  // sine
+  const Vec3 anterior = -Vec3::UnitY(), from = simulate::reference_normal(direction);
+  const Vec3 square = anterior - anterior.dot(direction) * direction;
+  if (square.norm() < kAlongY || from.isApprox(square.normalized(), 1e-12)) return 0.0;
+  return std::atan2(square.dot(direction.cross(from)), square.dot(from));
 }
 
 SceneFile read_scene(const std::filesystem::path& path) {

@@ -21,11 +21,18 @@ struct SceneVessel {
   simulate::ContactLaw contact_law = {};
 };
 
+/// What a roll of a scene lacks to that of simulate, which counts from reference_normal() [rad].
+/// Scenes count from anterior (-y) made square to the direction, however near to y that runs: so
+/// the zero turns evenly with the direction, and it is superior (+z) only along y itself, where no
+/// choice is without a jump.
+double roll_of_anterior(const Vec3& direction);
+
 /// A wire pushed into a vessel: what run_trial asks for.
 struct InsertionScene {
   simulate::Wire wire;
   simulate::Introducer introducer;
-  simulate::Goal goal;  // where the scene gives none: one so far away that no tip reaches it
+  double roll_zero = 0.0;  // of the scene, in the introducer's roll: see roll_of_anterior()  [rad]
+  simulate::Goal goal;     // where the scene gives none: one so far away that no tip reaches it
   bool has_target = false;
   simulate::InsertionOptions options;  // edges as long as the wire's elements
 };

@@ -216,6 +216,21 @@ TEST_F(CommandLine, RefusesASceneWhoseWireEntersOutsideOfTheVessel) {
   }
 }
 
+TEST_F(CommandLine, TellsThatASceneEntersWithinAWiresRadiusOfTheWall) {
+  Json scene = tube_scene();
+  scene["insertion"]["point_mm"] = {3.8, 0, 6};  // of 4 mm, a wire of 0.4 mm
+  scene["insertion"]["direction"] = {0, 0, 1};
+  write_json(scene, folder_ / "scene.json");
+  const Answer check = call("check scene.json");
+  EXPECT_EQ(check.code, 0) << check.log;
+  EXPECT_NE(check.out.find("insertion.point_mm lies 0."), std::string::npos) << check.out;
+  EXPECT_NE(check.out.find("the wire's radius of 0.40 mm"), std::string::npos) << check.out;
+  const Answer answer = call("simulate scene.json -o pushed");
+  EXPECT_EQ(answer.code, 0) << answer.log;
+  const Json result = read_json(folder_ / "pushed" / "result.json", "wireplan.result/1");
+  EXPECT_NE(result.at("warnings").dump().find("insertion.point_mm lies 0."), std::string::npos);
+}
+
 TEST_F(CommandLine, PushesAStuckWireOnWhereASceneSaysSo) {
   // A sac of 4 mm radius whose end is round, and so no opening: the tip leans on it.
   write_stl(shapes::level_set(

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
@@ -384,6 +385,58 @@ TEST_F(SceneMistakes, AreToldAndWhatIsNotInThisVersion) {
       {pushed_wire(), "/supports", Json::array({1}), {"supports is given", "version"}},
   };
   expect_each_told(mistakes);
+}
+
+/// Where a curved tip bends to by a scene's roll of 0.
+Vec3 zero_of_roll(const Vec3& direction) {
+  const Vec3 from = simulate::reference_normal(direction);
+  return Eigen::AngleAxisd(roll_of_anterior(direction), direction) * from;
+}
+
+TEST(SceneRoll, ZeroIsAnteriorAndTurnsEvenlyWithTheDirection) {
+  EXPECT_TRUE(zero_of_roll(Vec3::UnitZ()).isApprox(Vec3(0.0, -1.0, 0.0), 1e-12));
+  EXPECT_TRUE(zero_of_roll(Vec3::UnitY()).isApprox(Vec3::UnitZ(), 1e-12));
+  EXPECT_EQ(roll_of_anterior(Vec3(1.0, 2.0, 2.0).normalized()), 0.0);  // as before, away from y
+  // Through the cone of 10 degrees round y, past y by one degree: -y made square each time, and
+  // from step to step no more of a turn than the direction makes round y.
+  int inside = 0;
+  Vec3 before = Vec3::Zero();
+  for (double angle = -20.0; angle <= 20.0; angle += 0.05) {
+    const double a = angle * kRadPerDeg, off = 1.0 * kRadPerDeg;
+    const Vec3 direction =
+        Vec3(std::sin(a), std::cos(a) * std::cos(off), std::sin(off)).normalized();
+    const Vec3 zero = zero_of_roll(direction);
+    EXPECT_NEAR(zero.dot(direction), 0.0, 1e-12);
+    EXPECT_NEAR(zero.dot(direction.cross(Vec3::UnitY())), 0.0, 1e-12);
+    EXPECT_LT(zero.y(), 0.0);
+    if (before.norm() > 0.0) {
+      EXPECT_LT((zero - before).norm(), 0.06);
+    }
+    before = zero;
+    inside += roll_of_anterior(direction) != 0.0;
+  }
+  EXPECT_GT(inside, 300);
+}
+
+TEST_F(CaseFile, RollsOfASceneCountFromAnterior) {
+  Json json = cantilever();
+  json["supports"][0]["direction"] = {0.1, 1, 0};
+  json["supports"][0]["roll_deg"] = 30;
+  json["supports"].push_back({{"at", "distal"},
+                              {"kind", "clamped"},
+                              {"point_mm", {4, 39, 0}},
+                              {"direction", {0.1, 1, 0}},
+                              {"roll_deg", 75}});
+  const simulate::Scene scene = *read_scene(write("scene.json", json.dump())).bench;
+  const double zero = roll_of_anterior(Vec3(0.1, 1.0, 0.0).normalized());
+  EXPECT_NEAR(std::abs(zero), 0.5 * kPi, 1e-12);  // +z before
+  EXPECT_NEAR(scene.supports[0].roll, zero + 30.0 * kRadPerDeg, 1e-12);
+  EXPECT_NEAR(scene.supports[1].roll, zero + 75.0 * kRadPerDeg, 1e-12);
+  Json pushed = pushed_wire();
+  pushed["insertion"]["direction"] = {0.1, 1, 0};
+  const InsertionScene insertion = *read_scene(write("scene.json", pushed.dump())).insertion;
+  EXPECT_EQ(insertion.roll_zero, zero);
+  EXPECT_NEAR(insertion.introducer.roll, zero + 0.5 * kPi, 1e-12);
 }
 
 TEST_F(CaseFile, ResultOfABenchIsWrittenInFileUnitsWithoutNan) {
