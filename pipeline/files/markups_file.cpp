@@ -273,6 +273,24 @@ std::vector<MarkupPoint> read_markups(const fs::path& path) {
   return read_markups_json(text, path.string());
 }
 
+void resolve_scene_points(Json& file, const fs::path& folder, Problems& problems) {
+  if (!file.is_object()) return;
+  PointFinder finder(file, folder, problems);
+  const auto resolve = [&](Json& owner, const std::string& key) {
+    finder.resolve_end(owner, key);
+    if (owner.is_object() && owner.contains("point_mm") && owner["point_mm"].is_object()) {
+      owner["point_mm"] = finder.find(owner["point_mm"], key + ".point_mm");
+    }
+  };
+  for (const char* one : {"insertion", "target"}) {
+    if (file.contains(one)) resolve(file[one], one);
+  }
+  if (!file.contains("supports") || !file["supports"].is_array()) return;
+  for (std::size_t k = 0; k < file["supports"].size(); ++k) {
+    resolve(file["supports"][k], "supports[" + std::to_string(k) + "]");
+  }
+}
+
 void resolve_points(Json& file, const fs::path& folder, Problems& problems) {
   if (!file.is_object()) return;
   PointFinder finder(file, folder, problems);

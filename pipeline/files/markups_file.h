@@ -28,4 +28,8 @@ std::vector<MarkupPoint> read_markups(const std::filesystem::path& path);
 /// After a problem some other point stands in its place, so that all else can be told too.
 void resolve_points(Json& file, const std::filesystem::path& folder, Problems& problems);
 
+/// The same in a scene: of its supports, its insertion and its target, under "point" as in a case
+/// or in the place of the three numbers of "point_mm".
+void resolve_scene_points(Json& file, const std::filesystem::path& folder, Problems& problems);
+
 }  // namespace wireplan::pipeline

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "pipeline/files/json_reader.h"
+#include "pipeline/files/markups_file.h"
 
 namespace wireplan::pipeline {
 namespace {
@@ -490,8 +491,9 @@ SceneFile read_scene(const std::filesystem::path& path) {
   SceneFile scene;
   scene.file = path;
   scene.name = scene_name(path);
-  const Json file = read_json(path, kSceneSchema);
+  Json file = read_json(path, kSceneSchema);
   Problems problems(path.string());
+  resolve_scene_points(file, path.parent_path(), problems);
   JsonReader root(file, "", problems);
   root.text("schema", std::nullopt);
   const simulate::Scene wire = read_wire_of_scene(root);

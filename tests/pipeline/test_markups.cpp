@@ -3,6 +3,7 @@
 
 #include "pipeline/files/case_file.h"
 #include "pipeline/files/markups_file.h"
+#include "pipeline/files/scene_file.h"
 #include "preprocess/volume/image.h"
 #include "tests/messages.h"
 #include "tests/pipeline/small_case.h"
@@ -68,6 +69,45 @@ TEST_F(Markups, SeedsAndListsAreResolved) {
   EXPECT_EQ(file["accesses"][0]["point_mm"], Json::parse("[-1.0, -2.0, 3.0]"));
   EXPECT_FALSE(file["accesses"][0].contains("point"));
   EXPECT_EQ(file["segmentation"]["seeds_mm"][1], Json::parse("[-4.0, -5.0, 6.0]"));
+}
+
+TEST_F(Markups, AnyPointOfASceneMayBeOne) {
+  write("points.mrk.json", markups("RAS", {{"hub", {-1, -2, 3}}, {"grip", {-30, 0, 5}}}));
+  const Json hub = {{"markups", "points.mrk.json"}, {"label", "hub"}},
+             grip = {{"markups", "points.mrk.json"}, {"label", "grip"}};
+  const Json wire = {{"sections", Json::array({{{"length_mm", 40},
+                                                {"element_length_mm", 1},
+                                                {"bending_stiffness_n_mm2", 50},
+                                                {"radius_mm", 0.4}}})}};
+  Json bench = {{"schema", "wireplan.scene/1"}, {"wire", wire}};
+  bench["supports"] = Json::array({{{"at", "proximal"}, {"kind", "clamped"}, {"point_mm", hub}},
+                                   {{"at", "distal"}, {"kind", "pinned"}, {"point", grip}}});
+  write("bench.json", bench);
+  const SceneFile gripped = read_scene(folder_ / "bench.json");
+  EXPECT_EQ(gripped.bench->supports[0].point, Vec3(1.0, 2.0, 3.0));
+  EXPECT_EQ(gripped.bench->supports[1].point, Vec3(30.0, 0.0, 5.0));
+
+  Json pushed = {{"schema", "wireplan.scene/1"}, {"wire", wire}};
+  pushed["vessel"] = {{"surface", {{"path", "tube.stl"}, {"unit", "mm"}, {"frame", "LPS"}}}};
+  pushed["insertion"] = {{"point", hub}, {"direction", {0, 0, 1}}, {"length_mm", 20}};
+  pushed["target"] = {{"point_mm", grip}};
+  write("pushed.json", pushed);
+  const SceneFile inserted = read_scene(folder_ / "pushed.json");
+  EXPECT_EQ(inserted.insertion->introducer.point, Vec3(1.0, 2.0, 3.0));
+  EXPECT_EQ(inserted.insertion->goal.point, Vec3(30.0, 0.0, 5.0));
+
+  // What is wrong is told under its key.
+  pushed["insertion"]["point"]["label"] = "hob";
+  pushed["target"]["point_mm"] = {{"markups", "none.mrk.json"}};
+  write("pushed.json", pushed);
+  const std::string told = message_of([&] { read_scene(folder_ / "pushed.json"); });
+  EXPECT_NE(told.find("insertion.point.label is \"hob\""), std::string::npos) << told;
+  EXPECT_NE(told.find("did you mean \"hub\"?"), std::string::npos) << told;
+  EXPECT_NE(told.find("target.point_mm.markups is none.mrk.json"), std::string::npos) << told;
+  pushed["target"] = {{"point_mm", {{"ijk", {1, 2, 3}}}}};
+  write("pushed.json", pushed);
+  EXPECT_NE(message_of([&] { read_scene(folder_ / "pushed.json"); }).find("target.point_mm.ijk"),
+            std::string::npos);
 }
 
 TEST_F(Markups, OldTablesAreReadInTheirFrame) {
