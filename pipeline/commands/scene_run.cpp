@@ -3,6 +3,7 @@
 #include <map>
 #include <memory>
 
+#include "pipeline/commands/scene_sensitivity.h"
 #include "pipeline/files/result_file.h"
 #include "pipeline/files/text.h"
 #include "pipeline/files/trial_file.h"
@@ -27,8 +28,9 @@ struct LoadedVessel {
   std::unique_ptr<const simulate::VesselModel> model;
 };
 
-/// Returns a sentence where the wire touches the wall already as it enters, else nothing.
-std::vector<std::string> require_entry_inside(const SceneFile& scene, const Surface& surface) {
+/// Refuses an entry outside the vessel. Returns a sentence where the wire touches the wall already
+/// as it enters, else nothing.
+std::vector<std::string> look_at_entry(const SceneFile& scene, const Surface& surface) {
   if (!scene.insertion) return {};
   const Vec3& entry = scene.insertion->introducer.point;
   const preprocess::InsideAnswer answer = preprocess::locate_point(surface, entry);
@@ -58,7 +60,7 @@ SceneSurface read_scene_surface(const SceneFile& scene) {
   const SurfaceInput& file = scene.vessel->surface;
   preprocess::RepairedSurface repaired =
       preprocess::read_sound_surface(file.path, file.unit, file.frame);
-  std::vector<std::string> entry = require_entry_inside(scene, repaired.surface);
+  std::vector<std::string> entry = look_at_entry(scene, repaired.surface);
   return {std::move(repaired.surface), preprocess::tell_mends(repaired.mends), std::move(entry)};
 }
 
@@ -197,7 +199,11 @@ SceneAnswer run_insertion_scene(const SceneFile& file, const LoadedVessel& vesse
         format("; the tip did not advance from %.1f mm of insertion to %.1f mm", from, to);
   }
 
-  write_result(result_json(result, scene.options.record_every, seconds), file, &vessel, folder);
+  const Sensitivity sensitivity = check_sensitivity(scene, *vessel.model, result);
+  Json json = result_json(result, scene.options.record_every, seconds);
+  json["sensitivity"] = sensitivity.json;
+  if (!sensitivity.reason.empty()) json["sensitivity_reason"] = sensitivity.reason;
+  write_result(std::move(json), file, &vessel, folder);
   write_forces(vessel, result.peak_forces, folder);
   preprocess::write_polyline(result.nodes, {}, folder / "wire.vtp");
   write_shapes(result, "shapes", folder);
@@ -222,6 +228,7 @@ SceneAnswer run_insertion_scene(const SceneFile& file, const LoadedVessel& vesse
                    last.tip.x(), last.tip.y(), last.tip.z(), last.residual);
   }
   if (!result.reason.empty()) line += "; " + result.reason;
+  if (!sensitivity.warning.empty()) line += "\n" + sensitivity.warning;
   return {result.outcome != simulate::Outcome::kNotConverged &&
               result.outcome != simulate::Outcome::kFailed,
           line};

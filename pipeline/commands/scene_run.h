@@ -10,7 +10,7 @@ namespace wireplan::pipeline {
 
 struct SceneAnswer {
   bool solved = false;  // an equilibrium was found, whatever became of the wire
-  std::string line;     // what came out, in one line
+  std::string line;     // what came out, in one line, and in another what it hangs on
 };
 
 /// Throws Error where the scene's vessel is not sound or its wire would enter outside of it;

@@ -462,6 +462,9 @@ InsertionScene read_insertion_scene(JsonReader& root, const simulate::Scene& wir
   scene.options.residual_tolerance = solver.residual_tolerance;
   scene.options.max_iterations = solver.max_iterations;
   scene.options.record_terms = true;
+  if (root.has("check_sensitivity")) {
+    scene.check_sensitivity = root.boolean("check_sensitivity", true);
+  }
   scene.has_target = root.has("target");
   scene.goal = read_goal(root, scene.introducer);
   return scene;

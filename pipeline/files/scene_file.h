@@ -34,7 +34,8 @@ struct InsertionScene {
   double roll_zero = 0.0;  // of the scene, in the introducer's roll: see roll_of_anterior()  [rad]
   simulate::Goal goal;     // where the scene gives none: one so far away that no tip reaches it
   bool has_target = false;
-  simulate::InsertionOptions options;  // edges as long as the wire's elements
+  simulate::InsertionOptions options;     // edges as long as the wire's elements
+  std::optional<bool> check_sensitivity;  // see scene_sensitivity.h; empty: if it costs little
 };
 
 /// Exactly one of bench and insertion is there, the latter with a vessel.
