@@ -359,6 +359,7 @@ Json input_json(const Case& input) {
                             {"smoothing_mm", value(segmentation.smoothing_mm)},
                             {"neck_opening_mm", value(segmentation.neck_opening_mm)}};
   }
+  if (!input.surface_input) json["mask"] = mask_limits_json(input.mask_limits);
   if (input.surface_input) {
     json["surface"] = {{"path", input.surface_input->given},
                        {"unit", input.surface_input->unit},
@@ -487,6 +488,7 @@ Case read_case(const std::filesystem::path& path, const std::vector<std::string>
       read_angles(root, "tip_roll_deg", {0.0, 90.0, 180.0, 270.0}, {.min = -360.0, .max = 360.0});
   read_inputs(root, input);
   read_segmentation(root, input);
+  input.mask_limits = read_mask_limits(root, input.surface_input.has_value());
   JsonReader wall = root.object("wall", false);
   input.wall = read_wall(wall, "elastic");
   wall.finish();

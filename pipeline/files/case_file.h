@@ -49,6 +49,7 @@ struct Case {
   std::optional<SurfaceInput> surface_input;  // labels are the lumen of the volume beside them
   std::optional<LabelsInput> labels;
   preprocess::SegmentOptions segmentation;  // of a volume; seeds besides the access point
+  preprocess::MaskLimits mask_limits;       // of a volume or labels
   preprocess::SurfaceOptions surface;
   WallInput wall;
   std::vector<AccessInput> accesses;  // one at least of each; every pair is a section

@@ -377,4 +377,23 @@ Json labels_json(const LabelsInput& labels) {
   return json;
 }
 
+preprocess::MaskLimits read_mask_limits(JsonReader& root, bool from_surface) {
+  preprocess::MaskLimits limits;
+  if (from_surface && root.has("mask")) {
+    root.problems().add("mask", "given with a surface as input", "none",
+                        "only a volume or labels become a mask; delete it");
+    root.raw("mask");
+    return limits;
+  }
+  JsonReader reader = root.object("mask", false);
+  limits.handles = reader.integer("most_handles", limits.handles, 0, 1'000'000'000);
+  limits.faces = reader.integer("most_faces", limits.faces, 1, 2'000'000'000);
+  reader.finish();
+  return limits;
+}
+
+Json mask_limits_json(const preprocess::MaskLimits& limits) {
+  return {{"most_handles", limits.handles}, {"most_faces", limits.faces}};
+}
+
 }  // namespace wireplan::pipeline

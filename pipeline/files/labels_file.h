@@ -1,11 +1,13 @@
 #pragma once
-/// The key `labels` of a case, a segmentation that somebody else made, and tables of label names.
+/// The key `labels` of a case, a segmentation that somebody else made, and tables of label names;
+/// and the key `mask`, of what becomes of these or of a volume.
 #include <filesystem>
 #include <map>
 #include <optional>
 #include <string>
 
 #include "pipeline/files/json_reader.h"
+#include "preprocess/segment/mask_shape.h"
 #include "preprocess/volume/labels.h"
 
 namespace wireplan::pipeline {
@@ -36,5 +38,10 @@ void resolve_branches(Json& file, const std::filesystem::path& folder, Problems&
 
 /// As the file has them.
 Json labels_json(const LabelsInput& labels);
+
+/// Reads "mask" {"most_handles", "most_faces"}: how complicated a mask may be. A surface as input
+/// has none.
+preprocess::MaskLimits read_mask_limits(JsonReader& root, bool from_surface);
+Json mask_limits_json(const preprocess::MaskLimits& limits);
 
 }  // namespace wireplan::pipeline

@@ -5,6 +5,7 @@
 
 #include "pipeline/files/text.h"
 #include "pipeline/stages/makers.h"
+#include "pipeline/stages/mask_checks.h"
 #include "preprocess/segment/label_growth.h"
 #include "preprocess/segment/label_mask.h"
 #include "preprocess/segment/segment.h"
@@ -17,6 +18,7 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr double kMm3PerMl = 1000.0;
+constexpr double kMostGap = 5.0;  // between pieces that are joined                       [mm]
 constexpr double kKnownTo = 0.5;  // of a voxel: how well labels know where the wall is
 
 std::string shown_place(const Vec3& p) {
@@ -103,8 +105,6 @@ void tell_labels(const preprocess::LabelVolume& labels, const preprocess::LabelM
   figures["left_out_specks_mm3"] = made.lost_specks_mm3;
 }
 
-double reach_beside(const preprocess::Grid& grid) { return std::max(3.0, 2.0 * voxel_side(grid)); }
-
 /// Arteries to accesses and targets that the labels lack, from the volume.
 void grow_to_points(const Case& given, const preprocess::Image& image,
                     const preprocess::LabelVolume& labels, preprocess::LabelMask& made,
@@ -169,6 +169,22 @@ void require_points_inside(const Case& given, const preprocess::LabelVolume& lab
   if (!problems.empty()) throw Error(problems);
 }
 
+/// Refuses a mask that is too complicated for a vessel.
+void look_at_shape(const Case& given, const preprocess::Mask& mask, Json& figures) {
+  using preprocess::Voxel;
+  const auto first = std::find(mask.labels.begin(), mask.labels.end(), 1);
+  expects(first != mask.labels.end());
+  const Voxel seed =
+      preprocess::voxel_at(mask.grid, static_cast<std::size_t>(first - mask.labels.begin()));
+  const preprocess::Box box = preprocess::grown(
+      preprocess::bounding_box(mask.grid, mask.labels, {seed, seed}), Voxel{1, 1, 1}, mask.grid);
+  const preprocess::Mask part{.grid = preprocess::cropped(mask.grid, box),
+                              .labels = preprocess::crop_values(mask.grid, box, mask.labels)};
+  const preprocess::MaskShape shape = preprocess::measure_shape(part.grid, part.labels);
+  add_shape(shape, figures);
+  preprocess::require_simple(shape, given.mask_limits, /*by_labels=*/true);
+}
+
 /// Means of the volume inside the mask, and on both sides of its edge [HU].
 void tell_values(const preprocess::Image& image, const preprocess::Mask& mask, Json& figures) {
   double sum = 0.0, count = 0.0, edge = 0.0, faces = 0.0;
@@ -201,10 +217,15 @@ LabelledLumen find_lumen(const Case& given, const preprocess::Image* image) {
                       .figures = figures_of("segment")};
   Json& figures = lumen.figures;
   if (image != nullptr) compare_with_volume(given, *image, lumen.labels, figures);
-  lumen.made = preprocess::merge_labels(lumen.labels);
+  constexpr std::size_t kPiecesPerHandle = 4;
+  lumen.made = preprocess::merge_labels(
+      lumen.labels, kMostGap,
+      kPiecesPerHandle * static_cast<std::size_t>(std::max(1, given.mask_limits.handles)));
   tell_labels(lumen.labels, lumen.made, figures);
   if (image != nullptr) grow_to_points(given, *image, lumen.labels, lumen.made, figures);
   require_points_inside(given, lumen.labels, lumen.made);
+  require_ends_in_one_piece(given, lumen.made.mask, figures);
+  look_at_shape(given, lumen.made.mask, figures);
   const preprocess::Grid& grid = lumen.labels.grid;
   figures["volume_mm3"] = lumen.made.volume_mm3;
   figures["touches_border"] = lumen.made.touches_border;

@@ -7,6 +7,7 @@
 #include "pipeline/files/viewer_files.h"
 #include "pipeline/report/report.h"
 #include "pipeline/stages/makers.h"
+#include "pipeline/stages/mask_checks.h"
 #include "preprocess/centerline/centerline.h"
 #include "preprocess/files/vessel_io.h"
 #include "preprocess/segment/segment.h"
@@ -169,18 +170,20 @@ void make_segment(Workspace& work, const fs::path& folder) {
     options.seeds.push_back(given.targets[k].point);
   }
   options.target = given.targets.front().point;
+  options.limits = given.mask_limits;
   const std::string& modality = work.image().modality;
   if (!options.lower_hu && !modality.empty() && modality != "CT") {
     throw Error("the volume's modality is " + modality +
                 ", and only in a CT is a band chosen; give segmentation.lower_hu and upper_hu in "
                 "the volume's own values");
   }
-  const preprocess::Segmentation segmentation = preprocess::segment(work.image(), options);
-  preprocess::write_mask(segmentation.mask, folder / "mask.nrrd");
-
+  preprocess::Segmentation segmentation = preprocess::segment(work.image(), options);
   const preprocess::SegmentStatistics& statistics = segmentation.statistics;
   Json figures = figures_of("segment");
   add_segmentation(statistics, !options.lower_hu.has_value(), figures);
+  add_shape(statistics.shape, figures);
+  require_ends_in_one_piece(given, segmentation.mask, figures);
+  preprocess::write_mask(segmentation.mask, folder / "mask.nrrd");
   if (statistics.touches_border) {
     figures["warnings"].push_back(
         "segment: the vessel touches the border of the volume and is closed there by a flat cap");

@@ -176,9 +176,10 @@ std::vector<Stage> stages_from_labels(const Case& given) {
     stages.push_back({.name = "volume", .version = 2, .reads_input = true, .make = make_volume});
   }
   stages.push_back({.name = "segment",
-                    .version = 1,
+                    .version = 2,
                     .reads_input = in_volume,
                     .reads_labels = true,
+                    .parameters = {"/mask"},
                     .make = make_labels});
   if (!given.labels->choice.values.empty()) read_too(stages.back(), {"/labels/values"});
   if (!given.labels->choice.names.empty()) read_too(stages.back(), {"/labels/names"});
@@ -206,9 +207,9 @@ std::vector<Stage> stages_to_surface(const Case& given) {
   }
   stages.push_back({.name = "volume", .version = 2, .reads_input = true, .make = make_volume});
   stages.push_back({.name = "segment",
-                    .version = 3,
+                    .version = 4,
                     .reads_input = true,
-                    .parameters = {"/segmentation"},
+                    .parameters = {"/segmentation", "/mask"},
                     .make = make_segment});
   read_points(stages.back(), given);
   stages.push_back({.name = "surface",

@@ -193,8 +193,24 @@ void fill_closed(Part& part) {
 /// sqrt(2 / 3) and a little.
 constexpr double kThroughFaces = 0.85;
 
+/// Refuses more pieces, the largest first, than a vessel has; specks do not count.
+void require_few(const std::vector<PieceOfLabels>& pieces, std::size_t most) {
+  if (pieces.size() <= most || pieces[most].voxels.size() < kLeastPiece) return;
+  const auto count = std::count_if(pieces.begin(), pieces.end(), [](const PieceOfLabels& piece) {
+    return piece.voxels.size() >= kLeastPiece;
+  });
+  throw Error("the chosen classes lie in " + std::to_string(count) +
+              " pieces that are not connected: noise, expected a vessel of at most " +
+              std::to_string(most) +
+              " pieces (four for each of mask.most_handles); choose the classes that are arteries, "
+              "and smooth what noise left of them; if it is a vessel all the same, raise "
+              "mask.most_handles");
+}
+
 /// Joins pieces to the first, and tells of those that stay alone.
-void join_pieces(Part& part, std::vector<PieceOfLabels> pieces, double most_gap, LabelMask& made) {
+void join_pieces(Part& part, std::vector<PieceOfLabels> pieces, double most_gap,
+                 std::size_t most_pieces, LabelMask& made) {
+  require_few(pieces, most_pieces);
   const double voxel = part.grid.spacing.prod();
   while (!pieces.empty() && pieces.back().voxels.size() < kLeastPiece && pieces.size() > 1) {
     made.lost_specks_mm3 += voxel * static_cast<double>(pieces.back().voxels.size());
@@ -242,11 +258,11 @@ void join_pieces(Part& part, std::vector<PieceOfLabels> pieces, double most_gap,
 
 }  // namespace
 
-LabelMask merge_labels(const LabelVolume& labels, double most_gap) {
+LabelMask merge_labels(const LabelVolume& labels, double most_gap, std::size_t most_pieces) {
   expects(labels.class_of.size() == labels.grid.voxels() && most_gap >= 0.0);
   Part part = cut_part(labels, most_gap);
   LabelMask made;
-  join_pieces(part, find_pieces(part), most_gap, made);
+  join_pieces(part, find_pieces(part), most_gap, most_pieces, made);
   fill_closed(part);
 
   made.mask = {.grid = labels.grid, .labels = Labels(labels.grid.voxels(), 0)};

@@ -8,6 +8,7 @@
 #include <string>
 #include <utility>
 
+#include "preprocess/segment/mask_shape.h"
 #include "preprocess/volume/voxels.h"
 
 namespace wireplan::preprocess {
@@ -441,6 +442,7 @@ Segmentation segment(const Image& image, const SegmentOptions& options) {
 
   const Task task = make_task(image, options);
   Region region = find_connected(image, task);
+  require_no_flood(region.grid, region.labels, options.limits);
   Segmentation result;
   SegmentStatistics& statistics = result.statistics;
   statistics.samples = task.samples;
@@ -471,6 +473,8 @@ Segmentation segment(const Image& image, const SegmentOptions& options) {
   statistics.bright_boundary =
       bright_boundary(region.grid, region.values, task.band.upper_hu, region.labels);
   require_no_bone(statistics, task);
+  statistics.shape = measure_shape(region.grid, region.labels);
+  require_simple(statistics.shape, options.limits, /*by_labels=*/false);
   result.mask = whole_mask(image, region, statistics);
   return result;
 }

@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "preprocess/segment/mask_shape.h"
 #include "preprocess/segment/segment_band.h"
 #include "preprocess/segment/segment_leak.h"
 #include "preprocess/volume/image.h"
@@ -23,6 +24,7 @@ struct SegmentOptions {
   /// Contacts with other bright things are cut where they are thinner than twice this, and so are
   /// arteries. Without it: as smoothing_mm.                                                [mm]
   std::optional<double> neck_opening_mm = {};
+  MaskLimits limits = {};  // of the mask, and of what the band connects (require_no_flood)
 };
 
 /// Figures of a segmentation for the log and the report.
@@ -35,6 +37,7 @@ struct SegmentStatistics {
   double bright_boundary = 0.0;         // share of the surface that lies against bone or calcium
   bool touches_border = false;          // of the volume: the vessel is cut there
   LeakSearch search;                    // the way from seed to target, and the leaks cut
+  MaskShape shape;                      // of the mask
 };
 
 struct Segmentation {
@@ -48,8 +51,8 @@ struct Segmentation {
 ///   3. Cut thin necks (prototypes A).
 ///   4. Where the band was chosen and not given, add the rim down to half of the contrast.
 ///   5. Cut leaks (segment_leak.h).
-///   6. Fill cavities that are closed in all directions (calcium, noise). Calcium on the wall stays
-///      out: a wire cannot pass there.
+///   6. Fill closed cavities (calcium, noise). Calcium on the wall stays out: no wire passes there.
+///   7. Refuse what is no vessel (mask_shape.h).
 /// All this is done in the part of the volume that holds the vessel; the answer is that of the
 /// whole. Throws `Error` when a seed lies outside the volume, outside the band (with the HU found
 /// there) or in a vessel that step 3 removes; when there is no contrast; when the target is not

@@ -177,6 +177,9 @@ inline Json full_case(Json json) {
         {"seeds_mm", Json::array({{1, 2, 3}})}, {"smoothing_mm", 0.8}, {"neck_opening_mm", 1.5}});
   }
   json["surface"]["edge_length_mm"] = 1.5;
+  if (!json["surface"].contains("path")) {
+    json["mask"] = {{"most_handles", 20}, {"most_faces", 100000}};
+  }
   json["wall"] = {
       {"model", "rigid"}, {"thickness_mm", 2}, {"young_modulus_kpa", 56}, {"poisson_ratio", 0.4}};
   json["access"].update(Json{{"inclination_deg", {0, 15}}, {"azimuth_deg", {0, 90}}});

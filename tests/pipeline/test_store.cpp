@@ -307,6 +307,8 @@ std::map<std::string, std::vector<std::string>> common_table() {
 Json common_changes() {
   return {{"/wall/model", "rigid"},
           {"/wall/poisson_ratio", 0.4},
+          {"/mask/most_handles", 60},
+          {"/mask/most_faces", 300000},
           {"/insertion/residual_tolerance_n", 1e-5},
           {"/insertion/max_iterations", 150},
           {"/manoeuvres", "never"},
@@ -358,6 +360,7 @@ TEST_F(RerunMatrix, OfACaseThatStartsFromAVolume) {
                           "smoothing_mm", "neck_opening_mm"}) {
     table[std::string("/segmentation/") + key] = {"segment", "report"};
   }
+  table["/mask/most_handles"] = table["/mask/most_faces"] = {"segment", "report"};
   for (const char* end : {"/access/point_mm/", "/target/point_mm/"}) {  // seeds too
     for (const char* k : {"0", "1", "2"}) {
       auto& stages = table[std::string(end) + k];
@@ -387,6 +390,7 @@ TEST_F(RerunMatrix, OfACaseThatStartsFromLabels) {
     if (in_volume) table["/volume/path"] = {"report"};
     table["/labels/path"] = table["/labels/table"] = {"report"};  // their contents count
     table["/labels/values/0"] = table["/labels/names/0"] = {"segment", "report"};
+    table["/mask/most_handles"] = table["/mask/most_faces"] = {"segment", "report"};
     for (const char* end : {"/access/point_mm/", "/target/point_mm/"}) {  // must lie in the labels
       for (const char* k : {"0", "1", "2"}) {
         auto& stages = table[std::string(end) + k];

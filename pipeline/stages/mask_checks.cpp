@@ -1,0 +1,97 @@
+#include "pipeline/stages/mask_checks.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "pipeline/files/text.h"
+#include "pipeline/report/report.h"
+
+namespace wireplan::pipeline {
+namespace {
+
+std::string place_in_mask(const Vec3& p) {
+  return format("(%.1f, %.1f, %.1f) mm", p.x(), p.y(), p.z());
+}
+
+/// Where two pieces come nearest: of voxels of the one, the nearest to the other's point is enough
+/// for a person to look at.
+Vec3 nearest_of_piece(const preprocess::Grid& grid, const preprocess::Labels& piece,
+                      const Vec3& point) {
+  return preprocess::center_of(grid, find_nearest({grid, piece}, point).voxel);
+}
+
+}  // namespace
+
+NearestOfMask find_nearest(const preprocess::Mask& mask, const Vec3& point) {
+  NearestOfMask nearest;
+  for (std::size_t n = 0; n < mask.labels.size(); ++n) {
+    if (mask.labels[n] == 0) continue;
+    const double here = (preprocess::center_of(mask.grid, n) - point).norm();
+    if (here < nearest.distance) nearest = {n, here};
+  }
+  return nearest;
+}
+
+double reach_beside(const preprocess::Grid& grid) {
+  return std::max(3.0, 2.0 * std::cbrt(grid.spacing.prod()));
+}
+
+void require_ends_in_one_piece(const Case& given, preprocess::Mask& mask, Json& figures) {
+  const preprocess::Grid& grid = mask.grid;
+  const double reach = reach_beside(grid);
+  const auto inside = [&](std::size_t n) { return mask.labels[n] != 0; };
+  std::string problems;
+  const auto add = [&](const std::string& line) {
+    problems += (problems.empty() ? "" : "\n") + line;
+  };
+  preprocess::Labels piece;  // that holds the first end
+  std::string first;
+  for (const auto& [key, point] : end_points(given)) {
+    const NearestOfMask nearest = find_nearest(mask, point);
+    if (nearest.distance > reach) {
+      add(key + " is " + to_json(point).dump() + ", " + format("%.1f", nearest.distance) +
+          " mm outside of what was found of the vessel, expected a point inside it (move the "
+          "point, or mend the segmentation that left its place out)");
+      continue;
+    }
+    if (piece.empty()) {
+      piece = preprocess::flood(grid, {nearest.voxel}, inside);
+      first = key;
+    } else if (piece[nearest.voxel] == 0) {
+      add(key + " is " + to_json(point).dump() + ", in another piece of the vessel than " + first +
+          ", which comes no nearer than " + place_in_mask(nearest_of_piece(grid, piece, point)) +
+          ", expected one piece that holds both (if the artery is open between them, lower "
+          "segmentation.lower_hu or neck_opening_mm, or draw what is missing)");
+    }
+  }
+  if (!problems.empty()) throw Error(problems);
+
+  // The surface is made of the largest piece.
+  const std::size_t kept = preprocess::count(piece), all = preprocess::count(mask.labels);
+  if (2 * kept > all) return;
+  preprocess::Labels rest = mask.labels;
+  for (std::size_t n = 0; n < rest.size(); ++n) rest[n] = piece[n] != 0 ? 0 : rest[n];
+  preprocess::Labels largest;
+  preprocess::measure_shape(grid, rest, &largest);
+  const std::size_t other = preprocess::count(largest);
+  if (other <= kept) return;
+  const Vec3 at = nearest_of_piece(grid, largest, end_points(given).front().second);
+  figures["warnings"].push_back(
+      "segment: a piece of " +
+      format("%.2g", static_cast<double>(other) * grid.spacing.prod() / 1000.0) + " ml at " +
+      place_in_mask(at) +
+      " is not connected with that of access and target, and left out although it is the largest; "
+      "delete the seed in it, or join them");
+  mask.labels = std::move(piece);
+}
+
+void add_shape(const preprocess::MaskShape& shape, Json& figures) {
+  figures["shape"] = {{"pieces", shape.pieces},
+                      {"voxels", shape.voxels},
+                      {"outer_faces", shape.faces},
+                      {"handles", shape.handles},
+                      {"cavities", shape.cavities}};
+}
+
+}  // namespace wireplan::pipeline

@@ -1,0 +1,30 @@
+#pragma once
+/// What is asked and told of a mask before a surface is made of it, whether a volume was segmented
+/// or labels were given.
+#include <cstddef>
+#include <limits>
+
+#include "pipeline/files/case_file.h"
+#include "preprocess/segment/mask_shape.h"
+
+namespace wireplan::pipeline {
+
+/// How far beside a mask an access or a target may lie: the surface may hold it still [mm].
+double reach_beside(const preprocess::Grid& grid);
+
+/// The labelled voxel nearest to a point, and how far from it that is [mm].
+struct NearestOfMask {
+  std::size_t voxel = 0;
+  double distance = std::numeric_limits<double>::infinity();
+};
+NearestOfMask find_nearest(const preprocess::Mask& mask, const Vec3& point);
+
+/// Refuses a mask outside of which an access or a target lies, or whose pieces part them; all that
+/// is wrong is told. Takes away all but the piece that holds them where another one is larger,
+/// which would become the surface, and tells that.
+void require_ends_in_one_piece(const Case& given, preprocess::Mask& mask, Json& figures);
+
+/// Counts of the mask, as figures.
+void add_shape(const preprocess::MaskShape& shape, Json& figures);
+
+}  // namespace wireplan::pipeline

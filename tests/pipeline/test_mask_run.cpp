@@ -1,0 +1,203 @@
+// What is no vessel ends with a reason, before a surface is made of it.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <functional>
+#include <random>
+
+#include "preprocess/files/vessel_io.h"
+#include "preprocess/volume/image.h"
+#include "tests/messages.h"
+#include "tests/pipeline/program.h"
+#include "tests/pipeline/small_case.h"
+#include "tests/preprocess/label_bytes.h"
+
+namespace wireplan::pipeline {
+namespace {
+
+using preprocess::Grid;
+
+class MaskRun : public testing::Test {
+ protected:
+  void SetUp() override {
+    if (!preprocess::reads_volumes()) GTEST_SKIP() << "built without imaging";
+    case_ = write_tube_case(folder_.path());
+    case_["surface"] = {{"edge_length_mm", 1.5}};
+  }
+
+  /// Runs the case between two points on a cube of 1 mm voxels with these values, with `more` as
+  /// arguments.
+  Answer run_volume(int side, const std::function<int(const Vec3&)>& hu, const Vec3& access,
+                    const Vec3& target, const std::string& more = "--to surface") {
+    preprocess::Image image{.grid = {.size = {side, side, side}}, .values = {}};
+    for (int k = 0; k < side; ++k) {
+      for (int j = 0; j < side; ++j) {
+        for (int i = 0; i < side; ++i) {
+          image.values.push_back(static_cast<float>(hu(Vec3(i, j, k))));
+        }
+      }
+    }
+    preprocess::write_image(image, folder_ / "ct.nrrd");
+    case_["volume"] = {{"path", "ct.nrrd"}};
+    if (!case_.contains("segmentation")) {
+      case_["segmentation"] = {{"lower_hu", 150}, {"upper_hu", 600}};
+    }
+    return run_between(access, target, more);
+  }
+
+  Answer run_labels(int side, const std::function<bool(int, int, int)>& inside, const Vec3& access,
+                    const Vec3& target, const std::string& more = "--to surface") {
+    std::vector<std::uint8_t> values;
+    for (int k = 0; k < side; ++k) {
+      for (int j = 0; j < side; ++j) {
+        for (int i = 0; i < side; ++i) values.push_back(inside(i, j, k) ? 1 : 0);
+      }
+    }
+    write_text(preprocess::label_nifti({.size = {side, side, side}}, values),
+               folder_ / "labels.nii");
+    case_["labels"] = {{"path", "labels.nii"}, {"values", {1}}, {"names", {"vessel"}}};
+    return run_between(access, target, more);
+  }
+
+  Answer run_between(const Vec3& access, const Vec3& target, const std::string& more) {
+    case_["access"]["point_mm"] = {access.x(), access.y(), access.z()};
+    case_["target"]["point_mm"] = {target.x(), target.y(), target.z()};
+    write_json(case_, folder_ / "case.json");
+    return run_program(folder_.path(), "run case.json -o out " + more);
+  }
+
+  TemporaryFolder folder_;
+  Json case_;
+};
+
+/// What the stage segment tells, as it lies in the cache.
+std::string figures_of_segment(const std::filesystem::path& folder) {
+  std::string text;
+  for (const auto& entry : std::filesystem::recursive_directory_iterator(folder / "cache")) {
+    const bool of_segment = holds(entry.path().string(), "segment");
+    if (of_segment && entry.path().filename() == "figures.json") text += read_text(entry.path());
+  }
+  return text;
+}
+
+/// Exit 2 with all of this, and no surface.
+void expect_refused(const Answer& answer, const std::vector<std::string>& parts) {
+  EXPECT_EQ(answer.code, 2) << answer.log;
+  for (const std::string& part : parts) {
+    EXPECT_TRUE(holds(answer.log, part)) << "\"" << part << "\" is not in: " << answer.log;
+  }
+  EXPECT_FALSE(holds(answer.log, "surface     made")) << answer.log;
+}
+
+TEST_F(MaskRun, NoiseIsRefusedAndMayBeAllowed) {
+  std::mt19937_64 random(3);
+  const Vec3 access(20, 20, 12), target(20, 20, 28);
+  const auto noise = [&](const Vec3& p) {
+    const bool tube = std::hypot(p.x() - 20.0, p.y() - 20.0) < 3.0 && p.z() > 8.0 && p.z() < 32.0;
+    return tube || random() % 2 == 0 ? 300 : 40;
+  };
+  expect_refused(run_volume(40, noise, access, target),
+                 {"stage segment: the mask has ", " handles in ", ": noise, expected a vessel",
+                  "raise mask.most_handles"});
+  const Answer allowed = run_between(access, target, "--to segment --set mask.most_handles=100000");
+  EXPECT_EQ(allowed.code, 0) << allowed.log;
+}
+
+TEST_F(MaskRun, ALatticeOfLabelsIsRefused) {
+  const auto lattice = [](int i, int j, int k) {
+    return (i % 12 < 4 ? 1 : 0) + (j % 12 < 4 ? 1 : 0) + (k % 12 < 4 ? 1 : 0) >= 2;
+  };
+  // 4^3 crossings and 3 * 16 * 3 ways: 144 - 64 + 1 handles.
+  const Answer answer = run_labels(40, lattice, Vec3(1, 1, 2), Vec3(37, 37, 37));
+  expect_refused(answer, {"stage segment: the mask has 81 handles in ", ": noise or veins",
+                          "choose the classes that are arteries"});
+  EXPECT_EQ(run_program(folder_.path(), "check case.json").code, 2);
+  EXPECT_EQ(
+      run_between(Vec3(1, 1, 2), Vec3(37, 37, 37), "--to surface --set mask.most_handles=81").code,
+      0);
+}
+
+TEST_F(MaskRun, LabelsInManyPiecesAreRefusedAsNoise) {
+  // Bars of 3 x 2 x 2 voxels, 6 apart: 7^3 of them.
+  const auto bars = [](int i, int j, int k) { return i % 6 < 3 && j % 6 < 2 && k % 6 < 2; };
+  expect_refused(run_labels(40, bars, Vec3(1, 1, 1), Vec3(37, 37, 37)),
+                 {"stage segment: the chosen classes lie in 343 pieces that are not connected: "
+                  "noise, expected a vessel of at most 200 pieces",
+                  "raise mask.most_handles"});
+}
+
+TEST_F(MaskRun, ABodyBesideTheAccessIsToldToLieApart) {
+  const auto body = [](const Vec3& p) { return (p - Vec3(30, 30, 30)).norm() < 22.0; };
+  expect_refused(run_labels(
+                     60, [&](int i, int j, int k) { return body(Vec3(i, j, k)); }, Vec3(4, 4, 4),
+                     Vec3(30, 30, 30)),
+                 {"access.point_mm is [4.0,4.0,4.0], 23.", "mm outside the labels"});
+  case_.erase("labels");
+  // In a volume the access is a seed, and its value told.
+  expect_refused(
+      run_volume(
+          60, [&](const Vec3& p) { return body(p) ? 300 : 40; }, Vec3(4, 4, 4), Vec3(30, 30, 30)),
+      {"seed (4.0, 4.0, 4.0) mm lies outside the band"});
+}
+
+TEST_F(MaskRun, ABodyOfTooManyFacesIsRefused) {
+  const auto body = [](const Vec3& p) { return (p - Vec3(30, 30, 30)).norm() < 22.0 ? 300 : 40; };
+  expect_refused(run_volume(60, body, Vec3(30, 30, 20), Vec3(30, 30, 40),
+                            "--to surface --set mask.most_faces=5000"),
+                 {": an organ, bone or the whole body", "of at most 5 thousand outer faces",
+                  "raise mask.most_faces"});
+}
+
+/// Tubes of radius 4 along z at these x, all y = 20.
+std::function<int(const Vec3&)> tubes_at(const std::vector<double>& at) {
+  return [at](const Vec3& p) {
+    for (const double x : at) {
+      if (std::hypot(p.x() - x, p.y() - 20.0) < 4.0) return 300;
+    }
+    return 40;
+  };
+}
+
+TEST_F(MaskRun, TargetsInAnotherPieceAreNamed) {
+  case_["targets"] = Json::array();
+  for (const double x : {10.0, 30.0}) {
+    Json target = case_["target"];
+    target["point_mm"] = {x, 20, 30};
+    target["name"] = x < 20.0 ? "near" : "far";
+    case_["targets"].push_back(target);
+  }
+  case_.erase("target");
+  case_["volume"] = {{"path", "ct.nrrd"}};
+  case_["access"]["point_mm"] = {10, 20, 6};
+  case_["segmentation"] = {{"lower_hu", 150}, {"upper_hu", 600}};
+  preprocess::Image image{.grid = {.size = {40, 40, 36}}, .values = {}};
+  for (std::size_t n = 0; n < image.grid.voxels(); ++n) {
+    const auto i = static_cast<double>(n % 40), j = static_cast<double>(n / 40 % 40);
+    image.values.push_back(static_cast<float>(tubes_at({10.0, 30.0})(Vec3(i, j, 0))));
+  }
+  preprocess::write_image(image, folder_ / "ct.nrrd");
+  write_json(case_, folder_ / "case.json");
+  expect_refused(run_program(folder_.path(), "run case.json --to surface -o out"),
+                 {"targets[1].point_mm is [30.0,20.0,30.0], in another piece of the vessel than "
+                  "access.point_mm, which comes no nearer than (13.0, 20.0, 30.0) mm"});
+}
+
+TEST_F(MaskRun, ASeedInALargerPieceDoesNotTakeTheVesselAway) {
+  // The other tube is twice as wide, and only a seed lies in it.
+  const auto tubes = [](const Vec3& p) {
+    return std::hypot(p.x() - 8.0, p.y() - 20.0) < 4.0    ? 300
+           : std::hypot(p.x() - 28.0, p.y() - 20.0) < 8.0 ? 300
+                                                          : 40;
+  };
+  case_["segmentation"] = {
+      {"lower_hu", 150}, {"upper_hu", 600}, {"seeds_mm", Json::array({{28, 20, 18}})}};
+  const Answer answer = run_volume(40, tubes, Vec3(8, 20, 6), Vec3(8, 20, 30));
+  ASSERT_EQ(answer.code, 0) << answer.log;
+  const Surface surface = preprocess::read_surface_artifact(folder_ / "out/surface.vtp");
+  EXPECT_LT(surface.vertices.row(0).maxCoeff(), 14.0);
+  EXPECT_TRUE(holds(figures_of_segment(folder_.path()),
+                    " is not connected with that of access and target"));
+}
+
+}  // namespace
+}  // namespace wireplan::pipeline
