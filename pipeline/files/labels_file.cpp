@@ -351,10 +351,14 @@ void resolve_branches(Json& file, const fs::path& folder, Problems& problems) {
   const std::size_t problems_before = problems.count();
   const LabelsInput labels = read_labels_input(root.object("labels", true), folder);
   if (problems.count() > problems_before) return;
+  Problems told_later(problems);  // the case's reader tells them of its mask
+  JsonReader mask_of(file, "", told_later);
+  const std::size_t most_pieces = read_mask_limits(mask_of, false).pieces();
   std::optional<NamedLumen> lumen;
   try {
     preprocess::LabelVolume read = preprocess::read_labels(labels.path, labels.choice);
-    lumen = NamedLumen{preprocess::merge_labels(read), std::move(read.classes)};
+    lumen = NamedLumen{preprocess::merge_labels(read, preprocess::kMostGap, most_pieces),
+                       std::move(read.classes)};
   } catch (const DiskError&) {
     throw;
   } catch (const Error& error) {

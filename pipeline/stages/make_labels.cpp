@@ -18,7 +18,6 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr double kMm3PerMl = 1000.0;
-constexpr double kMostGap = 5.0;  // between pieces that are joined                       [mm]
 constexpr double kKnownTo = 0.5;  // of a voxel: how well labels know where the wall is
 
 std::string shown_place(const Vec3& p) {
@@ -115,7 +114,7 @@ void grow_to_points(const Case& given, const preprocess::Image& image,
     if (preprocess::compute_distance(made.mask, point) <= reach_beside(labels.grid)) continue;
     if (!image.modality.empty() && image.modality != "CT") continue;  // is told to lie outside
     try {
-      const preprocess::Growth growth = preprocess::grow_to(image, point, made);
+      const preprocess::Growth growth = preprocess::grow_to(image, point, made, given.mask_limits);
       const std::string& name = labels.classes.at(growth.from).name;
       figures["grown"].push_back({{"toward", key},
                                   {"from", name},
@@ -169,7 +168,8 @@ void require_points_inside(const Case& given, const preprocess::LabelVolume& lab
   if (!problems.empty()) throw Error(problems);
 }
 
-/// Refuses a mask that is too complicated for a vessel.
+/// Refuses a mask that is too complicated for a vessel, and tells where the way leads through a
+/// touch.
 void look_at_shape(const Case& given, const preprocess::Mask& mask, Json& figures) {
   using preprocess::Voxel;
   const auto first = std::find(mask.labels.begin(), mask.labels.end(), 1);
@@ -183,6 +183,13 @@ void look_at_shape(const Case& given, const preprocess::Mask& mask, Json& figure
   const preprocess::MaskShape shape = preprocess::measure_shape(part.grid, part.labels);
   add_shape(shape, figures);
   preprocess::require_simple(shape, given.mask_limits, /*by_labels=*/true);
+  std::vector<std::size_t> ends;
+  std::vector<Vec3> points;
+  for (const auto& [key, point] : end_points(given)) {
+    ends.push_back(find_nearest(part, point).voxel);
+    points.push_back(point);
+  }
+  add_touches(given, preprocess::find_touches(part.grid, part.labels, ends, points), 0, figures);
 }
 
 /// Means of the volume inside the mask, and on both sides of its edge [HU].
@@ -217,10 +224,8 @@ LabelledLumen find_lumen(const Case& given, const preprocess::Image* image) {
                       .figures = figures_of("segment")};
   Json& figures = lumen.figures;
   if (image != nullptr) compare_with_volume(given, *image, lumen.labels, figures);
-  constexpr std::size_t kPiecesPerHandle = 4;
-  lumen.made = preprocess::merge_labels(
-      lumen.labels, kMostGap,
-      kPiecesPerHandle * static_cast<std::size_t>(std::max(1, given.mask_limits.handles)));
+  lumen.made =
+      preprocess::merge_labels(lumen.labels, preprocess::kMostGap, given.mask_limits.pieces());
   tell_labels(lumen.labels, lumen.made, figures);
   if (image != nullptr) grow_to_points(given, *image, lumen.labels, lumen.made, figures);
   require_points_inside(given, lumen.labels, lumen.made);

@@ -178,11 +178,15 @@ void make_segment(Workspace& work, const fs::path& folder) {
                 "the volume's own values");
   }
   preprocess::Segmentation segmentation = preprocess::segment(work.image(), options);
-  const preprocess::SegmentStatistics& statistics = segmentation.statistics;
+  preprocess::SegmentStatistics& statistics = segmentation.statistics;
   Json figures = figures_of("segment");
+  if (require_ends_in_one_piece(given, segmentation.mask, figures)) {
+    measure_mask(work.image(), segmentation.mask, statistics);
+    statistics.shape = measure_shape(segmentation.mask.grid, segmentation.mask.labels);
+  }
   add_segmentation(statistics, !options.lower_hu.has_value(), figures);
   add_shape(statistics.shape, figures);
-  require_ends_in_one_piece(given, segmentation.mask, figures);
+  add_touches(given, statistics.touches, statistics.dipping, figures);
   preprocess::write_mask(segmentation.mask, folder / "mask.nrrd");
   if (statistics.touches_border) {
     figures["warnings"].push_back(

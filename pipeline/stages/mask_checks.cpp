@@ -21,6 +21,29 @@ Vec3 nearest_of_piece(const preprocess::Grid& grid, const preprocess::Labels& pi
   return preprocess::center_of(grid, find_nearest({grid, piece}, point).voxel);
 }
 
+std::string touch_warning(const preprocess::Touch& touch, bool by_values, bool of_labels) {
+  const std::string place = place_in_mask(touch.place);
+  const std::string measured =
+      by_values ? "the contact has " + format("%.0f", touch.level) + " HU, both sides " +
+                      format("%.0f", touch.side) + " or more"
+                : "the contact is " + format("%.1f", touch.level) + " mm in radius, both sides " +
+                      format("%.1f", touch.side) + " or more";
+  const std::string ways = " (" + format("%.0f", touch.through_mm) + " mm through it, " +
+                           format("%.0f", touch.round_mm) + " mm round)";
+  const std::string seed = "a seed there in segmentation.seeds_mm";
+  if (touch.cut) {
+    return "segment: limbs touch at " + place + " and were parted there: " + measured + ways +
+           "; if they are open to each other, " + seed + " keeps them so";
+  }
+  return "segment: limbs touch at " + place + ", and the way leads through the touch: " + measured +
+         ways +
+         (of_labels ? "; if they only touch, part them in the labels; if the vessel is open there, "
+                      "nothing is to be done"
+                    : "; if they only touch, raise segmentation.lower_hu or neck_opening_mm; if "
+                      "the vessel is open there, " +
+                          seed + " says so");
+}
+
 }  // namespace
 
 NearestOfMask find_nearest(const preprocess::Mask& mask, const Vec3& point) {
@@ -37,7 +60,7 @@ double reach_beside(const preprocess::Grid& grid) {
   return std::max(3.0, 2.0 * std::cbrt(grid.spacing.prod()));
 }
 
-void require_ends_in_one_piece(const Case& given, preprocess::Mask& mask, Json& figures) {
+bool require_ends_in_one_piece(const Case& given, preprocess::Mask& mask, Json& figures) {
   const preprocess::Grid& grid = mask.grid;
   const double reach = reach_beside(grid);
   const auto inside = [&](std::size_t n) { return mask.labels[n] != 0; };
@@ -61,29 +84,32 @@ void require_ends_in_one_piece(const Case& given, preprocess::Mask& mask, Json& 
     } else if (piece[nearest.voxel] == 0) {
       add(key + " is " + to_json(point).dump() + ", in another piece of the vessel than " + first +
           ", which comes no nearer than " + place_in_mask(nearest_of_piece(grid, piece, point)) +
-          ", expected one piece that holds both (if the artery is open between them, lower "
-          "segmentation.lower_hu or neck_opening_mm, or draw what is missing)");
+          ", expected one piece that holds both (if the artery is open between them, " +
+          (given.labels ? "" : "lower segmentation.lower_hu or neck_opening_mm, or ") +
+          "draw what is missing)");
     }
   }
   if (!problems.empty()) throw Error(problems);
 
   // The surface is made of the largest piece.
   const std::size_t kept = preprocess::count(piece), all = preprocess::count(mask.labels);
-  if (2 * kept > all) return;
+  if (2 * kept > all) return false;
   preprocess::Labels rest = mask.labels;
   for (std::size_t n = 0; n < rest.size(); ++n) rest[n] = piece[n] != 0 ? 0 : rest[n];
   preprocess::Labels largest;
   preprocess::measure_shape(grid, rest, &largest);
   const std::size_t other = preprocess::count(largest);
-  if (other <= kept) return;
+  if (other <= kept) return false;
   const Vec3 at = nearest_of_piece(grid, largest, end_points(given).front().second);
   figures["warnings"].push_back(
       "segment: a piece of " +
       format("%.2g", static_cast<double>(other) * grid.spacing.prod() / 1000.0) + " ml at " +
       place_in_mask(at) +
-      " is not connected with that of access and target, and left out although it is the largest; "
-      "delete the seed in it, or join them");
+      " is not connected with that of access and target, and left out although it is the "
+      "largest; " +
+      (given.labels ? "draw what joins them" : "delete the seed in it, or join them"));
   mask.labels = std::move(piece);
+  return true;
 }
 
 void add_shape(const preprocess::MaskShape& shape, Json& figures) {
@@ -92,6 +118,23 @@ void add_shape(const preprocess::MaskShape& shape, Json& figures) {
                       {"outer_faces", shape.faces},
                       {"handles", shape.handles},
                       {"cavities", shape.cavities}};
+}
+
+void add_touches(const Case& given, const std::vector<preprocess::Touch>& touches,
+                 std::size_t dipping, Json& figures) {
+  figures["touches"] = Json::array();
+  for (std::size_t k = 0; k < touches.size(); ++k) {
+    const preprocess::Touch& touch = touches[k];
+    const bool by_values = k < dipping;
+    const std::string unit = by_values ? "hu" : "radius_mm";
+    figures["touches"].push_back({{"place_mm", to_json(touch.place)},
+                                  {"contact_" + unit, touch.level},
+                                  {"beside_" + unit, touch.side},
+                                  {"way_through_mm", touch.through_mm},
+                                  {"way_round_mm", touch.round_mm},
+                                  {"cut", touch.cut}});
+    figures["warnings"].push_back(touch_warning(touch, by_values, given.labels.has_value()));
+  }
 }
 
 }  // namespace wireplan::pipeline

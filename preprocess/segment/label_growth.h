@@ -1,6 +1,7 @@
 #pragma once
 /// An artery that labels lack, grown from the volume beyond them to a point in it.
 #include "preprocess/segment/label_mask.h"
+#include "preprocess/segment/mask_shape.h"
 #include "preprocess/volume/image.h"
 
 namespace wireplan::preprocess {
@@ -17,7 +18,8 @@ struct Growth {
 /// Segments the volume (segment.h) from the middle of the labels nearest to the point, with a band
 /// chosen from there and from the point, and adds of what is found the vessel round the way between
 /// them: all within 1.5 of its inscribed radius and a voxel. The image lies on the mask's grid.
-/// Throws `Error` as segment() does: no contrast, or not connected.
-Growth grow_to(const Image& image, const Vec3& point, LabelMask& labels);
+/// Throws `Error` as segment() does with these limits: no contrast, or not connected.
+Growth grow_to(const Image& image, const Vec3& point, LabelMask& labels,
+               const MaskLimits& limits = {});
 
 }  // namespace wireplan::preprocess

@@ -38,12 +38,13 @@ struct LabelMask {
 };
 
 inline constexpr std::size_t kLeastPiece = 10;
+inline constexpr double kMostGap = 5.0;  // between pieces that are joined                 [mm]
 
 /// Joins the classes to one piece: the largest, connected through voxel faces. A piece that is less
 /// than `most_gap` [mm] from it is joined by a round bridge from the middle of its end, nearest
 /// pieces first. Cavities that are closed in all directions are filled. Throws `Error` where there
 /// are more than `most_pieces` of kLeastPiece voxels: noise, and each takes time to join.
-LabelMask merge_labels(const LabelVolume& labels, double most_gap = 5.0,
+LabelMask merge_labels(const LabelVolume& labels, double most_gap = kMostGap,
                        std::size_t most_pieces = 200);
 
 /// From the point to the nearest voxel outside the mask, at most `most` [mm].

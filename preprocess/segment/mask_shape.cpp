@@ -123,7 +123,7 @@ std::string rounded(double value) {
   return number_text(std::round(value / step) * step);
 }
 
-/// "12", "51000", "5.1 million".
+/// "12", "51 thousand", "5.1 million".
 std::string count_text(double count) {
   if (count < 1000.0) return std::to_string(static_cast<int>(count));
   return count < 1e6 ? rounded(count / 1000.0) + " thousand" : rounded(count / 1e6) + " million";
@@ -184,9 +184,10 @@ MaskShape measure_shape(const Grid& grid, const Labels& labels, Labels* largest)
 
 std::string describe_shape(const MaskShape& shape) {
   constexpr double kMm3PerMl = 1000.0;
+  const double ml = shape.volume_mm3 / kMm3PerMl;
   return count_text(static_cast<double>(shape.handles)) +
-         (shape.handles == 1 ? " handle" : " handles") + " in " +
-         rounded(shape.volume_mm3 / kMm3PerMl) + " ml (" +
+         (shape.handles == 1 ? " handle (a loop or hole)" : " handles (loops or holes)") + " in " +
+         (ml < 1000.0 ? rounded(ml) : count_text(ml)) + " ml (" +
          count_text(static_cast<double>(shape.voxels)) + " voxels with " +
          count_text(static_cast<double>(shape.faces)) + " outer faces)";
 }

@@ -392,6 +392,16 @@ void smooth_boundary(Region& region) {
   }
 }
 
+/// The voxel itself where it is labelled, as almost always: the boundary was smoothed.
+std::size_t nearest_labelled(const Region& region, std::size_t voxel) {
+  std::optional<std::size_t> nearest;
+  flood(region.grid, {voxel}, [&](std::size_t n) {
+    if (!nearest && region.labels[n] != 0) nearest = n;
+    return !nearest && region.labels[voxel] == 0;
+  });
+  return region.labels[voxel] != 0 ? voxel : nearest.value_or(voxel);
+}
+
 /// An artery with plaque or a stent has a few bright neighbours; the inside of a bone, many.
 void require_no_bone(const SegmentStatistics& statistics, const Task& task) {
   if (statistics.bright_boundary <= kMostBright) {
@@ -404,25 +414,38 @@ void require_no_bone(const SegmentStatistics& statistics, const Task& task) {
               "contrast-filled artery (the volume may have none)");
 }
 
+/// Touches between the seeds and the target are cut, or told.
+void part_touches(Region& region, std::vector<std::size_t> ends, const SegmentOptions& options,
+                  const Band& band, SegmentStatistics& statistics) {
+  for (std::size_t& end : ends) end = nearest_labelled(region, end);
+  std::vector<Vec3> kept = options.seeds;
+  if (options.target) kept.push_back(*options.target);
+  statistics.touches =
+      cut_touches(region.grid, region.values, band.lower_hu, ends, kept, region.labels);
+  statistics.dipping = statistics.touches.size();
+  if (statistics.dipping > 0) {
+    statistics.search.route = find_route(region.grid, ends, region.labels);
+  }
+  constexpr double kSamePlace = 5.0;  // mm
+  for (const Touch& touch : find_touches(region.grid, region.labels, ends, kept)) {
+    const auto is_there = [&](const Touch& told) {
+      return (told.place - touch.place).norm() < kSamePlace;
+    };
+    const auto& told = statistics.touches;
+    if (std::none_of(told.begin(), told.end(), is_there)) statistics.touches.push_back(touch);
+  }
+}
+
 /// The mask on the full grid, with its statistics.
 Mask whole_mask(const Image& image, const Region& region, SegmentStatistics& statistics) {
   Mask mask{.grid = image.grid, .labels = Labels(image.grid.voxels(), 0)};
-  std::size_t n = 0, inside = 0;
-  double sum = 0.0;
+  std::size_t n = 0;
   for_each_row(image.grid, region.box, [&](std::size_t start) {
     for (int i = 0; i < region.grid.size[0]; ++i, ++n) {
-      if (region.labels[n] != 0) {
-        const std::size_t whole = start + static_cast<std::size_t>(i);
-        mask.labels[whole] = 1;
-        sum += static_cast<double>(image.values[whole]);
-        ++inside;
-        statistics.touches_border =
-            statistics.touches_border || on_border(image.grid, voxel_at(image.grid, whole));
-      }
+      mask.labels[start + static_cast<std::size_t>(i)] = region.labels[n];
     }
   });
-  statistics.volume_mm3 = static_cast<double>(inside) * image.grid.spacing.prod();
-  statistics.mean_hu = sum / static_cast<double>(inside);
+  measure_mask(image, mask, statistics);
   return mask;
 }
 
@@ -475,8 +498,24 @@ Segmentation segment(const Image& image, const SegmentOptions& options) {
   require_no_bone(statistics, task);
   statistics.shape = measure_shape(region.grid, region.labels);
   require_simple(statistics.shape, options.limits, /*by_labels=*/false);
+  part_touches(region, trusted, options, task.band, statistics);
   result.mask = whole_mask(image, region, statistics);
   return result;
+}
+
+void measure_mask(const Image& image, const Mask& mask, SegmentStatistics& statistics) {
+  std::size_t inside = 0;
+  double sum = 0.0;
+  statistics.touches_border = false;
+  for (std::size_t n = 0; n < mask.labels.size(); ++n) {
+    if (mask.labels[n] == 0) continue;
+    sum += static_cast<double>(image.values[n]);
+    ++inside;
+    statistics.touches_border =
+        statistics.touches_border || on_border(image.grid, voxel_at(image.grid, n));
+  }
+  statistics.volume_mm3 = static_cast<double>(inside) * image.grid.spacing.prod();
+  statistics.mean_hu = sum / static_cast<double>(inside);
 }
 
 bool contains(const Mask& mask, const Vec3& point) {

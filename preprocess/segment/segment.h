@@ -7,6 +7,7 @@
 #include "preprocess/segment/mask_shape.h"
 #include "preprocess/segment/segment_band.h"
 #include "preprocess/segment/segment_leak.h"
+#include "preprocess/segment/segment_touch.h"
 #include "preprocess/volume/image.h"
 
 namespace wireplan::preprocess {
@@ -37,7 +38,9 @@ struct SegmentStatistics {
   double bright_boundary = 0.0;         // share of the surface that lies against bone or calcium
   bool touches_border = false;          // of the volume: the vessel is cut there
   LeakSearch search;                    // the way from seed to target, and the leaks cut
-  MaskShape shape;                      // of the mask
+  MaskShape shape;                      // before touches are cut
+  std::vector<Touch> touches;           // by their values, then by their shape [HU, mm]
+  std::size_t dipping = 0;              // of these by their values
 };
 
 struct Segmentation {
@@ -52,12 +55,15 @@ struct Segmentation {
 ///   4. Where the band was chosen and not given, add the rim down to half of the contrast.
 ///   5. Cut leaks (segment_leak.h).
 ///   6. Fill closed cavities (calcium, noise). Calcium on the wall stays out: no wire passes there.
-///   7. Refuse what is no vessel (mask_shape.h).
+///   7. Refuse what is no vessel (mask_shape.h); cut touches on the way, or tell them.
 /// All this is done in the part of the volume that holds the vessel; the answer is that of the
 /// whole. Throws `Error` when a seed lies outside the volume, outside the band (with the HU found
 /// there) or in a vessel that step 3 removes; when there is no contrast; when the target is not
 /// connected (with the nearest point reached); and when what was found lies in a shell of bone.
 Segmentation segment(const Image& image, const SegmentOptions& options);
+
+/// Volume, mean and whether the border is touched, of a mask on the image's grid.
+void measure_mask(const Image& image, const Mask& mask, SegmentStatistics& statistics);
 
 /// True where the voxel nearest to the point [mm] is labelled; false outside the grid.
 bool contains(const Mask& mask, const Vec3& point);

@@ -21,30 +21,17 @@ struct Inside {
   std::vector<float> depth;  // 0 outside
 };
 
-Inside measure_depth(const Grid& grid, const Labels& labels) {
-  Inside inside{.grid = grid, .depth = distance_to(0, grid, labels)};
-  const auto half = static_cast<float>(0.5 * grid.spacing.minCoeff());
-  for (float& depth : inside.depth) {
-    depth = depth > 0.0F ? depth - half : 0.0F;  // from the face between two voxels
-  }
-  return inside;
+Inside measure_inside(const Grid& grid, const Labels& labels) {
+  return {.grid = grid, .depth = measure_depth(grid, labels)};
 }
 
 /// Calls visit(neighbour, step [mm]) for the up to 26 voxels round voxel n that lie inside.
 template <typename Visit>
 void for_each_inside(const Inside& inside, std::size_t n, Visit visit) {
-  const Grid& grid = inside.grid;
-  const Voxel v = voxel_at(grid, n);
-  for (int k = std::max(0, v[2] - 1); k <= std::min(grid.size[2] - 1, v[2] + 1); ++k) {
-    for (int j = std::max(0, v[1] - 1); j <= std::min(grid.size[1] - 1, v[1] + 1); ++j) {
-      for (int i = std::max(0, v[0] - 1); i <= std::min(grid.size[0] - 1, v[0] + 1); ++i) {
-        const std::size_t m = grid.index(i, j, k);
-        if (m != n && inside.depth[m] > 0.0F) {
-          visit(m, grid.spacing.cwiseProduct(Vec3(i - v[0], j - v[1], k - v[2])).norm());
-        }
-      }
-    }
-  }
+  for_each_neighbour(inside.grid, n, [&](std::size_t m, const Voxel& step) {
+    if (inside.depth[m] <= 0.0F) return;
+    visit(m, inside.grid.spacing.cwiseProduct(Vec3(step[0], step[1], step[2])).norm());
+  });
 }
 
 /// From a voxel uphill to where the depth has a maximum: a seed may lie near the wall.
@@ -61,32 +48,6 @@ std::size_t climb(const Inside& inside, std::size_t n) {
     }
     n = best;
   }
-}
-
-/// A line of neighbouring voxels without its zigzag: each point is thrice replaced by the mean of
-/// the seven round it, the ends stay.
-std::vector<Vec3> smooth_line(std::vector<Vec3> points) {
-  constexpr std::size_t kReach = 3;
-  for (int round = 0; round < 3; ++round) {
-    const std::vector<Vec3> before = points;
-    for (std::size_t n = 1; n + 1 < points.size(); ++n) {
-      const std::size_t reach = std::min({kReach, n, points.size() - 1 - n});
-      Vec3 sum = Vec3::Zero();
-      for (std::size_t m = n - reach; m <= n + reach; ++m) {
-        sum += before[m];
-      }
-      points[n] = sum / static_cast<double>(2 * reach + 1);
-    }
-  }
-  return points;
-}
-
-double length_of(const std::vector<Vec3>& points) {
-  double length = 0.0;
-  for (std::size_t n = 1; n < points.size(); ++n) {
-    length += (points[n] - points[n - 1]).norm();
-  }
-  return length;
 }
 
 /// Voxels on the ways from the first seed to the others, each as short and as far from the wall as
@@ -138,7 +99,7 @@ std::vector<std::size_t> find_ways(const Inside& inside, const std::vector<std::
     }
     std::reverse(points.begin(), points.end());
     route.points = smooth_line(std::move(points));
-    route.length_mm = length_of(route.points);
+    route.length_mm = length_of_line(route.points);
   }
   route.narrowest_radius_mm = static_cast<double>(inside.depth[narrowest]);
   route.narrowest = center_of(inside.grid, narrowest);
@@ -254,11 +215,49 @@ std::vector<Leak> describe(const Inside& inside, const std::vector<float>& value
 
 }  // namespace
 
+std::vector<float> measure_depth(const Grid& grid, const Labels& labels) {
+  std::vector<float> depth = distance_to(0, grid, labels);
+  const auto half = static_cast<float>(0.5 * grid.spacing.minCoeff());
+  for (float& d : depth) d = d > 0.0F ? d - half : 0.0F;  // from the face between two voxels
+  return depth;
+}
+
+std::vector<Vec3> smooth_line(std::vector<Vec3> points) {
+  constexpr std::size_t kReach = 3;
+  for (int round = 0; round < 3; ++round) {
+    const std::vector<Vec3> before = points;
+    for (std::size_t n = 1; n + 1 < points.size(); ++n) {
+      const std::size_t reach = std::min({kReach, n, points.size() - 1 - n});
+      Vec3 sum = Vec3::Zero();
+      for (std::size_t m = n - reach; m <= n + reach; ++m) {
+        sum += before[m];
+      }
+      points[n] = sum / static_cast<double>(2 * reach + 1);
+    }
+  }
+  return points;
+}
+
+double length_of_line(const std::vector<Vec3>& points) {
+  double length = 0.0;
+  for (std::size_t n = 1; n < points.size(); ++n) {
+    length += (points[n] - points[n - 1]).norm();
+  }
+  return length;
+}
+
+Route find_route(const Grid& grid, const std::vector<std::size_t>& seeds, const Labels& labels) {
+  expects(!seeds.empty());
+  Route route;
+  find_ways(measure_inside(grid, labels), seeds, route);
+  return route;
+}
+
 LeakSearch cut_leaks(const Grid& grid, const std::vector<float>& values, double upper,
                      const std::vector<std::size_t>& seeds, Labels& labels) {
   expects(!seeds.empty() && values.size() == labels.size());
   LeakSearch search;
-  const Inside inside = measure_depth(grid, labels);
+  const Inside inside = measure_inside(grid, labels);
   const std::vector<std::size_t> ways = find_ways(inside, seeds, search.route);
 
   // what is much wider than the way to it

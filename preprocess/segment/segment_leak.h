@@ -44,6 +44,18 @@ struct LeakSearch {
 LeakSearch cut_leaks(const Grid& grid, const std::vector<float>& values, double upper,
                      const std::vector<std::size_t>& seeds, Labels& labels);
 
+/// The ways of step 1 alone.
+Route find_route(const Grid& grid, const std::vector<std::size_t>& seeds, const Labels& labels);
+
+/// Inscribed radius of each labelled voxel, to the faces of the nearest others [mm]; 0 outside.
+std::vector<float> measure_depth(const Grid& grid, const Labels& labels);
+
+/// A line of neighbouring voxels without its zigzag: each point is thrice replaced by the mean of
+/// the seven round it, the ends stay.
+std::vector<Vec3> smooth_line(std::vector<Vec3> points);
+
+double length_of_line(const std::vector<Vec3>& points);
+
 /// Share of the boundary faces of the mask behind which, one or two voxels on, the values [HU] lie
 /// above `upper`: about 1 inside a bone's shell, small in an artery with plaque.
 double bright_boundary(const Grid& grid, const std::vector<float>& values, double upper,

@@ -1,6 +1,7 @@
 #pragma once
 /// Voxels of a grid: boxes, floods, distances, smoothing. What the steps of the segmentation share;
 /// for use in this folder.
+#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <optional>
@@ -94,6 +95,21 @@ void for_each_face_neighbour(const Grid& grid, std::size_t n, Visit visit) {
     }
     if (v[axis] + 1 < grid.size[axis]) {
       visit(n + stride[axis]);
+    }
+  }
+}
+
+/// Calls visit(neighbour, step) for the up to 26 voxels that share a face, edge or corner with
+/// voxel n; step is where the neighbour lies from it, -1 to 1 along each axis.
+template <typename Visit>
+void for_each_neighbour(const Grid& grid, std::size_t n, Visit visit) {
+  const Voxel v = voxel_at(grid, n);
+  for (int k = std::max(0, v[2] - 1); k <= std::min(grid.size[2] - 1, v[2] + 1); ++k) {
+    for (int j = std::max(0, v[1] - 1); j <= std::min(grid.size[1] - 1, v[1] + 1); ++j) {
+      for (int i = std::max(0, v[0] - 1); i <= std::min(grid.size[0] - 1, v[0] + 1); ++i) {
+        const Voxel step = {i - v[0], j - v[1], k - v[2]};
+        if (step != Voxel{0, 0, 0}) visit(grid.index(i, j, k), step);
+      }
     }
   }
 }

@@ -97,8 +97,8 @@ TEST_F(MaskRun, NoiseIsRefusedAndMayBeAllowed) {
     return tube || random() % 2 == 0 ? 300 : 40;
   };
   expect_refused(run_volume(40, noise, access, target),
-                 {"stage segment: the mask has ", " handles in ", ": noise, expected a vessel",
-                  "raise mask.most_handles"});
+                 {"stage segment: the mask has ", " handles (loops or holes) in ",
+                  ": noise, expected a vessel", "raise mask.most_handles"});
   const Answer allowed = run_between(access, target, "--to segment --set mask.most_handles=100000");
   EXPECT_EQ(allowed.code, 0) << allowed.log;
 }
@@ -109,8 +109,8 @@ TEST_F(MaskRun, ALatticeOfLabelsIsRefused) {
   };
   // 4^3 crossings and 3 * 16 * 3 ways: 144 - 64 + 1 handles.
   const Answer answer = run_labels(40, lattice, Vec3(1, 1, 2), Vec3(37, 37, 37));
-  expect_refused(answer, {"stage segment: the mask has 81 handles in ", ": noise or veins",
-                          "choose the classes that are arteries"});
+  expect_refused(answer, {"stage segment: the mask has 81 handles (loops or holes) in ",
+                          ": noise or veins", "choose the classes that are arteries"});
   EXPECT_EQ(run_program(folder_.path(), "check case.json").code, 2);
   EXPECT_EQ(
       run_between(Vec3(1, 1, 2), Vec3(37, 37, 37), "--to surface --set mask.most_handles=81").code,

@@ -121,8 +121,9 @@ TEST(MaskShape, HasTheHandlesOfItsSurface) {
 
 TEST(MaskShape, NoiseIsRefusedAsNoise) {
   const std::string text = refusal(noise(40));
-  expect_holds(text, {" handles in ", ": noise, expected a vessel, of at most 50 handles",
-                      "raise segmentation.smoothing_mm", "raise mask.most_handles"});
+  expect_holds(
+      text, {" handles (loops or holes) in ", ": noise, expected a vessel, of at most 50 handles",
+             "raise segmentation.smoothing_mm", "raise mask.most_handles"});
   expect_holds(refusal(noise(40), /*by_labels=*/true), {"choose the classes that are arteries"});
 }
 
@@ -133,7 +134,7 @@ TEST(MaskShape, HandlesFarApartMayBeVeins) {
   });
   const MaskShape shape = shape_of(mask);
   EXPECT_GT(shape.handles, 50U);
-  expect_holds(refusal(mask), {std::to_string(shape.handles) + " handles in ",
+  expect_holds(refusal(mask), {std::to_string(shape.handles) + " handles (loops or holes) in ",
                                ": noise or veins, bone and organs that touch"});
   EXPECT_EQ(refusal(mask, false, {.handles = static_cast<int>(shape.handles)}), "no error");
 }
@@ -143,7 +144,7 @@ TEST(MaskShape, ABodyIsRefusedByItsFaces) {
       60, [](int i, int j, int k) { return std::hypot(i - 30.0, j - 30.0, k - 30.0) < 28.0; });
   EXPECT_EQ(refusal(body), "no error");
   expect_holds(refusal(body, false, {.faces = 10000}),
-               {"0 handles in 92 ml", ": an organ, bone or the whole body",
+               {"0 handles (loops or holes) in 92 ml", ": an organ, bone or the whole body",
                 "of at most 10 thousand outer faces", "raise mask.most_faces"});
 }
 
