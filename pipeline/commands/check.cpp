@@ -43,8 +43,9 @@ std::vector<std::string> check_surface_file(const Case& given, Problems& problem
   const Surface& surface = repaired.surface;
   const auto expect_inside = [&](const std::string& key, const Vec3& point) {
     if (!preprocess::locate_point(surface, point).inside) {
+      const std::string of_piece = preprocess::tell_dropped(repaired.dropped, surface, point);
       problems.add(key, to_json(point).dump(), "a point inside the surface",
-                   "wrong surface.unit or surface.frame?");
+                   of_piece.empty() ? "wrong surface.unit or surface.frame?" : "it " + of_piece);
     }
   };
   for (const auto& [key, point] : end_points(given)) expect_inside(key, point);

@@ -122,13 +122,46 @@ Json write_tree(const std::vector<preprocess::Branch>& tree, const fs::path& fol
   return branches;
 }
 
-void require_inside(const Surface& surface, const std::string& key, const Vec3& point) {
+fs::path dropped_file(const fs::path& folder) { return folder / kKeptFolder / "dropped.vtp"; }
+
+/// The pieces of a given surface that were dropped, for the stage centerline: a point may lie in
+/// one of them.
+void write_dropped(const std::vector<Surface>& dropped, const fs::path& folder) {
+  if (dropped.empty()) return;
+  Surface all;
+  for (const Surface& piece : dropped) {
+    const Eigen::Index vertices = all.vertices.cols(), triangles = all.triangles.cols();
+    all.vertices.conservativeResize(3, vertices + piece.vertices.cols());
+    all.vertices.rightCols(piece.vertices.cols()) = piece.vertices;
+    all.triangles.conservativeResize(3, triangles + piece.triangles.cols());
+    all.triangles.rightCols(piece.triangles.cols()) =
+        piece.triangles.array() + static_cast<int>(vertices);
+  }
+  fs::create_directories(folder / kKeptFolder);
+  preprocess::write_surface(all, dropped_file(folder));
+}
+
+std::vector<Surface> read_dropped(const fs::path& folder) {
+  std::vector<Surface> dropped;
+  if (!fs::exists(dropped_file(folder))) return dropped;
+  for (preprocess::Piece& piece :
+       preprocess::pieces_of(preprocess::read_surface_artifact(dropped_file(folder)))) {
+    dropped.push_back(std::move(piece.surface));
+  }
+  return dropped;
+}
+
+void require_inside(const Surface& surface, const fs::path& folder, const std::string& key,
+                    const Vec3& point) {
   const preprocess::InsideAnswer answer = preprocess::locate_point(surface, point);
   if (answer.inside) return;
+  const std::string of_piece = preprocess::tell_dropped(read_dropped(folder), surface, point);
   throw Error(key + " is " + to_json(point).dump() + ", " +
               Json(std::round(answer.distance * 10.0) / 10.0).dump() +
-              " mm outside the vessel, expected a point inside it; look at surface.vtp and move " +
-              "the point, or mend the segmentation that left its place out");
+              " mm outside the vessel, expected a point inside it; " +
+              (of_piece.empty() ? "look at surface.vtp and move the point, or mend the "
+                                  "segmentation that left its place out"
+                                : "it " + of_piece));
 }
 
 }  // namespace
@@ -206,6 +239,7 @@ void make_surface(Workspace& work, const fs::path& folder) {
         work.input, given.surface_input->unit, given.surface_input->frame);
     surface = std::move(repaired.surface);
     mends = std::move(repaired.mends);
+    write_dropped(repaired.dropped, folder);
     surface = preprocess::remesh(surface, given.surface.edge_length_mm);
   } else {
     const preprocess::Mask mask =
@@ -263,8 +297,9 @@ void make_centerline(Workspace& work, const fs::path& folder) {
       preprocess::read_surface_artifact(work.artifact("surface").folder / "surface.vtp");
   const plan::Study& study = work.given().study;
   const Case& given = work.given();
-  require_inside(surface, access_key(given) + ".point_mm", study.access);
-  require_inside(surface, target_key(given) + ".point_mm", study.goal.point);
+  const fs::path& folder_of_surface = work.artifact("surface").folder;
+  require_inside(surface, folder_of_surface, access_key(given) + ".point_mm", study.access);
+  require_inside(surface, folder_of_surface, target_key(given) + ".point_mm", study.goal.point);
 
   const Centerline line =
       preprocess::find_centerline(surface, study.access, study.goal.point,

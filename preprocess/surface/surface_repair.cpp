@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <optional>
 #include <utility>
 
@@ -138,12 +139,16 @@ std::optional<Surface> unite(const Surface& vessel, const Piece& piece, const st
 /// The vessel among closed or open pieces: the largest, closed, with what overlaps it; or a piece
 /// within it that is the inner skin of its wall.
 Surface choose_piece(const std::vector<Piece>& pieces, const std::string& origin,
-                     std::vector<Mend>& mends) {
+                     std::vector<Mend>& mends, std::vector<Surface>& dropped) {
   const Surface& first = pieces.front().surface;
   const double largest = area_of(first);
   if (pieces.front().turned) mends.push_back(turned_piece(first));
   require_area(first, origin);
   Surface vessel = close_openings(first, origin, mends);
+  const auto drop = [&](const Surface& piece) {
+    mends.push_back(dropped_piece(piece));
+    dropped.push_back(piece);
+  };
   for (std::size_t k = 1; k < pieces.size(); ++k) {
     const Surface& piece = pieces[k].surface;
     const InsideAnswer there =
@@ -152,14 +157,14 @@ Surface choose_piece(const std::vector<Piece>& pieces, const std::string& origin
       if (std::optional<Surface> united = unite(vessel, pieces[k], origin, mends)) {
         vessel = std::move(*united);
       } else {
-        mends.push_back(dropped_piece(piece));
+        drop(piece);
       }
       continue;
     }
     std::vector<Mend> of_piece;
     Surface inner = largest_piece(close_openings(piece, origin, of_piece));
     if (signed_volume(inner) < kInnerSkin * std::abs(signed_volume(vessel))) {
-      mends.push_back(dropped_piece(piece));
+      drop(piece);
       continue;
     }
     mends = std::move(of_piece);  // what was mended on the outer skin does not matter
@@ -241,6 +246,29 @@ std::vector<std::string> tell_mends(const std::vector<Mend>& mends) {
   return lines;
 }
 
+std::string tell_dropped(const std::vector<Surface>& dropped, const Surface& vessel,
+                         const Vec3& point) {
+  constexpr Eigen::Index kSamples = 500;  // vertices, to see where it comes near
+  for (const Surface& piece : dropped) {
+    if (!locate_point(piece, point).inside) continue;
+    double apart = std::numeric_limits<double>::infinity();
+    Vec3 nearest = point;
+    const Eigen::Index stride = std::max<Eigen::Index>(1, piece.vertices.cols() / kSamples);
+    for (Eigen::Index v = 0; v < piece.vertices.cols(); v += stride) {
+      const InsideAnswer answer = locate_point(vessel, piece.vertices.col(v));
+      if (answer.distance >= apart) continue;
+      apart = answer.distance;
+      nearest = piece.vertices.col(v);
+    }
+    return "lies in a piece of the surface, " + number_text(length_of(piece)) +
+           " mm long, that is not joined with the vessel and was dropped: it comes within " +
+           number_text(apart) + " mm at " + place_text(nearest) +
+           " mm; join the two there in the program that made them, or delete the piece that is "
+           "not meant";
+  }
+  return "";
+}
+
 RepairedSurface read_surface(const std::filesystem::path& path, const std::string& unit,
                              const std::string& frame) {
   return repair_surface(read_triangles(path, unit, frame), path.string());
@@ -259,12 +287,12 @@ RepairedSurface repair_surface(const Surface& triangles, const std::string& orig
   RepairedSurface repaired;
   std::vector<Mend>& mends = repaired.mends;
   const Surface manifold = make_manifold(triangles, origin, mends);
-  Surface vessel = choose_piece(pieces_of(manifold), origin, mends);
+  Surface vessel = choose_piece(pieces_of(manifold), origin, mends, repaired.dropped);
 
   // A wall with two skins that hang together: the inner one, closed again.
   Surface skin = inner_skin(vessel, mends);
   if (skin.triangles.cols() < vessel.triangles.cols()) {
-    vessel = choose_piece(pieces_of(skin), origin, mends);
+    vessel = choose_piece(pieces_of(skin), origin, mends, repaired.dropped);
   }
   repaired.surface = without_intersections(vessel, mends);
   return repaired;

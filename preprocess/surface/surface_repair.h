@@ -35,7 +35,8 @@ struct Mend {
 
 struct RepairedSurface {
   Surface surface;
-  std::vector<Mend> mends;  // in the order in which they were made
+  std::vector<Mend> mends;       // in the order in which they were made
+  std::vector<Surface> dropped;  // the pieces of MendKind::kPiece, as they were: closed or open
 };
 
 /// Repairs triangles as a file holds them (equal points merged). One vessel is kept: the piece of
@@ -52,6 +53,12 @@ RepairedSurface read_surface(const std::filesystem::path& path, const std::strin
 /// The same; throws `Error` too where the result is not sound.
 RepairedSurface read_sound_surface(const std::filesystem::path& path, const std::string& unit,
                                    const std::string& frame);
+
+/// Of a point [mm] outside the vessel that lies in a dropped piece: "lies in a piece of the surface
+/// that was dropped", with its place and how far from the vessel it is, and what to do. Empty where
+/// it lies in none.
+std::string tell_dropped(const std::vector<Surface>& dropped, const Surface& vessel,
+                         const Vec3& point);
 
 /// What was mended, one sentence per kind, with numbers, sizes and places [mm] for a person.
 std::vector<std::string> tell_mends(const std::vector<Mend>& mends);

@@ -13,7 +13,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   constexpr std::array kNames = {"surface.stl", "surface.ply", "surface.obj", "surface.vtp"};
   if (size == 0) return 0;
   try {
-    const auto [surface, mends] = preprocess::read_surface(
+    const auto [surface, mends, dropped] = preprocess::read_surface(
         fuzz::folder().write(kNames[data[0] % kNames.size()], fuzz::view(data + 1, size - 1)), "mm",
         "LPS");
     preprocess::check_surface(surface);

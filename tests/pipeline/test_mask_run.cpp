@@ -182,6 +182,24 @@ TEST_F(MaskRun, TargetsInAnotherPieceAreNamed) {
                   "access.point_mm, which comes no nearer than (13.0, 20.0, 30.0) mm"});
 }
 
+TEST_F(MaskRun, ATargetInADroppedPieceOfASurfaceIsNamed) {
+  Surface beside = shapes::straight_tube(2.0, 20.0, 1.5);
+  for (auto p : beside.vertices.colwise()) p += Vec3(10, 0, 8);
+  write_stl(shapes::joined(shapes::straight_tube(4.0, 36.0, 1.5), beside), folder_ / "tube.stl");
+  case_["surface"] = {{"path", "tube.stl"}, {"unit", "mm"}, {"frame", "LPS"}};
+  case_["target"]["point_mm"] = {10, 0, 18};
+  write_json(case_, folder_ / "case.json");
+  for (const char* command : {"run case.json --to centerline -o out", "check case.json"}) {
+    const Answer answer = run_program(folder_.path(), command);
+    EXPECT_EQ(answer.code, 2) << answer.log;
+    EXPECT_TRUE(holds(answer.log, "target.point_mm") &&
+                holds(answer.log,
+                      "lies in a piece of the surface, 20 mm long, that is not joined "
+                      "with the vessel and was dropped: it comes within 4"))
+        << answer.log;
+  }
+}
+
 TEST_F(MaskRun, ASeedInALargerPieceDoesNotTakeTheVesselAway) {
   // The other tube is twice as wide, and only a seed lies in it.
   const auto tubes = [](const Vec3& p) {

@@ -252,6 +252,23 @@ TEST(SurfaceRepair, UnitesClosedPiecesThatOverlap) {
   EXPECT_TRUE(locate_point(repaired.surface, Vec3(18, 0, 30)).inside);
 }
 
+TEST(SurfaceRepair, APointInADroppedPieceIsToldWithWhereItComesNear) {
+  // A branch that ends 2 mm beside the trunk: it overlaps nothing, and is dropped.
+  const Surface trunk = shapes::straight_tube(5.0, 60.0, 1.5);
+  Surface branch = shapes::straight_tube(1.5, 20.0, 0.8);
+  for (auto p : branch.vertices.colwise()) p = Vec3(p.z() + 7.0, p.x(), p.y() + 30.0);
+  const RepairedSurface repaired = repair_surface(shapes::joined(branch, trunk), "x");
+  EXPECT_EQ(count_of(repaired, MendKind::kPiece), 1);
+  ASSERT_EQ(repaired.dropped.size(), 1U);
+  const std::string told = tell_dropped(repaired.dropped, repaired.surface, Vec3(20, 0, 30));
+  EXPECT_NE(told.find("lies in a piece of the surface, 20 mm long, that is not joined with the "
+                      "vessel and was dropped: it comes within 2"),
+            std::string::npos)
+      << told;
+  EXPECT_NE(told.find("join the two there"), std::string::npos) << told;
+  EXPECT_EQ(tell_dropped(repaired.dropped, repaired.surface, Vec3(20, 20, 30)), "");
+}
+
 TEST(SurfaceRepair, TakesTheInnerSkinOfAWallWhoseSkinsHangTogether) {
   RingTube inner = ring_tube(3.0, 30), outer = ring_tube(4.0, 30);
   Surface wall = shapes::joined(shapes::inside_out(inner.surface), outer.surface);
