@@ -394,12 +394,13 @@ void smooth_boundary(Region& region) {
 
 /// The voxel itself where it is labelled, as almost always: the boundary was smoothed.
 std::size_t nearest_labelled(const Region& region, std::size_t voxel) {
+  if (region.labels[voxel] != 0) return voxel;
   std::optional<std::size_t> nearest;
   flood(region.grid, {voxel}, [&](std::size_t n) {
     if (!nearest && region.labels[n] != 0) nearest = n;
-    return !nearest && region.labels[voxel] == 0;
+    return !nearest;
   });
-  return region.labels[voxel] != 0 ? voxel : nearest.value_or(voxel);
+  return nearest.value_or(voxel);
 }
 
 /// An artery with plaque or a stent has a few bright neighbours; the inside of a bone, many.
