@@ -16,6 +16,7 @@
 #include "pipeline/report/print.h"
 #include "pipeline/report/render.h"
 #include "pipeline/store/cache.h"
+#include "preprocess/volume/random_patient.h"
 
 namespace wireplan::pipeline {
 namespace {
@@ -157,6 +158,22 @@ int make_phantom_files(const std::string& path, const std::string& output) {
   return kDone;
 }
 
+int make_patient_files(std::uint64_t seed, const std::string& output) {
+  const preprocess::RandomPatient patient = preprocess::draw_patient(seed);
+  write_patient(patient, output);
+  std::string features;
+  for (const std::string& feature : patient.features) features += ", " + feature;
+  const preprocess::Grid& grid = patient.spec.grid;
+  std::cout << patient.anatomy << features << "\n"
+            << format("%d x %d x %d voxels of %.2f x %.2f x %.3g mm, contrast %.0f to %.0f HU",
+                      grid.size[0], grid.size[1], grid.size[2], grid.spacing[0], grid.spacing[1],
+                      grid.spacing[2], patient.access_contrast_hu, patient.target_contrast_hu)
+            << format(", noise %.0f HU\n", patient.spec.noise_hu) << "from the "
+            << patient.access.name << " to the " << patient.target.name << "\n"
+            << "case: " << (fs::path(output) / "case.json").string() << "\n";
+  return kDone;
+}
+
 }  // namespace
 
 fs::path cache_folder(const std::string& given) {
@@ -266,15 +283,29 @@ void add_phantom(CLI::App& app, int& code) {
   struct Arguments {
     std::string path;
     std::string output;
+    std::uint64_t seed = 0;
   };
   const auto arguments = std::make_shared<Arguments>();
   CLI::App* phantom =
       app.add_subcommand("phantom", "A CT volume from an anatomical description, with its truth");
-  phantom->add_option("SPEC", arguments->path, "Description")->required();
+  CLI::Option* spec = phantom->add_option("SPEC", arguments->path, "Description");
+  CLI::Option* random =
+      phantom
+          ->add_option("--random", arguments->seed, "A patient drawn from this seed, in its place")
+          ->check(CLI::Range(0, 2147483647));
   phantom->add_option("-o,--output", arguments->output, "Folder for volume and truth")->required();
-  phantom->footer("Example: wireplan phantom cases/abdomen/phantom.json -o cases/abdomen/data");
-  phantom->callback(
-      [&code, arguments] { code = make_phantom_files(arguments->path, arguments->output); });
+  phantom->footer(
+      "A patient drawn at random has an abdomen or an arch with some of aneurysm and thrombus,\n"
+      "stenosis, calcium, stents, limbs that kiss, veins and organs with contrast, a breath and\n"
+      "thick slices, and a case.json that runs: wireplan phantom --random 7 -o patient-7\n"
+      "Example: wireplan phantom cases/abdomen/phantom.json -o cases/abdomen/data");
+  phantom->callback([&code, arguments, spec, random] {
+    if ((spec->count() > 0) == (random->count() > 0)) {
+      throw CLI::RequiredError("either SPEC or --random SEED");
+    }
+    code = random->count() > 0 ? make_patient_files(arguments->seed, arguments->output)
+                               : make_phantom_files(arguments->path, arguments->output);
+  });
 }
 
 void add_render(CLI::App& app, int& code) {

@@ -19,6 +19,7 @@ using preprocess::Phantom;
 using preprocess::PhantomCalcium;
 using preprocess::PhantomEllipsoid;
 using preprocess::PhantomSpec;
+using preprocess::PhantomStent;
 using preprocess::PhantomTube;
 using preprocess::PhantomTubeKind;
 using preprocess::PhantomVertebra;
@@ -140,8 +141,10 @@ std::string read_tube_name(JsonReader& reader, const std::vector<PhantomTube>& o
 }
 
 PhantomTubeKind read_tube_kind(JsonReader& reader) {
-  const std::string kind = reader.choice("kind", std::nullopt, {"artery", "vein", "tissue"});
+  const std::string kind =
+      reader.choice("kind", std::nullopt, {"artery", "vein", "thrombus", "tissue"});
   if (kind == "vein") return PhantomTubeKind::kVein;
+  if (kind == "thrombus") return PhantomTubeKind::kThrombus;
   return kind == "tissue" ? PhantomTubeKind::kTissue : PhantomTubeKind::kArtery;
 }
 
@@ -150,7 +153,8 @@ PhantomTube read_tube(JsonReader reader, const std::vector<PhantomTube>& others)
   Problems& problems = reader.problems();
   tube.name = read_tube_name(reader, others);
   tube.kind = read_tube_kind(reader);
-  tube.hu = reader.number("hu", std::nullopt, kHu);
+  const bool hu_varies = reader.raw("hu").is_array();
+  if (!hu_varies) tube.hu = reader.number("hu", std::nullopt, kHu);
   tube.wall_mm = reader.number("wall_mm", tube.wall_mm, kMm);
 
   // Control points, of which two neighbours may not coincide.
@@ -178,8 +182,28 @@ PhantomTube read_tube(JsonReader reader, const std::vector<PhantomTube>& others)
                  "one radius for each of the " + std::to_string(given) + " points");
   }
   tube.radius = Eigen::VectorXd::Map(radius.data(), radius.size());
+
+  // One value, or one for each.
+  if (hu_varies) {
+    const std::vector<double> hu = reader.numbers("hu", std::nullopt, kHu);
+    if (reader.has("points_mm") && reader.raw("hu").size() != given) {
+      problems.add(reader.path_of("hu"), "a list of " + std::to_string(reader.raw("hu").size()),
+                   "a number, or one for each of the " + std::to_string(given) + " points");
+    }
+    tube.hu_along = Eigen::VectorXd::Map(hu.data(), hu.size());
+  }
   reader.finish();
   return tube;
+}
+
+/// The tube that the key "tube" names; null after a problem, which is told.
+const PhantomTube* find_tube(JsonReader& reader, const std::string& name,
+                             const std::vector<PhantomTube>& tubes) {
+  const auto tube = std::find_if(tubes.begin(), tubes.end(),
+                                 [&](const PhantomTube& one) { return one.name == name; });
+  if (tube != tubes.end()) return &*tube;
+  reader.problems().add(reader.path_of("tube"), Json(name).dump(), "the name of a tube");
+  return nullptr;
 }
 
 PhantomCalcium read_calcium(JsonReader reader, const std::vector<PhantomTube>& tubes) {
@@ -191,18 +215,42 @@ PhantomCalcium read_calcium(JsonReader reader, const std::vector<PhantomTube>& t
   calcium.width_deg = reader.number("width_deg", calcium.width_deg, {.min = 1.0, .max = 360.0});
   calcium.thickness_mm = reader.number("thickness_mm", calcium.thickness_mm, kPositiveMm);
   calcium.hu = reader.number("hu", calcium.hu, kHu);
-  const auto tube = std::find_if(tubes.begin(), tubes.end(), [&](const PhantomTube& candidate) {
-    return candidate.name == calcium.tube;
-  });
-  if (tube == tubes.end()) {
-    reader.problems().add(reader.path_of("tube"), Json(calcium.tube).dump(), "the name of a tube");
-  } else if (tube->radius.size() > 0 && calcium.thickness_mm >= 0.5 * tube->radius.minCoeff()) {
+  const PhantomTube* tube = find_tube(reader, calcium.tube, tubes);
+  if (tube && tube->radius.size() > 0 && calcium.thickness_mm >= 0.5 * tube->radius.minCoeff()) {
     reader.problems().add(reader.path_of("thickness_mm"), Json(calcium.thickness_mm).dump(),
                           "below half the smallest radius of the tube, " +
                               Json(0.5 * tube->radius.minCoeff()).dump());
   }
   reader.finish();
   return calcium;
+}
+
+PhantomStent read_stent(JsonReader reader, const std::vector<PhantomTube>& tubes) {
+  PhantomStent stent;
+  stent.tube = reader.text("tube", std::nullopt);
+  stent.from = reader.number("from", std::nullopt, {.min = 0.0, .max = 1.0});
+  stent.to = reader.number("to", std::nullopt, {.min = 0.0, .max = 1.0});
+  stent.strut_mm = reader.number("strut_mm", stent.strut_mm, kPositiveMm);
+  stent.pitch_mm = reader.number("pitch_mm", stent.pitch_mm, {.min = 0.1, .max = 1000.0});
+  stent.amplitude_mm = reader.number("amplitude_mm", stent.amplitude_mm, kMm);
+  stent.crowns = reader.integer("crowns", stent.crowns, 1, 100);
+  stent.hu = reader.number("hu", stent.hu, kHu);
+  if (stent.to <= stent.from) {
+    reader.problems().add(reader.path_of("to"), Json(stent.to).dump(),
+                          "more than from, " + Json(stent.from).dump());
+  }
+  find_tube(reader, stent.tube, tubes);
+  reader.finish();
+  return stent;
+}
+
+preprocess::PhantomBreath read_breath(JsonReader reader) {
+  preprocess::PhantomBreath breath;
+  breath.above_z_mm = reader.number("above_z_mm", std::nullopt, {.min = -1e5, .max = 1e5});
+  breath.shift_mm =
+      read_three(reader, "shift_mm", {.min = -100.0, .max = 100.0}, Vec3(Vec3::Zero()));
+  reader.finish();
+  return breath;
 }
 
 /// A folder that is gone, with all that is left in it, when the work in it ends.
@@ -235,7 +283,7 @@ Json centerlines_to_json(const Phantom& phantom) {
   return {{"schema", "wireplan.phantom-truth/1"}, {"frame", "LPS"}, {"arteries", arteries}};
 }
 
-void write_files(const Phantom& phantom, const fs::path& folder) {
+void write_files(const Phantom& phantom, const Json* case_file, const fs::path& folder) {
   const TemporaryFolder part(folder / (".part-" + std::to_string(::getpid())));
   fs::create_directories(folder / "truth");
   const auto commit = [&](const fs::path& file, const auto& write) {
@@ -253,6 +301,9 @@ void write_files(const Phantom& phantom, const fs::path& folder) {
          [&](const fs::path& beside) { write_json(centerlines_to_json(phantom), beside); });
   commit("truth/lumen.nrrd",
          [&](const fs::path& beside) { preprocess::write_mask(phantom.lumen, beside); });
+  if (case_file) {
+    commit("case.json", [&](const fs::path& beside) { write_json(*case_file, beside); });
+  }
   commit("ct.nrrd",
          [&](const fs::path& beside) { preprocess::write_image(phantom.image, beside); });
 }
@@ -279,8 +330,14 @@ PhantomSpec read_phantom_spec(const fs::path& path) {
   for (const JsonReader& calcium : reader.objects("calcium", false)) {
     spec.calcium.push_back(read_calcium(calcium, spec.tubes));
   }
+  for (const JsonReader& stent : reader.objects("stents", false)) {
+    spec.stents.push_back(read_stent(stent, spec.tubes));
+  }
+  if (reader.has("breath")) spec.breath = read_breath(reader.object("breath", true));
   spec.blur_mm = reader.number("blur_mm", spec.blur_mm, {.min = 0.0, .max = 20.0});
   spec.noise_hu = reader.number("noise_hu", spec.noise_hu, {.min = 0.0, .max = 1000.0});
+  spec.noise_texture_mm =
+      reader.number("noise_texture_mm", spec.noise_texture_mm, {.min = 0.0, .max = 5.0});
   spec.seed = static_cast<std::uint64_t>(reader.integer("seed", 1, 0, 2147483647));
   spec.supersampling = reader.integer("supersampling", spec.supersampling, 1, 16);
   reader.finish();
@@ -288,18 +345,36 @@ PhantomSpec read_phantom_spec(const fs::path& path) {
   return spec;
 }
 
-void write_phantom(const Phantom& phantom, const fs::path& folder) {
+namespace {
+
+void write_checked(const Phantom& phantom, const Json* case_file, const fs::path& folder) {
   if (!preprocess::reads_volumes()) {
     throw Error(folder.string() +
                 ": no volume can be written by this build of wireplan, which has no images (build "
                 "it with -DWIREPLAN_IMAGING=ON)");
   }
   try {
-    write_files(phantom, folder);
+    write_files(phantom, case_file, folder);
   } catch (const fs::filesystem_error& error) {
     throw DiskError(folder.string() + ": cannot be written: " + error.code().message() +
                     " (check its permissions and the free space)");
   }
+}
+
+}  // namespace
+
+void write_phantom(const Phantom& phantom, const fs::path& folder) {
+  write_checked(phantom, nullptr, folder);
+}
+
+void write_patient(const preprocess::RandomPatient& patient, const fs::path& folder) {
+  const Json case_file = {{"schema", "wireplan.case/1"},
+                          {"name", "random-" + std::to_string(patient.spec.seed)},
+                          {"volume", {{"path", "ct.nrrd"}}},
+                          {"access", {{"point_mm", to_json(patient.access.point)}}},
+                          {"target", {{"point_mm", to_json(patient.target.point)}}},
+                          {"wires", {"glidewire-angled", "amplatz-stiff", "amplatz-stiff-angled"}}};
+  write_checked(make_phantom(patient.spec), &case_file, folder);
 }
 
 }  // namespace wireplan::pipeline

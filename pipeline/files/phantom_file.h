@@ -3,6 +3,7 @@
 #include <filesystem>
 
 #include "preprocess/volume/phantom.h"
+#include "preprocess/volume/random_patient.h"
 
 namespace wireplan::pipeline {
 
@@ -19,5 +20,9 @@ preprocess::PhantomSpec read_phantom_spec(const std::filesystem::path& path);
 /// it stands the truth is complete. An artery with no part in the volume has no axis file. Throws
 /// Error where the disk refuses, or in a build without images.
 void write_phantom(const preprocess::Phantom& phantom, const std::filesystem::path& folder);
+
+/// The same of a patient drawn at random, with a case.json for it, which runs as it stands: the
+/// band is left to the program.
+void write_patient(const preprocess::RandomPatient& patient, const std::filesystem::path& folder);
 
 }  // namespace wireplan::pipeline

@@ -4,175 +4,23 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <optional>
 #include <variant>
 
 #include "preprocess/volume/phantom_noise.h"
+#include "preprocess/volume/phantom_shapes.h"
 
 namespace wireplan::preprocess {
 namespace {
 
-// ---- Shapes -------------------------------------------------------------------------------------
-// Each shape has a clearance: negative inside, zero on its surface, and never changing faster than
-// the point moves. So |clearance| > r at the middle of a ball of radius r proves that no surface of
-// the shape crosses that ball, which is what makes painting fast.
-
-/// Ellipsoid, or elliptic cylinder along its third axis (`half_height` finite or infinite).
-struct Ellipse {
-  Vec3 center = Vec3::Zero();
-  Mat3 to_unit = Mat3::Identity();  // maps the ellipsoid to the unit ball, the cylinder to r < 1
-  double min_axis = 1.0;
-  Vec3 along = Vec3::UnitZ();  // direction of the cylinder
-  double half_height = std::numeric_limits<double>::infinity();
-};
-
-double clearance(const Ellipse& e, const Vec3& p) {
-  const Vec3 d = p - e.center;
-  return std::max(((e.to_unit * d).norm() - 1.0) * e.min_axis,
-                  std::abs(d.dot(e.along)) - e.half_height);
-}
-
-/// A piece of a tube: all balls with centre on a segment and linearly changing radius.
-struct Segment {
-  Vec3 a = Vec3::Zero(), ab = Vec3::Zero();
-  double inverse_squared_length = 0.0;
-  double radius_a = 0.0, radius_ab = 0.0;  // radius at a, and its change from a to b
-  double arc_a = 0.0, length = 0.0;
-};
-
-struct Tube {
-  std::vector<Segment> segments;
-  double inverse_slope = 1.0;  // 1/sqrt(1 + (dr/ds)^2), largest slope: bounds the clearance's
-};
-
-/// The point of a tube nearest to another, and how far it lies inside.
-struct Foot {
-  const Segment* segment = nullptr;
-  double t = 0.0;      // along the segment, 0 to 1
-  double depth = 0.0;  // below the tube's surface; negative outside                    [mm]
-};
-
-Foot find_foot(const Segment& s, const Vec3& p) {
-  const double t = std::clamp((p - s.a).dot(s.ab) * s.inverse_squared_length, 0.0, 1.0);
-  return {&s, t, s.radius_a + t * s.radius_ab - (p - s.a - t * s.ab).norm()};
-}
-
-Foot find_foot(const Tube& tube, const Vec3& p) {
-  Foot deepest{nullptr, 0.0, -std::numeric_limits<double>::infinity()};
-  for (const Segment& s : tube.segments) {
-    const Foot foot = find_foot(s, p);
-    if (foot.depth > deepest.depth) deepest = foot;
-  }
-  return deepest;
-}
-
-double clearance(const Tube& tube, const Vec3& p) {
-  return -find_foot(tube, p).depth * tube.inverse_slope;
-}
-
-/// Unit vector normal to `tangent` from which angles round a tube are counted.
-Vec3 reference_direction(const Vec3& tangent) {
-  const Vec3 anterior = -Vec3::UnitY() + tangent.y() * tangent;
-  if (anterior.norm() > 1e-3) return anterior.normalized();
-  return (Vec3::UnitZ() - tangent.z() * tangent).normalized();
-}
-
-/// The part of a tube less deep than a thickness that falls from the middle to the rim.
-struct Plaque {
-  Tube tube;  // the stretch on which it lies
-  double arc = 0.0, half_length = 0.0;
-  double angle = 0.0, half_width = 0.0;  //                                             [rad]
-  double thickness = 0.0;
-  double inverse_slope = 1.0;
-};
-
-double clearance(const Plaque& plaque, const Vec3& p) {
-  const Foot foot = find_foot(plaque.tube, p);
-  if (foot.depth < 0.0) return -foot.depth * plaque.inverse_slope;
-  // Where p lies along and round the tube, measured from the plaque's middle to its rim.
-  const Segment& s = *foot.segment;
-  const Vec3 tangent = s.ab.normalized(), anterior = reference_direction(tangent);
-  const Vec3 outward = p - s.a - foot.t * s.ab;
-  const double angle =
-      std::atan2(outward.dot(tangent.cross(anterior)), outward.dot(anterior)) - plaque.angle;
-  const double along = (s.arc_a + foot.t * s.length - plaque.arc) / plaque.half_length;
-  const double around = std::remainder(angle, 2.0 * kPi) / plaque.half_width;
-  // A parabola, cut off beyond the rim so that its slope stays bounded.
-  const double thickness = plaque.thickness * std::max(1.0 - along * along - around * around, -1.0);
-  return (foot.depth - thickness) * plaque.inverse_slope;
-}
-
 struct Layer {
-  std::variant<Ellipse, Tube, Plaque> shape;
+  std::variant<EllipseShape, TubeShape, PlaqueShape, StentShape> shape;
   double hu = 0.0;
-  bool lumen = false;  // of an artery
+  bool lumen = false;   // of an artery
+  bool varies = false;  // a tube whose HU change along it, in place of `hu`
 };
 
 double clearance(const Layer& layer, const Vec3& p) {
   return std::visit([&](const auto& shape) { return clearance(shape, p); }, layer.shape);
-}
-
-// ---- From the description to layers -------------------------------------------------------------
-
-Ellipse make_ellipsoid(const Vec3& center, const Vec3& semi_axes, const Mat3& rotation) {
-  expects((semi_axes.array() > 0.0).all());
-  return {.center = center,
-          .to_unit = semi_axes.cwiseInverse().asDiagonal() * rotation.transpose(),
-          .min_axis = semi_axes.minCoeff()};
-}
-
-Ellipse make_cylinder(const Vec3& center, const Vec3& semi_axes) {
-  expects((semi_axes.array() > 0.0).all());
-  return {.center = center,
-          .to_unit = Vec3(1.0 / semi_axes.x(), 1.0 / semi_axes.y(), 0.0).asDiagonal(),
-          .min_axis = semi_axes.head<2>().minCoeff(),
-          .half_height = semi_axes.z()};
-}
-
-/// A tube round the axis, `margin` wider than it.
-Tube make_tube(const Centerline& axis, double margin) {
-  Tube tube;
-  double steepest = 0.0;
-  for (Eigen::Index i = 0; i + 1 < axis.points.cols(); ++i) {
-    const Vec3 a = axis.points.col(i), ab = axis.points.col(i + 1) - a;
-    const double change = axis.radius(i + 1) - axis.radius(i);
-    tube.segments.push_back({.a = a,
-                             .ab = ab,
-                             .inverse_squared_length = 1.0 / ab.squaredNorm(),
-                             .radius_a = axis.radius(i) + margin,
-                             .radius_ab = change,
-                             .arc_a = axis.arc_length(i),
-                             .length = ab.norm()});
-    steepest = std::max(steepest, std::abs(change) / ab.norm());
-  }
-  tube.inverse_slope = 1.0 / std::sqrt(1.0 + steepest * steepest);
-  return tube;
-}
-
-Plaque make_plaque(const PhantomCalcium& calcium, const Centerline& axis) {
-  const Tube whole = make_tube(axis, 0.0);
-  const double end = axis.arc_length(axis.arc_length.size() - 1);
-  Plaque plaque{.tube = {},
-                .arc = calcium.at * end,
-                .half_length = 0.5 * calcium.length_mm,
-                .angle = calcium.angle_deg * kRadPerDeg,
-                .half_width = 0.5 * calcium.width_deg * kRadPerDeg,
-                .thickness = calcium.thickness_mm};
-  // The stretch reaches past both rims, so that no point of the plaque has its foot at an end.
-  double radius = std::numeric_limits<double>::infinity();
-  for (const Segment& s : whole.segments) {
-    if (std::abs(s.arc_a - plaque.arc) > plaque.half_length + 2.0) continue;
-    plaque.tube.segments.push_back(s);
-    radius = std::min(radius, s.radius_a);
-  }
-  expects(plaque.half_length > 0.0 && plaque.half_width > 0.0);
-  expects(plaque.thickness > 0.0 && plaque.thickness < 0.5 * radius);
-  // Largest slopes of the parabola, along and round the tube, down to its cut-off.
-  const double steepness = 2.0 * std::numbers::sqrt2 * plaque.thickness;
-  const double along = steepness / plaque.half_length;
-  const double around = steepness / (plaque.half_width * (radius - plaque.thickness));
-  plaque.inverse_slope = whole.inverse_slope / std::sqrt(1.0 + along * along + around * around);
-  return plaque;
 }
 
 void add_body(const PhantomSpec& spec, std::vector<Layer>& layers) {
@@ -227,21 +75,11 @@ void add_tubes(const PhantomSpec& spec, PhantomTubeKind kind, std::vector<Layer>
   std::vector<Layer> lumens;
   for (const PhantomTube& tube : spec.tubes) {
     if (tube.kind != kind) continue;
-    const Centerline axis = phantom_axis(tube);
-    if (tube.wall_mm > 0.0) layers.push_back({make_tube(axis, tube.wall_mm), spec.tissue_hu});
-    lumens.push_back({make_tube(axis, 0.0), tube.hu, kind == PhantomTubeKind::kArtery});
+    if (tube.wall_mm > 0.0) layers.push_back({make_tube(tube, tube.wall_mm), spec.tissue_hu});
+    lumens.push_back({make_tube(tube, 0.0), tube.hu, kind == PhantomTubeKind::kArtery,
+                      tube.hu_along.size() > 0});
   }
   layers.insert(layers.end(), lumens.begin(), lumens.end());
-}
-
-void add_calcium(const PhantomSpec& spec, std::vector<Layer>& layers) {
-  for (const PhantomCalcium& calcium : spec.calcium) {
-    const auto tube =
-        std::find_if(spec.tubes.begin(), spec.tubes.end(),
-                     [&](const PhantomTube& candidate) { return candidate.name == calcium.tube; });
-    expects(tube != spec.tubes.end());
-    layers.push_back({make_plaque(calcium, phantom_axis(*tube)), calcium.hu});
-  }
 }
 
 /// From below to above.
@@ -252,8 +90,14 @@ std::vector<Layer> build_layers(const PhantomSpec& spec) {
   add_tubes(spec, PhantomTubeKind::kTissue, layers);
   for (const PhantomVertebra& v : spec.vertebrae) add_vertebra(v, spec.tissue_hu, layers);
   add_tubes(spec, PhantomTubeKind::kVein, layers);
+  add_tubes(spec, PhantomTubeKind::kThrombus, layers);
   add_tubes(spec, PhantomTubeKind::kArtery, layers);
-  add_calcium(spec, layers);
+  for (const PhantomCalcium& calcium : spec.calcium) {
+    layers.push_back({make_plaque(calcium, tube_named(spec, calcium.tube)), calcium.hu});
+  }
+  for (const PhantomStent& stent : spec.stents) {
+    layers.push_back({make_stent(stent, tube_named(spec, stent.tube)), stent.hu});
+  }
   return layers;
 }
 
@@ -261,13 +105,13 @@ std::vector<Layer> build_layers(const PhantomSpec& spec) {
 
 /// The layer without what cannot touch the ball: of a tube, the far segments.
 Layer restrict_to_ball(const Layer& layer, const Vec3& center, double radius) {
-  const Tube* tube = std::get_if<Tube>(&layer.shape);
+  const TubeShape* tube = std::get_if<TubeShape>(&layer.shape);
   if (!tube) return layer;
-  Tube near{.segments = {}, .inverse_slope = tube->inverse_slope};
-  for (const Segment& s : tube->segments) {
+  TubeShape near{.segments = {}, .inverse_slope = tube->inverse_slope};
+  for (const TubeSegment& s : tube->segments) {
     if (-find_foot(s, center).depth * tube->inverse_slope <= radius) near.segments.push_back(s);
   }
-  return {std::move(near), layer.hu, layer.lumen};
+  return {std::move(near), layer.hu, layer.lumen, layer.varies};
 }
 
 /// The layers that can be seen within the ball, from below to above.
@@ -304,8 +148,9 @@ bool is_uniform(const std::vector<Layer>& layers, const Vec3& center, double rad
 
 class Painter {
  public:
-  Painter(const PhantomSpec& spec, Phantom& phantom)
-      : spec_(spec), grid_(spec.grid), phantom_(phantom) {}
+  /// `places` is the spec's grid, moved against what is painted.
+  Painter(const PhantomSpec& spec, const Grid& places, Phantom& phantom)
+      : spec_(spec), grid_(places), phantom_(phantom) {}
 
   /// Paints the voxels from `low` to before `high`, halving the box until it shows one thing alone
   /// or is small.
@@ -331,8 +176,10 @@ class Painter {
     for (int k = low(2); k < high(2); ++k) {
       for (int j = low(1); j < high(1); ++j) {
         const std::size_t row = grid_.index(low(0), j, k);
-        std::fill_n(phantom_.image.values.begin() + row, high(0) - low(0),
-                    static_cast<float>(hu_of(top)));
+        float* values = phantom_.image.values.data() + row;
+        for (int i = low(0); i < high(0); ++i) {
+          *values++ = static_cast<float>(hu_of(top, i, j, k));
+        }
         std::fill_n(phantom_.lumen.labels.begin() + row, high(0) - low(0), label_of(top));
       }
     }
@@ -348,8 +195,9 @@ class Painter {
           const Layer* top = find_top(layers, center);
           const bool uniform = is_uniform(layers, center, reach);
           const std::size_t voxel = grid_.index(i, j, k);
-          phantom_.image.values[voxel] =
-              static_cast<float>(uniform ? hu_of(top) : average(layers, i, j, k));
+          phantom_.image.values[voxel] = static_cast<float>(
+              uniform ? hu_of(top, i, j, k)
+                      : average(restrict_to_ball(layers, center, reach), i, j, k));
           phantom_.lumen.labels[voxel] = label_of(top);
         }
       }
@@ -357,7 +205,11 @@ class Painter {
   }
 
   static std::uint8_t label_of(const Layer* layer) { return layer && layer->lumen ? 1 : 0; }
-  double hu_of(const Layer* layer) const { return layer ? layer->hu : spec_.air_hu; }
+  double hu_of(const Layer* layer, double i, double j, double k) const {
+    if (!layer) return spec_.air_hu;
+    if (!layer->varies) return layer->hu;
+    return hu_at(std::get<TubeShape>(layer->shape), grid_.lps_from_ijk(Vec3(i, j, k)));
+  }
 
   /// Mean over a voxel, from the middles of its parts.
   double average(const std::vector<Layer>& layers, int i, int j, int k) const {
@@ -368,7 +220,8 @@ class Painter {
       for (int b = 0; b < n; ++b) {
         for (int a = 0; a < n; ++a) {
           const Vec3 ijk(part(i, a), part(j, b), part(k, c));
-          sum += hu_of(find_top(layers, grid_.lps_from_ijk(ijk)));
+          const Layer* top = find_top(layers, grid_.lps_from_ijk(ijk));
+          sum += hu_of(top, ijk.x(), ijk.y(), ijk.z());
         }
       }
     }
@@ -380,16 +233,38 @@ class Painter {
   Phantom& phantom_;
 };
 
+/// Whether a breath has moved what lies at this height.
+bool is_moved(const PhantomSpec& spec, double z) {
+  return spec.breath && z > spec.breath->above_z_mm;
+}
+
+/// Slices that are painted at once: a breath lies between two of them, not within one.
+std::vector<int> slab_limits(const PhantomSpec& spec) {
+  constexpr int kSlab = 8;  // slices
+  const auto moved = [&](int k) {
+    return is_moved(spec, spec.grid.lps_from_ijk(Vec3(0, 0, k)).z());
+  };
+  std::vector<int> limits;
+  for (int k = 0; k < spec.grid.size[2]; ++k) {
+    if (k % kSlab == 0 || moved(k) != moved(k - 1)) limits.push_back(k);
+  }
+  limits.push_back(spec.grid.size[2]);
+  return limits;
+}
+
 void paint_layers(const PhantomSpec& spec, Phantom& phantom) {
   const std::vector<Layer> layers = build_layers(spec);
   const auto& size = spec.grid.size;
-  constexpr int kSlab = 8;  // slices
-  const int slabs = (size[2] + kSlab - 1) / kSlab;
+  const std::vector<int> limits = slab_limits(spec);
+  const int slabs = static_cast<int>(limits.size()) - 1;
 #pragma omp parallel for schedule(dynamic)
   for (int slab = 0; slab < slabs; ++slab) {
-    Painter(spec, phantom)
-        .paint({0, 0, kSlab * slab}, {size[0], size[1], std::min(kSlab * (slab + 1), size[2])},
-               layers);
+    const int begin = limits[slab], end = limits[slab + 1];
+    Grid places = spec.grid;
+    if (is_moved(spec, spec.grid.lps_from_ijk(Vec3(0, 0, begin)).z())) {
+      places.origin -= spec.breath->shift_mm;
+    }
+    Painter(spec, places, phantom).paint({0, 0, begin}, {size[0], size[1], end}, layers);
   }
 }
 
@@ -418,86 +293,57 @@ Centerline clip_to_volume(const Centerline& line, const Grid& grid) {
   return part;
 }
 
-/// A point between b and c, at u from 0 to 1, of the centripetal Catmull-Rom curve through a, b, c
-/// and d, by the pyramid of Barry and Goldman (SIGGRAPH 1988).
-Vec3 catmull_rom(const Vec3& a, const Vec3& b, const Vec3& c, const Vec3& d, double u) {
-  const double t_b = std::sqrt((b - a).norm());
-  const double t_c = t_b + std::sqrt((c - b).norm());
-  const double t_d = t_c + std::sqrt((d - c).norm());
-  const double t = t_b + u * (t_c - t_b);
-  const auto mixed = [t](const Vec3& p, const Vec3& q, double t_p, double t_q) -> Vec3 {
-    return ((t_q - t) * p + (t - t_p) * q) / (t_q - t_p);
-  };
-  const Vec3 ab = mixed(a, b, 0.0, t_b), bc = mixed(b, c, t_b, t_c), cd = mixed(c, d, t_c, t_d);
-  const Vec3 abc = mixed(ab, bc, 0.0, t_c), bcd = mixed(bc, cd, t_b, t_d);
-  return mixed(abc, bcd, t_b, t_c);
-}
-
-/// The same line with its points evenly spaced, at most `spacing` apart.
-Centerline resample(const Centerline& line, double spacing) {
-  const Eigen::Index last = line.points.cols() - 1;
-  const double length = line.arc_length(last);
-  const auto pieces = static_cast<Eigen::Index>(std::ceil(length / spacing));
-  Centerline even{Eigen::Matrix3Xd(3, pieces + 1), Eigen::VectorXd(pieces + 1),
-                  Eigen::VectorXd::LinSpaced(pieces + 1, 0.0, length)};
-  Eigen::Index i = 0;
-  for (Eigen::Index k = 0; k <= pieces; ++k) {
-    while (i + 2 <= last && line.arc_length(i + 1) < even.arc_length(k)) ++i;
-    const double t =
-        (even.arc_length(k) - line.arc_length(i)) / (line.arc_length(i + 1) - line.arc_length(i));
-    even.points.col(k) = (1.0 - t) * line.points.col(i) + t * line.points.col(i + 1);
-    even.radius(k) = (1.0 - t) * line.radius(i) + t * line.radius(i + 1);
+/// The line as the volume shows it.
+Centerline move_line(const PhantomSpec& spec, Centerline line) {
+  if (!spec.breath) return line;
+  for (Eigen::Index i = 0; i < line.points.cols(); ++i) {
+    line.points.col(i) = moved_by_breath(spec, line.points.col(i));
+    if (i == 0) continue;
+    line.arc_length(i) =
+        line.arc_length(i - 1) + (line.points.col(i) - line.points.col(i - 1)).norm();
   }
-  return even;
+  return line;
 }
 
 }  // namespace
+
+const PhantomTube& tube_named(const PhantomSpec& spec, const std::string& name) {
+  const auto tube = std::find_if(spec.tubes.begin(), spec.tubes.end(),
+                                 [&](const PhantomTube& one) { return one.name == name; });
+  expects(tube != spec.tubes.end());
+  return *tube;
+}
+
+Vec3 moved_by_breath(const PhantomSpec& spec, const Vec3& point) {
+  return is_moved(spec, point.z()) ? Vec3(point + spec.breath->shift_mm) : point;
+}
 
 double thinnest_part(const PhantomVertebra& vertebra) {
   const Vec3& body = vertebra.semi_axes;
   return std::min({0.18 * body.x(), body.y(), 0.4 * body.z()});
 }
 
-Centerline phantom_axis(const PhantomTube& tube) {
-  const Eigen::Index controls = tube.points.cols();
-  expects(controls >= 2 && tube.radius.size() == controls && (tube.radius.array() > 0.0).all());
-  // Beyond either end the polygon goes on straight.
-  Eigen::Matrix3Xd polygon(3, controls + 2);
-  polygon << 2.0 * tube.points.col(0) - tube.points.col(1), tube.points,
-      2.0 * tube.points.col(controls - 1) - tube.points.col(controls - 2);
-  // Fine samples with their arc length.
-  constexpr Eigen::Index kSamples = 100;  // per span
-  const Eigen::Index count = (controls - 1) * kSamples + 1;
-  Centerline fine{Eigen::Matrix3Xd(3, count), Eigen::VectorXd(count), Eigen::VectorXd(count)};
-  for (Eigen::Index i = 0; i < count; ++i) {
-    const Eigen::Index span = std::min(i / kSamples, controls - 2);
-    const double u = static_cast<double>(i - span * kSamples) / static_cast<double>(kSamples);
-    expects(polygon.col(span + 1) != polygon.col(span + 2));
-    fine.points.col(i) = catmull_rom(polygon.col(span), polygon.col(span + 1),
-                                     polygon.col(span + 2), polygon.col(span + 3), u);
-    fine.radius(i) = (1.0 - u) * tube.radius(span) + u * tube.radius(span + 1);
-    fine.arc_length(i) =
-        i == 0 ? 0.0
-               : fine.arc_length(i - 1) + (fine.points.col(i) - fine.points.col(i - 1)).norm();
-  }
-  return resample(fine, 0.5);
-}
-
 Phantom make_phantom(const PhantomSpec& spec) {
   const Grid& grid = spec.grid;
   expects(grid.voxels() > 0 && (grid.spacing.array() > 0.0).all());
-  expects(spec.supersampling >= 1 && spec.blur_mm >= 0.0 && spec.noise_hu >= 0.0);
+  expects(spec.supersampling >= 1 && spec.blur_mm >= 0.0 && spec.noise_hu >= 0.0 &&
+          spec.noise_texture_mm >= 0.0);
   Phantom phantom;
   phantom.image = {grid, std::vector<float>(grid.voxels())};
   phantom.lumen = {grid, std::vector<std::uint8_t>(grid.voxels())};
   paint_layers(spec, phantom);
 
-  add_noise_and_blur(spec.noise_hu, spec.seed, spec.blur_mm, phantom.image);
+  if (spec.noise_texture_mm > 0.0) {
+    blur(spec.blur_mm, phantom.image);
+    add_textured_noise(spec.noise_hu, spec.seed, spec.noise_texture_mm, phantom.image);
+  } else {
+    add_noise_and_blur(spec.noise_hu, spec.seed, spec.blur_mm, phantom.image);
+  }
 
   for (const PhantomTube& tube : spec.tubes) {
     if (tube.kind != PhantomTubeKind::kArtery) continue;
     phantom.names.push_back(tube.name);
-    phantom.centerlines.push_back(clip_to_volume(phantom_axis(tube), grid));
+    phantom.centerlines.push_back(clip_to_volume(move_line(spec, phantom_axis(tube)), grid));
   }
   return phantom;
 }

@@ -1,8 +1,9 @@
 #pragma once
-/// A CT volume of an abdomen from an anatomical description, with its truth. Tubes of varying
-/// radius along smooth curves, ellipsoids and vertebrae are sampled with partial volume, blurred by
-/// a point spread and given noise from a seed.
+/// A CT volume from an anatomical description, with its truth. Tubes of varying radius along smooth
+/// curves, ellipsoids and vertebrae are sampled with partial volume, blurred by a point spread and
+/// given noise from a seed.
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -11,7 +12,8 @@
 
 namespace wireplan::preprocess {
 
-enum class PhantomTubeKind { kTissue, kVein, kArtery };  // what comes later is painted over it
+/// What comes later is painted over it. Thrombus lines a sac, in which the artery's lumen lies.
+enum class PhantomTubeKind { kTissue, kVein, kThrombus, kArtery };
 
 /// A tube along a smooth curve (centripetal Catmull-Rom through the control points), its radius
 /// linear between them; a half ball closes either end. Vessels, and by kTissue muscles and bowel.
@@ -19,9 +21,10 @@ struct PhantomTube {
   std::string name;
   PhantomTubeKind kind = PhantomTubeKind::kArtery;  // only arteries are in the true lumen
   double hu = 0.0;                                  //                                    [HU]
-  double wall_mm = 0.0;     // of soft tissue around the lumen; 0: none                   [mm]
-  Eigen::Matrix3Xd points;  // (3, c), c >= 2, neighbours apart                           [mm]
-  Eigen::VectorXd radius;   // (c)                                                        [mm]
+  double wall_mm = 0.0;           // of soft tissue around the lumen; 0: none                   [mm]
+  Eigen::Matrix3Xd points;        // (3, c), c >= 2, neighbours apart                           [mm]
+  Eigen::VectorXd radius;         // (c)                                                        [mm]
+  Eigen::VectorXd hu_along = {};  // (c) in place of `hu`, linear between the points; or (0)  [HU]
 };
 
 /// An organ, or with a shell a bone.
@@ -58,6 +61,24 @@ struct PhantomCalcium {
   double hu = 900.0;
 };
 
+/// A stent: rings of zigzag wire (sines, `crowns` round the tube) on the outside of the lumen of
+/// the named tube. It is no part of the true lumen.
+struct PhantomStent {
+  std::string tube;
+  double from = 0.3, to = 0.5;  // fractions of the tube's arc length, from < to
+  double strut_mm = 0.3;        // thickness of the wire
+  double pitch_mm = 6.0;        // from ring to ring
+  double amplitude_mm = 2.0;    // half the height of a ring
+  int crowns = 6;
+  double hu = 2500.0;
+};
+
+/// The patient moved between two slices: all above lies shifted.
+struct PhantomBreath {
+  double above_z_mm = 0.0;
+  Vec3 shift_mm = Vec3::Zero();
+};
+
 struct PhantomSpec {
   Grid grid;
   Vec3 body_center = Vec3::Zero();
@@ -69,8 +90,15 @@ struct PhantomSpec {
   std::vector<PhantomVertebra> vertebrae;
   std::vector<PhantomTube> tubes;
   std::vector<PhantomCalcium> calcium;
+  std::vector<PhantomStent> stents;
+  std::optional<PhantomBreath> breath = {};
   double blur_mm = 0.5;    // sigma of the point spread                       [mm]
-  double noise_hu = 20.0;  // sigma of the noise in the volume, correlated by the point spread
+  double noise_hu = 20.0;  // sigma of the noise in the volume
+  /// 0: the point spread correlates the noise. Else it has the texture of a reconstruction kernel
+  /// in the plane of the slices: white noise less its own blur, a difference of Gaussians of this
+  /// sigma and twice it. That is a band as ramp filter and roll-off leave it: little power at low
+  /// frequencies, most near 0.15 / sigma per mm. Between slices it is not correlated.     [mm]
+  double noise_texture_mm = 0.0;
   std::uint64_t seed = 1;
   int supersampling = 3;  // samples per axis of a voxel that a boundary crosses: partial volume
 };
@@ -83,12 +111,21 @@ struct Phantom {
                                         // volume; the radius is the tube's, before plaque
 };
 
+/// Expects that there is one of this name.
+const PhantomTube& tube_named(const PhantomSpec& spec, const std::string& name);
+
 /// The axis of a tube with its radius, evenly resampled at most 0.5 mm apart, ends included.
 Centerline phantom_axis(const PhantomTube& tube);
 
+/// HU at the points of the axis.
+Eigen::VectorXd phantom_hu(const PhantomTube& tube);
+
+/// Where a point of the description lies in the volume: moved where it is above a breath.
+Vec3 moved_by_breath(const PhantomSpec& spec, const Vec3& point);
+
 /// Paints, from below: air, skin, fat, body, organs, tissue tubes, vertebrae, walls and lumens of
-/// veins, walls and lumens of arteries, calcium. Deterministic: the same spec gives the same bytes
-/// at any thread count. Expects positive sizes, calcium on a tube that exists.
+/// veins, of thrombus and of arteries, calcium, stents. Deterministic: the same spec gives the same
+/// bytes at any thread count. Expects positive sizes, calcium and stents on tubes that exist.
 Phantom make_phantom(const PhantomSpec& spec);
 
 }  // namespace wireplan::preprocess

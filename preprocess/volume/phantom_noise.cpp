@@ -83,7 +83,21 @@ void blur_plane(float* plane, int lines, std::size_t line_step, int length, std:
   }
 }
 
-void blur(const std::array<std::vector<double>, 3>& weights, Image& image) {
+/// One half of the Gaussian of each axis.
+std::array<std::vector<double>, 3> weights_of(double sigma_mm, const Vec3& spacing) {
+  std::array<std::vector<double>, 3> weights;
+  for (int axis = 0; axis < 3; ++axis) weights[axis] = gaussian_weights(sigma_mm / spacing(axis));
+  return weights;
+}
+
+/// Of two kernels, each given by its half: the sum of their products.
+double product(const std::vector<double>& a, const std::vector<double>& b) {
+  double sum = a[0] * b[0];
+  for (std::size_t i = 1; i < std::min(a.size(), b.size()); ++i) sum += 2.0 * a[i] * b[i];
+  return sum;
+}
+
+void blur_volume(const std::array<std::vector<double>, 3>& weights, Image& image) {
   const auto [nx, ny, nz] = image.grid.size;
   const std::size_t row = static_cast<std::size_t>(nx), slice = row * ny;
   float* values = image.values.data();
@@ -104,14 +118,46 @@ void blur(const std::array<std::vector<double>, 3>& weights, Image& image) {
 
 }  // namespace
 
+void blur(double blur_mm, Image& image) {
+  if (blur_mm > 0.0) blur_volume(weights_of(blur_mm, image.grid.spacing), image);
+}
+
 void add_noise_and_blur(double noise_hu, std::uint64_t seed, double blur_mm, Image& image) {
   // White noise goes in before the blur, stronger by what the blur takes away.
-  std::array<std::vector<double>, 3> weights;
-  for (int axis = 0; axis < 3; ++axis) {
-    weights[axis] = gaussian_weights(blur_mm / image.grid.spacing(axis));
-  }
+  const std::array<std::vector<double>, 3> weights = weights_of(blur_mm, image.grid.spacing);
   if (noise_hu > 0.0) add_white_noise(noise_hu / noise_gain(weights), seed, image.values);
-  if (blur_mm > 0.0) blur(weights, image);
+  blur(blur_mm, image);
+}
+
+void add_textured_noise(double noise_hu, std::uint64_t seed, double texture_mm, Image& image) {
+  if (noise_hu <= 0.0) return;
+  const auto fine = weights_of(texture_mm, image.grid.spacing);
+  const auto coarse = weights_of(2.0 * texture_mm, image.grid.spacing);
+  // Sum of squares of the difference of the two kernels in the plane.
+  const auto in_plane = [](const auto& a, const auto& b) {
+    return product(a[0], b[0]) * product(a[1], b[1]);
+  };
+  const double gain =
+      std::sqrt(in_plane(fine, fine) + in_plane(coarse, coarse) - 2.0 * in_plane(fine, coarse));
+  const int nx = image.grid.size[0], ny = image.grid.size[1], nz = image.grid.size[2];
+  const std::size_t row = static_cast<std::size_t>(nx), slice = row * static_cast<std::size_t>(ny);
+#pragma omp parallel
+  {
+    std::vector<float> narrow(slice), wide(slice), buffer;
+#pragma omp for schedule(static)
+    for (int k = 0; k < nz; ++k) {
+      const std::size_t first = static_cast<std::size_t>(k) * slice;
+      for (std::size_t i = 0; i < slice; ++i) {
+        narrow[i] = static_cast<float>(noise_hu / gain * normal_number(seed, first + i));
+      }
+      wide = narrow;
+      blur_plane(narrow.data(), ny, row, nx, 1, fine[0], buffer);
+      blur_plane(narrow.data(), nx, 1, ny, row, fine[1], buffer);
+      blur_plane(wide.data(), ny, row, nx, 1, coarse[0], buffer);
+      blur_plane(wide.data(), nx, 1, ny, row, coarse[1], buffer);
+      for (std::size_t i = 0; i < slice; ++i) image.values[first + i] += narrow[i] - wide[i];
+    }
+  }
 }
 
 }  // namespace wireplan::preprocess

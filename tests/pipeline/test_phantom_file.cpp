@@ -4,6 +4,7 @@
 #include <cmath>
 #include <fstream>
 
+#include "pipeline/files/case_file.h"
 #include "pipeline/files/json_reader.h"
 #include "pipeline/files/phantom_file.h"
 #include "preprocess/files/vessel_io.h"
@@ -91,6 +92,61 @@ TEST_F(PhantomFile, AllProblemsAreToldAtOnce) {
     EXPECT_NE(message.find("spec.json: " + key), std::string::npos) << key << " in:\n" << message;
   }
   EXPECT_EQ(std::count(message.begin(), message.end(), '\n') + 1, 14) << message;
+}
+
+TEST_F(PhantomFile, HuAlongATubeStentsABreathAndTextureAreRead) {
+  Json file = Json::parse(kTube);
+  file["tubes"][0]["hu"] = {300, 280, 250};
+  file["tubes"].push_back({{"name", "sac"},
+                           {"kind", "thrombus"},
+                           {"hu", 50},
+                           {"points_mm", {{0, 0, -9}, {0, 0, 9}}},
+                           {"radius_mm", {8, 8}}});
+  file["stents"] = {{{"tube", "artery"}, {"from", 0.2}, {"to", 0.6}, {"crowns", 7}}};
+  file["breath"] = {{"above_z_mm", 4.5}, {"shift_mm", {2, -1, 0}}};
+  file["noise_texture_mm"] = 0.7;
+  const PhantomSpec spec = read(file.dump());
+  EXPECT_EQ(spec.tubes[0].hu_along, Eigen::Vector3d(300, 280, 250));
+  EXPECT_EQ(spec.tubes[1].kind, preprocess::PhantomTubeKind::kThrombus);
+  EXPECT_EQ(spec.tubes[1].hu, 50.0);
+  EXPECT_EQ(spec.tubes[1].hu_along.size(), 0);
+  ASSERT_EQ(spec.stents.size(), 1U);
+  EXPECT_EQ(spec.stents[0].to, 0.6);
+  EXPECT_EQ(spec.stents[0].crowns, 7);
+  ASSERT_TRUE(spec.breath.has_value());
+  EXPECT_EQ(spec.breath->above_z_mm, 4.5);
+  EXPECT_EQ(spec.breath->shift_mm, Vec3(2, -1, 0));
+  EXPECT_EQ(spec.noise_texture_mm, 0.7);
+
+  file["tubes"][0]["hu"] = {300, 280};
+  file["stents"][0]["tube"] = "nowhere";
+  file["stents"][0]["to"] = 0.1;
+  file["breath"]["shift_mm"] = {2, -1};
+  file["noise_texture_mm"] = 9;
+  const std::string message = message_of(file.dump());
+  for (const std::string key :
+       {"tubes[0].hu", "stents[0].tube", "stents[0].to", "breath.shift_mm", "noise_texture_mm"}) {
+    EXPECT_NE(message.find("spec.json: " + key), std::string::npos) << key << " in:\n" << message;
+  }
+  EXPECT_EQ(std::count(message.begin(), message.end(), '\n') + 1, 5) << message;
+}
+
+TEST_F(PhantomFile, APatientIsWrittenWithACaseThatReads) {
+  if (!preprocess::reads_volumes()) GTEST_SKIP() << "built without imaging";
+  std::uint64_t seed = 1;
+  while (preprocess::draw_patient(seed).spec.grid.voxels() > 1'000'000) ++seed;
+  const preprocess::RandomPatient patient = preprocess::draw_patient(seed);
+  write_patient(patient, folder_ / "patient");
+  const Case made = read_case(folder_ / "patient");
+  EXPECT_EQ(made.name, "random-" + std::to_string(seed));
+  const preprocess::Mask lumen =
+      preprocess::read_mask(folder_ / "patient" / "truth" / "lumen.nrrd");
+  for (const Vec3& point : {patient.access.point, patient.target.point}) {
+    const Vec3 ijk = lumen.grid.ijk_from_lps(point).array().round();
+    EXPECT_EQ(lumen.labels[lumen.grid.index(static_cast<int>(ijk.x()), static_cast<int>(ijk.y()),
+                                            static_cast<int>(ijk.z()))],
+              1);
+  }
 }
 
 TEST_F(PhantomFile, WhatIsMissingIsToldOnce) {

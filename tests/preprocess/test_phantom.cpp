@@ -4,6 +4,7 @@
 #endif
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <numeric>
 
@@ -272,6 +273,144 @@ TEST(Phantom, LaterPaintHidesEarlierAndWallsNeverCloseABranch) {
   EXPECT_NEAR(hu({0, 18.4, 0}), 700.0, 1.0);  // its shell behind
   // The wall touches the bone: between lumen (5 mm) and shell (6 mm) lies nothing else.
   EXPECT_GT(hu({0, 5.6, 0}), spec.tissue_hu - 1.0);
+}
+
+TEST(Phantom, HuOfATubeAreLinearBetweenItsPoints) {
+  PhantomSpec spec = make_fat({30, 30, 40}, 1.0);
+  spec.tubes = {make_tube("artery", {{0, 0, -30}, {0, 0, 0}, {0, 0, 30}}, {6.0, 6.0, 6.0})};
+  spec.tubes[0].hu_along = Eigen::Vector3d(200.0, 260.0, 140.0);
+  const Phantom phantom = make_phantom(spec);
+  const Grid& grid = phantom.image.grid;
+  for (int k = 0; k < grid.size[2]; ++k) {
+    const double z = grid.lps_from_ijk(Vec3(0, 0, k)).z();
+    const double expected = z < 0.0 ? 260.0 + 2.0 * z : 260.0 - 4.0 * z;
+    EXPECT_NEAR(phantom.image.values[grid.index(15, 15, k)], expected, 0.01) << z;
+    EXPECT_EQ(phantom.lumen.labels[grid.index(15, 15, k)], 1);
+  }
+}
+
+TEST(Phantom, ThrombusLinesTheSacOverVeinsAndUnderTheLumen) {
+  PhantomSpec spec = make_fat({60, 60, 12}, 0.8);
+  PhantomTube sac = make_tube("sac", {{0, 0, -20}, {0, 0, 20}}, {12.0, 12.0});
+  sac.kind = PhantomTubeKind::kThrombus;
+  sac.hu = 50.0;
+  PhantomTube vein = make_tube("vein", {{-14, 0, -20}, {-14, 0, 20}}, {5.0, 5.0});
+  vein.kind = PhantomTubeKind::kVein;
+  vein.hu = 200.0;
+  spec.tubes = {make_tube("artery", {{3, 0, -20}, {3, 0, 20}}, {6.0, 6.0}), sac, vein};
+  const Phantom phantom = make_phantom(spec);
+  for (std::size_t voxel = 0; voxel < phantom.image.values.size(); ++voxel) {
+    const Vec3 p = center_of(phantom.image.grid, voxel);
+    const double lumen = (p - Vec3(3, 0, p.z())).norm(), middle = p.head<2>().norm();
+    EXPECT_EQ(phantom.lumen.labels[voxel], lumen < 6.0 ? 1 : 0);
+    if (lumen > 7.0 && middle < 11.0) {
+      EXPECT_EQ(phantom.image.values[voxel], 50.0F);
+    }
+    if (middle > 13.0 && (p - Vec3(-14, 0, p.z())).norm() < 4.0) {
+      EXPECT_EQ(phantom.image.values[voxel], 200.0F);
+    }
+  }
+}
+
+TEST(Phantom, AStentIsWireOnTheWallOutsideTheLumen) {
+  PhantomSpec spec = make_fat({80, 80, 120}, 0.25);
+  spec.tubes = {make_tube("artery", {{0, 0, -30}, {0, 0, 30}}, {5.0, 5.0})};
+  spec.stents = {{.tube = "artery",
+                  .from = 0.35,
+                  .to = 0.65,
+                  .strut_mm = 0.5,
+                  .pitch_mm = 5.0,
+                  .amplitude_mm = 0.0,
+                  .crowns = 6,
+                  .hu = 2500.0}};
+  const Phantom phantom = make_phantom(spec);
+  double metal = 0.0;  // mm^3, by what a voxel has over fat
+  for (std::size_t voxel = 0; voxel < phantom.image.values.size(); ++voxel) {
+    const Vec3 p = center_of(phantom.image.grid, voxel);
+    const double off = p.head<2>().norm();
+    EXPECT_EQ(phantom.lumen.labels[voxel], off < 5.0 ? 1 : 0);
+    if (phantom.image.values[voxel] < 2499.0) continue;
+    EXPECT_GT(off, 5.0 - 1e-9);
+    EXPECT_LT(off, 5.5);
+    EXPECT_LT(std::abs(p.z()), 9.3);
+    metal += voxel_volume(phantom.image.grid);
+  }
+  // Rings at -9, -4, 1 and 6 mm, of 0.5 x 0.5 mm: the stretch has 18 mm, so four.
+  const double exact = 4.0 * 0.5 * kPi * (5.5 * 5.5 - 5.0 * 5.0);
+  EXPECT_GT(metal, 0.2 * exact);  // voxels that are all metal, of rings two voxels thick
+  EXPECT_LT(metal, exact);
+  // With a zigzag there is more wire: a sine on the wall is longer than the circle.
+  spec.stents[0].amplitude_mm = 1.5;
+  double mass = 0.0, straight = 0.0;
+  const Image zigzag = make_phantom(spec).image;
+  for (std::size_t voxel = 0; voxel < zigzag.values.size(); ++voxel) {
+    mass += std::max(zigzag.values[voxel] - kLumenHu, 0.0);
+    straight += std::max(phantom.image.values[voxel] - kLumenHu, 0.0);
+  }
+  EXPECT_GT(mass, 1.1 * straight * 3.0 / 4.0);  // three or four rings
+}
+
+TEST(Phantom, ABreathShiftsAllAboveItAndTheTruthToo) {
+  PhantomSpec spec = make_fat({40, 40, 40}, 1.0);
+  spec.tubes = {make_tube("artery", {{0, 0, -40}, {0, 0, 40}}, {5.0, 5.0})};
+  const Phantom still = make_phantom(spec);
+  spec.breath = PhantomBreath{.above_z_mm = 3.2, .shift_mm = {3.0, -2.0, 0.0}};
+  const Phantom moved = make_phantom(spec);
+  const Grid& grid = spec.grid;
+  int checked = 0;
+  for (int k = 0; k < 40; ++k) {
+    const bool above = grid.lps_from_ijk(Vec3(0, 0, k)).z() > 3.2;
+    for (int j = 5; j < 35; ++j) {
+      for (int i = 5; i < 35; ++i) {
+        const std::size_t here = grid.index(i, j, k);
+        const std::size_t there = above ? grid.index(i - 3, j + 2, k) : here;
+        EXPECT_EQ(moved.image.values[here], still.image.values[there]);
+        EXPECT_EQ(moved.lumen.labels[here], still.lumen.labels[there]);
+        checked += still.lumen.labels[there];
+      }
+    }
+  }
+  EXPECT_GT(checked, 2000);
+  const Centerline& line = moved.centerlines[0];
+  for (Eigen::Index i = 0; i < line.points.cols(); ++i) {
+    const bool above = line.points(2, i) > 3.2;
+    EXPECT_NEAR(line.points(0, i), above ? 3.0 : 0.0, 1e-9);
+    EXPECT_NEAR(line.points(1, i), above ? -2.0 : 0.0, 1e-9);
+  }
+}
+
+TEST(Phantom, TexturedNoiseIsCorrelatedAsADifferenceOfGaussians) {
+  PhantomSpec spec = make_fat({96, 96, 24}, 0.7);
+  spec.noise_hu = 22.0;
+  spec.blur_mm = 0.6;
+  spec.noise_texture_mm = 0.8;
+  const Phantom phantom = make_phantom(spec);
+  const Grid& grid = phantom.image.grid;
+  const auto noise = [&](int i, int j, int k) {
+    return phantom.image.values[grid.index(i, j, k)] - kFatHu;
+  };
+  std::array<double, 7> products{};  // of voxels 0 to 6 apart along the row
+  double up = 0.0, count = 0.0;
+  for (int k = 0; k < 23; ++k) {
+    for (int j = 8; j < 88; ++j) {
+      for (int i = 8; i < 82; ++i) {
+        for (int d = 0; d < 7; ++d) products[d] += noise(i, j, k) * noise(i + d, j, k);
+        up += noise(i, j, k) * noise(i, j, k + 1);
+        count += 1.0;
+      }
+    }
+  }
+  // 136 000 samples of which one in about ten counts by itself: sigma good to 1 %.
+  EXPECT_NEAR(std::sqrt(products[0] / count), 22.0, 0.02 * 22.0);
+  EXPECT_NEAR(up / products[0], 0.0, 0.02);
+  // In the continuum: Gaussians of variance 2, 5 and 8 sigma^2, the middle one twice and negative.
+  for (int d = 1; d < 7; ++d) {
+    const double q = std::pow(0.7 * d / 0.8, 2);
+    const double expected =
+        (std::exp(-q / 4.0) / 2.0 - 2.0 * std::exp(-q / 10.0) / 5.0 + std::exp(-q / 16.0) / 8.0) /
+        (1.0 / 2.0 - 2.0 / 5.0 + 1.0 / 8.0);
+    EXPECT_NEAR(products[d] / products[0], expected, 0.03) << d;
+  }
 }
 
 TEST(Phantom, RefusesImpossibleSpecs) {
