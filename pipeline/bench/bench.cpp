@@ -77,18 +77,23 @@ double median(std::vector<double> values) {
 
 void run_bench(const std::string& name, const std::filesystem::path& folder,
                const BenchOptions& options) {
-  const auto make_report = name == "accuracy"     ? bench_accuracy
-                           : name == "stability"  ? bench_stability
-                           : name == "throughput" ? bench_throughput
-                           : name == "preprocess" ? bench_preprocess
-                                                  : nullptr;
+  const auto make_report = name == "accuracy"       ? bench_accuracy
+                           : name == "stability"    ? bench_stability
+                           : name == "throughput"   ? bench_throughput
+                           : name == "preprocess"   ? bench_preprocess
+                           : name == "segmentation" ? bench_segmentation
+                                                    : nullptr;
   if (make_report == nullptr) {
     throw Error("bench: NAME is '" + name +
-                "', expected accuracy, stability, throughput or preprocess");
+                "', expected accuracy, stability, throughput, preprocess or segmentation");
   }
   if (make_report != bench_throughput && !options.case_path.empty()) {
     throw Error("bench: --case is '" + options.case_path +
                 "', expected none: only throughput takes a case");
+  }
+  if (make_report != bench_segmentation && (options.patients > 0 || !options.data.empty())) {
+    throw Error("bench: " + name +
+                " is given patients or --data, expected none: only segmentation takes them");
   }
   std::filesystem::create_directories(folder);
   const BenchReport report = make_report(options);

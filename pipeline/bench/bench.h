@@ -1,7 +1,8 @@
 #pragma once
-/// `wireplan bench NAME`: error against run time, stability, throughput and the cost of the
-/// preprocessing (design section 8).
+/// `wireplan bench NAME`: error against run time, stability, throughput, the cost of the
+/// preprocessing and how well patients are segmented (design section 8).
 /// Every bench writes NAME.json, NAME.csv and NAME.png into its folder and prints what it found.
+#include <cstdint>
 #include <filesystem>
 #include <string>
 #include <vector>
@@ -15,10 +16,15 @@ struct BenchOptions {
   std::string case_path = {};
   std::vector<std::string> overrides = {};
   std::filesystem::path cache = {};
+  /// Segmentation alone: how many patients are drawn (0: 100, or 2 of the quick size), from which
+  /// seed on, and the folder of real cases with labels (empty: what WIREPLAN_DATA names, if that).
+  int patients = 0;
+  std::uint64_t first_seed = 1;
+  std::filesystem::path data = {};
 };
 
-/// Names: "accuracy", "stability", "throughput", "preprocess". Throws Error for another name and
-/// where a file cannot be written.
+/// Names: "accuracy", "stability", "throughput", "preprocess", "segmentation". Throws Error for
+/// another name and where a file cannot be written.
 void run_bench(const std::string& name, const std::filesystem::path& folder,
                const BenchOptions& options);
 

@@ -23,6 +23,7 @@
 #include "preprocess/surface/openings.h"
 #include "preprocess/surface/surface.h"
 #include "preprocess/volume/phantom.h"
+#include "preprocess/volume/phantom_lumen.h"
 #include "preprocess/wall/wall.h"
 #include "simulate/wall/vessel_model.h"
 
@@ -98,38 +99,12 @@ preprocess::PhantomSpec abdomen(bool quick) {
   return spec;
 }
 
-/// Distance to the arteries' true surface [mm].
-class Truth {
- public:
-  explicit Truth(const preprocess::PhantomSpec& spec) {
-    for (const preprocess::PhantomTube& t : spec.tubes) {
-      if (t.kind != preprocess::PhantomTubeKind::kArtery) continue;
-      axes_.push_back(preprocess::phantom_axis(t));
-    }
-  }
-
-  double distance(const Vec3& p) const {
-    double depth = std::numeric_limits<double>::infinity();
-    for (const Centerline& axis : axes_) {
-      for (Eigen::Index i = 0; i + 1 < axis.points.cols(); ++i) {
-        const Vec3 a = axis.points.col(i), edge = axis.points.col(i + 1) - a;
-        const double f = std::clamp((p - a).dot(edge) / edge.squaredNorm(), 0.0, 1.0);
-        const double radius = axis.radius(i) + f * (axis.radius(i + 1) - axis.radius(i));
-        depth = std::min(depth, (p - a - f * edge).norm() - radius);
-      }
-    }
-    return std::abs(depth);
-  }
-
- private:
-  std::vector<Centerline> axes_;
-};
-
 struct SurfaceError {
   double mean = 0.0, p95 = 0.0;  // of the vertices, the caps at the volume's border apart    [mm]
 };
 
-SurfaceError compare(const Surface& surface, const Truth& truth, const preprocess::Grid& grid) {
+SurfaceError compare(const Surface& surface, const preprocess::PhantomLumen& truth,
+                     const preprocess::Grid& grid) {
   constexpr Eigen::Index kMost = 10'000;  // vertices looked at
   const Eigen::Index step = std::max<Eigen::Index>(1, surface.vertices.cols() / kMost);
   std::vector<double> errors;
@@ -139,7 +114,7 @@ SurfaceError compare(const Surface& surface, const Truth& truth, const preproces
     for (int axis = 0; axis < 3; ++axis) {
       capped = capped || p[axis] < 3.0 || p[axis] > grid.size[axis] - 4.0;
     }
-    if (!capped) errors.push_back(truth.distance(surface.vertices.col(v)));
+    if (!capped) errors.push_back(std::abs(truth.distance(surface.vertices.col(v))));
   }
   expects(!errors.empty());
   std::sort(errors.begin(), errors.end());
@@ -238,7 +213,7 @@ struct Preprocessed {
 
 /// Each step on what the one before left, as the pipeline does it.
 Preprocessed run_steps(const preprocess::PhantomSpec& spec, bool quick) {
-  const Truth truth(spec);
+  const preprocess::PhantomLumen truth(spec);
   const fs::path file =
       fs::temp_directory_path() / ("wireplan-bench-" + std::to_string(::getpid()) + ".nrrd");
   write_raw_nrrd(preprocess::make_phantom(spec).image, file);

@@ -32,6 +32,7 @@ BenchReport bench_accuracy(const BenchOptions& options);
 BenchReport bench_stability(const BenchOptions& options);
 BenchReport bench_throughput(const BenchOptions& options);
 BenchReport bench_preprocess(const BenchOptions& options);
+BenchReport bench_segmentation(const BenchOptions& options);
 
 /// Rows as a table for people: columns aligned, numbers with 4 digits.
 std::string table_text(const std::vector<Json>& rows);

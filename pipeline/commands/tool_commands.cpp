@@ -337,12 +337,20 @@ void add_bench(CLI::App& app, int& code) {
     BenchOptions options;
   };
   const auto arguments = std::make_shared<Arguments>();
-  CLI::App* bench =
-      app.add_subcommand("bench", "Error against run time, stability, throughput, preprocessing");
-  bench->add_option("NAME", arguments->name, "accuracy, stability, throughput or preprocess")
+  CLI::App* bench = app.add_subcommand(
+      "bench", "Error against run time, stability, throughput, preprocessing, segmentation");
+  bench
+      ->add_option("NAME", arguments->name,
+                   "accuracy, stability, throughput, preprocess or segmentation")
       ->required();
+  bench->add_option("N", arguments->options.patients, "Segmentation: how many patients [100]")
+      ->check(CLI::Range(1, 1'000'000));
   bench->add_option("-o,--output", arguments->output, "Folder for results [wireplan-out/bench]");
   bench->add_flag("--quick", arguments->options.quick, "A small size, under 20 s");
+  bench->add_option("--seed", arguments->options.first_seed, "Segmentation: of the first [1]")
+      ->check(CLI::Range(0, 2147483647));
+  bench->add_option("--data", arguments->options.data,
+                    "Segmentation: folder of real cases with labels [WIREPLAN_DATA]");
   bench->add_option("--case", arguments->options.case_path,
                     "Throughput: the case whose vessel to take");
   bench->add_option("--set", arguments->options.overrides, "Throughput: key=value of that case")
@@ -353,6 +361,8 @@ void add_bench(CLI::App& app, int& code) {
       "  accuracy   each method's error and time on scenes whose answer is known\n"
       "  stability  stiff and extreme scenes: which method converges, stops or fails\n"
       "  throughput insertions per second and core, rigid and yielding, with their error\n"
+      "  segmentation  patients drawn at random (see phantom --random) and real ones with labels,\n"
+      "             each from two points: overlap, surface, way, leaks, refusals\n"
       "Example: wireplan bench accuracy -o out");
   bench->callback([&code, arguments] {
     run_bench(arguments->name, arguments->output, arguments->options);

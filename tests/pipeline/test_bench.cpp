@@ -213,6 +213,35 @@ TEST(Bench, PreprocessTellsTimeMemoryAndErrorOfEachStep) {
   EXPECT_EQ(preprocess.result.at("results").at("self_intersections"), 0);
   expect_written(preprocess, "preprocess", "surface_error_mm");
 }
+TEST(Bench, SegmentationHoldsPatientsAgainstTheirTruth) {
+  const QuickRun segmentation("segmentation");
+  const Json& rows = segmentation.result.at("rows");
+  ASSERT_EQ(rows.size(), 2u);
+  int done = 0;
+  for (const Json& row : rows) {
+    SCOPED_TRACE(row.dump());
+    EXPECT_NE(row.at("outcome"), "failed");
+    EXPECT_EQ(row.at("outcome") == "done", row.at("message") == "");
+    if (row.at("outcome") != "done") continue;
+    ++done;
+    EXPECT_GT(row.at("dice_way"), 0.7);  // thick slices; how good it is, the full size says
+    EXPECT_LE(row.at("dice_way"), 1.0);
+    EXPECT_LE(row.at("outside_silent_percent"), row.at("outside_percent"));
+    EXPECT_LT(row.at("axis_mean_mm"), 3.0);
+    EXPECT_LT(row.at("surface_mean_mm"), 1.5);
+  }
+  EXPECT_GT(done, 0);
+  const Json& results = segmentation.result.at("results");
+  EXPECT_EQ(results.at("criteria").size(), 6u);
+  EXPECT_EQ(results.at("spread")[0].at("patients"), done);
+  expect_written(segmentation, "segmentation", "dice_way");
+}
+
+TEST(Bench, PatientsAreForSegmentationAlone) {
+  const TemporaryFolder folder;
+  EXPECT_THROW(run_bench("accuracy", folder.path(), {.patients = 3}), Error);
+}
+
 TEST(Bench, PreprocessSaysThatItNeedsImages) {
   if (preprocess::reads_volumes()) GTEST_SKIP() << "built with imaging";
   const TemporaryFolder folder;
@@ -236,7 +265,8 @@ TEST(Bench, UnknownNameIsToldWithTheKnownOnes) {
     FAIL() << "no error";
   } catch (const Error& error) {
     EXPECT_EQ(std::string(error.what()),
-              "bench: NAME is 'speed', expected accuracy, stability, throughput or preprocess");
+              "bench: NAME is 'speed', expected accuracy, stability, throughput, preprocess or "
+              "segmentation");
   }
 }
 

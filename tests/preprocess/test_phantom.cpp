@@ -9,6 +9,7 @@
 #include <numeric>
 
 #include "preprocess/volume/phantom.h"
+#include "preprocess/volume/phantom_lumen.h"
 
 namespace wireplan::preprocess {
 namespace {
@@ -377,6 +378,30 @@ TEST(Phantom, ABreathShiftsAllAboveItAndTheTruthToo) {
     EXPECT_NEAR(line.points(0, i), above ? 3.0 : 0.0, 1e-9);
     EXPECT_NEAR(line.points(1, i), above ? -2.0 : 0.0, 1e-9);
   }
+}
+
+TEST(PhantomLumen, DistanceIsThatToTheWallAndToPlaqueWhereABreathHasPutThem) {
+  PhantomSpec spec = make_fat({40, 40, 40}, 1.0);
+  spec.tubes = {make_tube("artery", {{0, 0, -40}, {0, 0, 40}}, {5.0, 5.0}),
+                make_tube("vein", {{9, 0, -40}, {9, 0, 40}}, {3.0, 3.0})};
+  spec.tubes[1].kind = PhantomTubeKind::kVein;
+  spec.calcium = {{.tube = "artery",
+                   .at = 0.5,
+                   .angle_deg = 90.0,  // to the left, +x, as the tube runs up
+                   .length_mm = 10.0,
+                   .width_deg = 60.0,
+                   .thickness_mm = 2.0}};
+  spec.breath = PhantomBreath{.above_z_mm = 12.0, .shift_mm = {3.0, -2.0, 0.0}};
+  const PhantomLumen lumen(spec);
+  for (const double x : {-7.0, -5.0, -4.0, -0.5, 4.0, 9.0}) {
+    EXPECT_NEAR(lumen.distance({x, 0, -20}), std::abs(x) - 5.0, 1e-9);
+    EXPECT_NEAR(lumen.distance({x + 3.0, -2, 20}), std::abs(x) - 5.0, 1e-9);
+  }
+  // In the middle of the plaque, 2 mm thick, and half way to its rim along the tube, 1.5 mm.
+  EXPECT_NEAR(lumen.distance({4, 0, 0}), 1.0, 1e-6);
+  EXPECT_NEAR(lumen.distance({2.5, 0, 0}), -0.5, 1e-6);
+  EXPECT_NEAR(lumen.distance({4, 0, 2.5}), 0.5, 1e-6);
+  EXPECT_NEAR(lumen.distance({-4, 0, 0}), -1.0, 1e-6);  // none there
 }
 
 TEST(Phantom, TexturedNoiseIsCorrelatedAsADifferenceOfGaussians) {

@@ -1,0 +1,288 @@
+#include "pipeline/bench/segmented_patient.h"
+
+#include <algorithm>
+#include <cmath>
+#include <ctime>
+
+#include "preprocess/centerline/centerline.h"
+#include "preprocess/centerline/path_place.h"
+#include "preprocess/surface/surface.h"
+#include "preprocess/volume/phantom_lumen.h"
+#include "preprocess/volume/voxels.h"
+
+namespace wireplan::pipeline {
+namespace {
+
+namespace fs = std::filesystem;
+using preprocess::Grid;
+using preprocess::Labels;
+using preprocess::Mask;
+using preprocess::SegmentStatistics;
+
+constexpr double kNearWay = 3.0;  // true radii
+constexpr double kRadiusTolerance = 0.05;
+constexpr double kWideEnough = 2.0;  // voxels in radius, for a radius to be asked for
+
+double process_seconds() {
+  timespec now{};
+  clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &now);
+  return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
+}
+
+double mean_of(const std::vector<double>& values) {
+  double sum = 0.0;
+  for (const double value : values) sum += value;
+  return sum / static_cast<double>(values.size());
+}
+
+double p95_of(std::vector<double> values) {
+  std::sort(values.begin(), values.end());
+  return values[std::min(values.size() - 1, values.size() * 95 / 100)];
+}
+
+bool is_near_way(const Centerline& way, const Vec3& p) {
+  for (Eigen::Index i = 0; i < way.points.cols(); ++i) {
+    const double reach = kNearWay * way.radius(i);
+    if ((way.points.col(i) - p).squaredNorm() <= reach * reach) return true;
+  }
+  return false;
+}
+
+/// 2 |A and B| / (|A| + |B|) over the voxels that `counts` takes.
+template <typename Counts>
+double overlap(const Labels& a, const Labels& b, Counts counts) {
+  double both = 0.0, sum = 0.0;
+  for (std::size_t n = 0; n < a.size(); ++n) {
+    if ((a[n] | b[n]) == 0 || !counts(n)) continue;
+    both += 2.0 * (a[n] & b[n]);
+    sum += a[n] + b[n];
+  }
+  return sum > 0.0 ? both / sum : 0.0;
+}
+
+/// Places that the warnings of stage segment name.
+std::vector<Vec3> told_places(const SegmentStatistics& statistics) {
+  std::vector<Vec3> places;
+  for (const preprocess::Leak& leak : statistics.search.leaks) places.push_back(leak.place);
+  for (const preprocess::Touch& touch : statistics.touches) places.push_back(touch.place);
+  return places;
+}
+
+int count_warnings(const SegmentStatistics& statistics, int handles) {
+  constexpr std::size_t kLeaksTold = 5;  // as the stage tells them
+  return static_cast<int>(std::min(statistics.search.leaks.size(), kLeaksTold) +
+                          statistics.touches.size()) +
+         (statistics.touches_border ? 1 : 0) + (handles > 0 ? 1 : 0);
+}
+
+/// What the mask holds that neither is nor is next to truth, corners included: all of it, and that
+/// of pieces to which no told place comes near, over the truth.
+void measure_outside(const Grid& grid, const Labels& mask, const Labels& truth,
+                     const std::vector<Vec3>& told, PatientRow& row) {
+  Labels outside = mask;
+  std::size_t true_voxels = 0;
+  for (std::size_t n = 0; n < truth.size(); ++n) {
+    if (truth[n] == 0) continue;
+    ++true_voxels;
+    outside[n] = 0;
+    preprocess::for_each_neighbour(grid, n, [&](std::size_t m, const auto&) { outside[m] = 0; });
+  }
+  constexpr double kNamed = 10.0;  // mm from the piece: a person who looks there sees it
+  std::size_t all = 0, silent = 0;
+  for (std::size_t start = 0; start < outside.size(); ++start) {
+    if (outside[start] == 0) continue;
+    std::vector<std::size_t> piece = {start};
+    outside[start] = 0;
+    bool named = false;
+    for (std::size_t next = 0; next < piece.size(); ++next) {
+      const Vec3 p = preprocess::center_of(grid, piece[next]);
+      named = named || std::any_of(told.begin(), told.end(),
+                                   [&](const Vec3& q) { return (p - q).norm() < kNamed; });
+      preprocess::for_each_neighbour(grid, piece[next], [&](std::size_t m, const auto&) {
+        if (outside[m] != 0) piece.push_back(m);
+        outside[m] = 0;
+      });
+    }
+    all += piece.size();
+    silent += named ? 0 : piece.size();
+  }
+  const double whole = static_cast<double>(std::max<std::size_t>(true_voxels, 1));
+  row.outside = static_cast<double>(all) / whole;
+  row.outside_silent = static_cast<double>(silent) / whole;
+}
+
+/// Of the vertices near the way and away from where the volume cuts the vessel.
+void measure_surface(const Surface& surface, const Grid& grid, const Centerline& way,
+                     const preprocess::PhantomLumen& truth, PatientRow& row) {
+  constexpr Eigen::Index kMost = 6000;  // vertices looked at
+  const Eigen::Index step = std::max<Eigen::Index>(1, surface.vertices.cols() / kMost);
+  std::vector<double> errors;
+  for (Eigen::Index v = 0; v < surface.vertices.cols(); v += step) {
+    const Vec3 p = surface.vertices.col(v), ijk = grid.ijk_from_lps(p);
+    bool capped = false;
+    for (int axis = 0; axis < 3; ++axis) {
+      capped = capped || ijk[axis] < 2.0 || ijk[axis] > grid.size[axis] - 3.0;
+    }
+    if (!capped && is_near_way(way, p)) errors.push_back(std::abs(truth.distance(p)));
+  }
+  if (errors.empty()) return;
+  row.surface_mean_mm = mean_of(errors);
+  row.surface_p95_mm = p95_of(errors);
+}
+
+/// The line that was found against the true way. It is right where each of its points lies within
+/// the true way's radius at the place next to it, no step skips more of the way than five radii
+/// and 5 mm, as corners do and limbs that kiss do not, and it begins and ends with the way, to the
+/// same tolerance. A radius counts where the lumen there is a single round tube, so neither at
+/// mouths of branches nor by plaque, and where it is over two voxels.
+void measure_line(const Centerline& line, const Centerline& way, double voxel_mm,
+                  const preprocess::PhantomLumen& truth, PatientRow& row) {
+  std::vector<double> off;
+  bool right = true;
+  int asked = 0, within = 0;
+  double arc_before = 0.0;
+  const Eigen::Index last = line.points.cols() - 1;
+  const double whole = way.arc_length(way.arc_length.size() - 1);
+  for (Eigen::Index i = 0; i <= last; ++i) {
+    const Vec3 p = line.points.col(i);
+    const preprocess::PathPlace place = preprocess::find_place(p, way);
+    off.push_back(place.from_axis);
+    const double corner = 5.0 * place.radius + 5.0;
+    right = right && place.from_axis <= place.radius && place.arc - arc_before < corner;
+    if (i == last) right = right && whole - place.arc < corner;
+    arc_before = place.arc;
+
+    // The place on the true axis where the lumen is as wide as its tube says.
+    if (place.radius < kWideEnough * voxel_mm) continue;
+    Eigen::Index nearest = 0;
+    (way.points.colwise() - p).colwise().squaredNorm().minCoeff(&nearest);
+    const double open = -truth.distance(way.points.col(nearest));
+    if (std::abs(open - place.radius) > 0.01 * place.radius) continue;
+    ++asked;
+    within += std::abs(line.radius(i) - place.radius) <= kRadiusTolerance * place.radius ? 1 : 0;
+  }
+  row.axis_mean_mm = mean_of(off);
+  row.axis_p95_mm = p95_of(off);
+  row.way_right = right;
+  if (asked > 0) row.radius_within = static_cast<double>(within) / asked;
+}
+
+/// The steps on which a patient can end. Returns the surface's centerline.
+std::optional<Centerline> find_line(const preprocess::Image& image, const Vec3& access,
+                                    const Vec3& target, preprocess::Segmentation& found,
+                                    Surface& surface, PatientRow& row) {
+  const double start = process_seconds();
+  try {
+    found = preprocess::segment(image, {.seeds = {access}, .target = target});
+  } catch (const Error& error) {
+    row.outcome = PatientOutcome::kRefused;
+    row.message = error.what();
+  }
+  row.segment_s = process_seconds() - start;
+  if (row.outcome != PatientOutcome::kDone) return std::nullopt;
+  try {
+    surface = preprocess::surface_from_image(image, found.mask, {});
+    row.handles = (2 - preprocess::check_surface(surface).euler_number) / 2;
+    row.warnings = count_warnings(found.statistics, *row.handles);
+  } catch (const Error& error) {
+    row.outcome = PatientOutcome::kNoSurface;
+    row.message = error.what();
+    return std::nullopt;
+  }
+  try {
+    return preprocess::find_centerline(surface, access, target);
+  } catch (const Error& error) {
+    row.outcome = PatientOutcome::kNoCenterline;
+    row.message = error.what();
+    return std::nullopt;
+  }
+}
+
+}  // namespace
+
+PatientRow segment_patient(const preprocess::RandomPatient& patient) {
+  PatientRow row;
+  row.patient = std::to_string(patient.spec.seed);
+  row.features = patient.anatomy;
+  for (const std::string& feature : patient.features) row.features += ", " + feature;
+  row.slice_mm = patient.spec.grid.spacing.z();
+  row.spacing_mm = patient.spec.grid.spacing.x();
+  row.access_contrast_hu = patient.access_contrast_hu;
+  row.target_contrast_hu = patient.target_contrast_hu;
+  row.noise_hu = patient.spec.noise_hu;
+  const preprocess::Phantom phantom = preprocess::make_phantom(patient.spec);
+  const Centerline way = preprocess::true_way(patient);
+  const preprocess::PhantomLumen truth(patient.spec);
+
+  const double start = process_seconds();
+  preprocess::Segmentation found;
+  Surface surface;
+  const std::optional<Centerline> line =
+      find_line(phantom.image, patient.access.point, patient.target.point, found, surface, row);
+  row.all_s = process_seconds() - start;
+  if (row.outcome == PatientOutcome::kRefused) return row;
+
+  const Grid& grid = phantom.image.grid;
+  const auto everywhere = [](std::size_t) { return true; };
+  row.dice = overlap(found.mask.labels, phantom.lumen.labels, everywhere);
+  row.dice_way = overlap(found.mask.labels, phantom.lumen.labels, [&](std::size_t n) {
+    return is_near_way(way, preprocess::center_of(grid, n));
+  });
+  measure_outside(grid, found.mask.labels, phantom.lumen.labels, told_places(found.statistics),
+                  row);
+  if (row.outcome == PatientOutcome::kNoSurface) return row;
+  measure_surface(surface, grid, way, truth, row);
+  if (line) measure_line(*line, way, std::cbrt(grid.spacing.prod()), truth, row);
+  return row;
+}
+
+std::vector<LabelledCase> find_labelled_cases(const fs::path& data) {
+  std::vector<LabelledCase> cases;
+  const fs::path dissection = data / "ct-aorta-dissection-labelled";
+  if (fs::exists(dissection / "ct_cropped.nii.gz")) {
+    LabelledCase one{.name = "ct-aorta-dissection-labelled",
+                     .volume = dissection / "ct_cropped.nii.gz",
+                     .lumen = dissection / "aorta_true_lumen.nii.gz",
+                     .others = {},
+                     .access = {-5.7, -149.2, 552.2},
+                     .target = {16.8, -170.2, 780.2}};
+    for (const char* artery :
+         {"brachiocephalic_trunk", "common_carotid_artery_left", "subclavian_artery_left",
+          "celiac_trunk", "superior_mesenteric_artery"}) {
+      one.others.push_back(dissection / (std::string(artery) + ".nii.gz"));
+    }
+    cases.push_back(std::move(one));
+  }
+  return cases;
+}
+
+PatientRow segment_labelled(const LabelledCase& given) {
+  PatientRow row;
+  row.patient = given.name;
+  row.features = "real";
+  try {
+    const preprocess::Image image = preprocess::read_image(given.volume);
+    const Mask lumen = preprocess::read_mask(given.lumen);
+    Labels allowed = lumen.labels;
+    for (const fs::path& other : given.others) {
+      const Mask more = preprocess::read_mask(other);
+      for (std::size_t n = 0; n < allowed.size(); ++n) allowed[n] |= more.labels.at(n);
+    }
+    row.slice_mm = image.grid.spacing.z();
+    row.spacing_mm = image.grid.spacing.x();
+    const double start = process_seconds();
+    preprocess::Segmentation found;
+    Surface surface;
+    find_line(image, given.access, given.target, found, surface, row);
+    row.all_s = process_seconds() - start;
+    if (row.outcome == PatientOutcome::kRefused) return row;
+    row.dice = overlap(found.mask.labels, lumen.labels, [](std::size_t) { return true; });
+    measure_outside(image.grid, found.mask.labels, allowed, told_places(found.statistics), row);
+  } catch (const Error& error) {  // a file of it
+    row.outcome = PatientOutcome::kRefused;
+    row.message = error.what();
+  }
+  return row;
+}
+
+}  // namespace wireplan::pipeline
