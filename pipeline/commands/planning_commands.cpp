@@ -232,7 +232,10 @@ int run_case(const RunArguments& arguments) {
     const std::string name = section_name(section);
     if (!name.empty()) log->info(name);
     const RunResult result = run_stages(section, own);
-    publish(result.artifacts, output / section_folder(section));
+    const fs::path folder = output / section_folder(section);
+    publish(result.artifacts, folder);
+    const fs::path look = folder / "slices.png";
+    if (fs::exists(look)) log->info("look first at the outline of the mask: " + look.string());
     const std::string missing = arguments.after_shards ? missing_shards(result) : "";
     if (!missing.empty()) log->warn(missing);
     done.push_back(section);

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <tuple>
 #include <utility>
 
 namespace wireplan::pipeline {
@@ -55,18 +56,20 @@ std::vector<Place> list_places(const SlicedVessel& vessel, const std::vector<dou
 
 }  // namespace
 
-Slices cut_vessel_slices(const preprocess::Image& image, const SlicedVessel& vessel,
-                         const Json& segment, const std::vector<double>& peak_force) {
-  // The lumen's mean bright, as far below the threshold as above it; never past the values there
-  // are.
+std::pair<double, double> vessel_window(const preprocess::Image& image, const Json& segment) {
   const double threshold =
       segment.contains("band") ? segment.at("band").at("lower_hu") : segment.at("edge_hu");
   const double span = 2.0 * (segment.at("mean_hu").get<double>() - threshold);
   const auto [least, most] = std::minmax_element(image.values.begin(), image.values.end());
+  const double low = std::max(threshold - span, static_cast<double>(*least));
+  const double high = std::min(threshold + span, static_cast<double>(*most));
+  return {low, high <= low ? low + 1.0 : high};
+}
+
+Slices cut_vessel_slices(const preprocess::Image& image, const SlicedVessel& vessel,
+                         const Json& segment, const std::vector<double>& peak_force) {
   SliceOptions options;
-  options.window_low = std::max(threshold - span, static_cast<double>(*least));
-  options.window_high = std::min(threshold + span, static_cast<double>(*most));
-  if (options.window_high <= options.window_low) options.window_high = options.window_low + 1.0;
+  std::tie(options.window_low, options.window_high) = vessel_window(image, segment);
   return cut_slices(image, vessel.surface, list_places(vessel, peak_force), options);
 }
 

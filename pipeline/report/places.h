@@ -1,5 +1,6 @@
 #pragma once
 /// Where the page of a report cuts the volume, and with which window.
+#include <utility>
 #include <vector>
 
 #include "pipeline/files/json_reader.h"
@@ -13,6 +14,11 @@ struct SlicedVessel {
   const Centerline& path;  // access to target
   Vec3 access, target;     //                                                              [mm]
 };
+
+/// The window in which a vessel is looked at: its mean bright, as far below its edge as above it,
+/// never past the values there are. `segment` is what the stage of that name tells. Black and white
+/// [HU].
+std::pair<double, double> vessel_window(const preprocess::Image& image, const Json& segment);
 
 /// Slices at the access, the target, the place of the largest force on the wall and on the way.
 /// `segment` is what the stage of that name tells; `peak_force` is per triangle [N].

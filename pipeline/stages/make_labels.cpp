@@ -6,6 +6,7 @@
 #include "pipeline/files/text.h"
 #include "pipeline/stages/makers.h"
 #include "pipeline/stages/mask_checks.h"
+#include "pipeline/stages/mask_look.h"
 #include "preprocess/segment/label_growth.h"
 #include "preprocess/segment/label_mask.h"
 #include "preprocess/segment/segment.h"
@@ -315,6 +316,9 @@ void make_labels(Workspace& work, const fs::path& folder) {
   preprocess::write_image(
       {.grid = labels.grid, .values = {made.class_of.begin(), made.class_of.end()}},
       folder / "classes.nrrd");
+  if (work.given().volume) {
+    write_mask_look(work.given(), work.image(), made.mask, figures, folder);
+  }
   write_figures(figures, folder);
 }
 

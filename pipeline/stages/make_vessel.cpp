@@ -8,6 +8,7 @@
 #include "pipeline/report/report.h"
 #include "pipeline/stages/makers.h"
 #include "pipeline/stages/mask_checks.h"
+#include "pipeline/stages/mask_look.h"
 #include "preprocess/centerline/centerline.h"
 #include "preprocess/files/vessel_io.h"
 #include "preprocess/segment/segment.h"
@@ -225,6 +226,7 @@ void make_segment(Workspace& work, const fs::path& folder) {
     figures["warnings"].push_back(
         "segment: the vessel touches the border of the volume and is closed there by a flat cap");
   }
+  write_mask_look(given, work.image(), segmentation.mask, figures, folder);
   write_figures(figures, folder);
 }
 

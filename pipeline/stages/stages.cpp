@@ -176,7 +176,7 @@ std::vector<Stage> stages_from_labels(const Case& given) {
     stages.push_back({.name = "volume", .version = 2, .reads_input = true, .make = make_volume});
   }
   stages.push_back({.name = "segment",
-                    .version = 3,
+                    .version = 4,
                     .reads_input = in_volume,
                     .reads_labels = true,
                     .parameters = {"/mask"},
@@ -207,7 +207,7 @@ std::vector<Stage> stages_to_surface(const Case& given) {
   }
   stages.push_back({.name = "volume", .version = 2, .reads_input = true, .make = make_volume});
   stages.push_back({.name = "segment",
-                    .version = 5,
+                    .version = 6,
                     .reads_input = true,
                     .parameters = {"/segmentation", "/mask"},
                     .make = make_segment});

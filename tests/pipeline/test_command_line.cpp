@@ -365,6 +365,8 @@ TEST_F(CommandLine, SegmentsAVolumeAndPlansInIt) {
   const Answer answer = call("run case.json -o results");
   ASSERT_EQ(answer.code, 0) << answer.log;
   EXPECT_TRUE(fs::exists(folder_ / "results" / "mask.nrrd"));
+  EXPECT_EQ(read_text(folder_ / "results" / "slices.png").substr(1, 3), "PNG");
+  EXPECT_NE(answer.log.find("slices.png"), std::string::npos) << answer.log;
   const Json report = read_json(folder_ / "results" / "report.json", "wireplan.report/2");
   // One tube of radius 6 and length 36: 4072 mm^3, of which voxels keep all but some per cent.
   EXPECT_NEAR(report.at("vessel").at("volume_mm3").get<double>(), 4072.0, 300.0);
