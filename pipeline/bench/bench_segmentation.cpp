@@ -258,29 +258,31 @@ Picture plot_of_patients(const std::vector<PatientRow>& rows) {
 }
 
 Json describe_columns() {
-  return {{"patient", "seed of `wireplan phantom --random`, or the name of a real case"},
-          {"access_contrast_hu", "over blood without contrast; it falls to target_contrast_hu"},
-          {"outcome",
-           "done; refused by the segmentation; no surface; no centerline; failed: our fault"},
-          {"dice_way", "of the voxels within three true radii of the true way"},
-          {"surface_mean_mm",
-           "from the surface's vertices within three true radii of the true way to "
-           "the true wall; also surface_p95_mm"},
-          {"axis_mean_mm", "from the centerline to the true axis; also axis_p95_mm"},
-          {"radius_within_5_percent",
-           "of the places along the centerline where the lumen is a single "
-           "tube without plaque, over two voxels in radius"},
-          {"way_right",
-           "each point of the centerline lies within the true radius of the true axis, and none of "
-           "its steps skips more of it than five radii and 5 mm; so at both ends"},
-          {"outside_percent",
-           "of the mask, neither in the truth nor next to it (corners included), "
-           "over the truth"},
-          {"outside_silent_percent",
-           "of that, in pieces of which no warning names a place within 10 mm"},
-          {"handles", "of the surface"},
-          {"warnings", "leaks cut, touches, border, handles"},
-          {"segment_s", "CPU time, of all threads; all_s with surface and centerline"}};
+  return {
+      {"patient", "seed of `wireplan phantom --random`, or the name of a real case"},
+      {"access_contrast_hu", "over blood without contrast; it falls to target_contrast_hu"},
+      {"outcome",
+       "done; refused by the segmentation; no surface; no centerline; failed: our fault"},
+      {"dice_way", "of the voxels within three true radii of the true way"},
+      {"surface_mean_mm",
+       "from the surface's vertices within three true radii of the true way to "
+       "the true wall; also surface_p95_mm"},
+      {"axis_mean_mm", "from the centerline to the true axis; also axis_p95_mm"},
+      {"radius_within_5_percent",
+       "of the places along the centerline where the lumen is a single "
+       "tube without plaque, over two voxels in radius"},
+      {"way_right",
+       "each point of the centerline lies within the true radius of the true axis (of the wider "
+       "artery where it leaves that), and none of its steps skips more of it than 2.5 radii and 5 "
+       "mm; so at both ends"},
+      {"outside_percent",
+       "of the mask, neither in the truth nor next to it (corners included), "
+       "over the truth"},
+      {"outside_silent_percent",
+       "of that, in pieces of which no warning names a place within 10 mm"},
+      {"handles", "of the surface"},
+      {"warnings", "leaks cut, touches, border, handles"},
+      {"segment_s", "CPU time, of all threads; all_s with surface and centerline"}};
 }
 
 }  // namespace

@@ -130,40 +130,39 @@ void measure_surface(const Surface& surface, const Grid& grid, const Centerline&
   row.surface_p95_mm = p95_of(errors);
 }
 
-/// The line that was found against the true way. It is right where each of its points lies within
-/// the true way's radius at the place next to it, no step skips more of the way than five radii
-/// and 5 mm, as corners do and limbs that kiss do not, and it begins and ends with the way, to the
-/// same tolerance. A radius counts where the lumen there is a single round tube, so neither at
-/// mouths of branches nor by plaque, and where it is over two voxels.
+/// How far from the way a line may be: the radius there, or, as far along it as a wider artery's
+/// radius from where the way leaves that, the wider one's, since lines cut corners.
+Centerline widened(Centerline way) {
+  const Centerline narrow = way;
+  for (Eigen::Index i = 0; i < way.points.cols(); ++i) {
+    for (Eigen::Index j = 0; j < way.points.cols(); ++j) {
+      if (std::abs(narrow.arc_length(i) - narrow.arc_length(j)) > narrow.radius(j)) continue;
+      way.radius(i) = std::max(way.radius(i), narrow.radius(j));
+    }
+  }
+  return way;
+}
+
+/// The line that was found against the true way. A radius counts where the lumen there is a single
+/// round tube, so neither at mouths of branches nor by plaque, and where it is over two voxels.
 void measure_line(const Centerline& line, const Centerline& way, double voxel_mm,
                   const preprocess::PhantomLumen& truth, PatientRow& row) {
   std::vector<double> off;
-  bool right = true;
   int asked = 0, within = 0;
-  double arc_before = 0.0;
-  const Eigen::Index last = line.points.cols() - 1;
-  const double whole = way.arc_length(way.arc_length.size() - 1);
-  for (Eigen::Index i = 0; i <= last; ++i) {
+  for (Eigen::Index i = 0; i < line.points.cols(); ++i) {
     const Vec3 p = line.points.col(i);
-    const preprocess::PathPlace place = preprocess::find_place(p, way);
-    off.push_back(place.from_axis);
-    const double corner = 5.0 * place.radius + 5.0;
-    right = right && place.from_axis <= place.radius && place.arc - arc_before < corner;
-    if (i == last) right = right && whole - place.arc < corner;
-    arc_before = place.arc;
-
-    // The place on the true axis where the lumen is as wide as its tube says.
-    if (place.radius < kWideEnough * voxel_mm) continue;
+    off.push_back(preprocess::find_place(p, way).from_axis);
     Eigen::Index nearest = 0;
     (way.points.colwise() - p).colwise().squaredNorm().minCoeff(&nearest);
+    const double radius = way.radius(nearest);
     const double open = -truth.distance(way.points.col(nearest));
-    if (std::abs(open - place.radius) > 0.01 * place.radius) continue;
+    if (radius < kWideEnough * voxel_mm || std::abs(open - radius) > 0.01 * radius) continue;
     ++asked;
-    within += std::abs(line.radius(i) - place.radius) <= kRadiusTolerance * place.radius ? 1 : 0;
+    within += std::abs(line.radius(i) - radius) <= kRadiusTolerance * radius ? 1 : 0;
   }
   row.axis_mean_mm = mean_of(off);
   row.axis_p95_mm = p95_of(off);
-  row.way_right = right;
+  row.way_right = is_way_right(line, way);
   if (asked > 0) row.radius_within = static_cast<double>(within) / asked;
 }
 
@@ -199,6 +198,19 @@ std::optional<Centerline> find_line(const preprocess::Image& image, const Vec3& 
 }
 
 }  // namespace
+
+bool is_way_right(const Centerline& line, const Centerline& way) {
+  const Centerline wide = widened(way);
+  preprocess::PathPlace before{.radius = wide.radius(0)};
+  const auto skips = [](double arc, double radius) { return arc > 2.5 * radius + 5.0; };
+  for (const Vec3& p : line.points.colwise()) {
+    const preprocess::PathPlace place = preprocess::find_place(p, wide);
+    if (place.from_axis > place.radius) return false;
+    if (skips(place.arc - before.arc, std::max(place.radius, before.radius))) return false;
+    before = place;
+  }
+  return !skips(wide.arc_length(wide.arc_length.size() - 1) - before.arc, before.radius);
+}
 
 PatientRow segment_patient(const preprocess::RandomPatient& patient) {
   PatientRow row;

@@ -36,6 +36,12 @@ struct PatientRow {
   double segment_s = 0.0, all_s = 0.0;        // CPU time, of all threads
 };
 
+/// Whether a line keeps to the true way: each of its points lies within the way's radius at the
+/// place next to it (as far from a mouth as the wider artery's radius, within that: lines cut
+/// corners); no step skips more of the way than two and a half radii and 5 mm, as those across
+/// limbs that kiss do; and it begins and ends with the way, to the same tolerance.
+bool is_way_right(const Centerline& line, const Centerline& way);
+
 /// Segmented from the two clicked points alone, no band given; then its surface and centerline with
 /// the defaults of a case. Never throws `Error`: a refusal is a row.
 PatientRow segment_patient(const preprocess::RandomPatient& patient);

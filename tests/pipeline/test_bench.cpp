@@ -8,6 +8,7 @@
 #include "pipeline/bench/bench.h"
 #include "pipeline/bench/bench_report.h"
 #include "pipeline/bench/bench_walls.h"
+#include "pipeline/bench/segmented_patient.h"
 #include "preprocess/surface/surface.h"
 #include "preprocess/surface/surface_repair.h"
 #include "preprocess/volume/image.h"
@@ -235,6 +236,57 @@ TEST(Bench, SegmentationHoldsPatientsAgainstTheirTruth) {
   EXPECT_EQ(results.at("criteria").size(), 6u);
   EXPECT_EQ(results.at("spread")[0].at("patients"), done);
   expect_written(segmentation, "segmentation", "dice_way");
+}
+
+Centerline line_through(const std::vector<Vec3>& corners, double radius) {
+  std::vector<Vec3> points;
+  for (std::size_t k = 0; k + 1 < corners.size(); ++k) {
+    const double length = (corners[k + 1] - corners[k]).norm();
+    for (double s = 0.0; s < length; s += 0.5) {
+      points.emplace_back(corners[k] + s / length * (corners[k + 1] - corners[k]));
+    }
+  }
+  points.push_back(corners.back());
+  const auto count = static_cast<Eigen::Index>(points.size());
+  Centerline line{Eigen::Matrix3Xd(3, count), Eigen::VectorXd::Constant(count, radius),
+                  Eigen::VectorXd::Zero(count)};
+  for (Eigen::Index i = 0; i < count; ++i) {
+    line.points.col(i) = points[static_cast<std::size_t>(i)];
+    if (i > 0) {
+      line.arc_length(i) =
+          line.arc_length(i - 1) + (line.points.col(i) - line.points.col(i - 1)).norm();
+    }
+  }
+  return line;
+}
+
+TEST(Bench, AWayIsRightThatKeepsToTheTrueOneAndSkipsNothingOfIt) {
+  // Up a trunk of 10 mm radius, then into a branch of 3 mm across it.
+  Centerline way = line_through({{0, 0, 0}, {0, 0, 60}, {50, 0, 60}}, 10.0);
+  for (Eigen::Index i = 0; i < way.points.cols(); ++i) {
+    if (way.points(0, i) > 0.0) way.radius(i) = 3.0;
+  }
+  EXPECT_TRUE(is_way_right(way, way));
+  // Cut through the corner, within the trunk.
+  EXPECT_TRUE(
+      is_way_right(line_through({{0, 0, 0}, {0, 0, 52}, {12, 0, 60}, {50, 0, 60}}, 3.0), way));
+  // Beside the branch by more than its radius, where the trunk is far.
+  EXPECT_FALSE(is_way_right(
+      line_through({{0, 0, 0}, {0, 0, 60}, {25, 0, 60}, {30, 4, 60}, {35, 0, 60}, {50, 0, 60}},
+                   3.0),
+      way));
+  EXPECT_FALSE(
+      is_way_right(line_through({{0, 0, 0}, {0, 0, 60}, {35, 0, 60}}, 3.0), way));  // short
+  EXPECT_FALSE(is_way_right(line_through({{0, 0, 40}, {0, 0, 60}, {50, 0, 60}}, 3.0), way))
+      << "late";
+
+  // Limbs of 4 mm radius that come back to 0.5 mm from each other, and a line that steps across.
+  const Centerline loop = line_through(
+      {{0, 0, 0}, {0, 0, 40}, {-20, 0, 60}, {4, 0, 80}, {28, 0, 60}, {8.5, 0, 40}, {8.5, 0, 0}},
+      4.0);
+  EXPECT_TRUE(is_way_right(loop, loop));
+  EXPECT_FALSE(
+      is_way_right(line_through({{0, 0, 0}, {0, 0, 40}, {8.5, 0, 40}, {8.5, 0, 0}}, 4.0), loop));
 }
 
 TEST(Bench, PatientsAreForSegmentationAlone) {
