@@ -22,7 +22,8 @@ Surface remesh_parts(const Surface& surface, const std::vector<int>& part_of_tri
                      const std::vector<double>& edge_length, double crease_deg, int iterations);
 
 /// What at least one of two closed surfaces encloses; empty where CGAL finds no manifold one, as
-/// where a surface cuts itself.
+/// where a surface cuts itself. Numbered by where its triangles are, so that the same bits come out
+/// of every process.
 std::optional<Surface> union_of(const Surface& a, const Surface& b);
 
 /// What it costs to give a triangle the label 0 and 1.

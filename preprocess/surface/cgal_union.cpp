@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <numeric>
 
 #include "preprocess/surface/cgal_calls.h"
 #include "preprocess/surface/cgal_mesh.h"
@@ -70,6 +71,35 @@ void remove_slivers(CgalMesh& mesh) {
   }
 }
 
+/// The same triangles, numbered by where they are: vertices by their coordinates, triangles by
+/// their vertices, the first of which is the least. CGAL numbers the patches of a union by the
+/// addresses at which they happen to lie in memory.
+Surface in_order(const Surface& surface) {
+  std::vector<int> order(static_cast<std::size_t>(surface.vertices.cols()));
+  std::iota(order.begin(), order.end(), 0);
+  std::sort(order.begin(), order.end(), [&](int a, int b) {
+    const auto p = surface.vertices.col(a), q = surface.vertices.col(b);
+    return std::lexicographical_compare(p.begin(), p.end(), q.begin(), q.end());
+  });
+  Surface ordered{.vertices = surface.vertices(Eigen::all, order), .triangles = {}};
+  std::vector<int> number(order.size());
+  for (std::size_t k = 0; k < order.size(); ++k) {
+    number[static_cast<std::size_t>(order[k])] = static_cast<int>(k);
+  }
+  std::vector<std::array<int, 3>> triangles;
+  for (const auto& t : surface.triangles.colwise()) {
+    std::array<int, 3>& triangle = triangles.emplace_back();
+    std::transform(t.begin(), t.end(), triangle.begin(),
+                   [&](int v) { return number[static_cast<std::size_t>(v)]; });
+    std::rotate(triangle.begin(), std::min_element(triangle.begin(), triangle.end()),
+                triangle.end());
+  }
+  std::sort(triangles.begin(), triangles.end());
+  ordered.triangles = Eigen::Map<const Eigen::Matrix3Xi>(
+      triangles.data()->data(), 3, static_cast<Eigen::Index>(triangles.size()));
+  return ordered;
+}
+
 }  // namespace
 
 std::optional<Surface> union_of(const Surface& a, const Surface& b) {
@@ -77,6 +107,7 @@ std::optional<Surface> union_of(const Surface& a, const Surface& b) {
   if (!pmp::does_bound_a_volume(first) || !pmp::does_bound_a_volume(second)) return {};
   const bool manifold = pmp::corefine_and_compute_union(first, second, whole);
   if (!manifold || whole.number_of_faces() == 0) return {};
+  whole = cgal_mesh_from(in_order(surface_from(whole)));  // of no memory's order
   remove_slivers(whole);
   return surface_from(whole);
 }

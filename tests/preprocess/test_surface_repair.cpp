@@ -1,12 +1,16 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Geometry>
+#include <algorithm>
 #include <cstdlib>
 #include <filesystem>
 #include <functional>
+#include <optional>
+#include <random>
 #include <set>
 #include <vector>
 
+#include "preprocess/surface/cgal_calls.h"
 #include "preprocess/surface/surface.h"
 #include "preprocess/surface/surface_repair.h"
 #include "tests/messages.h"
@@ -250,6 +254,33 @@ TEST(SurfaceRepair, UnitesClosedPiecesThatOverlap) {
   EXPECT_NEAR(signed_volume(repaired.surface), trunk_volume + 0.75 * branch_volume,
               0.02 * branch_volume);
   EXPECT_TRUE(locate_point(repaired.surface, Vec3(18, 0, 30)).inside);
+}
+
+TEST(SurfaceRepair, AUnionDoesNotDependOnMemory) {
+  // A tube through another: of the patches that it cuts, CGAL keeps three, in an order of its own.
+  const Surface trunk = shapes::straight_tube(5.0, 60.0, 1.5);
+  Surface through = shapes::straight_tube(1.5, 40.0, 0.8);
+  for (auto p : through.vertices.colwise()) p = Vec3(p.z() - 20.03, p.x(), p.y() + 30.01);
+  const std::optional<Surface> expected = union_of(trunk, through);
+  ASSERT_TRUE(expected);
+  ASSERT_GT(expected->triangles.cols(), 2000);
+  // The numbers follow from places alone.
+  for (Eigen::Index k = 1; k < expected->vertices.cols(); ++k) {
+    const auto a = expected->vertices.col(k - 1), b = expected->vertices.col(k);
+    ASSERT_TRUE(std::lexicographical_compare(a.begin(), a.end(), b.begin(), b.end())) << k;
+  }
+  std::mt19937_64 random(7);
+  for (int run = 0; run < 12; ++run) {
+    SCOPED_TRACE(run);
+    // Another heap: blocks of many sizes, every other one free again.
+    std::vector<std::vector<char>> blocks(20000);
+    for (std::vector<char>& block : blocks) block.resize(16 + random() % 3000);
+    for (std::size_t k = run % 2; k < blocks.size(); k += 2) std::vector<char>().swap(blocks[k]);
+    const std::optional<Surface> united = union_of(trunk, through);
+    ASSERT_TRUE(united);
+    EXPECT_TRUE(united->vertices == expected->vertices);
+    EXPECT_TRUE(united->triangles == expected->triangles);
+  }
 }
 
 TEST(SurfaceRepair, APointInADroppedPieceIsToldWithWhereItComesNear) {
