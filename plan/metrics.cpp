@@ -54,6 +54,7 @@ Metrics compute_push_metrics(const std::vector<simulate::Push>& pushes) {
     const simulate::Push& last = pushes.back();
     metrics.push_work = last.push_work;
     metrics.friction_work = last.friction_work;
+    metrics.energy_unbalanced = last.unbalanced;
     metrics.energy_released = last.push_work - last.stored_energy - last.friction_work;
   }
   if (way > 0.0) metrics.mean_contact_force = metrics.force_impulse / way;

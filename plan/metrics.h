@@ -29,7 +29,7 @@ struct Metrics {
   double peak_contact_force = 0.0;      // largest single contact                            [N]
   double mean_contact_force = 0.0;      // all contacts together, mean over the wire's way   [N]
   double force_impulse = 0.0;           // integral of all contacts' force over that way     [N mm]
-  double peak_push_force = 0.0;         // largest size, pushed or held back                 [N]
+  double peak_push_force = 0.0;         // largest mean over a push, pushed or held back     [N]
   double peak_curvature = 0.0;          //                                                   [1/mm]
   double centerline_deviation = 0.0;    // mean distance of the final wire from the path     [mm]
   double off_path = 0.0;                // furthest part of the final wire from the path's lumen, by
@@ -39,10 +39,11 @@ struct Metrics {
   WallMotion wall_motion;               // largest displacement / radius over the insertion
   double push_work = 0.0;               // of the hand                                     [N mm]
   double friction_work = 0.0;           // turned into heat                                [N mm]
-  double energy_released = 0.0;  // work that is neither stored nor heat of friction at the end:
-                                 // what the wire gave off in jumps                        [N mm]
-  double residual = 0.0;         // largest over the pushes                           [N]
-  long iterations = 0;           // of all pushes together
+  double energy_released = 0.0;    // work that is neither stored nor heat of friction at the end:
+                                   // what the wire gave off in jumps                        [N mm]
+  double energy_unbalanced = 0.0;  // see simulate::PushBalance                            [N mm]
+  double residual = 0.0;           // largest over the pushes                           [N]
+  long iterations = 0;             // of all pushes together
 };
 
 /// The numbers of Metrics with their names in files, in the order of a report's trial.
@@ -63,6 +64,7 @@ inline constexpr std::array kMetricFields = {
     MetricField{"push_work_n_mm", &Metrics::push_work},
     MetricField{"friction_work_n_mm", &Metrics::friction_work},
     MetricField{"energy_released_n_mm", &Metrics::energy_released},
+    MetricField{"energy_unbalanced_n_mm", &Metrics::energy_unbalanced},
     MetricField{"peak_wall_displacement_mm", &Metrics::peak_wall_displacement},
     MetricField{"peak_curvature_per_mm", &Metrics::peak_curvature},
     MetricField{"centerline_deviation_mm", &Metrics::centerline_deviation},

@@ -96,6 +96,7 @@ void put_work(Json& json, const simulate::Push& push) {
   put(json, "stored_energy_n_mm", push.stored_energy);
   put(json, "friction_work_n_mm", push.friction_work);
   put(json, "energy_released_n_mm", push.push_work - push.stored_energy - push.friction_work);
+  put(json, "energy_unbalanced_n_mm", push.unbalanced);
 }
 
 /// One row per `every_mm` of insertion, and one for the last push.

@@ -68,6 +68,27 @@ HeldEnd Statics::held_end(const Problem& problem, const RodState& state) {
   return sink.sum;
 }
 
+double Statics::bend_per_length(const Rod& rod, const RodState& state, int i, double length) {
+  // W is EI / length times a function of the rest angle, which grows with the length too.
+  const double r = rod.rest_angle[i], r_per_length = r / length;
+  const Vec3 u = (state.x.col(i + 1) - state.x.col(i)) * rod.per_length[i] -
+                 (state.x.col(i) - state.x.col(i - 1)) * rod.per_length[i - 1];
+  const double half = 0.5 * u.squaredNorm();
+  if (r == 0.0 && rod.strip[i] == 0.0) return -rod.bend[i] * half / length;
+  const double cosine = std::cos(r), sine = std::sin(r);
+  const double toward_m = Lean(rod, state, i, wireplan::simulate::toward_m).s;
+  const double turned = cosine * half + 1.0 - cosine - sine * toward_m;
+  const double by_r = sine * (1.0 - half) - cosine * toward_m;
+  double slope = rod.bend[i] * (by_r * r_per_length - turned / length);
+  if (const double strip = rod.strip[i]; strip != 0.0) {
+    const Lean lean(rod, state, i, [strip](const Edge& e) { return toward_stiff(e, strip); });
+    const double excess = lean.s - (strip > 0.0 ? 0.0 : sine);
+    const double rest_by_r = strip > 0.0 ? 0.0 : cosine;
+    slope -= std::abs(strip) * excess * (0.5 * excess / length + rest_by_r * r_per_length);
+  }
+  return slope;
+}
+
 void Statics::derivatives(const Problem& problem, const RodState& state, Eigen::VectorXd& gradient,
                           Eigen::MatrixXd& hessian) {
   const int n = problem.rod->nodes();

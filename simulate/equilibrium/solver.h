@@ -19,6 +19,10 @@ class Statics {
                          Eigen::Ref<Eigen::Matrix3Xd> gradient);
   /// What keeps the nodes before the first free one, and their edges, where they are.
   static HeldEnd held_end(const Problem& problem, const RodState& state);
+  /// The energy that node i gains per length of bent wire that is added to its `length` as it is
+  /// bent now, its turn and the wire's shape elsewhere given: -M^2/(2 EI) of a straight round wire
+  /// under a moment M [N].
+  static double bend_per_length(const Rod& rod, const RodState& state, int i, double length);
   /// For tests: gradient and dense Hessian over all x, then all theta (4n-1), supports ignored.
   static void derivatives(const Problem& problem, const RodState& state, Eigen::VectorXd& gradient,
                           Eigen::MatrixXd& hessian);

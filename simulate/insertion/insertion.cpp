@@ -30,7 +30,7 @@ constexpr double kDriftInto = 0.5;    // a wire's drift may lead this much deepe
 constexpr double kSnap = 2.0;         // way off the path per push that is a jump, not to go on
 constexpr double kDriftLasts = 5.0;   // push that a wire's drift falls to 1/e in               [mm]
 constexpr double kBent = 16.0;        // wire that a guess bends to keep its tip off the wall [mm]
-constexpr double kSmallestPart = 0.05;  // of a node's share of wire that bends at the exit
+constexpr double kSmallestPart = 0.01;  // of a node's share of wire that bends at the exit
 constexpr double kLongestPart = 2.0;  // of a push: friction turns with the path               [mm]
 constexpr double kLongestTurn = 15.0 * kRadPerDeg;  // of the hub in one go
 constexpr double kSmallestCut = 1.0 / 16.0;         // of a push, when one does not converge
@@ -90,8 +90,7 @@ Insertion::Insertion(const Wire& wire, const Introducer& introducer, const Vesse
       contact_(rod_, vessel, contact_options(options)) {
   const int n = rod_.nodes();
   longest_ = std::min(options.length, rod_.tip_distance[2]);
-  full_bend_ = rod_.bend;
-  full_rest_angle_ = rod_.rest_angle;
+  whole_ = rod_;
   const Vec3 start = introducer.point - rod_.tip_distance[0] * introducer.direction;
   state_ = straight_state(rod_, start, introducer.direction, introducer.roll);
   if (!rod_.twisted) {  // nothing that turns about the wire, so nothing to copy in every push
@@ -152,6 +151,7 @@ std::optional<Push> Insertion::move(double amount, double longest_part, const Pa
     if (cut < kSmallestCut * std::abs(amount)) return std::nullopt;
   }
   measure(record);
+  find_work(record);
   return record;
 }
 
@@ -173,6 +173,7 @@ void Insertion::save(Snapshot& snapshot) const {
   snapshot.forces = forces_;
   snapshot.memory = contact_.memory();
   snapshot.totals = totals_;
+  snapshot.balance = balance_;
   snapshot.wall_energy = wall_energy_;
 }
 
@@ -185,6 +186,7 @@ void Insertion::restore(const Snapshot& snapshot) {
   contact_.restore(snapshot.memory);
   contact_.free_from(depth_);
   totals_ = snapshot.totals;
+  balance_ = snapshot.balance;
   wall_energy_ = snapshot.wall_energy;
   forget_drift();
   bend_at_the_exit();
@@ -337,25 +339,55 @@ NewtonResult Insertion::follow_jump() {
   return statics_.solve(problem_, state_, newton_);
 }
 
-/// The introducer is straight: a node bends with that part alone of its share of the wire that is
-/// out of it. A node at the exit is then half a bend element, the second-order clamp of design 7.
+/// The introducer is straight: a node bends, and a free edge twists against the hub's, with that
+/// part alone of its length of wire that is out of it.
 void Insertion::bend_at_the_exit() {
   for (int i = exit_first_; i <= exit_last_; ++i) {
-    rod_.bend[i] = full_bend_[i];
-    rod_.rest_angle[i] = full_rest_angle_[i];
+    rod_.bend[i] = whole_.bend[i];
+    rod_.strip[i] = whole_.strip[i];
+    rod_.rest_angle[i] = whole_.rest_angle[i];
+    rod_.twist[i] = whole_.twist[i];
   }
-  exit_first_ = std::max(1, problem_.first - 3);
-  exit_last_ = std::min(problem_.first + 1, rod_.nodes() - 2);
+  const int first = problem_.first, last = rod_.nodes() - 2;
+  exit_first_ = first - 1;
+  exit_last_ = std::min(first, last);
   for (int i = exit_first_; i <= exit_last_; ++i) {
-    const double part = part_outside(i);
-    rod_.bend[i] = full_bend_[i] / std::max(kSmallestPart, part);
-    rod_.rest_angle[i] = full_rest_angle_[i] * part;
+    const double part = length_outside(i) / rod_.share[i];
+    rod_.bend[i] = whole_.bend[i] / part;
+    rod_.strip[i] = whole_.strip[i] / part;
+    rod_.rest_angle[i] = whole_.rest_angle[i] * part;
   }
+  if (first > last) return;
+  // The edge at the exit turns with the hub: twist begins at the exit, not at that edge's middle.
+  const double whole = twist_length(first), edge = rod_.rest_length[first - 1];
+  rod_.twist[first] *= whole / (whole - 0.5 * edge + depth_ - rod_.tip_distance[first]);
 }
 
-double Insertion::part_outside(int i) const {
-  const double out = depth_ - rod_.tip_distance[i] + 0.5 * rod_.rest_length[i];
-  return std::clamp(out / rod_.share[i], 0.0, 1.0);
+/// Length of wire that twists at node i: to the middles of its edges, the tip's to its end [mm].
+double Insertion::twist_length(int i) const {
+  const double tip = i == rod_.nodes() - 2 ? 0.5 * rod_.rest_length[i] : 0.0;
+  return rod_.share[i] + tip;
+}
+
+namespace {
+
+/// Of a function that falls evenly from 1 to 0 over `length`, the integral from `start` on.
+double rest_of_hat(double length, double start) {
+  const double rest = std::max(0.0, length - start);
+  return 0.5 * rest * rest / length;
+}
+
+}  // namespace
+
+/// Length of wire outside that node i bends for: a node's share of a place falls evenly from 1 at
+/// the node to 0 at the next. Wire that is bent evenly then comes out of the introducer as it lies,
+/// wherever its nodes are, so that neither its shape nor its energy ripples as they come out; no
+/// such share of all or nothing does that. At least a hundredth of its whole length [mm].
+double Insertion::length_outside(int i) const {
+  const double inside = rod_.tip_distance[i] - depth_;
+  const double out = inside >= 0.0 ? rest_of_hat(rod_.rest_length[i], inside)
+                                   : rod_.share[i] - rest_of_hat(rod_.rest_length[i - 1], -inside);
+  return std::max(kSmallestPart * rod_.share[i], out);
 }
 
 /// Point of the present shape `distance` further along the wire than node i, which is that far from
@@ -371,20 +403,25 @@ Vec3 Insertion::ahead_of(int i, double distance) {
 /// wall where it pushes on the edge at the exit; and as it lets out bent wire at the exit, this
 /// pushes outward by M^2/(2 EI), the configurational force of a sliding sleeve (Bigoni et al.,
 /// "Eshelby-like forces acting on elastic structures", Mech. Mater. 2015); so does twisted wire, by
-/// T^2/(2 GJ).
+/// T^2/(2 GJ). Without friction it is the slope of the energy in equilibrium over the insertion.
 double Insertion::push_force(const HeldEnd& held) const {
   double force = held.force.dot(introducer_.direction);
   for (const Touch& touch : touches_) {
     if (touch.edge >= problem_.first) break;
     force -= (1.0 - touch.part) * force_on_wire(touch).dot(introducer_.direction);
   }
-  for (int i = std::max(1, problem_.first - 3); i + 1 < rod_.nodes(); ++i) {
-    if (part_outside(i) <= kSmallestPart) continue;
-    const double moment = rod_.bend[i] * (turn_at(i).norm() - rod_.rest_angle[i]);
-    const double EI = full_bend_[i] * rod_.share[i];
-    force -= moment * moment / (2.0 * EI) + moment * full_rest_angle_[i] / rod_.share[i];
-    if (rod_.twisted) force -= held.torque * held.torque / (2.0 * rod_.twist[i] * rod_.share[i]);
-    break;
+  for (int i = exit_first_; i <= exit_last_; ++i) {
+    const double out = length_outside(i);
+    if (out == kSmallestPart * rod_.share[i]) continue;
+    const double inside = rod_.tip_distance[i] - depth_;
+    const double hat = 1.0 - std::abs(inside) / rod_.rest_length[inside >= 0.0 ? i : i - 1];
+    force += std::max(0.0, hat) * Statics::bend_per_length(rod_, state_, i, out);
+  }
+  const int first = problem_.first;
+  if (rod_.twisted && first < rod_.nodes() - 1) {
+    const double torque = rod_.twist[first] * (state_.theta[first] - state_.theta[first - 1] +
+                                               state_.reference_twist[first]);
+    force -= 0.5 * torque * torque / (whole_.twist[first] * twist_length(first));
   }
   return force;
 }
@@ -393,7 +430,7 @@ Vec3 Insertion::turn_at(int i) const {
   return edge(i) / rod_.rest_length[i] - edge(i - 1) / rod_.rest_length[i - 1];
 }
 
-/// After an equilibrium: what slipped, and the work of the push by `distance`.
+/// After an equilibrium: what slipped, and the work of the hand's forces before and after.
 void Insertion::settle(double distance, double angle) {
   touches_ = contact_.touches();
   deepest_ = 0.0;
@@ -409,15 +446,30 @@ void Insertion::settle(double distance, double angle) {
   totals_.friction_work += contact_.settle();
 }
 
+/// Work and mean force of the hand in the move that has just been made.
+void Insertion::find_work(Push& record) {
+  const Push& before = before_move_.totals;
+  const double distance = depth_ - before_move_.depth;
+  record.push_force = totals_.push_force - balance_.ripple();
+  if (distance != 0.0) {
+    const double by_forces = totals_.push_work - before.push_work;
+    const double by_energy =
+        totals_.stored_energy - before.stored_energy + totals_.friction_work - before.friction_work;
+    const double work = by_energy + balance_.find_release(distance, by_forces, by_energy);
+    totals_.push_work = before.push_work + work;
+    record.push_force = work / distance;
+  }
+  record.push_work = totals_.push_work;
+  record.unbalanced = balance_.unbalanced();
+}
+
 /// Forces and shape of the present equilibrium.
 void Insertion::measure(Push& record) {
   const int n = rod_.nodes();
   record.insertion = depth_;
   record.tip = tip();
   record.hub_angle = hub_angle_;
-  record.push_force = totals_.push_force;
   record.hub_torque = totals_.hub_torque;
-  record.push_work = totals_.push_work;
   record.stored_energy = totals_.stored_energy;
   record.friction_work = totals_.friction_work;
 

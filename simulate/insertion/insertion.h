@@ -8,6 +8,7 @@
 #include "simulate/contact/wall_contact.h"
 #include "simulate/equilibrium/solver.h"
 #include "simulate/insertion/push.h"
+#include "simulate/insertion/push_balance.h"
 #include "simulate/wall/vessel_model.h"
 #include "simulate/wire/rod.h"
 
@@ -99,6 +100,8 @@ class Insertion {
   double longest() const { return longest_; }      // that can be brought into the body      [mm]
   double depth() const { return depth_; }          // wire in the body                       [mm]
   double hub_angle() const { return hub_angle_; }  // since the start               [rad]
+  /// Of the hand on the wire at this very place, with the ripple of the elements (PushBalance) [N].
+  double hand_force() const { return totals_.push_force; }
   const Rod& rod() const { return rod_; }
   Vec3 tip() const { return state_.x.rightCols<1>(); }
   int first_free() const { return problem_.first; }  // node
@@ -125,6 +128,7 @@ class Insertion {
     Eigen::Matrix3Xd forces;
     WallContact::Memory memory;
     Push totals;
+    PushBalance balance;
     double wall_energy = 0.0;
   };
   void save(Snapshot& snapshot) const;
@@ -139,7 +143,8 @@ class Insertion {
   std::optional<Push> move(double amount, double longest_part, const Part& part);
   void turn_with_the_hub(RodState& state) const;
   void bend_at_the_exit();
-  double part_outside(int i) const;
+  double length_outside(int i) const;
+  double twist_length(int i) const;
   Vec3 ahead_of(int i, double distance);
   void bend_off_wall(int tip);
   void forget_drift() {
@@ -150,6 +155,7 @@ class Insertion {
   Vec3 edge(int i) const { return state_.x.col(i + 1) - state_.x.col(i); }
   Vec3 turn_at(int i) const;
   void settle(double distance, double angle);
+  void find_work(Push& record);
   void measure(Push& record);
   void add_triangle_forces();
 
@@ -157,7 +163,7 @@ class Insertion {
   InsertionOptions options_;
   const VesselModel& vessel_;
   Rod rod_;
-  Eigen::VectorXd full_bend_, full_rest_angle_;  // of the rod, all of it outside
+  Rod whole_;  // as if all of it were outside; rod_ is cut at the exit
   WallContact contact_;
   RodState state_, guess_;
   Snapshot before_move_, before_part_;
@@ -172,7 +178,8 @@ class Insertion {
   double hub_angle_ = 0.0;      // since the start                                           [rad]
   double last_distance_ = 0.0;  // of the last push; negative: pulled                         [mm]
   std::optional<int> slipped_out_;
-  Push totals_;               // forces of the hand, works and energy so far
+  Push totals_;  // forces of the hand now, works and energy so far
+  PushBalance balance_;
   double wall_energy_ = 0.0;  // of the stored energy, in the yielding wall              [N mm]
   Eigen::Matrix3Xd path_;     // where the wire ahead of each node was before the last push   [mm]
   Eigen::Matrix3Xd drift_;    // off that path, per length of push

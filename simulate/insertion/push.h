@@ -15,7 +15,8 @@ namespace wireplan::simulate {
 struct Push {
   double insertion = 0.0;            // wire beyond the introducer's point               [mm]
   double hub_angle = 0.0;            // turned since the start                          [rad]
-  double push_force = 0.0;           // axial force of the hand on the wire              [N]
+  double push_force = 0.0;           // axial force of the hand on the wire, its mean over a push
+                                     // or pull; after a turn, less the ripple           [N]
   double hub_torque = 0.0;           // of the hand, about the introducer's direction  [N mm]
   Vec3 tip = Vec3::Zero();           //                                                  [mm]
   double tip_force = 0.0;            // norm of the contact force on the last 2 mm       [N]
@@ -30,6 +31,7 @@ struct Push {
   double stored_energy = 0.0;  // ... of wire, contact and wall now ...                  [N mm]
   double friction_work = 0.0;  // ... and turned into heat since the start; what is left of the
                                // work was released in jumps [N mm]
+  double unbalanced = 0.0;     // see PushBalance::unbalanced()                        [N mm]
   double residual = 0.0;       //                                                        [N]
   int iterations = 0;          // Newton iterations of this step
 };
@@ -59,6 +61,7 @@ inline constexpr std::array kPushFields = {
     PushField{"push_work_n_mm", &Push::push_work, true},
     PushField{"stored_energy_n_mm", &Push::stored_energy, true},
     PushField{"friction_work_n_mm", &Push::friction_work, true},
+    PushField{"energy_unbalanced_n_mm", &Push::unbalanced, true},
     PushField{"residual_n", &Push::residual, true},
     PushField{"tip_mm", &Push::tip},
     PushField{"wall_displacement_point_mm", &Push::wall_displacement_point},

@@ -47,6 +47,8 @@ constexpr double kOutside = 1.0;       // penetration that contact does not expl
 constexpr double kPatience = 40.0;        //                                               [mm]
 constexpr double kPatienceBeyond = 10.0;  // where the tip is as far as a goal's sphere    [mm]
 
+constexpr double kBalance = 0.01;  // of the work that may be out of balance
+
 constexpr double kTurnStep = 15.0 * kRadPerDeg;      // of the hub between two records
 constexpr double kTurnPerShape = 30.0 * kRadPerDeg;  // of the hub between two shapes
 
@@ -295,7 +297,7 @@ void Trial::end(std::size_t goal, Outcome outcome, const std::string& reason) {
   pursuit.shapes = record_.shapes.size();
   TrialResult& ended = pursuit.end;
   ended.outcome = outcome;
-  ended.reason = reason;
+  ended.reason = reason + balance_text();
   ended.nodes = insertion_.free_nodes();
   ended.contacts = insertion_.contacts();
   ended.peak_forces = insertion_.peak_forces();
@@ -303,6 +305,18 @@ void Trial::end(std::size_t goal, Outcome outcome, const std::string& reason) {
                         record_.shapes.back().insertion == insertion_.depth() &&
                         record_.shapes.back().hub_angle == insertion_.hub_angle();
   if (!recorded) ended.shapes.push_back(shape_here());
+}
+
+/// Named where work and energy are not in balance; else empty.
+std::string Trial::balance_text() const {
+  if (record_.pushes.empty()) return "";
+  const Push& last = record_.pushes.back();
+  const double work = std::max(std::abs(last.push_work), last.stored_energy + last.friction_work);
+  if (std::abs(last.unbalanced) <= kBalance * work) return "";
+  char text[96];
+  std::snprintf(text, sizeof text, "; work and energy differ by %.1f %% of the work",
+                100.0 * std::abs(last.unbalanced) / work);
+  return text;
 }
 
 std::string Trial::reached_reason(std::size_t goal) const {

@@ -47,7 +47,8 @@ struct Shape {
 
 struct TrialResult {
   Outcome outcome = Outcome::kFailed;
-  std::string reason;                 // one sentence; with the place in mm where it failed
+  std::string reason;                 // one sentence; with the place in mm where it failed, and
+                                      // by how much work and energy differ beyond 1 % of the work
   std::vector<Push> pushes;           // in the order in which they were made
   std::vector<PushTerms> push_terms;  // one per push, if recorded
   /// Where the tip did not advance, if pushed on: wire in the body from and to [mm].
@@ -130,6 +131,7 @@ class Trial {
   void check_motion(std::size_t goal);
   bool pushed_on(std::size_t goal, double from, double to);
   std::string reached_reason(std::size_t goal) const;
+  std::string balance_text() const;
   std::string place_of(int opening) const;
   Shape shape_here() const;
 
