@@ -26,7 +26,7 @@ struct Metrics {
   double tip_to_target = 0.0;           // distance at the end                               [mm]
   double nearest_to_target = 0.0;       // smallest distance after any push                  [mm]
   double peak_tip_force = 0.0;          // over the insertion                                [N]
-  double peak_contact_force = 0.0;      // largest single contact                            [N]
+  double peak_contact_force = 0.0;      // on any simulate::kContactLength of wire           [N]
   double mean_contact_force = 0.0;      // all contacts together, mean over the wire's way   [N]
   double force_impulse = 0.0;           // integral of all contacts' force over that way     [N mm]
   double peak_push_force = 0.0;         // largest mean over a push, pushed or held back     [N]

@@ -52,7 +52,7 @@ void add_plans(Table& table, const Json& report) {
     if (!plan.at("script").get<std::string>().empty()) table.row("moves", plan.at("script"));
     table.row("wire in the vessel", trial.at("insertion_mm"), "mm");
     table.row("tip force", trial.at("peak_tip_force_n"), "N", limits.at("tip_force_warn_n"));
-    table.row("largest contact force", trial.at("peak_contact_force_n"), "N");
+    table.row("largest force on 5 mm of wire", trial.at("peak_contact_force_n"), "N");
     table.row("score", plan.at("score"));
     const Json* repeats = find_by_trial(report.at("robustness").at("plans"), plan.at("trial"));
     if (repeats != nullptr) {

@@ -20,6 +20,7 @@ struct Touch {
   double penetration = 0.0;        // of the wire's surface past the yielded wall           [mm]
   double wall_displacement = 0.0;  // outward                                             [mm]
   double tip_distance = 0.0;       // along the wire                                      [mm]
+  double share = 0.0;              // length of wire that it stands for                   [mm]
 };
 
 /// Energies of the contact [N mm].

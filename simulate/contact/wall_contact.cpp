@@ -68,7 +68,8 @@ const std::vector<Touch>& WallContact::touches() {
                         .friction = friction_.acts() ? friction_.force(active.point) : Vec3::Zero(),
                         .penetration = std::max(0.0, radius_ - active.wall.distance - active.yield),
                         .wall_displacement = active.yield,
-                        .tip_distance = point.tip_distance});
+                        .tip_distance = point.tip_distance,
+                        .share = point.share});
   }
   return touches_;
 }

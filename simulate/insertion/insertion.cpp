@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "simulate/contact/contact_force.h"
+
 namespace wireplan::simulate {
 
 WireContact contact_of(const Touch& touch, double wire_radius, const TriangleLocator& locator) {
@@ -75,10 +77,6 @@ ContactOptions contact_options(const InsertionOptions& options) {
   return contact;
 }
 
-Vec3 force_on_wire(const Touch& touch) {
-  return touch.normal_force * touch.normal + touch.friction;
-}
-
 }  // namespace
 
 Insertion::Insertion(const Wire& wire, const Introducer& introducer, const VesselModel& vessel,
@@ -113,6 +111,7 @@ Insertion::Insertion(const Wire& wire, const Introducer& introducer, const Vesse
   guess_ahead_.resize(3, n);
   path_.resize(3, n);
   drift_ = moved_ = Eigen::Matrix3Xd::Zero(3, n);
+  force_sums_.reserve(static_cast<std::size_t>(contact_.memory().normal_force.size()) + 1);
   mapped_.assign(static_cast<std::size_t>(contact_.memory().normal_force.size()), -1);
 }
 
@@ -473,16 +472,12 @@ void Insertion::measure(Push& record) {
   record.stored_energy = totals_.stored_energy;
   record.friction_work = totals_.friction_work;
 
-  Vec3 group = Vec3::Zero(), at_tip = Vec3::Zero();
+  Vec3 at_tip = Vec3::Zero();
   forces_.setZero();
   triangle_forces_.clear();
-  int previous = -2;
+  record.peak_contact_force = peak_force_on_length(touches_, kContactLength, force_sums_);
   for (const Touch& touch : touches_) {
     const Vec3 force = force_on_wire(touch);
-    if (touch.point != previous + 1) group.setZero();
-    previous = touch.point;
-    group += force;
-    record.peak_contact_force = std::max(record.peak_contact_force, group.norm());
     record.total_contact_force += touch.normal_force;
     record.friction_force += touch.friction.norm();
     record.max_penetration = std::max(record.max_penetration, touch.penetration);
@@ -490,7 +485,7 @@ void Insertion::measure(Push& record) {
       record.wall_displacement = touch.wall_displacement;
       record.wall_displacement_point = touch.position - rod_.radius * touch.normal;
     }
-    if (touch.tip_distance <= kTipRegion) at_tip += force;
+    at_tip += part_within(touch, kTipRegion) * force;
     forces_.col(touch.edge) += (1.0 - touch.part) * force;
     forces_.col(touch.edge + 1) += touch.part * force;
     if (!options_.map_forces) continue;

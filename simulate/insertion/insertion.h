@@ -186,6 +186,7 @@ class Insertion {
   Eigen::Matrix3Xd moved_;    // each node in the last push, per length of it
   Eigen::Matrix3Xd forces_, guess_ahead_;
   std::vector<Touch> touches_;
+  std::vector<Vec3> force_sums_;                         // scratch
   std::vector<std::int32_t> mapped_;                     // triangle that each contact point was on
   std::vector<std::pair<int, double>> triangle_forces_;  // of this push
   std::map<int, double> peak_forces_;                    // of all pushes, by triangle

@@ -9,9 +9,13 @@
 
 namespace wireplan::simulate {
 
+/// So much wire makes one contact: the force at a contact is the norm of the sum of the wall's
+/// forces on it, where it is largest. A length of its own, so that the force does not hang on how
+/// far contact points are apart; about that of a short lesion, chosen [mm].
+inline constexpr double kContactLength = 5.0;
+
 /// State after one step of a push, pull or turn, in equilibrium. Forces are those of the wall on
-/// the wire. A contact is a maximal run of neighbouring contact points that touch; its force is the
-/// norm of their sum.
+/// the wire.
 struct Push {
   double insertion = 0.0;            // wire beyond the introducer's point               [mm]
   double hub_angle = 0.0;            // turned since the start                          [rad]
@@ -20,7 +24,7 @@ struct Push {
   double hub_torque = 0.0;           // of the hand, about the introducer's direction  [N mm]
   Vec3 tip = Vec3::Zero();           //                                                  [mm]
   double tip_force = 0.0;            // norm of the contact force on the last 2 mm       [N]
-  double peak_contact_force = 0.0;   // of the largest contact                           [N]
+  double peak_contact_force = 0.0;   // on the kContactLength of wire with the largest   [N]
   double total_contact_force = 0.0;  // sum of the normal forces of all points           [N]
   double friction_force = 0.0;       // sum of the friction forces of all points         [N]
   double max_penetration = 0.0;      // of the wire's surface past the (yielded) wall    [mm]

@@ -119,7 +119,7 @@ TEST(ViewerFiles, ListTheFiguresOfTheSheet) {
             "\"plan 1\",\"roll of the tip\",0,\"deg\",,\r\n"
             "\"plan 1\",\"wire in the vessel\",30.5,\"mm\",,\r\n"
             "\"plan 1\",\"tip force\",0.125,\"N\",0.3,\r\n"
-            "\"plan 1\",\"largest contact force\",0.5,\"N\",,\r\n"
+            "\"plan 1\",\"largest force on 5 mm of wire\",0.5,\"N\",,\r\n"
             "\"plan 1\",\"score\",0.25,,,\r\n"
             "\"plan 1\",\"safe repeats\",3,,4,\r\n"
             "\"plan 1\",\"share safe, low end of 95 % interval\",0.25,,,\r\n"

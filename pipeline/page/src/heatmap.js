@@ -89,7 +89,7 @@ export const heatSection = (page, selection) => {
 
   const seen = outcomes.filter((outcome) => trials.some((t) => t.outcome === outcome && outcome !== "reached"));
   return section("heat", "Wires and angles",
-    el("p", {}, "Every trial: where the target was reached, the largest contact force in newtons with its color; else a letter for how it ended. Press a cell to see the trial."),
+    el("p", {}, "Every trial: where the target was reached, the largest force on any 5 mm of wire in newtons (largest contact) with its color; else a letter for how it ended. Press a cell to see the trial."),
     el("div", {class: "legend"},
       el("span", {}, "reached, largest contact: 0"),
       el("span", {class: "bar", style: `background:${gradient()}`, role: "img", "aria-label": "color scale of the largest contact force"}),

@@ -52,7 +52,7 @@ export const answerSection = (page) => {
       "Best of ", plural(report.ranking.length, "safe plan"), `, which reach and break no limit; ${trials.filter((x) => x.reached).length} of ${trials.length} tried reach: `,
       el("strong", {}, el("bdi", {}, planName(t))),
       `. Its tip ends ${withError(t.tip_to_target_mm, errors.position_error_mm)}\u00a0mm from the target's middle, with at most ` +
-      `${withError(t.peak_contact_force_n, errors.peak_contact_force_error_n)}\u00a0N at one contact and ${withError(t.peak_tip_force_n, errors.peak_tip_force_error_n)}\u00a0N at the tip.`),
+      `${withError(t.peak_contact_force_n, errors.peak_contact_force_error_n)}\u00a0N on any 5\u00a0mm of wire and ${withError(t.peak_tip_force_n, errors.peak_tip_force_error_n)}\u00a0N at the tip.`),
     el("p", {}, ties ? `${plural(ties, "other plan")} cannot be told apart from it: ${best.tied_with.map((id) => `plan ${trials[id].plan?.rank ?? "?"}`).join(", ")}. ` : "No other plan is as good within the errors. ", rate),
     el("p", {class: "note"}, "\u00b1 is the estimated numerical error alone; see what is uncertain below."));
 };
