@@ -277,10 +277,12 @@ void write_sentences(Ranking& ranking, const Study& study, const std::vector<Can
 std::vector<WireSummary> summarise_wires(const Study& study,
                                          const std::vector<Candidate>& candidates,
                                          const std::vector<Metrics>& metrics,
-                                         const std::vector<RankedPlan>& plans) {
+                                         const std::vector<RankedPlan>& plans,
+                                         const std::vector<bool>& scouted) {
   std::vector<WireSummary> wires(study.wires.size());
   std::vector<std::vector<double>> forces(study.wires.size());
   for (std::size_t k = 0; k < candidates.size(); ++k) {
+    if (!scouted.empty() && scouted[k]) continue;
     const int wire = candidates[k].wire;
     ++wires[wire].trials;
     if (metrics[k].reached) forces[wire].push_back(metrics[k].peak_contact_force);
@@ -459,7 +461,7 @@ Ranking rank(const Study& study, const std::vector<Candidate>& candidates,
   sort_plans(ranking.plans);
   find_ties(ranking.plans, findings.repeated, all.between);
   write_sentences(ranking, study, candidates, metrics, limits, weights, findings.repeated);
-  ranking.wires = summarise_wires(study, candidates, metrics, ranking.plans);
+  ranking.wires = summarise_wires(study, candidates, metrics, ranking.plans, findings.scouted);
   ranking.pareto = find_pareto_front(ranking.plans, metrics);
   return ranking;
 }

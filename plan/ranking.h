@@ -98,8 +98,9 @@ struct ExcludedTrial {
   std::string reason;
 };
 
-/// Forces are medians and maxima of peak_contact_force over the trials that reached the target,
-/// also those that broke a limit; 0 if none did.
+/// Of trials in full alone: a scout's wall is rigid. Forces are medians and maxima of
+/// peak_contact_force over the trials that reached the target, also those that broke a limit; 0 if
+/// none did.
 struct WireSummary {
   int wire = 0, trials = 0, reached = 0, safe = 0;         // safe: ranked plans
   std::optional<int> best_trial;                           // of the ranked plans

@@ -320,6 +320,14 @@ TEST(Rank, RanksNoTrialThatWasScoutedOnly) {
             std::string::npos)
       << ranking.excluded[0].reason;
   EXPECT_NE(ranking.excluded[1].reason.find("scouted only: missed"), std::string::npos);
+  // Nor does it count for its wire: its wall was rigid.
+  int trials = 0, reached = 0;
+  for (const WireSummary& wire : ranking.wires) {
+    trials += wire.trials;
+    reached += wire.reached;
+  }
+  EXPECT_EQ(trials, 1);
+  EXPECT_EQ(reached, 1);
 }
 
 TEST(Rank, SummarisesEachWireOverTheTrialsThatReached) {
