@@ -11,6 +11,9 @@ namespace {
 /// Below this a change of position is rounding, and says nothing of the order [mm].
 constexpr double kRoundingDistance = 1e-9;
 
+/// The least order that is reckoned with; and that of forces, see estimate_error().
+constexpr double kLeastOrder = 0.5;
+
 std::string in_mm(double length) {
   char text[64];
   std::snprintf(text, sizeof text, "%.6g mm", length);
@@ -48,6 +51,12 @@ Change compare_runs(const RefinedRun& coarse, const RefinedRun& fine) {
           .peak_force = std::abs(a.peak_contact_force - b.peak_contact_force),
           .mean_force = std::abs(a.mean_contact_force - b.mean_contact_force),
           .tip_force = std::abs(a.peak_tip_force - b.peak_tip_force)};
+}
+
+/// The error of the study's run: that of the change to the finer one, but no less than what second
+/// order makes of the change from the coarser one, which three times the error is then.
+double stated_error(double factor, double fine, double coarse) {
+  return std::max(factor * fine, coarse / 3.0);
 }
 
 std::optional<double> find_order(const std::optional<Change>& coarse,
@@ -111,16 +120,19 @@ Refinement estimate_error(int trial, double insertion, const std::vector<Refined
   if (complete[0] && complete[1]) coarse = compare_runs(runs[0], runs[1]);
   if (complete[1] && complete[2]) fine = compare_runs(runs[1], runs[2]);
   result.observed_order = find_order(coarse, fine);
-  const double ratio = std::exp2(std::clamp(result.observed_order.value_or(2.0), 0.5, 2.0));
+  const double ratio = std::exp2(std::clamp(result.observed_order.value_or(2.0), kLeastOrder, 2.0));
   const double of_longer = ratio / (ratio - 1.0), of_shorter = 1.0 / (ratio - 1.0);
 
   // The study's own run, by comparison with the finer one.
   if (fine) {
-    result.error = NumericalError{.position = of_longer * fine->position,
-                                  .tip = of_longer * fine->tip,
-                                  .peak_force = of_longer * fine->peak_force,
-                                  .mean_force = of_longer * fine->mean_force,
-                                  .tip_force = of_longer * fine->tip_force};
+    const Change longer = coarse.value_or(Change{});
+    const double least = std::exp2(kLeastOrder), of_force = least / (least - 1.0);
+    result.error =
+        NumericalError{.position = stated_error(of_longer, fine->position, longer.position),
+                       .tip = stated_error(of_longer, fine->tip, longer.tip),
+                       .peak_force = stated_error(of_force, fine->peak_force, longer.peak_force),
+                       .mean_force = stated_error(of_force, fine->mean_force, longer.mean_force),
+                       .tip_force = stated_error(of_force, fine->tip_force, longer.tip_force)};
   }
 
   // The table.

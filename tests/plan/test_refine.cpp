@@ -81,9 +81,11 @@ TEST(EstimateError, IsExactForErrorsOfSecondOrder) {
   ASSERT_TRUE(result.error.has_value());
   EXPECT_NEAR(result.error->position, 0.03, 1e-13);
   EXPECT_NEAR(result.error->tip, 0.03, 1e-13);
-  EXPECT_NEAR(result.error->peak_force, 0.03, 1e-13);
-  EXPECT_NEAR(result.error->tip_force, 0.03, 1e-13);
-  EXPECT_NEAR(result.error->mean_force, 0.015, 1e-13);  // from rest: half the last force
+  // Of forces half an order is assumed: the change to h/2 is three quarters of 0.03 N.
+  const double force = 0.75 * 0.03 * std::sqrt(2.0) / (std::sqrt(2.0) - 1.0);
+  EXPECT_NEAR(result.error->peak_force, force, 1e-13);
+  EXPECT_NEAR(result.error->tip_force, force, 1e-13);
+  EXPECT_NEAR(result.error->mean_force, 0.5 * force, 1e-13);  // from rest: half the last force
 
   ASSERT_EQ(result.rows.size(), 3u);
   for (const NumericsRow& row : result.rows) {
@@ -103,10 +105,10 @@ TEST(EstimateError, FollowsALowerOrder) {
 }
 
 TEST(EstimateError, DoesNotTrustAHigherOrderThanTheRodHas) {
-  // Fourth order: the change is (1 - 1/16) 0.03 mm, of which second order makes 4/3.
+  // Fourth order: the change to h is (16 - 1) 0.03 mm, of which second order makes a third.
   const Refinement result = estimate_error(0, kLength, runs_of_order(4.0, 0.03));
   EXPECT_NEAR(result.observed_order.value(), 4.0, 1e-9);
-  EXPECT_NEAR(result.error.value().position, 4.0 / 3.0 * 15.0 / 16.0 * 0.03, 1e-13);
+  EXPECT_NEAR(result.error.value().position, 15.0 / 3.0 * 0.03, 1e-12);
 }
 
 TEST(EstimateError, StaysFiniteWhereTheRunsDoNotConverge) {
@@ -117,6 +119,16 @@ TEST(EstimateError, StaysFiniteWhereTheRunsDoNotConverge) {
   EXPECT_LT(result.observed_order.value(), 0.0);
   const double half_order = std::sqrt(2.0) / (std::sqrt(2.0) - 1.0);
   EXPECT_NEAR(result.error.value().position, 0.05 * half_order, 1e-13);
+}
+
+TEST(EstimateError, AChangeThatHappensToBeSmallIsNotTrusted) {
+  // From 2h to h by 0.3 mm and N, from h to h/2 by a thousandth.
+  const auto offset = [](double h, double) { return h == 2.0 ? 0.3 : h == 1.0 ? 0.0 : 0.001; };
+  const Refinement result = estimate_error(
+      0, kLength, {run_of(2.0, offset, 1.3), run_of(1.0, offset, 1.0), run_of(0.5, offset, 1.001)});
+  EXPECT_NEAR(result.error.value().tip, 0.1, 1e-13);
+  EXPECT_NEAR(result.error.value().position, 0.1, 1e-13);
+  EXPECT_NEAR(result.error.value().peak_force, 0.1, 1e-13);
 }
 
 TEST(EstimateError, HasNoOrderWhereNothingChanges) {
