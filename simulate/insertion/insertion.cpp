@@ -69,15 +69,19 @@ Eigen::VectorXd layout(const Wire& wire, const InsertionOptions& options) {
                                            static_cast<Eigen::Index>(from_tip.size()));
 }
 
-ContactOptions contact_options(const InsertionOptions& options) {
+ContactOptions contact_options(const Wire& wire, const InsertionOptions& options) {
   ContactOptions contact;
   contact.law = options.contact_law;
   contact.spacing = options.contact_spacing;
-  contact.friction = options.friction;
+  contact.friction = friction_of(wire, options);
   return contact;
 }
 
 }  // namespace
+
+double friction_of(const Wire& wire, const InsertionOptions& options) {
+  return options.friction_factor * wire.friction.value_or(options.friction);
+}
 
 Insertion::Insertion(const Wire& wire, const Introducer& introducer, const VesselModel& vessel,
                      const InsertionOptions& options)
@@ -85,7 +89,7 @@ Insertion::Insertion(const Wire& wire, const Introducer& introducer, const Vesse
       options_(options),
       vessel_(vessel),
       rod_(build_rod(wire, layout(wire, options))),
-      contact_(rod_, vessel, contact_options(options)) {
+      contact_(rod_, vessel, contact_options(wire, options)) {
   const int n = rod_.nodes();
   longest_ = std::min(options.length, rod_.tip_distance[2]);
   whole_ = rod_;

@@ -23,7 +23,8 @@ struct InsertionOptions {
   /// element_length. It is shortened so that whole elements fill the section [mm].
   std::vector<double> section_element_length = {};
   double contact_spacing = 1.0;      // see ContactOptions::spacing                      [mm]
-  double friction = 0.0;             // Coulomb's coefficient
+  double friction = 0.0;             // Coulomb's coefficient of wires that have none of their own
+  double friction_factor = 1.0;      // on the friction of every wire
   ContactLaw contact_law = {};       // the default; see contact_law.h
   double residual_tolerance = 1e-6;  // largest nodal force out of balance               [N]
   int max_iterations = 50;           // Newton iterations per solve; see Insertion::push()
@@ -33,6 +34,9 @@ struct InsertionOptions {
   bool push_on = false;              // whether a wire whose tip is stuck, or that folds back, is
                                      // pushed on; see TrialResult::stuck
 };
+
+/// Coulomb's coefficient as it acts between the wire and the wall.
+double friction_of(const Wire& wire, const InsertionOptions& options);
 
 /// The wire's energy by term after a push, and how its tip is rolled.
 struct PushTerms {

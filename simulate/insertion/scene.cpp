@@ -396,7 +396,8 @@ double twist_compliance(const Wire& wire, double a, double b) {
   double sum = 0.0, start = 0.0;
   for (const Section& section : wire.sections) {
     const double end = start + section.length;
-    sum += std::max(0.0, std::min(b, end) - std::max(a, start)) / section.gj();
+    const double part = std::max(0.0, std::min(b, end) - std::max(a, start));
+    if (part > 0.0) sum += section.twist_compliance(std::max(a, start) - start, part);
     start = end;
   }
   return sum;

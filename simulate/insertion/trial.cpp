@@ -73,7 +73,7 @@ Trial::Trial(const Wire& wire, const Introducer& introducer, const std::vector<G
     expects(goals_[k].at_section || goals_.size() == 1);
     pursuits_[k].best_distance = (insertion_.tip() - goals_[k].point).norm();
   }
-  record_.terms = name_terms(insertion_.rod(), {}, &vessel, options.friction);
+  record_.terms = name_terms(insertion_.rod(), {}, &vessel, friction_of(wire, options));
 }
 
 bool Trial::ended() const {

@@ -6,6 +6,34 @@
 
 namespace wireplan::simulate {
 
+// A cone: with q, the fourth root of EI, linear from a to b, the integral of q^-4 over a length l
+// is l (a^2 + a b + b^2) / (3 a^3 b^3).
+double Section::bend_compliance(double from, double part) const {
+  if (!tapered()) return part / bending_stiffness;
+  const double a = from / length, b = (from + part) / length;
+  const double EI_0 = bending_stiffness, EI_1 = proximal_bending_stiffness;
+  if (taper == Taper::kCone) {
+    const double root_0 = std::sqrt(std::sqrt(EI_0)), root_1 = std::sqrt(std::sqrt(EI_1));
+    const double q_a = root_0 + a * (root_1 - root_0), q_b = root_0 + b * (root_1 - root_0);
+    return part * (q_a * q_a + q_a * q_b + q_b * q_b) / (3.0 * std::pow(q_a * q_b, 3));
+  }
+  const double EI_a = EI_0 + a * (EI_1 - EI_0), EI_b = EI_0 + b * (EI_1 - EI_0);
+  const double rise = (EI_b - EI_a) / EI_a;
+  return part / EI_a * (rise == 0.0 ? 1.0 : std::log1p(rise) / rise);
+}
+
+double Section::axial_compliance(double from, double part, double radius) const {
+  if (axial_stiffness > 0.0) return part / axial_stiffness;
+  if (tapered()) return 0.25 * radius * radius * bend_compliance(from, part);
+  return part / (4.0 * bending_stiffness / (radius * radius));
+}
+
+double Section::twist_compliance(double from, double part) const {
+  if (twist_stiffness > 0.0) return part / twist_stiffness;
+  if (tapered()) return 1.3 * bend_compliance(from, part);
+  return part / (bending_stiffness / 1.3);
+}
+
 double Wire::length() const {
   double sum = 0.0;
   for (const Section& section : sections) sum += section.length;
@@ -41,14 +69,14 @@ Average average_over(const Wire& wire, double a, double b) {
     const bool last = k + 1 == wire.sections.size();
     const double end = last ? std::max(b, start + section.length) : start + section.length;
     const double part = std::max(0.0, std::min(b, end) - std::max(a, start));
+    const double from = std::max(a, start) - start;
     start = end;
     if (part == 0.0) continue;
-    const double EI = section.bending_stiffness;
-    const double EA = section.ea(wire.radius), GJ = section.gj();
-    inverse_EI += part / EI;
-    inverse_EI_2 += part / (section.round() ? EI : section.bending_stiffness_2);
-    inverse_EA += part / EA;
-    inverse_GJ += part / GJ;
+    const double bend = section.bend_compliance(from, part);
+    inverse_EI += bend;
+    inverse_EI_2 += section.round() ? bend : part / section.bending_stiffness_2;
+    inverse_EA += section.axial_compliance(from, part, wire.radius);
+    inverse_GJ += section.twist_compliance(from, part);
     sum.rest_angle += part * section.rest_curvature;
     sum.mass += part * section.mass_per_length;
   }

@@ -4,6 +4,7 @@
 /// vasculature". Directors, twist and their derivatives: Bergou et al., "Discrete Viscous Threads",
 /// SIGGRAPH 2010. Departures from both are named where they occur.
 #include <Eigen/Core>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -11,7 +12,13 @@
 
 namespace wireplan::simulate {
 
-/// A stretch of wire with constant properties.
+/// How EI runs along a section from the end toward the tip to the other.
+enum class Taper {
+  kLinear,  // EI is linear
+  kCone,    // of a round core of one material whose diameter is linear: the fourth root of EI is
+};
+
+/// A stretch of wire with constant properties, but for a taper of EI.
 struct Section {
   double length = 0.0;               //                                                   [mm]
   double bending_stiffness = 0.0;    // EI; of a strip: toward the material director      [N mm^2]
@@ -21,14 +28,25 @@ struct Section {
   double mass_per_length = 0.0;      //                                                   [t/mm]
   double rest_curvature = 0.0;       // of the unloaded wire toward the material director, 1/radius
                                      //                                                   [1/mm]
+  double proximal_bending_stiffness = 0.0;  // EI at the end away from the tip, where a round wire
+                                            // tapers; 0: the same                        [N mm^2]
+  Taper taper = Taper::kLinear;
+
   bool round() const {
     return bending_stiffness_2 == 0.0 || bending_stiffness_2 == bending_stiffness;
   }
-  /// EA and GJ as they act; the radius is the wire's.
-  double ea(double radius) const {
-    return axial_stiffness > 0.0 ? axial_stiffness : 4.0 * bending_stiffness / (radius * radius);
+  bool tapered() const {
+    return proximal_bending_stiffness > 0.0 && proximal_bending_stiffness != bending_stiffness;
   }
-  double gj() const { return twist_stiffness > 0.0 ? twist_stiffness : bending_stiffness / 1.3; }
+  /// EI at the section's end away from the tip [N mm^2].
+  double proximal_EI() const { return tapered() ? proximal_bending_stiffness : bending_stiffness; }
+  /// Integrals of 1/EI, 1/EA and 1/GJ over a part of the section, which begins `from` its end
+  /// toward the tip [mm]: what springs in series give way. The radius is the wire's.
+  double bend_compliance(double from, double part) const;                  // [1/(N mm)]
+  double axial_compliance(double from, double part, double radius) const;  // [mm/N]
+  double twist_compliance(double from, double part) const;                 // [1/(N mm)]
+  /// EA as it acts; of a taper the mean that stretches as the whole section does [N].
+  double ea(double radius) const { return length / axial_compliance(0.0, length, radius); }
 };
 
 /// A device: sections listed from the tip backwards.
@@ -36,6 +54,7 @@ struct Wire {
   std::string name;
   double radius = 0.0;  //                                                                [mm]
   std::vector<Section> sections;
+  std::optional<double> friction = {};  // Coulomb's coefficient of its own; empty: the insertion's
 
   double length() const;
   bool straight() const;  // no section has a rest curvature

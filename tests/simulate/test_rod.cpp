@@ -2,6 +2,7 @@
 
 #include <Eigen/Geometry>
 #include <cmath>
+#include <utility>
 
 #include "simulate/wire/rod.h"
 
@@ -35,6 +36,74 @@ TEST(Rod, ActsAsSpringsInSeriesWhereStiffnessChanges) {
   const Rod rod = build_rod(two_sections(), 100.0, 100);
   // The node at the joint, 10 mm from the tip, has half a millimetre of either side.
   EXPECT_NEAR(rod.bend[90], 1.0 / (0.5 / 5.0 + 0.5 / 500.0), 1e-12);
+}
+
+/// The integral of a taper's 1/EI from a to b of its length, by Simpson's rule on `law`, which has
+/// EI at a place from 0 to 1.
+template <class Law>
+double integrate_compliance(const Law& law, double length, double a, double b) {
+  constexpr int kParts = 2000;  // odd-even error (b - a)^4 / kParts^4
+  double sum = 0.0;
+  for (int i = 0; i <= kParts; ++i) {
+    const double weight = i == 0 || i == kParts ? 1.0 : i % 2 == 1 ? 4.0 : 2.0;
+    sum += weight / law(a + (b - a) * i / kParts);
+  }
+  return sum * length * (b - a) / (3.0 * kParts);
+}
+
+TEST(Section, TapersGiveWayAsTheIntegralOfTheirCompliance) {
+  Section section{.length = 60.0, .bending_stiffness = 3.0, .proximal_bending_stiffness = 521.0};
+  const auto linear = [](double part) { return 3.0 + part * (521.0 - 3.0); };
+  const auto cone = [](double part) {
+    const double diameter = 1.0 + part * (std::pow(521.0 / 3.0, 0.25) - 1.0);  // of the thin end's
+    return 3.0 * std::pow(diameter, 4);
+  };
+  for (const auto& [a, b] : {std::pair(0.0, 1.0), std::pair(0.0, 0.02), std::pair(0.3, 0.9)}) {
+    SCOPED_TRACE(b);
+    section.taper = Taper::kLinear;
+    const double of_linear = integrate_compliance(linear, 60.0, a, b);
+    EXPECT_NEAR(section.bend_compliance(60.0 * a, 60.0 * (b - a)), of_linear, 1e-6 * of_linear);
+    section.taper = Taper::kCone;
+    const double of_cone = integrate_compliance(cone, 60.0, a, b);
+    const double bend = section.bend_compliance(60.0 * a, 60.0 * (b - a));
+    EXPECT_NEAR(bend, of_cone, 1e-6 * of_cone);
+    // EA and GJ follow EI along the taper, unless they are given.
+    EXPECT_NEAR(section.twist_compliance(60.0 * a, 60.0 * (b - a)), 1.3 * bend, 1e-12 * bend);
+    EXPECT_NEAR(section.axial_compliance(60.0 * a, 60.0 * (b - a), 0.4), 0.04 * bend, 1e-12 * bend);
+  }
+  section.axial_stiffness = 1e4;
+  EXPECT_DOUBLE_EQ(section.axial_compliance(10.0, 20.0, 0.4), 20.0 / 1e4);
+  EXPECT_DOUBLE_EQ(section.ea(0.4), 1e4);
+}
+
+TEST(Section, ATaperToNearlyTheSameStiffnessIsNoTaper) {
+  Section section{.length = 60.0,
+                  .bending_stiffness = 30.0,
+                  .proximal_bending_stiffness = 30.0 * (1.0 + 1e-13)};
+  for (const Taper taper : {Taper::kLinear, Taper::kCone}) {
+    section.taper = taper;
+    EXPECT_NEAR(section.bend_compliance(10.0, 40.0), 40.0 / 30.0, 1e-12);
+  }
+}
+
+TEST(Rod, ATaperIsTheSameInOneSectionAsInMany) {
+  // Each step with the EI of the taper's mean compliance over it: the same springs in series.
+  Wire taper = two_sections(), steps = two_sections();
+  taper.sections.insert(taper.sections.begin() + 1, {.length = 40.0,
+                                                     .bending_stiffness = 5.0,
+                                                     .proximal_bending_stiffness = 500.0,
+                                                     .taper = Taper::kCone});
+  const Section& whole = taper.sections[1];
+  for (int k = 39; k >= 0; --k) {
+    steps.sections.insert(
+        steps.sections.begin() + 1,
+        {.length = 1.0, .bending_stiffness = 1.0 / whole.bend_compliance(k, 1.0)});
+  }
+  const Rod one = build_rod(taper, 140.0, 70), many = build_rod(steps, 140.0, 70);
+  EXPECT_TRUE(one.bend.isApprox(many.bend, 1e-12));
+  EXPECT_TRUE(one.stretch.isApprox(many.stretch, 1e-12));
+  EXPECT_TRUE(one.twist.isApprox(many.twist, 1e-12));
+  EXPECT_GT(one.bend[55], 1.05 * one.bend[56]);  // 30 mm from the tip it rises from node to node
 }
 
 TEST(Rod, TakesSolidRoundStiffnessWhereNoneIsGiven) {

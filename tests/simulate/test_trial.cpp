@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -346,6 +347,29 @@ TrialResult rubbed(double friction, double step,
   some.step = step;
   some.length = 150.0;
   return run_trial(straight_wire(520.0), along_z(), {.point = Vec3(0.0, 0.0, 1e3)}, bend(), some);
+}
+
+TEST(FrictionTrial, AWireWithFrictionOfItsOwnDoesNotTakeTheInsertions) {
+  InsertionOptions some = options();
+  some.length = 110.0;
+  some.friction = 0.2;
+  const auto push = [&](std::optional<double> own) {
+    Wire wire = straight_wire(520.0);
+    wire.friction = own;
+    const TrialResult trial =
+        run_trial(wire, along_z(), {.point = Vec3(0.0, 0.0, 1e3)}, bend(), some);
+    EXPECT_FALSE(trial.pushes.empty()) << trial.reason;
+    return trial.pushes.back().push_force;
+  };
+  const double of_insertion = push({}), own = push(0.05);
+  EXPECT_EQ(push(0.2), of_insertion);
+  EXPECT_LT(own, 0.6 * of_insertion);
+  // The factor is on both.
+  some.friction_factor = 0.25;
+  EXPECT_EQ(push({}), own);
+  EXPECT_EQ(push(0.2), own);
+  some.friction_factor = 0.0;
+  EXPECT_LT(push(0.2), own);
 }
 
 TEST(FrictionTrial, PushOvercomesWhatTheWallHoldsBack) {

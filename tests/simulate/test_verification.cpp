@@ -8,6 +8,7 @@
 #include <cmath>
 #include <cstdlib>
 #include <functional>
+#include <utility>
 #include <vector>
 
 #include "simulate/equilibrium/solver.h"
@@ -157,6 +158,38 @@ TEST(Verification, StiffnessRatioOfTenThousandConverges) {
     EXPECT_NEAR(tip.reach, reference.reach, 0.001 * L);
     EXPECT_NEAR(tip.drop, reference.drop, 0.001 * L);
     EXPECT_LT(iterations, 60);
+  }
+}
+
+TEST(Verification, TaperedWireBendsAsItsStiffnessRuns) {
+  const double L = 60.0, EI_tip = 3.0, EI_shaft = 521.0;
+  const auto linear = [=](double s) { return EI_tip + s / L * (EI_shaft - EI_tip); };
+  const auto cone = [=](double s) {
+    const double thin = std::pow(EI_tip, 0.25), thick = std::pow(EI_shaft, 0.25);
+    return std::pow(thin + s / L * (thick - thin), 4);
+  };
+  using Law = std::function<double(double)>;
+  for (const auto& [taper, law] : {std::pair(Taper::kLinear, Law(linear)), {Taper::kCone, cone}}) {
+    for (const double force : {0.001, 0.05}) {
+      SCOPED_TRACE(force);
+      const analytic::Cantilever reference = analytic::bend_cantilever(L, law, force, 0.0, 6000);
+      std::vector<double> errors;
+      for (const int elements : {60, 120}) {
+        const Wire wire{.name = "taper",
+                        .radius = 0.4,
+                        .sections = {{.length = L,
+                                      .bending_stiffness = EI_tip,
+                                      .axial_stiffness = 1e6,
+                                      .proximal_bending_stiffness = EI_shaft,
+                                      .taper = taper}}};
+        int iterations = 0;
+        const analytic::Cantilever tip = bend(build_rod(wire, L, elements), force, 0.0, iterations);
+        errors.push_back(std::hypot(tip.reach - reference.reach, tip.drop - reference.drop));
+      }
+      EXPECT_GT(reference.drop, force > 0.01 ? 2.0 : 0.05);  // it bends
+      EXPECT_LT(errors[1], 5e-4 * reference.drop);
+      EXPECT_NEAR(order_of(errors[0], errors[1]), 2.0, 0.25);
+    }
   }
 }
 
