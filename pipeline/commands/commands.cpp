@@ -40,9 +40,9 @@ int run_command(int argc, const char* const* argv) {
   int code = kDone;
 
   // In the order of the help.
-  for (const auto add :
-       {add_run, add_trials, add_report, add_batch, add_cache, add_status, add_check, add_inspect,
-        add_new, add_wires, add_compare, add_simulate, add_phantom, add_render, add_bench}) {
+  for (const auto add : {add_run, add_trials, add_report, add_batch, add_cache, add_status,
+                         add_check, add_inspect, add_new, add_wires, add_devices, add_compare,
+                         add_simulate, add_phantom, add_render, add_bench}) {
     add(app, code);
   }
   try {

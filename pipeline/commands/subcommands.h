@@ -18,10 +18,13 @@ void add_status(CLI::App& app, int& code);
 void add_inspect(CLI::App& app, int& code);
 void add_new(CLI::App& app, int& code);
 
+// device_commands.cpp: the catalogue.
+void add_wires(CLI::App& app, int& code);
+void add_devices(CLI::App& app, int& code);
+
 // tool_commands.cpp: what stands by itself.
 void add_cache(CLI::App& app, int& code);
 void add_check(CLI::App& app, int& code);
-void add_wires(CLI::App& app, int& code);
 void add_compare(CLI::App& app, int& code);
 void add_simulate(CLI::App& app, int& code);
 void add_phantom(CLI::App& app, int& code);

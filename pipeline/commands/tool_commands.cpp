@@ -8,7 +8,6 @@
 #include "pipeline/commands/scene_run.h"
 #include "pipeline/commands/subcommands.h"
 #include "pipeline/files/case_file.h"
-#include "pipeline/files/catalogue.h"
 #include "pipeline/files/phantom_file.h"
 #include "pipeline/files/text.h"
 #include "pipeline/report/compare.h"
@@ -88,44 +87,10 @@ int check_file(const std::string& path, const std::vector<std::string>& override
     std::cout << given.file.string() << ": the case is in order, "
               << plan::list_candidates(given.study).size() << " trials\n";
     print_told(told, given.labels ? "" : "mended: ");  // labels are told as the stage tells them
-  }
-  return kDone;
-}
-
-/// As a case's "wires" takes them, with where the values come from.
-int print_wires_json() {
-  Json file = {{"schema", "wireplan.wires/1"}, {"wires", Json::array()}};
-  for (const CatalogueWire& entry : catalogue()) {
-    Json wire = wire_json(entry.wire);
-    wire["title"] = entry.title;
-    wire["source"] = entry.source;
-    for (std::size_t k = 0; k < entry.section_sources.size(); ++k) {
-      wire["sections"][k]["source"] = entry.section_sources[k];
-    }
-    file["wires"].push_back(std::move(wire));
-  }
-  std::cout << file.dump(2) << "\n";
-  return kDone;
-}
-
-// Sections run from the tip backwards, so the shaft is the last.
-int print_wires() {
-  std::cout << "name                          diameter  EI tip  EI shaft  tip\n"
-               "                                    mm  N mm^2    N mm^2\n";
-  for (const CatalogueWire& entry : catalogue()) {
-    const simulate::Wire& wire = entry.wire;
-    std::string tip = "straight";
-    for (const simulate::Section& section : wire.sections) {
-      if (section.rest_curvature != 0.0) {
-        tip = format("curved, radius %.3g mm over %.3g mm", 1.0 / section.rest_curvature,
-                     section.length);
-      }
-    }
-    std::cout << format("%-28s  %8.3f  %6.4g  %8.4g  ", wire.name.c_str(), 2.0 * wire.radius,
-                        wire.sections.front().bending_stiffness,
-                        wire.sections.back().bending_stiffness)
-              << tip << "\n    " << entry.title << ". EI: " << entry.section_sources.back() << "; "
-              << entry.source << "\n";
+    print_told(given.told, "");
+    const simulate::InsertionOptions& insertion = given.study.insertion;
+    print_told(tell_friction(given.devices, insertion), "");
+    print_told(warn_of_friction(given.devices, insertion), "mind: ");
   }
   return kDone;
 }
@@ -235,14 +200,6 @@ void add_check(CLI::App& app, int& code) {
       ->allow_extra_args(false);
   check->footer("Tells all that is wrong at once. Example: wireplan check cases/abdomen");
   check->callback([&code, arguments] { code = check_file(arguments->path, arguments->overrides); });
-}
-
-void add_wires(CLI::App& app, int& code) {
-  const auto as_json = std::make_shared<bool>(false);
-  CLI::App* wires = app.add_subcommand("wires", "The wire catalogue with its sources");
-  wires->add_flag("--json", *as_json, "As JSON, each wire as a case file takes it");
-  wires->footer("Example: wireplan wires --json");
-  wires->callback([&code, as_json] { code = *as_json ? print_wires_json() : print_wires(); });
 }
 
 void add_compare(CLI::App& app, int& code) {

@@ -11,7 +11,6 @@
 #include <utility>
 
 #include "pipeline/files/access_limits_file.h"
-#include "pipeline/files/catalogue.h"
 #include "pipeline/files/markups_file.h"
 
 namespace wireplan::pipeline {
@@ -19,7 +18,6 @@ namespace {
 
 constexpr const char* kSchema = "wireplan.case/1";
 constexpr std::string_view kDataVariable = "${WIREPLAN_DATA}";
-constexpr double kFriction = 0.04;  // of a hydrophilic wire, references A3
 
 std::filesystem::path find_case_file(const std::filesystem::path& path) {
   if (!std::filesystem::is_directory(path)) return path;
@@ -175,55 +173,6 @@ const char* manoeuvring_name(Manoeuvring value) {
     if (value == known) return name;
   }
   throw LogicError("a Manoeuvring without a name");
-}
-
-/// The wire under a name of the catalogue; a wire without sections where there is none.
-simulate::Wire find_catalogue_wire(const std::string& name, const std::string& key,
-                                   const std::vector<CatalogueWire>& known, Problems& problems) {
-  std::vector<std::string> names;
-  std::string list;
-  for (const CatalogueWire& entry : known) {
-    if (entry.wire.name == name) return entry.wire;
-    names.push_back(entry.wire.name);
-    list += (list.empty() ? "" : ", ") + entry.wire.name;
-  }
-  const std::string nearest = nearest_name(name, names);
-  problems.add(key, "\"" + name + "\"", "a wire of the catalogue: " + list,
-               nearest.empty() ? "a wire of your own is an object {\"name\", \"diameter_mm\", "
-                                 "\"sections\"}"
-                               : "did you mean \"" + nearest + "\"?");
-  return {.name = name, .radius = 0.0, .sections = {}};
-}
-
-std::vector<simulate::Wire> read_wires(JsonReader& root) {
-  const std::string expected = "a list of catalogue names and wires, at least one";
-  Problems& problems = root.problems();
-  if (!root.has("wires")) {
-    problems.add("wires", "missing", expected, "`wireplan wires` lists the catalogue");
-    return {};
-  }
-  const Json& list = root.raw("wires");
-  if (!list.is_array() || list.empty()) {
-    problems.add("wires", list.dump(), expected, "`wireplan wires` lists the catalogue");
-    return {};
-  }
-  const std::vector<CatalogueWire> known = catalogue();
-  std::vector<simulate::Wire> wires;
-  std::set<std::string> names;
-  for (std::size_t i = 0; i < list.size(); ++i) {
-    const std::string key = "wires[" + std::to_string(i) + "]";
-    if (list[i].is_string()) {
-      wires.push_back(find_catalogue_wire(list[i].get<std::string>(), key, known, problems));
-    } else {
-      JsonReader reader(list[i], key, problems);
-      wires.push_back(read_wire(reader).wire);
-    }
-    if (!wires.back().name.empty() && !names.insert(wires.back().name).second) {
-      problems.add(key, "\"" + wires.back().name + "\" again", "a name of its own",
-                   "the report tells wires by name");
-    }
-  }
-  return wires;
 }
 
 void read_insertion(JsonReader& root, plan::Study& study) {
@@ -461,8 +410,7 @@ WallInput read_wall(JsonReader& reader, const std::string& model) {
 }
 
 double read_friction(JsonReader& reader, double fallback) {
-  return reader.number("friction", fallback, {.min = 0.0, .max = 1.0},
-                       "Coulomb's coefficient: 0.04 hydrophilic, 0.12 PTFE, 0.25 bare");
+  return reader.number("friction", fallback, kFrictionRange, kFrictionHint);
 }
 
 Case read_case(const std::filesystem::path& path, const std::vector<std::string>& overrides) {
@@ -492,13 +440,18 @@ Case read_case(const std::filesystem::path& path, const std::vector<std::string>
   JsonReader wall = root.object("wall", false);
   input.wall = read_wall(wall, "elastic");
   wall.finish();
-  input.study.wires = read_wires(root);
+  CaseWires wires = read_wires(root);
+  input.told = std::move(wires.told);
+  input.devices = std::move(wires.devices);
+  for (const DeviceWire& device : input.devices) input.study.wires.push_back(device.wire);
   read_insertion(root, input.study);
   input.access_limits = read_access_limits(root);
   read_limits(root, input.limits);
   read_weights(root, input.weights);
   input.manoeuvres = read_manoeuvring(root);
-  input.study.insertion.friction = read_friction(root, kFriction);
+  input.study.insertion.friction = read_friction(root, kDefaultFriction);
+  input.study.insertion.friction_factor =
+      root.number("friction_factor", 1.0, {.min = 0.0, .max = 100.0}, "0: frictionless");
   read_robustness(root, input);
   JsonReader search = root.object("search", false);
   input.exhaustive = search.boolean("exhaustive", false);
@@ -564,10 +517,11 @@ Json case_parameters(const Case& input) {
   put("access", "accesses", input.accesses, access_json);
   put("target", "targets", input.targets, target_json);
   json["wires"] = Json::array();
-  for (const simulate::Wire& wire : study.wires) json["wires"].push_back(wire_json(wire));
+  for (const DeviceWire& device : input.devices) json["wires"].push_back(device.json);
   json["tip_roll_deg"] = degrees_json(study.rolls);
   json["manoeuvres"] = manoeuvring_name(input.manoeuvres);
   json["friction"] = study.insertion.friction;
+  json["friction_factor"] = study.insertion.friction_factor;
   json["insertion"] = {{"length_mm", study.insertion.length},
                        {"step_mm", study.insertion.step},
                        {"element_length_mm", study.insertion.element_length},

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "pipeline/files/access_target_file.h"
+#include "pipeline/files/case_wires.h"
 #include "pipeline/files/json_reader.h"
 #include "pipeline/files/labels_file.h"
 #include "plan/anatomy/access_limits.h"
@@ -58,6 +59,7 @@ struct Case {
   /// Its tangent and the goal's way are found later, from the centerline. Where insertion.length is
   /// 0 the trials stage takes 1.25 times the path's length and 20 mm more.
   plan::Study study;
+  std::vector<DeviceWire> devices;  // of the study's wires, in their order
   Manoeuvring manoeuvres = Manoeuvring::kWhenNeeded;
   plan::AccessLimits access_limits;
   plan::Limits limits;
@@ -65,7 +67,8 @@ struct Case {
   /// Where unknowns.lumen is 0 the stages that repeat choose it: half a voxel if the input is a
   /// volume or labels, 0.25 mm if it is a surface.
   plan::RobustnessOptions robustness;
-  bool exhaustive = false;  // all candidates are run in full, none is only scouted
+  std::vector<std::string> told;  // of the case itself, in sentences: names that have changed
+  bool exhaustive = false;        // all candidates are run in full, none is only scouted
 };
 
 /// Reads CASE (a file, or a folder with a case.json), applies `overrides` ("wall.thickness_mm=2":

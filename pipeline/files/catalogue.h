@@ -1,30 +1,62 @@
 #pragma once
-/// The wires that wireplan knows by name: wires.json beside this file, which is built into the
-/// program, so that it needs no data folder. Each section says where its values come from, or
-/// "assumed".
+/// The devices that wireplan knows by name: devices.json beside this file, which is built into the
+/// program, so that it needs no data folder. Every value says how far it may be off, where it comes
+/// from and how well it is known.
 #include <string>
 #include <vector>
 
 #include "pipeline/files/json_reader.h"
-#include "simulate/wire/rod.h"
+#include "pipeline/files/wire_file.h"
 
 namespace wireplan::pipeline {
 
-struct CatalogueWire {
-  simulate::Wire wire;
-  std::string title;
-  std::string source;                        // of what all sections share: diameter, mass, EA, GJ
-  std::vector<std::string> section_sources;  // of length and EI, one per section, from the tip
+/// What sources of values begin with: "harrison", or "harrison: 17 GPa". Besides, "definition",
+/// "estimated" and "assumed" need no citation.
+struct Source {
+  std::string id;
+  std::string citation;
+  bool opened = false;  // by who wrote the value; else quoted by what was
 };
 
-/// The catalogue, by falling diameter and, within one, rising shaft stiffness.
-std::vector<CatalogueWire> catalogue();
+struct CatalogueWire : DeviceWire {
+  std::vector<std::string> aliases;  // earlier names, which cases may still use
+};
 
-/// Reads a wire as the catalogue and a case file write it: "name", "diameter_mm" and "sections"
-/// from the tip backwards, and optionally "title" and "source".
-CatalogueWire read_wire(JsonReader& reader);
+/// A tube: its sections are those of a wire, of which no trial makes use yet.
+struct Catheter {
+  simulate::Wire tube;      // of the outer radius
+  plan::WireSpread spread;  // of the tube
+  std::string title, shape;
+  double inner_diameter = 0.0;  //                                                        [mm]
+  std::vector<NamedValue> values;
+};
 
-/// The same back, with every default written out except "title" and "source".
-Json wire_json(const simulate::Wire& wire);
+struct Sheath {
+  std::string name, title;
+  double outer_diameter = 0.0, inner_diameter = 0.0, length = 0.0;  //                    [mm]
+  std::vector<NamedValue> values;
+};
+
+struct Catalogue {
+  std::vector<Source> sources;
+  std::vector<Coating> coatings;
+  std::vector<CatalogueWire> wires;  // by falling diameter and, within one, rising stiffness
+  std::vector<Catheter> catheters;
+  std::vector<Sheath> sheaths;
+  Json file;
+};
+
+/// The built-in catalogue.
+Catalogue catalogue();
+
+/// Reads such a file. Throws Error with all problems at once: a value without spread, source or
+/// confidence, a source that is not listed, a confidence that it does not bear.
+Catalogue read_catalogue(const Json& file);
+
+/// The wire of the name, or whose alias it is; null where there is none.
+const CatalogueWire* find_wire(const Catalogue& known, const std::string& name);
+
+/// The source with its citation in the place of its id.
+std::string cite(const Catalogue& known, const std::string& source);
 
 }  // namespace wireplan::pipeline

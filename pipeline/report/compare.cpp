@@ -192,7 +192,7 @@ std::string compare_reports(const std::vector<std::filesystem::path>& files) {
     if (agree(reports, pointer)) continue;
     text += std::string("Scores are not comparable: ") + (pointer + 1) + " differs.\n";
   }
-  for (const char* pointer : {"/robustness", "/friction", "/wall"}) {
+  for (const char* pointer : {"/robustness", "/friction", "/friction_factor", "/wall"}) {
     if (agree(reports, pointer)) continue;
     text += std::string("Mind that ") + (pointer + 1) + " differs.\n";
   }

@@ -47,7 +47,9 @@ PictureMarks marks_of(const Json& report, const std::string& title) {
 
 double radius_of(const Json& report, const std::string& wire) {
   for (const Json& given : report.at("provenance").at("parameters").at("wires")) {
-    if (given.at("name") == wire) return 0.5 * given.at("diameter_mm").get<double>();
+    if (given.at("name") != wire) continue;
+    const Json& diameter = given.at("diameter_mm");
+    return 0.5 * (diameter.is_object() ? diameter.at("value") : diameter).get<double>();
   }
   throw Error("report: the wire \"" + wire +
               "\" of a trial is not among those of the case; expected " +

@@ -116,9 +116,8 @@ void make_trials(Workspace& work, const fs::path& folder) {
   figures["lumen_grid_mm"] = vessel.lumen.grid_spacing();
   figures["lumen_max_deviation_mm"] = vessel.lumen.max_deviation();
   figures["lumen_mean_deviation_mm"] = vessel.lumen.mean_deviation();
-  if (study.insertion.friction == 0.0) {
-    figures["warnings"].push_back("trials: frictionless (friction is 0): " +
-                                  std::string("push forces are lower bounds"));
+  for (const std::string& told : warn_of_friction(work.given().devices, study.insertion)) {
+    figures["warnings"].push_back("trials: " + told);
   }
   if (!work.given().wall.elastic) {
     figures["warnings"].push_back("trials: rigid wall: contact forces are upper bounds");

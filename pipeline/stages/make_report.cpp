@@ -60,7 +60,7 @@ class ForceMap {
 /// Wires of the catalogue with an angled tip that the case did not ask for.
 std::vector<std::string> other_angled_wires(const plan::Study& study) {
   std::vector<std::string> names;
-  for (const CatalogueWire& entry : catalogue()) {
+  for (const CatalogueWire& entry : catalogue().wires) {
     const bool asked = std::any_of(study.wires.begin(), study.wires.end(),
                                    [&](const auto& wire) { return wire.name == entry.wire.name; });
     if (!asked && !entry.wire.straight()) names.push_back(entry.wire.name);

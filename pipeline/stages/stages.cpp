@@ -253,7 +253,7 @@ std::vector<Stage> stages_of(const Case& given) {
                .version = 25,
                .after = {"surface", "centerline"},
                .parameters = {"/access", "/target", "/wires", "/tip_roll_deg", "/friction",
-                              "/wall/model", "/insertion"},
+                              "/friction_factor", "/wall/model", "/insertion"},
                .make = make_trials};
   if (given.wall.elastic) trials.after.push_back("wall");  // a rigid one does not act
   if (const std::vector<std::size_t> served = targets_served(given); served.size() > 1) {

@@ -2,11 +2,11 @@
 
 #include <algorithm>
 
-#include "pipeline/files/catalogue.h"
 #include "pipeline/files/disk.h"
 #include "pipeline/files/plan_file.h"
 #include "pipeline/files/text.h"
 #include "pipeline/files/trial_file.h"
+#include "pipeline/files/wire_file.h"
 #include "pipeline/stages/plan_artifact.h"
 
 namespace wireplan::pipeline {

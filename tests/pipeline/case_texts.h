@@ -158,6 +158,9 @@ inline Json own_wire() {
           {"title", "My wire"},
           {"source", "measured"},
           {"diameter_mm", 0.889},
+          {"coating", "ptfe"},
+          {"friction", 0.1},
+          {"mass_kg_per_m", 0.004},
           {"sections",
            {{{"length_mm", 3000},
              {"bending_stiffness_n_mm2", 5},
@@ -187,6 +190,7 @@ inline Json full_case(Json json) {
   json["wires"] = {own_wire(), "amplatz"};
   json["tip_roll_deg"] = {0, 180};
   json["friction"] = 0.12;
+  json["friction_factor"] = 0.9;
   json["insertion"] = {{"length_mm", 250},
                        {"step_mm", 2},
                        {"element_length_mm", 0.5},

@@ -434,6 +434,17 @@ TEST_F(CaseFile, CodeAndSchemaAgreeOnKeysLimitsAndRequirements) {
   of_lists.visit(schema, "", "");
   of_sections.visit(schema, "", "");
   EXPECT_GE(of_volume.limits, 50) << "limits held against the code";
+  std::set<std::string> of_forms;
+  for (const Json& form : {Json{{"tip_load_gf", 8}}, Json{{"flexural_modulus_gpa", 17}},
+                           Json{{"bending_stiffness_n_mm2", {3, 521}}, {"taper", "cone"}}}) {
+    Json json = full_case(surface_case());
+    Json& wire_section = json["wires"][0]["sections"][0];
+    wire_section.erase("bending_stiffness_n_mm2");
+    wire_section.update(form);
+    SchemaWalk walk(schema, json, told);
+    walk.visit(schema, "", "");
+    of_forms.insert(walk.visited.begin(), walk.visited.end());
+  }
 
   for (const char* end : {"access", "target"}) {  // one of two keys is required
     Json without = section;
@@ -444,6 +455,7 @@ TEST_F(CaseFile, CodeAndSchemaAgreeOnKeysLimitsAndRequirements) {
   // Nothing of the schema was passed over.
   std::set<std::string> known, visited = of_volume.visited;
   visited.merge(of_labels);
+  visited.merge(of_forms);
   list_properties(schema, schema, "", known);
   for (const SchemaWalk* walk : {&of_surface, &of_lists, &of_sections, &of_marked, &of_marked_lists,
                                  &of_voxels, &of_voxel_lists}) {
@@ -492,86 +504,6 @@ TEST(CaseFiles, OfTheRepositoryAreAccepted) {
     ++read;
   }
   EXPECT_GE(read, 3);
-}
-
-// ---- the catalogue ----------------------------------------------------------------------------
-
-TEST(Catalogue, EveryWireIsPhysicalAndHasItsSource) {
-  const std::vector<CatalogueWire> wires = catalogue();
-  ASSERT_GE(wires.size(), 10u);
-  std::set<std::string> names;
-  double diameter = std::numeric_limits<double>::infinity();
-  for (const CatalogueWire& entry : wires) {
-    SCOPED_TRACE(entry.wire.name);
-    EXPECT_TRUE(names.insert(entry.wire.name).second);
-    EXPECT_GE(entry.wire.length(), 900.0) << "long enough for insertions of 600 mm";
-    EXPECT_LE(2.0 * entry.wire.radius, diameter) << "listed by falling diameter";
-    diameter = 2.0 * entry.wire.radius;
-    EXPECT_TRUE(diameter == 0.889 || diameter == 0.457 || diameter == 0.356);
-    EXPECT_NE(entry.source, "the case file");
-    ASSERT_EQ(entry.section_sources.size(), entry.wire.sections.size());
-    double stiffness = 0.0;
-    for (std::size_t i = 0; i < entry.wire.sections.size(); ++i) {
-      EXPECT_NE(entry.section_sources[i], entry.source) << "a source of its own";
-      EXPECT_GE(entry.wire.sections[i].bending_stiffness, stiffness) << "stiffer toward the shaft";
-      stiffness = entry.wire.sections[i].bending_stiffness;
-
-      // Between the mass of nitinol and of steel filling the whole cross section, 2 % for rounding.
-      const double area = kPi * entry.wire.radius * entry.wire.radius;
-      EXPECT_GE(entry.wire.sections[i].mass_per_length, 0.98 * 6.45e-9 * area);
-      EXPECT_LE(entry.wire.sections[i].mass_per_length, 1.02 * 7.9e-9 * area);
-    }
-  }
-}
-
-TEST(Catalogue, ShaftStiffnessIsThatOfTheMeasuredModulus) {
-  // Flexural moduli of Harrison et al. 2011 [MPa], times I = pi d^4 / 64; rounded to 1 N mm^2.
-  const std::vector<std::pair<std::string, double>> moduli = {{"amplatz", 9500},
-                                                              {"amplatz-stiff", 17000},
-                                                              {"amplatz-extra-stiff", 29200},
-                                                              {"amplatz-super-stiff", 60300},
-                                                              {"amplatz-ultra-stiff", 65400},
-                                                              {"meier-backup", 139600},
-                                                              {"lunderquist-extra-stiff", 158400}};
-  const double I = kPi * std::pow(0.889, 4) / 64.0;
-  int found = 0;
-  for (const CatalogueWire& entry : catalogue()) {
-    for (const auto& [name, modulus] : moduli) {
-      if (entry.wire.name != name) continue;
-      EXPECT_NEAR(entry.wire.sections.back().bending_stiffness, modulus * I, 1.0) << name;
-      ++found;
-    }
-  }
-  EXPECT_EQ(found, 7);
-}
-
-TEST(Catalogue, CurvedTipsTurnByTheAngleThatTheyAreNamedFor) {
-  const std::map<std::string, double> expected = {
-      {"glidewire-angled", 45.0},           {"amplatz-stiff-angled", 86.0},
-      {"amplatz-super-stiff-angled", 86.0}, {"amplatz-stiff-hook", 115.0},
-      {"amplatz-super-stiff-hook", 115.0},  {"amplatz-super-stiff-curved", 57.0}};
-  std::size_t curved = 0;
-  for (const CatalogueWire& entry : catalogue()) {
-    if (entry.wire.straight()) continue;
-    ++curved;
-    double angle = 0.0;
-    for (const simulate::Section& section : entry.wire.sections) {
-      angle += section.length * section.rest_curvature;
-    }
-    ASSERT_TRUE(expected.count(entry.wire.name)) << entry.wire.name;
-    EXPECT_NEAR(angle / kRadPerDeg, expected.at(entry.wire.name), 0.5);  // radii of 2 digits
-  }
-  EXPECT_EQ(curved, expected.size());
-}
-
-TEST(Catalogue, SchemaNamesTheSameWires) {
-  std::set<std::string> known, named;
-  for (const CatalogueWire& entry : catalogue()) known.insert(entry.wire.name);
-  const Json schema = read_schema("case.schema.json");
-  for (const Json& name : schema.at("/properties/wires/items/oneOf/0/enum"_json_pointer)) {
-    named.insert(name.get<std::string>());
-  }
-  EXPECT_EQ(known, named);
 }
 
 // ---- writing ----------------------------------------------------------------------------------

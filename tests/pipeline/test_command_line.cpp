@@ -107,7 +107,7 @@ TEST_F(CommandLine, StopsAtAStageAndForcesOne) {
 
 TEST_F(CommandLine, HelpAndVersionAreAnswersAndUnknownArgumentsAreBadInput) {
   for (const char* command : {"", "run", "batch", "check", "status", "cache", "cache prune",
-                              "wires", "simulate", "phantom"}) {
+                              "wires", "devices", "simulate", "phantom"}) {
     SCOPED_TRACE(command);
     const Answer help = call(std::string(command) + " --help");
     EXPECT_EQ(help.code, 0);
@@ -121,13 +121,21 @@ TEST_F(CommandLine, HelpAndVersionAreAnswersAndUnknownArgumentsAreBadInput) {
   EXPECT_EQ(call("run case.json -j 0").code, 2);
 }
 
-TEST_F(CommandLine, ListsEveryWireOfTheCatalogue) {
-  const Answer answer = call("wires");
-  EXPECT_EQ(answer.code, 0);
-  const std::vector<CatalogueWire> wires = catalogue();
-  ASSERT_FALSE(wires.empty());
-  for (const CatalogueWire& entry : wires) {
-    EXPECT_NE(answer.out.find(entry.wire.name), std::string::npos) << entry.wire.name;
+TEST_F(CommandLine, ListsEveryDeviceOfTheCatalogue) {
+  const Answer wires = call("wires"), devices = call("devices");
+  EXPECT_EQ(wires.code, 0);
+  EXPECT_EQ(devices.code, 0);
+  const Catalogue known = catalogue();
+  ASSERT_FALSE(known.wires.empty());
+  for (const CatalogueWire& entry : known.wires) {
+    EXPECT_NE(wires.out.find(entry.wire.name), std::string::npos) << entry.wire.name;
+    EXPECT_NE(devices.out.find(entry.wire.name), std::string::npos) << entry.wire.name;
+  }
+  for (const Catheter& entry : known.catheters) {
+    EXPECT_NE(devices.out.find(entry.tube.name), std::string::npos) << entry.tube.name;
+  }
+  for (const Sheath& entry : known.sheaths) {
+    EXPECT_NE(devices.out.find(entry.name), std::string::npos) << entry.name;
   }
 }
 
@@ -135,17 +143,25 @@ TEST_F(CommandLine, ListsTheCatalogueAsACaseTakesIt) {
   const Answer answer = call("wires --json");
   ASSERT_EQ(answer.code, 0);
   const Json file = parse_json(answer.out, "wires", "wireplan.wires/1");
-  const std::vector<CatalogueWire> wires = catalogue();
-  ASSERT_EQ(file.at("wires").size(), wires.size());
-  for (std::size_t k = 0; k < wires.size(); ++k) {
+  const Catalogue known = catalogue();
+  ASSERT_EQ(file.at("wires").size(), known.wires.size());
+  for (std::size_t k = 0; k < known.wires.size(); ++k) {
     Problems problems("wires");
-    JsonReader reader(file.at("wires")[k], "", problems);
-    const CatalogueWire read = read_wire(reader);
+    const DeviceWire read = read_wire(file.at("wires")[k], "", problems, known.coatings);
     EXPECT_TRUE(problems.empty());
-    EXPECT_EQ(wire_json(read.wire), wire_json(wires[k].wire));
-    EXPECT_EQ(read.title, wires[k].title);
-    EXPECT_EQ(read.section_sources, wires[k].section_sources);
+    EXPECT_EQ(wire_json(read.wire), wire_json(known.wires[k].wire));
+    EXPECT_EQ(read.title, known.wires[k].title);
+    EXPECT_EQ(read.values.size(), known.wires[k].values.size());
   }
+}
+
+TEST_F(CommandLine, ListsTheDevicesAsTheirSchemaHasThem) {
+  const Answer answer = call("devices --json");
+  ASSERT_EQ(answer.code, 0);
+  EXPECT_EQ(parse_json(answer.out, "devices", "wireplan.devices/1"), catalogue().file);
+  fs::create_directories(folder_ / "listed");
+  write_text(answer.out, folder_ / "listed" / "devices.json");
+  expect_follows_schemas(folder_ / "listed");
 }
 
 TEST_F(CommandLine, ChecksACaseWithoutRunningIt) {

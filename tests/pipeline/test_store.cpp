@@ -266,15 +266,21 @@ std::map<std::string, std::vector<std::string>> common_table() {
                                         {"/access/azimuth_deg/0", trials},
                                         {"/tip_roll_deg/0", trials},
                                         {"/friction", trials},
+                                        {"/friction_factor", trials},
                                         {"/manoeuvres", {"manoeuvres", "plans", "report"}},
                                         {"/search/exhaustive", report}};
   for (const char* k : {"0", "1", "2"}) {
     table[std::string("/access/point_mm/") + k] = ends;
     table[std::string("/target/point_mm/") + k] = ends;
   }
-  for (const char* key : {"name", "diameter_mm", "sections/0/length_mm",
-                          "sections/0/bending_stiffness_n_mm2", "sections/0/axial_stiffness_n",
-                          "sections/0/twist_stiffness_n_mm2", "sections/0/mass_kg_per_m"}) {
+  for (const char* key :
+       {"name", "diameter_mm", "coating", "friction", "sections/0/length_mm",
+        "sections/0/bending_stiffness_n_mm2/value/0", "sections/0/bending_stiffness_n_mm2/value/1",
+        "sections/0/bending_stiffness_n_mm2/spread/0",
+        "sections/0/bending_stiffness_n_mm2/spread/1", "sections/0/bending_stiffness_n_mm2/source",
+        "sections/0/bending_stiffness_n_mm2/confidence", "sections/0/taper",
+        "sections/0/axial_stiffness_n", "sections/0/twist_stiffness_n_mm2",
+        "sections/0/mass_kg_per_m"}) {
     table[std::string("/wires/0/") + key] = trials;
   }
   for (const char* key : {"length_mm", "step_mm", "element_length_mm", "contact_spacing_mm",
@@ -313,6 +319,9 @@ Json common_changes() {
           {"/insertion/max_iterations", 150},
           {"/manoeuvres", "never"},
           {"/search/exhaustive", true},
+          {"/wires/0/coating", "bare"},
+          {"/wires/0/sections/0/taper", "cone"},
+          {"/wires/0/sections/0/bending_stiffness_n_mm2/confidence", "assumed"},
           {"/robustness/repeats", 17},
           {"/robustness/plans", 4},
           {"/robustness/seed", 8},
@@ -323,6 +332,14 @@ Json case_with_every_list_of_one(const fs::path& folder) {
   Json file = write_tube_case(folder);
   file["access"]["inclination_deg"] = {20};
   file["tip_roll_deg"] = {0};
+  // A wire with every kind of value.
+  Json& wire = file["wires"][0];
+  wire["coating"] = "ptfe";
+  wire["friction"] = 0.1;
+  Json& section = wire["sections"][0];
+  section["bending_stiffness_n_mm2"] = {
+      {"value", {20, 30}}, {"spread", {1, 2}}, {"source", "own"}, {"confidence", "measured"}};
+  section["taper"] = "linear";
   return file;
 }
 

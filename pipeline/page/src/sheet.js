@@ -116,7 +116,8 @@ const accessTable = ({anatomy}) => {
 const wireText = (report, wire, what) => {
   const given = report.provenance.parameters.wires.find((row) => row.name === wire);
   const length = report.anatomy?.lengths.wires.find((row) => row.wire === wire);
-  const inches = given?.diameter_mm ? `, ${(given.diameter_mm / kMillimetresPerInch).toFixed(3)}\u00a0in` : "";
+  const diameter = given?.diameter_mm?.value ?? given?.diameter_mm;
+  const inches = diameter ? `, ${(diameter / kMillimetresPerInch).toFixed(3)}\u00a0in` : "";
   const enough = length ? `, ${mm(length.length_mm)} long${length.long_enough ? "" : `: ${mm(-length.spare_mm)} too short`}` : "";
   return el("span", {class: "two-lines"}, what, name(shown(wire)), inches, enough);
 };

@@ -1,0 +1,32 @@
+#pragma once
+/// The wires of a case: of the catalogue by name, or its own.
+#include <string>
+#include <vector>
+
+#include "pipeline/files/json_reader.h"
+#include "pipeline/files/wire_file.h"
+#include "simulate/insertion/insertion.h"
+
+namespace wireplan::pipeline {
+
+/// Of wires that state none: a hydrophilic one's.
+inline constexpr double kDefaultFriction = 0.04;
+
+struct CaseWires {
+  std::vector<DeviceWire> devices;
+  std::vector<std::string> told;  // names that the catalogue has changed since
+};
+
+/// Reads "wires". A wire without sections where a name is not known.
+CaseWires read_wires(JsonReader& root);
+
+/// Which friction acts on which wire, in sentences.
+std::vector<std::string> tell_friction(const std::vector<DeviceWire>& devices,
+                                       const simulate::InsertionOptions& insertion);
+
+/// What the friction of the case leaves to be warned of: that it acts on no wire, or that nothing
+/// rubs.
+std::vector<std::string> warn_of_friction(const std::vector<DeviceWire>& devices,
+                                          const simulate::InsertionOptions& insertion);
+
+}  // namespace wireplan::pipeline
