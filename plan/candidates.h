@@ -3,6 +3,7 @@
 #include <string>
 #include <vector>
 
+#include "plan/wire_spread.h"
 #include "simulate/insertion/trial.h"
 
 namespace wireplan::plan {
@@ -18,6 +19,7 @@ struct Study {
   /// at once, and each gets its result.
   std::vector<simulate::Goal> others = {};
   simulate::InsertionOptions insertion;
+  std::vector<WireSpread> spreads = {};  // of each wire; empty: its values are taken for known
 };
 
 struct Candidate {

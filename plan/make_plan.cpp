@@ -106,7 +106,7 @@ class Planner {
     std::sort(plans.begin(), plans.end());
     plans.resize(std::min(kPlansTried, plans.size()));
 
-    const std::vector<Disturbance> tries = draw_disturbances(unknowns(kTries));
+    const std::vector<Disturbance> tries = draw_disturbances(unknowns(kTries), study_.wires);
     const auto works = [&](const Measured& trial) {
       return judge_repeat(trial, study_, by.limits, by.weights).safe;
     };
@@ -185,7 +185,7 @@ class Planner {
   // then what is best, as often as the case asks for, and what has come up by that.
   void repeat() {
     plan_.robustness = unknowns(options_.robustness.repeats);
-    plan_.disturbances = draw_disturbances(plan_.robustness);
+    plan_.disturbances = draw_disturbances(plan_.robustness, study_.wires);
     const int asked = plan_.robustness.repeats, few = std::min(kFirstRepeats, asked);
     repeat_best(few, kRepeatRounds);
     if (asked > few) {
@@ -255,7 +255,6 @@ class Planner {
     Unknowns& known = options.unknowns;
     known.lumen = std::min(known.lumen, largest_lumen_offset(study_));
     known.entry = std::min(known.entry, largest_entry_shift(study_, vessel_.model()));
-    if (study_.insertion.friction == 0.0) known.friction_low = known.friction_high = 1.0;
     if (!vessel_.yields) known.wall_low = known.wall_high = 1.0;
     return options;
   }

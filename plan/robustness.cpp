@@ -4,8 +4,10 @@
 #include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <numeric>
 #include <random>
+#include <utility>
 #include <variant>
 
 #include "plan/batch.h"
@@ -41,13 +43,14 @@ Eigen::Vector2d on_disc(double radius, double part, double turn) {
 }
 
 /// A wire that bends against a wall of stiffness 1 as the given one does against one of `factor`.
-simulate::Wire softened(const simulate::Wire& wire, double factor) {
+/// `fix_axial`: EA is written out, since the default follows the radius, which is to be changed.
+simulate::Wire softened(const simulate::Wire& wire, double factor, bool fix_axial) {
   simulate::Wire soft = wire;
   for (simulate::Section& section : soft.sections) {
-    // Written out, since the default follows the radius, which a disturbance changes.
-    section.axial_stiffness = section.ea(wire.radius);
+    if (fix_axial) section.axial_stiffness = section.ea(wire.radius);
     section.bending_stiffness /= factor;
     section.bending_stiffness_2 /= factor;
+    section.proximal_bending_stiffness /= factor;
     section.axial_stiffness /= factor;
     section.twist_stiffness /= factor;
   }
@@ -73,25 +76,50 @@ struct Predictor {
   std::vector<std::vector<double>> columns;
 };
 
-std::vector<Predictor> list_predictors(const std::vector<Disturbance>& disturbances) {
-  std::vector<Predictor> predictors = {
-      {"friction", {}}, {"wall", {}}, {"angle", {}}, {"entry", {}}, {"lumen", {}}};
+/// Those that act on plans of the wire.
+std::vector<Predictor> list_predictors(const std::vector<Disturbance>& disturbances,
+                                       const Study& study, int wire) {
+  std::vector<Predictor> predictors = {{"friction", {}}, {"stiffness", {}}, {"wall", {}},
+                                       {"angle", {}},    {"entry", {}},     {"lumen", {}}};
   const auto add = [&](std::size_t k, auto value) {
     std::vector<double> column;
     for (const Disturbance& d : disturbances) column.push_back(value(d));
     const auto [low, high] = std::minmax_element(column.begin(), column.end());
     if (low != column.end() && *low < *high) predictors[k].columns.push_back(find_ranks(column));
   };
-  add(0, [](const Disturbance& d) { return d.friction_factor; });
-  add(1, [](const Disturbance& d) { return d.wall_factor; });
-  for (const int axis : {0, 1}) {
-    add(2, [axis](const Disturbance& d) { return d.tilt[axis]; });
-    add(3, [axis](const Disturbance& d) { return d.shift[axis]; });
+  const auto k = static_cast<std::size_t>(wire);
+  if (!study.spreads.empty()) {
+    const WireSpread& spread = study.spreads[k];
+    const bool rubs = simulate::friction_of(study.wires[k], study.insertion) > 0.0;
+    if (rubs && !spread.friction.known()) {
+      add(0, [](const Disturbance& d) { return d.friction; });
+    }
+    if (!spread.stiffness_known()) {
+      add(1, [k](const Disturbance& d) { return d.stiffness.empty() ? 0.5 : d.stiffness[k]; });
+    }
   }
-  add(4, [](const Disturbance& d) { return d.inward; });
+  add(2, [](const Disturbance& d) { return d.wall_factor; });
+  for (const int axis : {0, 1}) {
+    add(3, [axis](const Disturbance& d) { return d.tilt[axis]; });
+    add(4, [axis](const Disturbance& d) { return d.shift[axis]; });
+  }
+  add(5, [](const Disturbance& d) { return d.inward; });
   const auto still = [](const Predictor& p) { return p.columns.empty(); };
   predictors.erase(std::remove_if(predictors.begin(), predictors.end(), still), predictors.end());
   return predictors;
+}
+
+Eigen::Index count_columns(const std::vector<Predictor>& predictors) {
+  Eigen::Index columns = 0;
+  for (const Predictor& predictor : predictors) columns += std::ssize(predictor.columns);
+  return columns;
+}
+
+/// Seed of a wire's own draws (FNV-1a of its name, from the seed of the run).
+std::uint64_t seed_of(std::uint64_t seed, const std::string& name) {
+  std::uint64_t hash = 14695981039346656037ULL ^ seed;
+  for (const char c : name) hash = (hash ^ static_cast<unsigned char>(c)) * 1099511628211ULL;
+  return hash;
 }
 
 /// Ranks with mean 0 and length 1; 0 if they are all the same.
@@ -106,10 +134,10 @@ Eigen::VectorXd standardised(const std::vector<double>& ranks) {
 
 }  // namespace
 
-std::vector<Disturbance> draw_disturbances(const RobustnessOptions& options) {
+std::vector<Disturbance> draw_disturbances(const RobustnessOptions& options,
+                                           const std::vector<simulate::Wire>& wires) {
   expects(options.repeats >= 0);
   const Unknowns& unknowns = options.unknowns;
-  expects(unknowns.friction_low > 0.0 && unknowns.friction_low <= unknowns.friction_high);
   expects(unknowns.wall_low > 0.0 && unknowns.wall_low <= unknowns.wall_high);
   expects(unknowns.angle >= 0.0 && unknowns.entry >= 0.0 && unknowns.lumen >= 0.0);
 
@@ -118,17 +146,39 @@ std::vector<Disturbance> draw_disturbances(const RobustnessOptions& options) {
   std::array<std::vector<double>, 7> u;
   for (std::vector<double>& column : u) column = draw_stratified(options.repeats, generator);
 
+  std::vector<std::vector<double>> of_wires;
+  for (const simulate::Wire& wire : wires) {
+    std::mt19937_64 own(seed_of(options.seed, wire.name));
+    of_wires.push_back(draw_stratified(options.repeats, own));
+  }
+
   std::vector<Disturbance> disturbances;
-  for (std::size_t k = 0; k < u[0].size(); ++k) {
-    disturbances.push_back(
-        {.friction_factor =
-             between_logarithms(unknowns.friction_low, unknowns.friction_high, u[0][k]),
-         .wall_factor = between_logarithms(unknowns.wall_low, unknowns.wall_high, u[1][k]),
-         .tilt = on_disc(unknowns.angle, u[2][k], u[3][k]),
-         .shift = on_disc(unknowns.entry, u[4][k], u[5][k]),
-         .inward = unknowns.lumen * (2.0 * u[6][k] - 1.0)});
+  for (std::size_t k = 0; k < static_cast<std::size_t>(options.repeats); ++k) {
+    Disturbance& drawn = disturbances.emplace_back();
+    drawn.friction = u[0][k];
+    for (const std::vector<double>& own : of_wires) drawn.stiffness.push_back(own[k]);
+    drawn.wall_factor = between_logarithms(unknowns.wall_low, unknowns.wall_high, u[1][k]);
+    drawn.tilt = on_disc(unknowns.angle, u[2][k], u[3][k]);
+    drawn.shift = on_disc(unknowns.entry, u[4][k], u[5][k]);
+    drawn.inward = unknowns.lumen * (2.0 * u[6][k] - 1.0);
   }
   return disturbances;
+}
+
+simulate::Wire disturbed_wire(const Study& study, int wire, const Disturbance& disturbance) {
+  const auto k = static_cast<std::size_t>(wire);
+  expects(wire >= 0 && k < study.wires.size());
+  const simulate::Wire& given = study.wires[k];
+  if (study.spreads.empty()) return given;
+  expects(study.spreads.size() == study.wires.size());
+  const WireSpread& spread = study.spreads[k];
+  simulate::Wire other = given;
+  if (!disturbance.stiffness.empty()) other = at_part(given, spread, disturbance.stiffness.at(k));
+  if (!spread.friction.known()) {
+    other.friction = spread.friction.at(disturbance.friction) *
+                     given.friction.value_or(study.insertion.friction);
+  }
+  return other;
 }
 
 simulate::TrialResult run_disturbed(const Study& study, const Candidate& candidate,
@@ -136,11 +186,10 @@ simulate::TrialResult run_disturbed(const Study& study, const Candidate& candida
                                     const Disturbance& disturbance) {
   // The wire, its friction and its contact radius.
   const double factor = vessel.compliance ? disturbance.wall_factor : 1.0;
-  expects(candidate.wire >= 0 && candidate.wire < std::ssize(study.wires));
-  simulate::Wire wire = softened(study.wires[candidate.wire], factor);
+  simulate::Wire wire = softened(disturbed_wire(study, candidate.wire, disturbance), factor,
+                                 /*fix_axial=*/disturbance.inward != 0.0);
   wire.radius += disturbance.inward;
   simulate::InsertionOptions insertion = study.insertion;
-  insertion.friction *= disturbance.friction_factor;
   insertion.residual_tolerance *= kRepeatTolerance / factor;
   insertion.record_every = insertion.length;
   insertion.map_forces = false;
@@ -207,17 +256,63 @@ std::vector<int> choose_plans_to_repeat(const Ranking& ranking,
   return chosen;
 }
 
+namespace {
+
+/// What each of a plan's unknowns explains of its differences, by its name.
+class Regression {
+ public:
+  explicit Regression(std::vector<Predictor> predictors)
+      : predictors_(std::move(predictors)), columns_(count_columns(predictors_)) {
+    const auto& first = predictors_.front().columns.front();
+    X_.resize(std::ssize(first), columns_);
+    Eigen::Index column = 0;
+    for (const Predictor& predictor : predictors_) {
+      for (const std::vector<double>& ranks : predictor.columns) {
+        X_.col(column++) = standardised(ranks);
+      }
+    }
+    solver_.compute(X_);
+  }
+
+  /// Adds the squared coefficients, each `weight` times; returns what is left unexplained of 1.
+  double add(const Eigen::VectorXd& y, double weight,
+             std::map<std::string, double>& squares) const {
+    const Eigen::VectorXd beta = solver_.solve(y);
+    Eigen::Index column = 0;
+    for (const Predictor& predictor : predictors_) {
+      const Eigen::Index width = std::ssize(predictor.columns);
+      squares[predictor.name] += weight * beta.segment(column, width).squaredNorm();
+      column += width;
+    }
+    return (y - X_ * beta).squaredNorm();
+  }
+
+ private:
+  std::vector<Predictor> predictors_;
+  Eigen::Index columns_;
+  Eigen::MatrixXd X_;
+  Eigen::ColPivHouseholderQR<Eigen::MatrixXd> solver_;
+};
+
+}  // namespace
+
 Sensitivity find_sensitivity(const std::vector<Disturbance>& disturbances,
-                             const std::vector<RepeatedPlan>& plans) {
+                             const std::vector<RepeatedPlan>& plans, const Study& study,
+                             const std::vector<Candidate>& candidates) {
   std::vector<RepeatedPlan> repeated;
+  std::map<int, std::vector<Predictor>> predictors;  // by wire
+  Eigen::Index columns = 0;
   for (const RepeatedPlan& plan : plans) {
-    if (plan.repeats.size() == disturbances.size()) repeated.push_back(plan);
+    if (plan.repeats.size() != disturbances.size()) continue;
+    repeated.push_back(plan);
+    const int wire = candidates.at(static_cast<std::size_t>(plan.trial)).wire;
+    if (predictors.count(wire) == 0) {
+      predictors[wire] = list_predictors(disturbances, study, wire);
+    }
+    columns = std::max(columns, count_columns(predictors[wire]));
   }
   Sensitivity result;
-  const std::vector<Predictor> predictors = list_predictors(disturbances);
   const auto count = static_cast<Eigen::Index>(disturbances.size());
-  Eigen::Index columns = 0;
-  for (const Predictor& predictor : predictors) columns += std::ssize(predictor.columns);
   const Eigen::Index freedom = count - columns - 1;
   if (repeated.size() < 2) {
     result.reason = "fewer than two plans are repeated";
@@ -227,16 +322,10 @@ Sensitivity find_sensitivity(const std::vector<Disturbance>& disturbances,
     result.reason = "at least " + std::to_string(columns + 3) + " repeats are needed";
   }
   if (!result.reason.empty()) return result;
-
-  // The unknowns.
-  Eigen::MatrixXd X(count, columns);
-  Eigen::Index column = 0;
-  for (const Predictor& predictor : predictors) {
-    for (const std::vector<double>& ranks : predictor.columns) {
-      X.col(column++) = standardised(ranks);
-    }
+  std::map<int, Regression> regressions;
+  for (auto& [wire, own] : predictors) {
+    if (count_columns(own) > 0) regressions.emplace(wire, Regression(std::move(own)));
   }
-  const Eigen::ColPivHouseholderQR<Eigen::MatrixXd> solver(X);
 
   // Each plan's score over the mean of all in the same repeat, on the unknowns.
   std::vector<double> mean(disturbances.size(), 0.0);
@@ -245,8 +334,8 @@ Sensitivity find_sensitivity(const std::vector<Disturbance>& disturbances,
       mean[k] += plan.repeats[k].score / static_cast<double>(repeated.size());
     }
   }
-  Eigen::VectorXd squares = Eigen::VectorXd::Zero(columns);
-  double moved = 0.0, unexplained = 0.0;
+  std::map<std::string, double> squares;
+  double moved = 0.0, unexplained = 0.0, sum = 0.0;
   for (const RepeatedPlan& plan : repeated) {
     std::vector<double> differences(mean.size());
     for (std::size_t k = 0; k < mean.size(); ++k) differences[k] = plan.repeats[k].score - mean[k];
@@ -255,12 +344,13 @@ Sensitivity find_sensitivity(const std::vector<Disturbance>& disturbances,
     const double variance = (values.array() - values.mean()).square().sum();
     const Eigen::VectorXd y = standardised(find_ranks(differences));
     if (y.norm() == 0.0 || variance == 0.0) continue;
-    const Eigen::VectorXd beta = solver.solve(y);
-    squares += variance * beta.cwiseAbs2();
+    const auto own = regressions.find(candidates.at(static_cast<std::size_t>(plan.trial)).wire);
     moved += variance;
-    unexplained += variance * (y - X * beta).squaredNorm();
+    unexplained += variance * (own == regressions.end() ? y.squaredNorm()
+                                                        : own->second.add(y, variance, squares));
   }
-  if (moved == 0.0 || squares.sum() == 0.0) {
+  for (const auto& [name, square] : squares) sum += square;
+  if (moved == 0.0 || sum == 0.0) {
     result.reason = "the unknowns do not move the plans against each other";
     return result;
   }
@@ -269,12 +359,7 @@ Sensitivity find_sensitivity(const std::vector<Disturbance>& disturbances,
   const double adjusted =
       1.0 - unexplained / moved * static_cast<double>(count - 1) / static_cast<double>(freedom);
   result.explained = std::max(0.0, adjusted);
-  column = 0;
-  for (const Predictor& predictor : predictors) {
-    const Eigen::Index width = std::ssize(predictor.columns);
-    result.shares.push_back({predictor.name, squares.segment(column, width).sum() / squares.sum()});
-    column += width;
-  }
+  for (const auto& [name, square] : squares) result.shares.push_back({name, square / sum});
   std::stable_sort(result.shares.begin(), result.shares.end(),
                    [](const auto& a, const auto& b) { return a.of_all > b.of_all; });
   return result;

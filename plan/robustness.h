@@ -11,11 +11,11 @@
 
 namespace wireplan::plan {
 
-/// How far the values may be from the assumed ones. Friction and wall are factors, spread evenly in
-/// their logarithm between the bounds. Angle and entry are radii of a disc over which the
-/// introducer's tilt and shift are spread evenly; the lumen's offset is spread evenly over +-lumen.
+/// How far the values may be from the assumed ones; those of the wires are in Study::spreads. The
+/// wall is a factor, spread evenly in its logarithm between the bounds. Angle and entry are radii
+/// of a disc over which the introducer's tilt and shift are spread evenly; the lumen's offset is
+/// spread evenly over +-lumen.
 struct Unknowns {
-  double friction_low = 0.5, friction_high = 2.0;  // assumed: of one coating, references A3
   /// The femoral artery stiffens 2.4 times from under 35 to over 60 years (references B1).
   double wall_low = 0.5, wall_high = 2.0;
   double angle = 5.0 * kRadPerDeg;  // of the introducer, in any direction; assumed        [rad]
@@ -34,8 +34,14 @@ struct RobustnessOptions {
 /// across the vessel's tangent at the access that azimuth 0 and 90 deg name: the introducer is
 /// turned toward them by `tilt`, and its point is moved along them by `shift`. A positive `inward`
 /// brings the wall nearer to the middle of the lumen.
+///
+/// One part of all wires' friction: what makes it more than assumed, the wall and what wets it,
+/// does so for each. A part of its own for the EI of each wire: how far one is off tells nothing of
+/// another.
 struct Disturbance {
-  double friction_factor = 1.0, wall_factor = 1.0;
+  double friction = 0.5;               // where every wire's lies in its spread, 0 to 1
+  std::vector<double> stiffness = {};  // the same of each wire's EI; empty: as it is given
+  double wall_factor = 1.0;
   Eigen::Vector2d tilt = Eigen::Vector2d::Zero();   //                                     [rad]
   Eigen::Vector2d shift = Eigen::Vector2d::Zero();  //                                     [mm]
   double inward = 0.0;                              //                                     [mm]
@@ -44,11 +50,18 @@ struct Disturbance {
 /// A Latin hypercube: every unknown takes each of `repeats` equal parts of its range once, in an
 /// order of its own drawn from the seed. So few repeats cover each range evenly (McKay, Beckman and
 /// Conover, Technometrics 1979). The same on every machine.
-std::vector<Disturbance> draw_disturbances(const RobustnessOptions& options);
+///
+/// A wire's own draws follow from the seed and its name, so that it meets the same whatever the
+/// others are.
+std::vector<Disturbance> draw_disturbances(const RobustnessOptions& options,
+                                           const std::vector<simulate::Wire>& wires);
 
 /// Repeats are solved to this many times the study's residual. What that changes is far below what
 /// the disturbances do (MEASUREMENTS.md).
 inline constexpr double kRepeatTolerance = 10.0;
+
+/// The study's wire with EI and friction as the disturbance has them.
+simulate::Wire disturbed_wire(const Study& study, int wire, const Disturbance& disturbance);
 
 /// The trial of a candidate under a disturbance; no shapes on the way, no forces per triangle.
 /// Never throws, as run_candidate does not.
@@ -82,7 +95,7 @@ std::vector<int> choose_plans_to_repeat(const Ranking& ranking,
 /// Which unknown moves the ranking most.
 struct Sensitivity {
   struct Share {
-    std::string unknown;  // "friction", "wall", "angle", "entry", "lumen"
+    std::string unknown;  // "friction", "stiffness", "wall", "angle", "entry", "lumen"
     double of_all = 0.0;  // of what all unknowns together explain; sum 1
   };
   std::vector<Share> shares;        // largest first; an unknown that does not act is not listed
@@ -96,11 +109,12 @@ struct Sensitivity {
 ///   1. What moves the order is how far each plan's score is from the mean of all plans in the same
 ///      repeat.
 ///   2. For each plan the ranks of these differences over the repeats are regressed on the
-///      unknowns' ranks.
+///      unknowns' ranks. Of friction and EI it is its own wire's, where they have a spread.
 ///   3. An unknown's share is the sum of its squared coefficients (of both directions, where it has
 ///      two) over all plans, each weighted by how much its differences vary.
 /// Plans with fewer repeats than there are disturbances are left out.
 Sensitivity find_sensitivity(const std::vector<Disturbance>& disturbances,
-                             const std::vector<RepeatedPlan>& plans);
+                             const std::vector<RepeatedPlan>& plans, const Study& study,
+                             const std::vector<Candidate>& candidates);
 
 }  // namespace wireplan::plan

@@ -255,6 +255,18 @@ void read_factors(JsonReader& reader, const std::string& key, double& low, doubl
   high = factors[1];
 }
 
+/// The factors under a key that may be left out, or null as the parameters of a report have it.
+std::optional<plan::FactorSpread> read_spread(JsonReader& reader, const std::string& key) {
+  if (reader.raw(key).is_null()) return {};
+  plan::FactorSpread spread;
+  read_factors(reader, key, spread.low, spread.high);
+  return spread;
+}
+
+Json spread_json(const std::optional<plan::FactorSpread>& spread) {
+  return spread ? Json({spread->low, spread->high}) : Json(nullptr);
+}
+
 void read_robustness(JsonReader& root, Case& input) {
   JsonReader reader = root.object("robustness", false);
   plan::RobustnessOptions& options = input.robustness;
@@ -263,7 +275,8 @@ void read_robustness(JsonReader& root, Case& input) {
   options.seed = static_cast<std::uint64_t>(
       reader.integer("seed", static_cast<int>(options.seed), 0, std::numeric_limits<int>::max()));
   plan::Unknowns& unknowns = options.unknowns;
-  read_factors(reader, "friction_factor", unknowns.friction_low, unknowns.friction_high);
+  input.friction_spread = read_spread(reader, "friction_factor");
+  input.stiffness_spread = read_spread(reader, "stiffness_factor");
   read_factors(reader, "wall_factor", unknowns.wall_low, unknowns.wall_high);
   unknowns.angle =
       reader.number("angle_deg", clean(unknowns.angle / kRadPerDeg), {.min = 0.0, .max = 45.0}) *
@@ -280,7 +293,8 @@ Json robustness_json(const Case& input) {
   return {{"repeats", options.repeats},
           {"plans", options.plans},
           {"seed", options.seed},
-          {"friction_factor", {unknowns.friction_low, unknowns.friction_high}},
+          {"friction_factor", spread_json(input.friction_spread)},
+          {"stiffness_factor", spread_json(input.stiffness_spread)},
           {"wall_factor", {unknowns.wall_low, unknowns.wall_high}},
           {"angle_deg", clean(unknowns.angle / kRadPerDeg)},
           {"entry_mm", unknowns.entry},
@@ -453,6 +467,7 @@ Case read_case(const std::filesystem::path& path, const std::vector<std::string>
   input.study.insertion.friction_factor =
       root.number("friction_factor", 1.0, {.min = 0.0, .max = 100.0}, "0: frictionless");
   read_robustness(root, input);
+  input.study.spreads = spreads_of(input.devices, input.friction_spread, input.stiffness_spread);
   JsonReader search = root.object("search", false);
   input.exhaustive = search.boolean("exhaustive", false);
   search.finish();

@@ -64,6 +64,20 @@ CaseWires read_wires(JsonReader& root) {
   return read;
 }
 
+std::vector<plan::WireSpread> spreads_of(const std::vector<DeviceWire>& devices,
+                                         const std::optional<plan::FactorSpread>& friction,
+                                         const std::optional<plan::FactorSpread>& stiffness) {
+  constexpr plan::FactorSpread kAnyFriction{.low = 0.5, .high = 2.0};  // assumed
+  std::vector<plan::WireSpread> spreads;
+  for (const DeviceWire& device : devices) {
+    plan::WireSpread& spread = spreads.emplace_back(device.spread);
+    if (spread.friction.known()) spread.friction = kAnyFriction;
+    if (friction) spread.friction = *friction;
+    if (stiffness) spread.stiffness.assign(device.wire.sections.size(), {*stiffness, *stiffness});
+  }
+  return spreads;
+}
+
 std::vector<std::string> tell_friction(const std::vector<DeviceWire>& devices,
                                        const simulate::InsertionOptions& insertion) {
   std::vector<std::string> told;

@@ -1,5 +1,6 @@
 #pragma once
 /// The wires of a case: of the catalogue by name, or its own.
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -19,6 +20,12 @@ struct CaseWires {
 
 /// Reads "wires". A wire without sections where a name is not known.
 CaseWires read_wires(JsonReader& root);
+
+/// How far the values of each wire may be off: as the case says of all, else as the wire's own
+/// values tell; of a friction that no source tells the spread of, half to twice.
+std::vector<plan::WireSpread> spreads_of(const std::vector<DeviceWire>& devices,
+                                         const std::optional<plan::FactorSpread>& friction,
+                                         const std::optional<plan::FactorSpread>& stiffness);
 
 /// Which friction acts on which wire, in sentences.
 std::vector<std::string> tell_friction(const std::vector<DeviceWire>& devices,

@@ -123,13 +123,9 @@ plan::Refinement refinement_of(const Json& json) {
 // In internal units: these are not for reading, and come back bit for bit.
 Json robustness_to_json(const plan::RobustnessOptions& options) {
   const plan::Unknowns& unknowns = options.unknowns;
-  return {{"repeats", options.repeats},
-          {"plans", options.plans},
-          {"seed", options.seed},
-          {"friction_factor", {unknowns.friction_low, unknowns.friction_high}},
-          {"wall_factor", {unknowns.wall_low, unknowns.wall_high}},
-          {"angle_rad", unknowns.angle},
-          {"entry_mm", unknowns.entry},
+  return {{"repeats", options.repeats},  {"plans", options.plans},
+          {"seed", options.seed},        {"wall_factor", {unknowns.wall_low, unknowns.wall_high}},
+          {"angle_rad", unknowns.angle}, {"entry_mm", unknowns.entry},
           {"lumen_mm", unknowns.lumen}};
 }
 
@@ -137,9 +133,7 @@ plan::RobustnessOptions robustness_of(const Json& json) {
   return {.repeats = json.at("repeats"),
           .plans = json.at("plans"),
           .seed = json.at("seed"),
-          .unknowns = {.friction_low = json.at("friction_factor").at(0),
-                       .friction_high = json.at("friction_factor").at(1),
-                       .wall_low = json.at("wall_factor").at(0),
+          .unknowns = {.wall_low = json.at("wall_factor").at(0),
                        .wall_high = json.at("wall_factor").at(1),
                        .angle = json.at("angle_rad"),
                        .entry = json.at("entry_mm"),
@@ -186,12 +180,12 @@ Json plan_to_json(const plan::Plan& plan) {
       {"repeated", std::move(repeated)},       {"attempts", plan.attempts}};
 }
 
-void plan_from_json(const Json& json, plan::Plan& plan) {
+void plan_from_json(const Json& json, const plan::Study& study, plan::Plan& plan) {
   for (const Json& level : json.at("levels")) plan.levels.push_back(level_of(level));
   for (const Json& trial : json.at("trials")) plan.trials.push_back(measured_of(trial));
   for (const Json& row : json.at("refinements")) plan.refinements.push_back(refinement_of(row));
   plan.robustness = robustness_of(json.at("robustness"));
-  plan.disturbances = plan::draw_disturbances(plan.robustness);
+  plan.disturbances = plan::draw_disturbances(plan.robustness, study.wires);
   for (const Json& row : json.at("repeated")) {
     plan::RepeatedTrials& repeats = plan.repeated.emplace_back();
     repeats.trial = row.at("trial");

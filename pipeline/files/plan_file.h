@@ -17,6 +17,6 @@ std::optional<plan::Measured> measured_from_text(const std::string& text);
 /// What the artifact `plans` holds: the trials' levels and numbers, errors, repeats, attempts. The
 /// candidates, and what scouting and the search for scripts came to, stand in the artifacts before.
 Json plan_to_json(const plan::Plan& plan);
-void plan_from_json(const Json& json, plan::Plan& plan);
+void plan_from_json(const Json& json, const plan::Study& study, plan::Plan& plan);
 
 }  // namespace wireplan::pipeline

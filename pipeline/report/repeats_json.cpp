@@ -1,6 +1,7 @@
 #include "pipeline/report/repeats_json.h"
 
 #include <algorithm>
+#include <array>
 #include <utility>
 
 #include "plan/statistics.h"
@@ -46,7 +47,8 @@ Json plan_json(const plan::RepeatedPlan& plan) {
 Json disturbances_json(const std::vector<plan::Disturbance>& disturbances) {
   Json list = Json::array();
   for (const plan::Disturbance& d : disturbances) {
-    list.push_back({{"friction_factor", d.friction_factor},
+    list.push_back({{"friction_part", d.friction},
+                    {"stiffness_parts", d.stiffness},
                     {"wall_factor", d.wall_factor},
                     {"tilt_deg", {d.tilt[0] / kRadPerDeg, d.tilt[1] / kRadPerDeg}},
                     {"shift_mm", {d.shift[0], d.shift[1]}},
@@ -55,8 +57,42 @@ Json disturbances_json(const std::vector<plan::Disturbance>& disturbances) {
   return list;
 }
 
-Json sensitivity_json(const plan::Plan& plan, const std::vector<plan::RepeatedPlan>& judged) {
-  const plan::Sensitivity found = plan::find_sensitivity(plan.disturbances, judged);
+/// The bounds of the factor, of a standard deviation those of the middle 90 %.
+std::array<double, 2> bounds_of(const plan::FactorSpread& spread) {
+  const double cut = spread.deviation > 0.0 ? 0.05 : 0.0;
+  return {spread.at(cut), spread.at(1.0 - cut)};
+}
+
+// Of friction and of EI: those of each wire, and the widest of all.
+void put_wire_unknowns(const plan::Study& study, Json& unknowns) {
+  std::array<double, 2> friction = {1.0, 1.0}, stiffness = {1.0, 1.0};
+  const auto widen = [](std::array<double, 2>& all, const std::array<double, 2>& own) {
+    all = {std::min(all[0], own[0]), std::max(all[1], own[1])};
+  };
+  Json wires = Json::array();
+  for (std::size_t k = 0; k < study.spreads.size(); ++k) {
+    const plan::WireSpread& spread = study.spreads[k];
+    const std::array<double, 2> own = bounds_of(spread.friction);
+    std::array<double, 2> shaft = {1.0, 1.0};
+    if (!spread.stiffness.empty()) shaft = bounds_of(spread.stiffness.back()[1]);
+    widen(friction, own);
+    for (const auto& ends : spread.stiffness) {
+      for (const plan::FactorSpread& end : ends) widen(stiffness, bounds_of(end));
+    }
+    wires.push_back({{"wire", study.wires[k].name},
+                     {"friction", simulate::friction_of(study.wires[k], study.insertion)},
+                     {"friction_factor", own},
+                     {"shaft_stiffness_factor", shaft}});
+  }
+  unknowns["friction_factor"] = friction;
+  unknowns["stiffness_factor"] = stiffness;
+  unknowns["wires"] = std::move(wires);
+}
+
+Json sensitivity_json(const plan::Study& study, const plan::Plan& plan,
+                      const std::vector<plan::RepeatedPlan>& judged) {
+  const plan::Sensitivity found =
+      plan::find_sensitivity(plan.disturbances, judged, study, plan.candidates);
   Json shares = Json::array(), json;
   for (const auto& share : found.shares) {
     shares.push_back({{"unknown", share.unknown}, {"share", share.of_all}});
@@ -69,20 +105,22 @@ Json sensitivity_json(const plan::Plan& plan, const std::vector<plan::RepeatedPl
 
 }  // namespace
 
-Json repeats_json(const plan::Plan& plan, const std::vector<plan::RepeatedPlan>& judged) {
+Json repeats_json(const plan::Study& study, const plan::Plan& plan,
+                  const std::vector<plan::RepeatedPlan>& judged) {
   const plan::Unknowns& unknowns = plan.robustness.unknowns;
   Json plans = Json::array();
   for (const plan::RepeatedPlan& repeated : judged) plans.push_back(plan_json(repeated));
   Json json;
   json["repeats"] = plan.robustness.repeats;
   json["seed"] = plan.robustness.seed;
-  json["unknowns"] = {{"friction_factor", {unknowns.friction_low, unknowns.friction_high}},
-                      {"wall_factor", {unknowns.wall_low, unknowns.wall_high}},
-                      {"angle_deg", clean(unknowns.angle / kRadPerDeg)},
-                      {"entry_mm", unknowns.entry},
-                      {"lumen_mm", unknowns.lumen}};
+  json["unknowns"] = Json::object();
+  put_wire_unknowns(study, json["unknowns"]);
+  json["unknowns"].update(Json{{"wall_factor", {unknowns.wall_low, unknowns.wall_high}},
+                               {"angle_deg", clean(unknowns.angle / kRadPerDeg)},
+                               {"entry_mm", unknowns.entry},
+                               {"lumen_mm", unknowns.lumen}});
   json["plans"] = std::move(plans);
-  json["sensitivity"] = sensitivity_json(plan, judged);
+  json["sensitivity"] = sensitivity_json(study, plan, judged);
   json["disturbances"] = disturbances_json(plan.disturbances);
   return json;
 }

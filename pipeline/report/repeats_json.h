@@ -8,6 +8,7 @@
 namespace wireplan::pipeline {
 
 /// The report's "robustness": the plan's repeats as they were judged.
-Json repeats_json(const plan::Plan& plan, const std::vector<plan::RepeatedPlan>& judged);
+Json repeats_json(const plan::Study& study, const plan::Plan& plan,
+                  const std::vector<plan::RepeatedPlan>& judged);
 
 }  // namespace wireplan::pipeline

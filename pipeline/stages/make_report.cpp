@@ -88,7 +88,7 @@ ReportInput describe_run(Workspace& work) {
   report.study = work.study();
   report.plan = read_plan(work);
   report.judgement = plan::judge(report.study, report.plan, given.limits, given.weights);
-  report.robustness = repeats_json(report.plan, report.judgement.repeated);
+  report.robustness = repeats_json(report.study, report.plan, report.judgement.repeated);
   for (const char* stage : kToldStages) {
     if (!work.has(stage)) continue;
     report.stages.push_back(stage);

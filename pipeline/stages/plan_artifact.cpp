@@ -52,7 +52,7 @@ plan::Plan read_plan(Workspace& work) {
   plan.scripts = read_scripts(work.figures("manoeuvres"), plan.candidates);
   plan.candidates.insert(plan.candidates.end(), plan.scripts.found.begin(),
                          plan.scripts.found.end());
-  plan_from_json(read_json(plan_file(work.artifact("plans").folder), kSchema), plan);
+  plan_from_json(read_json(plan_file(work.artifact("plans").folder), kSchema), work.study(), plan);
   expects(plan.trials.size() == plan.candidates.size());
   return plan;
 }

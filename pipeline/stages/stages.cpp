@@ -269,9 +269,9 @@ std::vector<Stage> stages_of(const Case& given) {
   if (given.manoeuvres == Manoeuvring::kWhenNeeded) {
     // Plans are tried under disturbances.
     if (voxels != nullptr) manoeuvres.after.emplace_back(voxels);
-    read_too(manoeuvres,
-             {"/robustness/seed", "/robustness/friction_factor", "/robustness/wall_factor",
-              "/robustness/angle_deg", "/robustness/entry_mm", "/robustness/lumen_mm"});
+    read_too(manoeuvres, {"/robustness/seed", "/robustness/friction_factor",
+                          "/robustness/stiffness_factor", "/robustness/wall_factor",
+                          "/robustness/angle_deg", "/robustness/entry_mm", "/robustness/lumen_mm"});
   }
   manoeuvres.make = make_manoeuvres;
   stages.push_back(manoeuvres);

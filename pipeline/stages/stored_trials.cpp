@@ -74,23 +74,24 @@ std::string StoredTrials::key_of(const plan::Run& run, const std::string& shared
   const plan::Study& study = study_of(run.level);
   Json script = Json::array();
   for (const auto& [push, turn] : moves) script.push_back({push, turn});
-  std::vector<KeyLine> lines = {
-      {"wire", wire_json(study.wires[static_cast<std::size_t>(wire)]).dump()},
-      {"inclination", Json(inclination).dump()},
-      {"azimuth", Json(azimuth).dump()},
-      {"roll", Json(roll).dump()},
-      {"moves", script.dump()},
-      {"length", Json(study.insertion.length).dump()},
-      {"level", plan::level_name(run.level)},
-      {"element", Json(study.insertion.element_length).dump()}};
+  const simulate::Wire& own = run.disturbance ? plan::disturbed_wire(study, wire, *run.disturbance)
+                                              : study.wires[static_cast<std::size_t>(wire)];
+  std::vector<KeyLine> lines = {{"wire", wire_json(own).dump()},
+                                {"inclination", Json(inclination).dump()},
+                                {"azimuth", Json(azimuth).dump()},
+                                {"roll", Json(roll).dump()},
+                                {"moves", script.dump()},
+                                {"length", Json(study.insertion.length).dump()},
+                                {"level", plan::level_name(run.level)},
+                                {"element", Json(study.insertion.element_length).dump()}};
   if (run.elements) {
     lines.push_back({"elements", Json({run.elements->factor, run.elements->insertion}).dump()});
   }
   if (run.disturbance) {
     const plan::Disturbance& d = *run.disturbance;
-    lines.push_back({"disturbance", Json({d.friction_factor, d.wall_factor, d.tilt.x(), d.tilt.y(),
-                                          d.shift.x(), d.shift.y(), d.inward})
-                                        .dump()});
+    lines.push_back(
+        {"disturbance",
+         Json({d.wall_factor, d.tilt.x(), d.tilt.y(), d.shift.x(), d.shift.y(), d.inward}).dump()});
   }
   return shared_key + key_text(lines);
 }

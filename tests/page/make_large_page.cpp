@@ -165,6 +165,7 @@ Json robustness(const plan::Ranking& ranking) {
           {"seed", 1},
           {"unknowns",
            {{"friction_factor", {0.5, 2.0}},
+            {"stiffness_factor", {0.9, 1.1}},
             {"wall_factor", {0.5, 2.0}},
             {"angle_deg", 5.0},
             {"entry_mm", 1.0},

@@ -209,9 +209,15 @@ inline Json full_case(Json json) {
                     {"off_path_fail_mm", 20}};
   json["search"] = {{"exhaustive", true}};
   json["manoeuvres"] = "always";
-  json["robustness"] = {
-      {"repeats", 32},         {"plans", 3},     {"seed", 7},       {"friction_factor", {0.25, 4}},
-      {"wall_factor", {1, 1}}, {"angle_deg", 3}, {"entry_mm", 0.5}, {"lumen_mm", 0.1}};
+  json["robustness"] = {{"repeats", 32},
+                        {"plans", 3},
+                        {"seed", 7},
+                        {"friction_factor", {0.25, 4}},
+                        {"stiffness_factor", {0.9, 1.2}},
+                        {"wall_factor", {1, 1}},
+                        {"angle_deg", 3},
+                        {"entry_mm", 0.5},
+                        {"lumen_mm", 0.1}};
   json["ranking"]["weights"] = {{"reach", 2}, {"peak_force", 3}, {"mean_force", 0}, {"margin", 1}};
   return json;
 }

@@ -302,8 +302,9 @@ std::map<std::string, std::vector<std::string>> common_table() {
     table[std::string("/") + key] = report;
   }
   const Names tried = {"manoeuvres", "plans", "report"};  // under disturbances
-  for (const char* key : {"seed", "friction_factor/0", "friction_factor/1", "wall_factor/0",
-                          "wall_factor/1", "angle_deg", "entry_mm", "lumen_mm"}) {
+  for (const char* key : {"seed", "friction_factor/0", "friction_factor/1", "stiffness_factor/0",
+                          "stiffness_factor/1", "wall_factor/0", "wall_factor/1", "angle_deg",
+                          "entry_mm", "lumen_mm"}) {
     table[std::string("/robustness/") + key] = tried;
   }
   table["/robustness/repeats"] = table["/robustness/plans"] = {"plans", "report"};
@@ -332,6 +333,8 @@ Json case_with_every_list_of_one(const fs::path& folder) {
   Json file = write_tube_case(folder);
   file["access"]["inclination_deg"] = {20};
   file["tip_roll_deg"] = {0};
+  file["robustness"]["friction_factor"] = {0.5, 2};
+  file["robustness"]["stiffness_factor"] = {0.8, 1.5};
   // A wire with every kind of value.
   Json& wire = file["wires"][0];
   wire["coating"] = "ptfe";

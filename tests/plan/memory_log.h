@@ -32,8 +32,9 @@ inline std::string text_of(const Run& run) {
   if (run.disturbance) {
     const Disturbance& d = *run.disturbance;
     text += " disturbed";
-    for (const double value : {d.friction_factor, d.wall_factor, d.tilt.x(), d.tilt.y(),
-                               d.shift.x(), d.shift.y(), d.inward}) {
+    for (const double part : d.stiffness) add(part);
+    for (const double value :
+         {d.friction, d.wall_factor, d.tilt.x(), d.tilt.y(), d.shift.x(), d.shift.y(), d.inward}) {
       add(value);
     }
   }

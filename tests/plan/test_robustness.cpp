@@ -50,13 +50,13 @@ TEST(Ranks, ShareTheMeanPlaceOfEquals) {
 TEST(Disturbances, CoverEachRangeEvenlyAndStayWithinIt) {
   RobustnessOptions options;
   options.repeats = 64;
-  const std::vector<Disturbance> drawn = draw_disturbances(options);
+  const std::vector<Disturbance> drawn = draw_disturbances(options, {});
   ASSERT_EQ(drawn.size(), 64u);
   std::set<int> friction, wall, tilt, shift, lumen;
   for (const Disturbance& d : drawn) {
     // The part of the range, by the inverse of how it is spread.
     const auto cell = [](double part) { return static_cast<int>(std::floor(64.0 * part)); };
-    friction.insert(cell(std::log(d.friction_factor / 0.5) / std::log(4.0)));
+    friction.insert(cell(d.friction));
     wall.insert(cell(std::log(d.wall_factor / 0.5) / std::log(4.0)));
     tilt.insert(cell(std::pow(d.tilt.norm() / options.unknowns.angle, 2)));
     shift.insert(cell(std::pow(d.shift.norm() / options.unknowns.entry, 2)));
@@ -74,21 +74,94 @@ TEST(Disturbances, LeanToAllSides) {
   RobustnessOptions options;
   options.repeats = 256;
   Eigen::Vector2d tilt = Eigen::Vector2d::Zero();
-  for (const Disturbance& d : draw_disturbances(options)) tilt += d.tilt / options.repeats;
+  for (const Disturbance& d : draw_disturbances(options, {})) tilt += d.tilt / options.repeats;
   // The mean of independent draws has a deviation of 5 deg / 2 / sqrt(256) on each axis.
   EXPECT_LT(tilt.norm(), 3.0 * 5.0 * kRadPerDeg / 2.0 / 16.0);
 }
 
 TEST(Disturbances, FollowTheSeedAlone) {
   RobustnessOptions options;
-  const auto first = draw_disturbances(options), again = draw_disturbances(options);
+  const auto first = draw_disturbances(options, {}), again = draw_disturbances(options, {});
   options.seed = 2;
-  const auto other = draw_disturbances(options);
+  const auto other = draw_disturbances(options, {});
   for (std::size_t k = 0; k < first.size(); ++k) {
-    EXPECT_EQ(first[k].friction_factor, again[k].friction_factor);
+    EXPECT_EQ(first[k].friction, again[k].friction);
     EXPECT_EQ(first[k].tilt, again[k].tilt);
-    EXPECT_NE(first[k].friction_factor, other[k].friction_factor);
+    EXPECT_NE(first[k].friction, other[k].friction);
   }
+}
+
+TEST(Disturbances, OfAWireFollowFromItsNameWhateverTheOthersAre) {
+  RobustnessOptions options;
+  options.repeats = 32;
+  const simulate::Wire a{.name = "a", .radius = 0.4, .sections = {}},
+      b{.name = "b", .radius = 0.4, .sections = {}};
+  const auto one = draw_disturbances(options, {a}), both = draw_disturbances(options, {b, a});
+  std::set<int> cells;
+  int different = 0;
+  for (std::size_t k = 0; k < one.size(); ++k) {
+    ASSERT_EQ(both[k].stiffness.size(), 2u);
+    EXPECT_EQ(one[k].stiffness[0], both[k].stiffness[1]);
+    EXPECT_EQ(one[k].tilt, both[k].tilt);
+    different += both[k].stiffness[0] != both[k].stiffness[1];
+    cells.insert(static_cast<int>(32.0 * one[k].stiffness[0]));
+  }
+  EXPECT_EQ(different, 32);
+  EXPECT_EQ(cells.size(), 32u) << "each part of its range once";
+}
+
+TEST(FactorSpread, HasItsBoundsOrItsStandardDeviation) {
+  const FactorSpread even{.low = 0.5, .high = 2.0}, normal{.deviation = 0.3};
+  EXPECT_TRUE(FactorSpread().known());
+  EXPECT_FALSE(even.known());
+  EXPECT_FALSE(normal.known());
+  EXPECT_DOUBLE_EQ(even.at(0.0), 0.5);
+  EXPECT_DOUBLE_EQ(even.at(0.5), 1.0);
+  EXPECT_DOUBLE_EQ(even.at(1.0), 2.0);
+  EXPECT_EQ(normal.at(0.5), 1.0);
+  // Of the log-normal distribution with median 1: sd = m sqrt(1 + v) with m = sqrt(1 + v) its mean
+  // and v the square of sd / mean, which is 0.3.
+  double sum = 0.0, squares = 0.0;
+  constexpr int kCount = 20000;
+  for (int k = 0; k < kCount; ++k) {
+    const double factor = normal.at((k + 0.5) / kCount);
+    sum += factor;
+    squares += factor * factor;
+  }
+  const double mean = sum / kCount, deviation = std::sqrt(squares / kCount - mean * mean);
+  EXPECT_NEAR(deviation / mean, 0.3, 0.006);  // cut at 3 standard deviations
+  EXPECT_NEAR(mean, std::sqrt(1.09), 0.005);
+  EXPECT_NEAR(normal.at(0.0) * normal.at(1.0), 1.0, 1e-12);
+}
+
+TEST(DisturbedWire, HasItsOwnPartOfEachSpread) {
+  Study study;
+  study.wires = {{.name = "wire",
+                  .radius = 0.4,
+                  .sections = {{.length = 10.0, .bending_stiffness = 5.0},
+                               {.length = 20.0,
+                                .bending_stiffness = 5.0,
+                                .proximal_bending_stiffness = 300.0,
+                                .taper = simulate::Taper::kCone},
+                               {.length = 60.0, .bending_stiffness = 300.0}},
+                  .friction = 0.12}};
+  study.insertion.friction = 0.5;
+  Disturbance d{.friction = 1.0, .stiffness = {0.0}};
+  EXPECT_EQ(disturbed_wire(study, 0, d).friction, 0.12) << "its values are known";
+  const FactorSpread tip{.low = 0.5, .high = 3.0}, shaft{.low = 0.9, .high = 1.1};
+  study.spreads = {{.friction = {.low = 0.5, .high = 2.0},
+                    .stiffness = {{tip, tip}, {tip, shaft}, {shaft, shaft}}}};
+  const simulate::Wire soft = disturbed_wire(study, 0, d);
+  EXPECT_DOUBLE_EQ(soft.friction.value(), 0.24);
+  EXPECT_DOUBLE_EQ(soft.sections[0].bending_stiffness, 2.5);
+  EXPECT_FALSE(soft.sections[0].tapered());
+  EXPECT_DOUBLE_EQ(soft.sections[1].bending_stiffness, 2.5);
+  EXPECT_DOUBLE_EQ(soft.sections[1].proximal_EI(), 270.0);
+  EXPECT_DOUBLE_EQ(soft.sections[2].bending_stiffness, 270.0);
+  d.stiffness = {1.0};
+  EXPECT_DOUBLE_EQ(disturbed_wire(study, 0, d).sections[2].bending_stiffness, 330.0);
+  study.wires[0].friction.reset();
+  EXPECT_DOUBLE_EQ(disturbed_wire(study, 0, d).friction.value(), 1.0) << "twice the insertion's";
 }
 
 // ---- disturbed trials -------------------------------------------------------------------------
@@ -114,6 +187,30 @@ struct TubeStudy {
     return simulate::VesselModel(surface, shapes::extruded_wall(surface, 1.0, young_modulus));
   }
 };
+
+TEST(RunDisturbed, PushesTheWireThatIsDisturbed) {
+  TubeStudy tube;
+  const simulate::VesselModel vessel = tube.vessel(0.056);
+  tube.study.spreads = {{.friction = {.low = 0.25, .high = 4.0},
+                         .stiffness = {{{{.low = 0.5, .high = 2.0}, {.low = 0.5, .high = 2.0}}}}}};
+  const auto last = [&](const Disturbance& d) {
+    const simulate::TrialResult trial = run_disturbed(tube.study, tube.candidate, vessel, d);
+    EXPECT_FALSE(trial.pushes.empty()) << trial.reason;
+    return trial.pushes.back();
+  };
+  const simulate::Push mean = last({}), rough = last({.friction = 1.0}),
+                       smooth = last({.friction = 0.0}), stiff = last({.stiffness = {1.0}});
+  EXPECT_GT(rough.friction_force, 1.5 * mean.friction_force);
+  EXPECT_LT(smooth.friction_force, 0.6 * mean.friction_force);
+  EXPECT_GT(stiff.total_contact_force, 1.3 * mean.total_contact_force);
+
+  // As a study of that very wire.
+  Study same = tube.study;
+  same.wires[0] = disturbed_wire(tube.study, 0, {.friction = 1.0, .stiffness = {1.0}});
+  same.spreads.clear();
+  const simulate::TrialResult own = run_disturbed(same, tube.candidate, vessel, {});
+  EXPECT_EQ(own.pushes.back().push_force, last({.friction = 1.0, .stiffness = {1.0}}).push_force);
+}
 
 TEST(RunDisturbed, IsTheTrialItselfWithoutADisturbance) {
   const TubeStudy tube;
@@ -366,16 +463,36 @@ TEST(ChoosePlansToRepeat, TakesTheFirstAndTheBestOfEachWireOnce) {
   EXPECT_EQ(choose_of_two(2), (std::vector<int>{1, 3}));
 }
 
+/// Plans 0 to 3 of two wires in turn, the friction of both and EI of the second not known.
+struct TwoWires {
+  Study study;
+  std::vector<Candidate> candidates;
+
+  explicit TwoWires(bool stiffness = false) {
+    for (const char* name : {"one", "other"}) {
+      study.wires.push_back(
+          {.name = name, .radius = 0.4, .sections = {{.length = 60.0, .bending_stiffness = 50.0}}});
+      study.spreads.push_back({.friction = {.low = 0.5, .high = 2.0}});
+    }
+    if (stiffness) {
+      for (WireSpread& spread : study.spreads) spread.stiffness = {{{{.deviation = 0.1}, {}}}};
+    }
+    study.insertion.friction = 0.1;
+    for (int k = 0; k < 4; ++k) candidates.push_back({.wire = k % 2});
+  }
+};
+
 TEST(Sensitivity, FindsTheUnknownThatMovesThePlansAgainstEachOther) {
-  const std::vector<Disturbance> disturbances = draw_disturbances({.repeats = 64});
-  RepeatedPlan a, b;
+  const TwoWires own;
+  const std::vector<Disturbance> disturbances = draw_disturbances({.repeats = 64}, {});
+  RepeatedPlan a{.trial = 0, .repeats = {}}, b{.trial = 1, .repeats = {}};
   for (const Disturbance& d : disturbances) {
     // Friction moves both alike and so no order; the wall moves them apart, a lean a little.
-    const double both = 0.2 * std::log(d.friction_factor);
+    const double both = 0.8 * (d.friction - 0.5);
     a.repeats.push_back({.safe = true, .score = 0.4 + both + 0.05 * std::log(d.wall_factor)});
     b.repeats.push_back({.safe = true, .score = 0.4 + both + 0.05 * d.tilt[0]});
   }
-  const Sensitivity found = find_sensitivity(disturbances, {a, b});
+  const Sensitivity found = find_sensitivity(disturbances, {a, b}, own.study, own.candidates);
   ASSERT_EQ(found.shares.size(), 5u);
   EXPECT_EQ(found.shares[0].unknown, "wall");
   EXPECT_GT(found.shares[0].of_all, 0.9);
@@ -386,13 +503,35 @@ TEST(Sensitivity, FindsTheUnknownThatMovesThePlansAgainstEachOther) {
 
   // A plan with fewer repeats says nothing.
   const RepeatedPlan few{.trial = 2, .repeats = {{.safe = true, .score = 0.9}}};
-  const Sensitivity again = find_sensitivity(disturbances, {a, few, b});
+  const Sensitivity again = find_sensitivity(disturbances, {a, few, b}, own.study, own.candidates);
   EXPECT_EQ(again.explained.value(), found.explained.value());
   EXPECT_EQ(again.shares[0].of_all, found.shares[0].of_all);
 }
 
+TEST(Sensitivity, EIOfAWireMovesItsOwnPlansAlone) {
+  const TwoWires own(/*stiffness=*/true);
+  const std::vector<Disturbance> disturbances = draw_disturbances({.repeats = 64}, own.study.wires);
+  RepeatedPlan a{.trial = 0, .repeats = {}}, b{.trial = 1, .repeats = {}};
+  for (const Disturbance& d : disturbances) {
+    a.repeats.push_back({.safe = true, .score = 0.4 + 0.1 * d.stiffness[0]});
+    b.repeats.push_back({.safe = true, .score = 0.4});
+  }
+  const Sensitivity found = find_sensitivity(disturbances, {a, b}, own.study, own.candidates);
+  ASSERT_EQ(found.shares.size(), 6u);
+  EXPECT_EQ(found.shares[0].unknown, "stiffness");
+  EXPECT_GT(found.shares[0].of_all, 0.8);
+  EXPECT_GT(found.explained.value(), 0.4) << "all of the first plan, nothing of the second";
+
+  // A wire whose friction is 0 has none to be unknown.
+  TwoWires smooth(true);
+  smooth.study.insertion.friction = 0.0;
+  EXPECT_EQ(find_sensitivity(disturbances, {a, b}, smooth.study, smooth.candidates).shares.size(),
+            5u);
+}
+
 TEST(Sensitivity, ExplainsNothingOfNoise) {
-  const std::vector<Disturbance> disturbances = draw_disturbances({.repeats = 64});
+  const TwoWires own;
+  const std::vector<Disturbance> disturbances = draw_disturbances({.repeats = 64}, {});
   std::vector<RepeatedPlan> plans(2);
   std::uint64_t state = 1;
   for (RepeatedPlan& plan : plans) {
@@ -403,18 +542,22 @@ TEST(Sensitivity, ExplainsNothingOfNoise) {
   }
   // 7 coefficients explain 11 % of 64 values by chance, which is corrected for; with a deviation of
   // about 6 %.
-  EXPECT_LT(find_sensitivity(disturbances, plans).explained.value(), 0.15);
+  EXPECT_LT(find_sensitivity(disturbances, plans, own.study, own.candidates).explained.value(),
+            0.15);
 }
 
 TEST(Sensitivity, SaysWhyThereIsNone) {
-  const std::vector<Disturbance> few = draw_disturbances({.repeats = 4});
+  const TwoWires own;
+  const std::vector<Disturbance> few = draw_disturbances({.repeats = 4}, {});
   std::vector<RepeatedPlan> plans(2);
   for (RepeatedPlan& plan : plans) plan.repeats.resize(4);
-  EXPECT_EQ(find_sensitivity(few, plans).reason, "at least 10 repeats are needed");
-  EXPECT_EQ(find_sensitivity(few, {plans[0]}).reason, "fewer than two plans are repeated");
-  const std::vector<Disturbance> enough = draw_disturbances({.repeats = 16});
+  EXPECT_EQ(find_sensitivity(few, plans, own.study, own.candidates).reason,
+            "at least 10 repeats are needed");
+  EXPECT_EQ(find_sensitivity(few, {plans[0]}, own.study, own.candidates).reason,
+            "fewer than two plans are repeated");
+  const std::vector<Disturbance> enough = draw_disturbances({.repeats = 16}, {});
   for (RepeatedPlan& plan : plans) plan.repeats.resize(16);
-  EXPECT_EQ(find_sensitivity(enough, plans).reason,
+  EXPECT_EQ(find_sensitivity(enough, plans, own.study, own.candidates).reason,
             "the unknowns do not move the plans against each other");
 }
 

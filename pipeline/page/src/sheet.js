@@ -20,6 +20,7 @@ const sectionText = ({provenance: {parameters: {section}}}) => {
 export const answerName = (answer) => kAnswers[answer] ?? shown(answer);
 const kUnknowns = {
   friction: "friction",
+  stiffness: "stiffness of the wire",
   wall: "stiffness of the wall",
   angle: "angle of the introducer",
   entry: "place of entry",

@@ -73,7 +73,8 @@ const sensitivity = (page, best, key, title) => {
 const unknownRows = (robustness) => {
   const {unknowns, sensitivity, repeats} = robustness;
   const names = {
-    friction: ["Friction", `times ${(unknowns.friction_factor ?? []).map(number).join(" to ")}`],
+    friction: ["Friction", `times ${(unknowns.friction_factor ?? []).map(number).join(" to ")}, each wire by its own spread`],
+    ...(unknowns.stiffness_factor ? {stiffness: ["Stiffness of the wires", `times ${unknowns.stiffness_factor.map(number).join(" to ")}, each wire by its own spread`]} : {}),
     wall: ["Stiffness of the wall", `times ${(unknowns.wall_factor ?? []).map(number).join(" to ")}`],
     angle: ["Angle of the introducer", `\u00b1\u00a0${degrees(unknowns.angle_deg)}`],
     entry: ["Place of entry", `\u00b1\u00a0${number(unknowns.entry_mm)}\u00a0mm`],
