@@ -27,11 +27,14 @@ bool is_rigid(const ReportInput& input) {
 }
 
 Json limits_of_validity(const ReportInput& input) {
+  const auto& wires = input.study.wires;
+  const bool smooth = std::all_of(wires.begin(), wires.end(), [&](const simulate::Wire& wire) {
+    return simulate::friction_of(wire, input.study.insertion) == 0.0;
+  });
   const char* friction =
-      input.study.insertion.friction == 0.0
-          ? "Frictionless: push forces are lower bounds."
-          : "One coefficient of friction stands for every wire and all of the wall; it is taken "
-            "from the case, not measured.";
+      smooth ? "Frictionless: push forces are lower bounds."
+             : "One coefficient of friction stands for all of the wall; it is that of the wire's "
+               "coating or of the case, not measured on either.";
   const char* wall =
       is_rigid(input)
           ? "The wall is rigid: contact forces are those of a vessel that does not give way, upper "
@@ -261,6 +264,23 @@ void put_repeats(Row& row, const ReportInput& input, int trial) {
   }
 }
 
+/// The weakest of the values of the wire that has come in: friction of the case has no source.
+Weakest weakest_behind(const ReportInput& input, int wire, double reach) {
+  const DeviceWire& device = input.devices.at(static_cast<std::size_t>(wire));
+  std::vector<NamedValue> values = device.values;
+  if (!device.wire.friction)
+    values.push_back({.key = "friction", .from = 0.0, .acts = true, .value = {}});
+  return find_weakest(values, reach);
+}
+
+void put_weakest(Row& row, const ReportInput& input, int trial) {
+  const auto k = static_cast<std::size_t>(trial);
+  const Weakest weakest =
+      weakest_behind(input, input.plan.candidates[k].wire, input.plan.trials[k].metrics.insertion);
+  row.put("weakest_confidence", weakest_name(weakest));
+  row.put("weakest_values", weakest.keys);
+}
+
 Json ranked_json(const ReportInput& input, std::size_t k) {
   const plan::RankedPlan& plan = input.judgement.ranking.plans[k];
   Row row;
@@ -277,6 +297,7 @@ Json ranked_json(const ReportInput& input, std::size_t k) {
   row.put("expected_success_rate", plan.expected_safe);
   row.put("expected_score", plan.expected_score);
   row.put("tied_with", plan.tied_with);
+  put_weakest(row, input, plan.trial);
   row.put("sentence", plan.sentence);
   return row.finish();
 }
@@ -297,6 +318,14 @@ Json wire_summary_json(const ReportInput& input, const plan::WireSummary& summar
   const char* none = "no trial of this wire reached the target";
   row.put_optional("median_peak_contact_force_n", force(summary.median_peak_force), none);
   row.put_optional("worst_peak_contact_force_n", force(summary.worst_peak_force), none);
+  Json values = Json::array();
+  for (const NamedValue& each : input.devices.at(static_cast<std::size_t>(summary.wire)).values) {
+    const std::optional<Confidence>& confidence = each.value.confidence;
+    values.push_back({{"key", each.key},
+                      {"confidence", confidence ? confidence_name(*confidence) : "not stated"},
+                      {"source", each.value.source}});
+  }
+  row.put("values", std::move(values));
   return row.finish();
 }
 

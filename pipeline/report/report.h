@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "pipeline/files/json_reader.h"
+#include "pipeline/files/wire_file.h"
 #include "plan/judge.h"
 #include "plan/verdict.h"
 #include "preprocess/surface/openings.h"
@@ -27,6 +28,7 @@ struct ReportInput {
   std::vector<std::string> stages;         // that were run or found, in order
   Json figures;                            // per stage name, what its figures.json holds
   plan::Study study;                       // as the trials used it
+  std::vector<DeviceWire> devices;         // of its wires: how well their values are known
   plan::Plan plan;                         // what was simulated, and ...
   plan::Judgement judgement;          // ... what that is worth by the case's limits and weights
   plan::Verdict verdict;              // for who decides

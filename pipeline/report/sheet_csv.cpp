@@ -46,6 +46,13 @@ void add_plans(Table& table, const Json& report) {
     const Json& trial = report.at("trials").at(plan.at("trial").get<std::size_t>());
     table.begin("plan " + std::to_string(k + 1));
     table.row("wire", plan.at("wire"));
+    if (plan.contains("weakest_confidence")) {
+      std::string keys;
+      for (const Json& key : plan.at("weakest_values")) {
+        keys += (keys.empty() ? "" : " ") + key.get<std::string>();
+      }
+      table.row("weakest value of the wire", plan.at("weakest_confidence"), "", nullptr, keys);
+    }
     table.row("inclination", plan.at("inclination_deg"), "deg");
     table.row("azimuth", plan.at("azimuth_deg"), "deg");
     table.row("roll of the tip", plan.at("roll_deg"), "deg");

@@ -86,6 +86,11 @@ ReportInput describe_run(Workspace& work) {
   report.input_name = work.input.filename().string();
   report.input_sha256 = work.input_sha256;
   report.study = work.study();
+  report.devices = given.devices;
+  const Catalogue known = catalogue();
+  for (DeviceWire& device : report.devices) {
+    for (NamedValue& each : device.values) each.value.source = cite(known, each.value.source);
+  }
   report.plan = read_plan(work);
   report.judgement = plan::judge(report.study, report.plan, given.limits, given.weights);
   report.robustness = repeats_json(report.study, report.plan, report.judgement.repeated);

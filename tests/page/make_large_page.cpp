@@ -205,6 +205,14 @@ std::string make_page(const std::string& name) {
   report.stages = {"surface", "centerline", "wall", "trials"};
   report.figures = figures(surface);
   report.study = make_study();
+  for (const simulate::Wire& wire : report.study.wires) {
+    DeviceWire& device = report.devices.emplace_back();
+    device.wire = wire;
+    NamedValue& value = device.values.emplace_back();
+    value.key = "sections[0].bending_stiffness_n_mm2";
+    value.value.source = "assumed";
+    value.value.confidence = Confidence::kAssumed;
+  }
   plan::Plan& plan = report.plan;
   plan.candidates = plan::list_candidates(report.study);
   plan.levels.assign(plan.candidates.size(), plan::Level::kFull);

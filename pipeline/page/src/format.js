@@ -56,3 +56,13 @@ export const planName = (trial) =>
   `${shown(trial.wire)}, inclination ${degrees(trial.inclination_deg)}, azimuth ` +
   `${degrees(trial.azimuth_deg)}, roll ${degrees(trial.roll_deg)}` +
   (trial.script ? `; ${shown(trial.script)}` : "");
+
+const kValues = {
+  diameter_mm: "diameter", coating: "coating", friction: "friction", length_mm: "length", taper: "taper", rest_radius_mm: "curve",
+  bending_stiffness_n_mm2: "EI", flexural_modulus_gpa: "EI", tip_load_gf: "EI", axial_stiffness_n: "EA", twist_stiffness_n_mm2: "GJ",
+};
+/** "EI of section 2, from the tip" of "sections[1].bending_stiffness_n_mm2". */
+export const valueName = (key) => {
+  const [, section, own] = key.match(/^sections\[(\d+)\]\.(.*)$/) ?? [null, null, key];
+  return `${kValues[own] ?? own}${section === null ? "" : ` of section ${Number(section) + 1}`}`;
+};

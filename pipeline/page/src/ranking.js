@@ -26,6 +26,7 @@ const kColumns = [
   ["Tip force [N]", (t) => t.peak_tip_force_n, (t) => told(t, t.peak_tip_force_n, t.errors.peak_tip_force_error_n)],
   ["Score, 0 best", (t) => t.plan?.score ?? Infinity, (t) => (t.plan ? withError(t.plan.score, t.plan.score_error) : "\u2013")],
   ["Safe share", (t) => t.plan?.success_rate ?? -1, success],
+  ["Weakest value of the wire", (t) => t.plan?.weakest_confidence ?? "", (t) => (t.plan?.weakest_confidence ? shown(t.plan.weakest_confidence) : "\u2013")],
   ["Why", (t) => t.plan?.sentence ?? t.excluded ?? "", (t) => shown(t.plan ? t.plan.sentence : t.excluded ?? outcomeWord(t.outcome))],
 ];
 

@@ -1,7 +1,7 @@
 // The first sheet: what is needed to decide and to prepare, on one A4 page. It has the size of the
 // page on paper also on a screen, so that what fits here fits there.
 import {el, name} from "./dom.js";
-import {degrees, number, plural, shown} from "./format.js";
+import {degrees, number, plural, shown, valueName} from "./format.js";
 import {drawView, workingView} from "./anatomy.js";
 
 const kPlans = 3, kReasons = 8, kChanges = 4, kWarnings = 3, kPlaces = 6;
@@ -163,6 +163,7 @@ const uncertainBlock = ({report, trials}) => {
     if (shares.length) {
       items.push(`What decides most between plans: ${shares.slice(0, 2).map((row) => `${kUnknowns[row.unknown] ?? shown(row.unknown)} (${wholePercent(row.share)})`).join(", ")}.`);
     }
+    if (first.weakest_confidence) items.push(`Plan 1: the weakest value of its wire is ${shown(first.weakest_confidence)} (${shown(first.weakest_values.slice(0, 3).map(valueName).join(", "))}${first.weakest_values.length > 3 ? ` and ${first.weakest_values.length - 3} more` : ""}).`);
     if (first.tied_with.length) items.push(`${plural(first.tied_with.length, "other plan")} cannot be told apart from plan 1.`);
   }
   items.push("Not in the numbers: errors of the vessel's outline, of the wires' data, blood flow, breathing.");
