@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "pipeline/files/catalogue.h"
 #include "pipeline/files/json_reader.h"
 #include "pipeline/files/markups_file.h"
 
@@ -121,15 +122,75 @@ void read_elements(JsonReader& reader, const std::vector<SectionInput>& sections
   }
 }
 
+/// The part of the wire next to its tip.
+void cut_to(simulate::Wire& wire, double length) {
+  double start = 0.0;
+  for (std::size_t k = 0; k < wire.sections.size(); ++k) {
+    simulate::Section& section = wire.sections[k];
+    const double part = std::min(section.length, length - start);
+    start += section.length;
+    if (part >= section.length) continue;
+    if (section.tapered()) {  // EI at the cut
+      const double share = part / section.length,
+                   power = section.taper == simulate::Taper::kCone ? 0.25 : 1.0;
+      const double tip = std::pow(section.bending_stiffness, power),
+                   shaft = std::pow(section.proximal_bending_stiffness, power);
+      section.proximal_bending_stiffness = std::pow(tip + share * (shaft - tip), 1.0 / power);
+    }
+    section.length = part;
+    wire.sections.resize(part > 1e-9 ? k + 1 : k);
+    return;
+  }
+}
+
+/// A wire of the catalogue, or its end, in edges of one length. Its friction is its own.
+void read_device(JsonReader& reader, simulate::Scene& scene) {
+  const Catalogue known = catalogue();
+  const std::string name = reader.text("device", std::nullopt);
+  const CatalogueWire* found = find_wire(known, name);
+  if (found == nullptr) {
+    std::vector<std::string> names;
+    for (const CatalogueWire& entry : known.wires) names.push_back(entry.wire.name);
+    const std::string nearest = nearest_name(name, names);
+    reader.problems().add(
+        "wire.device", "\"" + name + "\"", "a wire of the catalogue",
+        nearest.empty() ? "`wireplan devices` lists them" : "did you mean \"" + nearest + "\"?");
+    found = &known.wires.front();
+  }
+  scene.wire = found->wire;
+  const double whole = found->wire.length();
+  const double length = reader.number("length_mm", whole, {.min = 1.0, .max = whole},
+                                      "the catalogue's wire is no longer");
+  cut_to(scene.wire, length);
+  if (reader.has("friction")) {
+    scene.wire.friction = read_friction(reader, 0.0);
+  }
+  const double edge = reader.number("element_length_mm", 1.0, {.min = 0.05, .max = 20.0});
+  scene.elements = static_cast<int>(std::lround(length / edge));
+  if (scene.elements >= 2 && scene.elements <= kMaxElements) return;
+  reader.problems().add("wire.element_length_mm", Json(edge).dump(),
+                        "2 to " + std::to_string(kMaxElements) + " edges along the wire");
+  scene.elements = 2;
+}
+
 /// The wire and how it is cut and twisted, in an otherwise empty scene.
 simulate::Scene read_wire_of_scene(JsonReader& root) {
   JsonReader reader = root.object("wire", true);
   simulate::Scene scene;
-  scene.wire.name = reader.text("name", "wire");
+  const bool is_device = reader.has("device");
+  if (is_device) {
+    read_device(reader, scene);
+  } else {
+    scene.wire.name = reader.text("name", "wire");
+  }
   const std::string twist = reader.choice("twist", "auto", {"auto", "coupled", "decoupled"});
   scene.twist = twist == "coupled"     ? simulate::Twist::kCoupled
                 : twist == "decoupled" ? simulate::Twist::kDecoupled
                                        : simulate::Twist::kAuto;
+  if (is_device) {
+    reader.finish();
+    return scene;
+  }
   std::vector<SectionInput> sections;
   for (JsonReader& section : reader.objects("sections", true)) {
     sections.push_back(read_section(section));
@@ -508,6 +569,13 @@ SceneFile read_scene(const std::filesystem::path& path) {
   // An insertion has a vessel; a bench may have one.
   const bool inserted = root.has("insertion");
   if (inserted || root.has("vessel")) scene.vessel = read_vessel(root, path.parent_path());
+  if (scene.vessel && wire.wire.friction) {
+    if (file["vessel"].contains("friction")) {
+      problems.add("vessel.friction", Json(scene.vessel->friction).dump(), "no such key",
+                   "the wire has its own; give wire.friction for another");
+    }
+    scene.vessel->friction = *wire.wire.friction;
+  }
   if (inserted) {
     scene.insertion = read_insertion_scene(root, wire, *scene.vessel);
     scene.insertion->options.record_every = every;

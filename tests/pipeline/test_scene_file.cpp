@@ -86,6 +86,44 @@ TEST_F(CaseFile, CantileverOfThePaperIsReadInInternalUnits) {
   EXPECT_EQ(scene.supports[0].direction, Vec3(1, 0, 0));
 }
 
+TEST_F(CaseFile, ASceneMayNameAWireOfTheCatalogue) {
+  Json bench = cantilever();
+  bench["wire"] = {{"device", "amplatz-stiff"}, {"length_mm", 57.5}, {"element_length_mm", 0.5}};
+  const SceneFile file = read_scene(write("scene.json", bench.dump()));
+  const simulate::Scene& scene = *file.bench;
+  EXPECT_EQ(scene.elements, 115);
+  EXPECT_EQ(scene.wire.name, "amplatz-stiff");
+  ASSERT_EQ(scene.wire.sections.size(), 2u);
+  EXPECT_NEAR(scene.wire.length(), 57.5, 1e-12);
+  // The cut lies in the middle of a cone of 45 mm from EI 3 to 521: half-way between the roots.
+  const simulate::Section& cone = scene.wire.sections[1];
+  EXPECT_EQ(cone.length, 22.5);
+  EXPECT_NEAR(std::pow(cone.proximal_bending_stiffness, 0.25),
+              0.5 * (std::pow(3.0, 0.25) + std::pow(521.2, 0.25)), 1e-3);
+
+  // Its friction reaches the insertion and the bench in a vessel; another is said of the wire.
+  Json pushed = pushed_wire();
+  pushed["vessel"].erase("friction");
+  pushed["wire"] = {{"device", "heavy-duty"}, {"length_mm", 200}};
+  const SceneFile in_vessel = read_scene(write("scene.json", pushed.dump()));
+  EXPECT_EQ(in_vessel.vessel->friction, 0.12);
+  EXPECT_EQ(friction_of(in_vessel.insertion->wire, in_vessel.insertion->options), 0.12);
+  bench["vessel"] = pushed["vessel"];
+  EXPECT_EQ(read_scene(write("scene.json", bench.dump())).bench->contact.friction, 0.12);
+  pushed["wire"]["friction"] = 0.3;
+  const SceneFile rough = read_scene(write("scene.json", pushed.dump()));
+  EXPECT_EQ(friction_of(rough.insertion->wire, rough.insertion->options), 0.3);
+
+  pushed["vessel"]["friction"] = 0.2;
+  expect_mentions(scene_problem(pushed), {"vessel.friction is 0.2", "give wire.friction"});
+  bench["wire"] = {{"device", "amplatz-stif"}};
+  expect_mentions(scene_problem(bench), {"wire.device is", "did you mean \"amplatz-stiff\"?"});
+  bench["wire"] = {{"device", "amplatz-stiff"}, {"length_mm", 2000}};
+  expect_mentions(scene_problem(bench), {"wire.length_mm is 2000", "no longer"});
+  bench["wire"] = {{"device", "amplatz-stiff"}, {"sections", Json::array()}};
+  expect_mentions(scene_problem(bench), {"wire.sections is not a known key"});
+}
+
 TEST_F(CaseFile, PaperCoefficientsGiveTheSameWire) {
   // k_s = EA / (2 h^3) and k_b = EI / h^3 for h = 2 mm: EA = 160 N, EI = 0.8 N mm^2.
   EXPECT_NEAR(axial_stiffness_from_paper(1e10, 2.0), 160.0, 1e-12 * 160.0);
