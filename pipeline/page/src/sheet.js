@@ -157,8 +157,8 @@ const uncertainBlock = ({report, trials}) => {
       : `Plan 1: the tip is where it is told to within ${mm(Number(error.toPrecision(2)))}, by the computation alone.`);
     const repeats = report.robustness?.plans?.find((row) => row.trial === first.trial);
     items.push(repeats
-      ? `Plan 1: safe in ${safeText(repeats)} repeats with other angles, entry, friction, wall and lumen; the share lies between ${repeats.success_rate_interval.map(wholePercent).join(" and ")}.`
-      : "Plan 1 was not repeated with other angles, friction, wall and lumen.");
+      ? `Plan 1: safe in ${safeText(repeats)} repeats with other angles, entry, friction, stiffness of wire and wall, and lumen; the share lies between ${repeats.success_rate_interval.map(wholePercent).join(" and ")}.`
+      : "Plan 1 was not repeated with other angles, friction, stiffness and lumen.");
     const shares = report.robustness?.sensitivity?.shares ?? [];
     if (shares.length) {
       items.push(`What decides most between plans: ${shares.slice(0, 2).map((row) => `${kUnknowns[row.unknown] ?? shown(row.unknown)} (${wholePercent(row.share)})`).join(", ")}.`);
@@ -166,7 +166,7 @@ const uncertainBlock = ({report, trials}) => {
     if (first.weakest_confidence) items.push(`Plan 1: the weakest value of its wire is ${shown(first.weakest_confidence)} (${shown(first.weakest_values.slice(0, 3).map(valueName).join(", "))}${first.weakest_values.length > 3 ? ` and ${first.weakest_values.length - 3} more` : ""}).`);
     if (first.tied_with.length) items.push(`${plural(first.tied_with.length, "other plan")} cannot be told apart from plan 1.`);
   }
-  items.push("Not in the numbers: errors of the vessel's outline, of the wires' data, blood flow, breathing.");
+  items.push("Not in the numbers: errors of the vessel's outline, of the wires' shapes and lengths, blood flow, breathing.");
   const warnings = report.provenance.warnings.map((text) => `Warning: ${shown(text).replace(/^[a-z]+: /, "").replace(/: see wall_motion of each$/, "")}`);
   return block("uncertain", "What is uncertain", cutList([...items, ...warnings], items.length + kWarnings));
 };

@@ -24,7 +24,7 @@ export const askedSection = (page) => {
       ["Wall", report.vessel.wall_model === "rigid" ? "rigid" : `yields, ${number(report.vessel.wall_stiffness_kpa_per_mm)}\u00a0kPa/mm`],
       ["Tried", plural(trials.length, "insertion")],
       ["Repeats", report.robustness?.repeats > 0
-        ? `${report.robustness.repeats} of each of the best plans, disturbed in angle, friction, wall and lumen`
+        ? `${report.robustness.repeats} of each of the best plans, disturbed in angle, friction, stiffness, wall and lumen`
         : "none asked: how robust a plan is, is not known"],
     ]));
 };
@@ -117,7 +117,7 @@ export const uncertainSection = (page) => {
     if (robustness?.repeats > 0) {
       rows.push(...unknownRows(robustness), spreadRow(robustness, best.id, first));
     } else {
-      rows.push(["Friction, wall stiffness and small errors of the angles", "not varied: the case asked for no repeats", "not known"]);
+      rows.push(["Friction, stiffness of wires and wall, and small errors of the angles", "not varied: the case asked for no repeats", "not known"]);
     }
   }
   rows.push(["Shape of the lumen in the simulation", `smooth field on a grid of ${number(report.numerics.lumen_grid_mm)}\u00a0mm`,
@@ -129,7 +129,7 @@ export const uncertainSection = (page) => {
     rows.push(["Wall by linear theory", `${beyond} of ${plural(trials.length, "trial")} moved it further than the theory holds`,
       first ? `the best plan ${bestBeyond ? "did: its forces are rough" : "did not"}` : "forces of those are rough"]);
   }
-  rows.push(["Segmentation, wire data, blood flow, breathing", "not varied", "not known; see the limits"]);
+  rows.push(["Segmentation, shapes and lengths of the wires, blood flow, breathing", "not varied", "not known; see the limits"]);
   return section("uncertain", "What is uncertain, and how much it matters",
     table("Uncertainties", ["What", "How it was looked at", "What it changes"], rows.filter(Boolean)));
 };
