@@ -64,6 +64,7 @@ double overlap(const Labels& a, const Labels& b, Counts counts) {
 std::vector<Vec3> told_places(const SegmentStatistics& statistics) {
   std::vector<Vec3> places;
   for (const preprocess::Leak& leak : statistics.search.leaks) places.push_back(leak.place);
+  for (const preprocess::Leak& part : statistics.doubtful) places.push_back(part.place);
   for (const preprocess::Touch& touch : statistics.touches) places.push_back(touch.place);
   return places;
 }
@@ -71,7 +72,7 @@ std::vector<Vec3> told_places(const SegmentStatistics& statistics) {
 int count_warnings(const SegmentStatistics& statistics, int handles) {
   constexpr std::size_t kLeaksTold = 5;  // as the stage tells them
   return static_cast<int>(std::min(statistics.search.leaks.size(), kLeaksTold) +
-                          statistics.touches.size()) +
+                          statistics.doubtful.size() + statistics.touches.size()) +
          (statistics.touches_border ? 1 : 0) + (handles > 0 ? 1 : 0);
 }
 

@@ -34,22 +34,50 @@ std::string leak_warning(const preprocess::Leak& leak) {
          "; if that is artery, add a point in it to segmentation.seeds_mm";
 }
 
+// Whether the volume's values are HU. Where the file does not tell: a CT has air or fat, which no
+// other modality writes below zero, or no values that only others have.
+bool in_hounsfield(const preprocess::Image& image) {
+  constexpr float kLeastAir = -50.0F, kMostHu = 700.0F;
+  if (!image.modality.empty()) return image.modality == "CT";
+  const auto [low, high] = std::minmax_element(image.values.begin(), image.values.end());
+  return *low < kLeastAir || *high < kMostHu;
+}
+
+// What was kept, though it may be another vessel.
+std::string doubt_warning(const preprocess::Leak& part) {
+  const Vec3& at = part.place;
+  return "segment: " + format("%.1f", part.volume_mm3 / 1000.0) + " cm3 round " +
+         format("(%.1f, %.1f, %.1f)", at.x(), at.y(), at.z()) + " mm, up to " +
+         format("%.1f", part.radius_mm) + " mm in radius and of " + format("%.0f", part.mean_hu) +
+         " HU in the mean, may be a vein or an organ that touches the artery: look at its outline "
+         "there; if it is no artery, give segmentation.lower_hu and upper_hu, or labels";
+}
+
 // Figures of the segment stage. What was chosen for the case is told as the report prints it.
 void add_segmentation(const preprocess::SegmentStatistics& statistics, bool chosen, Json& figures) {
   constexpr std::size_t kLeaksTold = 5;
+  constexpr double kDoubtfulPart = 0.02;  // of the vessel's volume, from which it is told
   const preprocess::Band& band = statistics.band;
   figures["band"] = {{"chosen", chosen},
                      {"lower_hu", band.lower_hu},
                      {"connect_hu", band.connect_hu},
                      {"upper_hu", band.upper_hu},
-                     {"way_hu", band.way_hu},
                      {"smoothing_mm", band.smoothing_mm},
                      {"neck_opening_mm", band.neck_mm}};
   figures["samples"] = Json::array();
   for (const preprocess::LumenSample& sample : statistics.samples) {
     figures["samples"].push_back({{"point_mm", to_json(sample.point)},
                                   {"level_hu", sample.level_hu},
-                                  {"noise_hu", sample.noise_hu}});
+                                  {"noise_hu", sample.noise_hu},
+                                  {"voxels", sample.voxels},
+                                  {"standard_error_hu", sample.error_hu}});
+  }
+  figures["along_way"] = Json::array();
+  for (const preprocess::LevelAlong& place : statistics.along) {
+    figures["along_way"].push_back({{"place_mm", to_json(place.place)},
+                                    {"arc_mm", place.arc_mm},
+                                    {"level_hu", place.level_hu},
+                                    {"contrast_hu", place.level_hu - band.surroundings_hu}});
   }
   figures["volume_mm3"] = statistics.volume_mm3;
   figures["mean_hu"] = statistics.mean_hu;
@@ -71,6 +99,26 @@ void add_segmentation(const preprocess::SegmentStatistics& statistics, bool chos
       figures["warnings"].push_back(leak_warning(leak));
     }
   }
+  for (const preprocess::Leak& part : statistics.doubtful) {
+    if (part.volume_mm3 < kDoubtfulPart * statistics.volume_mm3) continue;
+    figures["warnings"].push_back(doubt_warning(part));
+  }
+}
+
+// Contrast that is there, but little.
+void add_little_contrast(const preprocess::SegmentStatistics& statistics, Json& figures) {
+  if (statistics.along.empty()) return;
+  const auto darkest =
+      std::min_element(statistics.along.begin(), statistics.along.end(),
+                       [](const auto& a, const auto& b) { return a.level_hu < b.level_hu; });
+  const double contrast = darkest->level_hu - preprocess::kBloodHu;
+  if (contrast >= preprocess::kSureContrastHu) return;
+  const Vec3& at = darkest->place;
+  figures["warnings"].push_back(
+      "segment: little contrast: " + format("%.0f", contrast) +
+      " HU over blood without contrast at " + format("(%.1f, %.1f, %.1f)", at.x(), at.y(), at.z()) +
+      " mm, expected 150 or more; look at the outline there, and take the arterial phase if there "
+      "is one");
 }
 
 // What was mended of a given surface: each place, and in words.
@@ -205,12 +253,7 @@ void make_segment(Workspace& work, const fs::path& folder) {
   }
   options.target = given.targets.front().point;
   options.limits = given.mask_limits;
-  const std::string& modality = work.image().modality;
-  if (!options.lower_hu && !modality.empty() && modality != "CT") {
-    throw Error("the volume's modality is " + modality +
-                ", and only in a CT is a band chosen; give segmentation.lower_hu and upper_hu in "
-                "the volume's own values");
-  }
+  options.hounsfield = in_hounsfield(work.image());
   preprocess::Segmentation segmentation = preprocess::segment(work.image(), options);
   preprocess::SegmentStatistics& statistics = segmentation.statistics;
   Json figures = figures_of("segment");
@@ -219,6 +262,7 @@ void make_segment(Workspace& work, const fs::path& folder) {
     statistics.shape = measure_shape(segmentation.mask.grid, segmentation.mask.labels);
   }
   add_segmentation(statistics, !options.lower_hu.has_value(), figures);
+  if (options.hounsfield) add_little_contrast(statistics, figures);
   add_shape(statistics.shape, figures);
   add_touches(given, statistics.touches, statistics.dipping, figures);
   preprocess::write_mask(segmentation.mask, folder / "mask.nrrd");

@@ -176,7 +176,7 @@ std::vector<Stage> stages_from_labels(const Case& given) {
     stages.push_back({.name = "volume", .version = 2, .reads_input = true, .make = make_volume});
   }
   stages.push_back({.name = "segment",
-                    .version = 4,
+                    .version = 5,
                     .reads_input = in_volume,
                     .reads_labels = true,
                     .parameters = {"/mask"},
@@ -199,7 +199,7 @@ std::vector<Stage> stages_to_surface(const Case& given) {
   std::vector<Stage> stages;
   if (!given.volume) {
     stages.push_back({.name = "surface",
-                      .version = 6,
+                      .version = 7,
                       .reads_input = true,
                       .parameters = {"/surface/unit", "/surface/frame", "/surface/edge_length_mm"},
                       .make = make_surface});
@@ -207,7 +207,7 @@ std::vector<Stage> stages_to_surface(const Case& given) {
   }
   stages.push_back({.name = "volume", .version = 2, .reads_input = true, .make = make_volume});
   stages.push_back({.name = "segment",
-                    .version = 6,
+                    .version = 7,
                     .reads_input = true,
                     .parameters = {"/segmentation", "/mask"},
                     .make = make_segment});

@@ -182,6 +182,11 @@ MaskShape measure_shape(const Grid& grid, const Labels& labels, Labels* largest)
   return shape;
 }
 
+std::ptrdiff_t euler_number(const Grid& grid, const Labels& labels) {
+  MaskShape shape;
+  return count_cells(grid, labels, shape);
+}
+
 std::string describe_shape(const MaskShape& shape) {
   constexpr double kMm3PerMl = 1000.0;
   const double ml = shape.volume_mm3 / kMm3PerMl;

@@ -32,6 +32,9 @@ struct MaskLimits {
 /// `largest`, where given, becomes the largest piece.
 MaskShape measure_shape(const Grid& grid, const Labels& labels, Labels* largest = nullptr);
 
+/// Of a part of a mask: pieces (connected through faces) - handles + cavities.
+std::ptrdiff_t euler_number(const Grid& grid, const Labels& labels);
+
 /// "67 handles (loops or holes) in 12 ml (310 thousand voxels with 51 thousand outer faces)".
 std::string describe_shape(const MaskShape& shape);
 

@@ -14,9 +14,10 @@ namespace wireplan::preprocess {
 
 struct SegmentOptions {
   /// Band of contrast-filled lumen, inclusive, lower < upper. Give both or neither. Without them
-  /// the band is chosen from the volume at the seeds and the target, and these points may lie up to
-  /// 2.5 mm beside the lumen.                                                              [HU]
+  /// the lumen's level is measured at the seeds and the target, and followed between them; these
+  /// points may lie up to 2.5 mm beside the lumen.                                         [HU]
   std::optional<double> lower_hu = {}, upper_hu = {};
+  bool hounsfield = true;           // the volume's values are HU: a CT
   std::vector<Vec3> seeds = {};     // inside the lumen; at least one                       [mm]
   std::optional<Vec3> target = {};  // to be in one piece with the first seed               [mm]
   /// Gaussian sigma before the band is applied. Without it: 0 where the band is given, else chosen
@@ -28,16 +29,26 @@ struct SegmentOptions {
   MaskLimits limits = {};  // of the mask, and of what the band connects (require_no_flood)
 };
 
+/// The lumen at a place of a way.
+struct LevelAlong {
+  Vec3 place = Vec3::Zero();  //                                                             [mm]
+  double arc_mm = 0.0;        // from the first seed
+  double level_hu = 0.0;      //                                                             [HU]
+};
+
 /// Figures of a segmentation for the log and the report.
 struct SegmentStatistics {
   std::vector<LumenSample> samples;  // of seeds and target
   Band band;                         // that was used
+  /// Where no band was given: the levels along the ways from the first seed, every 10 mm.
+  std::vector<LevelAlong> along;
   double volume_mm3 = 0.0;
   double mean_hu = 0.0;                 // of the unsmoothed image inside the mask             [HU]
   double removed_by_opening_mm3 = 0.0;  // if it is much more than the vessel, a leak was cut
   double bright_boundary = 0.0;         // share of the surface that lies against bone or calcium
   bool touches_border = false;          // of the volume: the vessel is cut there
   LeakSearch search;                    // the way from seed to target, and the leaks cut
+  std::vector<Leak> doubtful;           // what was kept, though it may be a vein
   MaskShape shape;                      // before touches are cut
   std::vector<Touch> touches;           // by their values, then by their shape [HU, mm]
   std::size_t dipping = 0;              // of these by their values
@@ -48,17 +59,20 @@ struct Segmentation {
   SegmentStatistics statistics;
 };
 
-/// The steps:
+/// With a band:
 ///   1. Smooth, and take the voxels in the band.
 ///   2. Keep what is connected to the seeds through voxel faces.
 ///   3. Cut thin necks (prototypes A).
-///   4. Where the band was chosen and not given, add the rim down to half of the contrast.
-///   5. Cut leaks (segment_leak.h).
-///   6. Fill closed cavities (calcium, noise). Calcium on the wall stays out: no wire passes there.
-///   7. Refuse what is no vessel (mask_shape.h); cut touches on the way, or tell them.
-/// All this is done in the part of the volume that holds the vessel; the answer is that of the
-/// whole. Throws `Error` when a seed lies outside the volume, outside the band (with the HU found
-/// there) or in a vessel that step 3 removes; when there is no contrast; when the target is not
+///   4. Cut leaks (segment_leak.h).
+/// Without one, within 80 mm of the points:
+///   1. Measure the lumen's level and noise at the points (segment_band.h), and smooth.
+///   2. Find the ways between them (segment_way.h).
+///   3. Find the lumen round the ways by the levels there, and cut what touches it
+///      (segment_lumen.h). Smooth its boundary.
+/// Then closed cavities are filled (calcium, noise; calcium on the wall stays out: no wire passes
+/// there), what is no vessel is refused (mask_shape.h), and touches on the way are cut or told.
+/// Throws `Error` when a seed lies outside the volume, outside the band (with the HU found there)
+/// or in a vessel that the cut of necks removes; when there is no contrast; when the target is not
 /// connected (with the nearest point reached); and when what was found lies in a shell of bone.
 Segmentation segment(const Image& image, const SegmentOptions& options);
 

@@ -5,6 +5,7 @@
 #include <iomanip>
 #include <limits>
 #include <sstream>
+#include <utility>
 
 #include "preprocess/volume/voxels.h"
 
@@ -12,16 +13,24 @@ namespace wireplan::preprocess {
 namespace {
 
 constexpr double kSurroundingsHu = 50.0;
-constexpr double kLeastLevelHu = 150.0;  // 100 HU of contrast; arterial phases have 200 and more
+constexpr double kLeastContrastHu = 100.0;  // over blood; arterial phases have 200 and more
+constexpr double kUnsureContrastHu = 80.0;  // at any point, where none has 150
+constexpr double kMostAllowance = 20.0;     // for what a level is not known to                [HU]
+constexpr double kMostScatter = 0.45;       // of a point's contrast, without a core about it
+constexpr double kLeastPart = 0.4;          // of the contrast of the brightest point, at any other
+constexpr double kLeastToNoise = 5.0;       // contrast of what is no CT
 constexpr double kMostNoisePart = 0.35;  // of the contrast; more is marrow, or no image to plan on
+constexpr double kSeenPart = 0.4;        // of the least contrast: below, a point has none at all
 constexpr double kCalciumHu = 800.0;     // references B5: arterial phase, calcium above
 constexpr double kSnapMm = 2.5;          // how far a point may lie beside the lumen it means
 constexpr double kNoiseMm = 10.0;        // ball in which noise is measured
 constexpr double kApartMm = 1.2;
-constexpr double kLumenMm = 4.0;  // ball in which the lumen's values are taken
+constexpr double kLumenMm = 6.0;        // ball in which the lumen's values are taken
+constexpr double kSurroundMm = 15.0;    // ball in which the surroundings are taken
+constexpr double kMedianError = 1.253;  // standard error of a median against that of a mean
+constexpr double kCorrelation = 1.5;    // of an average of neighbours, against independent noise
 constexpr std::size_t kLeastSample = 30;
-constexpr double kSearchMm = 60.0;  // round the ends, for the way between them
-constexpr double kConnectPart = 0.75, kLeastConnectPart = 0.3, kUpperPart = 0.4, kNoisePart = 0.05;
+constexpr double kConnectPart = 0.65, kUpperPart = 0.4, kNoisePart = 0.05;
 constexpr double kNeckMm = 0.5;
 
 double median_of(std::vector<double> values) {
@@ -136,39 +145,6 @@ std::optional<std::size_t> brightest_near(const Eroded& eroded, const Vec3& poin
   return best;
 }
 
-/// Of all ways from `start` to `end` over values of `floor` or more, one whose least value is
-/// largest, to a whole HU; empty where there is none. Floods level by level, from bright to dark.
-std::vector<std::size_t> brightest_way(const Eroded& eroded, std::size_t start, std::size_t end,
-                                       double floor) {
-  const auto level_of = [&](std::size_t n) {
-    return static_cast<std::size_t>(static_cast<double>(eroded.values[n]) - floor);
-  };
-  constexpr auto kUnseen = std::numeric_limits<std::uint32_t>::max();
-  std::vector<std::uint32_t> before(eroded.values.size(), kUnseen);
-  std::vector<std::vector<std::size_t>> waiting(level_of(start) + 1);
-  waiting.back().push_back(start);
-  before[start] = static_cast<std::uint32_t>(start);
-  for (std::size_t level = waiting.size(); level-- > 0 && before[end] == kUnseen;) {
-    std::vector<std::size_t> queue = std::move(waiting[level]);
-    for (std::size_t next = 0; next < queue.size(); ++next) {
-      for_each_face_neighbour(eroded.grid, queue[next], [&](std::size_t m) {
-        if (before[m] == kUnseen && eroded.values[m] >= static_cast<float>(floor)) {
-          before[m] = static_cast<std::uint32_t>(queue[next]);
-          (level_of(m) >= level ? queue : waiting[level_of(m)]).push_back(m);
-        }
-      });
-    }
-  }
-  std::vector<std::size_t> way;
-  if (before[end] != kUnseen) {
-    for (std::size_t n = end; n != start; n = before[n]) {
-      way.push_back(n);
-    }
-    way.push_back(start);
-  }
-  return way;
-}
-
 Box box_round(const Image& image, const std::vector<Vec3>& points, double margin) {
   std::optional<Box> box;
   for (const Vec3& point : points) {
@@ -195,10 +171,16 @@ void measure_lumen(const Image& image, const Eroded& eroded, const Vec3& middle,
     return;
   }
   sample.level_hu = median_of(values);
+  sample.voxels = values.size();
   for (double& value : values) {
     value = std::abs(value - sample.level_hu);
   }
   sample.noise_hu = std::min(sample.noise_hu, 1.4826 * median_of(std::move(values)));
+}
+
+/// Two standard errors, of a level that was measured in a core.
+double allowance(const LumenSample& sample) {
+  return sample.voxels > 1 ? std::min(kMostAllowance, 2.0 * sample.error_hu) : 0.0;
 }
 
 /// Contacts thinner than twice this are no vessel: with less than one voxel it would ask nothing.
@@ -219,89 +201,116 @@ std::string to_text(double value) {
   return text.str();
 }
 
-LumenSample sample_lumen(const Image& image, const Vec3& point) {
+LumenSample sample_lumen(const Image& image, const Vec3& point, double surroundings) {
   LumenSample sample{.point = point,
                      .level_hu = median_near(image, point),
                      .noise_hu = measure_noise(image, point)};
-  if (sample.level_hu < kLeastLevelHu) {
+  const auto with_error = [&sample] {
+    const auto voxels = static_cast<double>(std::max<std::size_t>(1, sample.voxels));
+    sample.error_hu = kMedianError * kCorrelation * sample.noise_hu / std::sqrt(voxels);
     return sample;
-  }
+  };
+  sample.voxels = 1;
+  if (sample.level_hu < surroundings + kSeenPart * kLeastContrastHu) return with_error();
 
   // the middle of the vessel nearby tells more than a point near the wall
-  const double half = kSurroundingsHu + 0.5 * (sample.level_hu - kSurroundingsHu);
+  const double contrast = sample.level_hu - surroundings, half = surroundings + 0.5 * contrast;
+  const bool noisy = sample.noise_hu > 0.15 * contrast;
   const Band like_lumen{.lower_hu = half,
                         .connect_hu = half,
-                        .upper_hu = kCalciumHu,
-                        .smoothing_mm = 0.0,
-                        .neck_mm = neck_of(image.grid),
-                        .way_hu = half,
-                        .way = {}};
+                        .upper_hu = std::max(kCalciumHu, sample.level_hu + contrast),
+                        .smoothing_mm = noisy ? 0.6 : 0.0,
+                        .neck_mm = neck_of(image.grid)};
   const Eroded eroded =
       erode(image, box_round(image, {point}, kSnapMm + kLumenMm), like_lumen, half);
   if (const std::optional<std::size_t> center = brightest_near(eroded, point, half)) {
     measure_lumen(image, eroded, center_of(eroded.grid, *center), half, sample);
   }
-  return sample;
+  return with_error();
 }
 
-Band choose_band(const Image& image, const std::vector<LumenSample>& samples, bool to_target,
-                 std::optional<double> smoothing_mm, std::optional<double> neck_mm) {
-  expects(!samples.empty());
-  double level = 0.0, noise = std::numeric_limits<double>::infinity();
-  for (const LumenSample& sample : samples) {
-    if (sample.level_hu < kLeastLevelHu) {
-      throw Error("no contrast-filled artery at " + to_text(sample.point) + " mm: the volume has " +
-                  to_text(std::round(sample.level_hu)) + " HU there (median), expected at least " +
-                  to_text(kLeastLevelHu) +
-                  " HU; take the arterial phase of a CT with contrast, or move the point into the "
-                  "lumen, or, if this is no CT, give segmentation.lower_hu and upper_hu");
+double find_surroundings(const Image& image, const std::vector<Vec3>& points, bool hounsfield) {
+  if (hounsfield) return kSurroundingsHu;
+  std::vector<double> dark;
+  for (const Vec3& point : points) {
+    const double level = median_near(image, point);
+    for (const std::size_t n : voxels_in_ball(image.grid, point, kSurroundMm)) {
+      if (static_cast<double>(image.values[n]) < 0.5 * level) {
+        dark.push_back(static_cast<double>(image.values[n]));
+      }
     }
-    level = std::max(level, sample.level_hu);
+  }
+  return dark.empty() ? 0.0 : median_of(std::move(dark));
+}
+
+Band choose_band(const Image& image, const std::vector<LumenSample>& samples, double surroundings,
+                 bool hounsfield, std::optional<double> smoothing_mm,
+                 std::optional<double> neck_mm) {
+  expects(!samples.empty());
+  double noise = std::numeric_limits<double>::infinity();
+  const LumenSample* brightest = &samples.front();
+  for (const LumenSample& sample : samples) {
+    if (hounsfield && sample.level_hu > kCalciumHu) {
+      throw Error("the volume has " + to_text(std::round(sample.level_hu)) + " HU round " +
+                  to_text(sample.point) + " mm, expected at most " + to_text(kCalciumHu) +
+                  " HU: bone, calcium or metal; move the point into the lumen, or, if this is no "
+                  "CT or so bright a lumen, give segmentation.lower_hu and upper_hu");
+    }
+    if (sample.level_hu > brightest->level_hu) brightest = &sample;
     noise = std::min(noise, sample.noise_hu);
   }
+  const double level = brightest->level_hu, contrast = level - surroundings;
+  const double base = hounsfield ? kBloodHu : surroundings;  // what a missing contrast leaves
+  const double least_of_all = hounsfield ? kLeastContrastHu : kLeastToNoise * noise;
+  for (const LumenSample& sample : samples) {
+    const double here = sample.level_hu + allowance(sample) - base;
+    const double most = brightest->level_hu + allowance(*brightest) - base;
+    // Beside a point that is sure a thin artery may have less.
+    const bool sure = !hounsfield || most >= kSureContrastHu;
+    const bool none = most < least_of_all || contrast <= 0.0 || (!sure && here < kUnsureContrastHu);
+    if (!none && here >= kLeastPart * most) continue;
+    const std::string unit = hounsfield ? " HU" : "";
+    throw Error(
+        "no contrast-filled artery at " + to_text(sample.point) + " mm: the volume has " +
+        to_text(std::round(sample.level_hu)) + unit + " there (median of " +
+        (sample.voxels < 2 ? "its nearest voxels" : std::to_string(sample.voxels) + " voxels") +
+        "), expected at least " +
+        to_text(std::round(base + (none ? least_of_all : kLeastPart * most))) + unit +
+        (none ? hounsfield ? ", 100 HU over blood without contrast"
+                           : ", five times the noise over what surrounds it"
+              : ", 40 % of the contrast at " + to_text(brightest->point) + " mm") +
+        "; take the arterial phase of a CT with contrast, or move the point into the "
+        "lumen, or, if this is no CT, give segmentation.lower_hu and upper_hu");
+  }
 
-  const double contrast = level - kSurroundingsHu;
-  if (noise > kMostNoisePart * contrast) {
-    throw Error("the values round " + to_text(samples.front().point) + " mm scatter by " +
-                to_text(std::round(noise)) + " HU round " + to_text(std::round(level)) +
-                " HU, expected at most " + to_text(100.0 * kMostNoisePart) +
+  const LumenSample* scattered = noise > kMostNoisePart * contrast ? &samples.front() : nullptr;
+  for (const LumenSample& sample : samples) {
+    const bool in_core = sample.voxels > 1;
+    if (!in_core && sample.noise_hu > kMostScatter * (sample.level_hu - surroundings)) {
+      scattered = &sample;
+    }
+  }
+  if (scattered != nullptr) {
+    throw Error("the values round " + to_text(scattered->point) + " mm scatter by " +
+                to_text(std::round(scattered->noise_hu)) + " HU round " +
+                to_text(std::round(level)) + " HU, expected at most " +
+                to_text(100.0 * kMostNoisePart) +
                 " % of the contrast: the texture of bone, or too much noise; move the point into "
                 "a contrast-filled artery, or give segmentation.lower_hu and upper_hu");
   }
-  Band band{.lower_hu = std::round(kSurroundingsHu + 0.5 * contrast),
-            .connect_hu = std::round(kSurroundingsHu + kConnectPart * contrast),
+  Band band{.lower_hu = std::round(surroundings + 0.5 * contrast),
+            .connect_hu = std::round(surroundings + kConnectPart * contrast),
             .upper_hu = std::round(level + kUpperPart * contrast + 3.0 * noise),
             .smoothing_mm = 0.0,
             .neck_mm = neck_mm.value_or(neck_of(image.grid)),
-            .way_hu = 0.0,
-            .way = {}};
+            .surroundings_hu = surroundings,
+            .contrast_hu = contrast};
   for (const double sigma : {0.4, 0.6, 0.8}) {
     if (noise * smoothed_noise(image.grid, band.smoothing_mm) > kNoisePart * contrast) {
       band.smoothing_mm = sigma;
     }
   }
-
   band.smoothing_mm = smoothing_mm.value_or(band.smoothing_mm);
-  std::vector<Vec3> points;
-  for (const LumenSample& sample : samples) {
-    points.push_back(sample.point);
-  }
-
-  // no more is asked for than the ends and the best way between them have
-  const double floor = std::round(kSurroundingsHu + kLeastConnectPart * contrast);
-  const Eroded eroded =
-      erode(image, box_round(image, points, to_target ? kSearchMm : kSnapMm), band, floor);
-  const std::optional<std::size_t> start = brightest_near(eroded, samples.front().point, floor);
-  const std::optional<std::size_t> end =
-      to_target ? brightest_near(eroded, samples.back().point, floor) : start;
-  if (start && end) {
-    float least = eroded.values[*start];
-    for (const std::size_t n : brightest_way(eroded, *start, *end, floor)) {
-      least = std::min(least, eroded.values[n]);
-      band.way.push_back(center_of(eroded.grid, n));
-    }
-    band.way_hu = std::min(band.connect_hu, static_cast<double>(least));
-  }
   return band;
 }
 

@@ -254,11 +254,13 @@ Route find_route(const Grid& grid, const std::vector<std::size_t>& seeds, const 
 }
 
 LeakSearch cut_leaks(const Grid& grid, const std::vector<float>& values, double upper,
-                     const std::vector<std::size_t>& seeds, Labels& labels) {
+                     const std::vector<std::size_t>& seeds, Labels& labels,
+                     const KnownParts* known) {
   expects(!seeds.empty() && values.size() == labels.size());
   LeakSearch search;
   const Inside inside = measure_inside(grid, labels);
-  const std::vector<std::size_t> ways = find_ways(inside, seeds, search.route);
+  const std::vector<std::size_t> ways =
+      known != nullptr ? known->ways : find_ways(inside, seeds, search.route);
 
   // what is much wider than the way to it
   std::vector<float> width(labels.size(), 0.0F);
@@ -267,8 +269,9 @@ LeakSearch cut_leaks(const Grid& grid, const std::vector<float>& values, double 
   std::vector<std::uint32_t> owner = number_pieces(
       inside,
       [&](std::size_t n) {
-        return inside.depth[n] >
-               static_cast<float>(kGrowth) * width[n] + static_cast<float>(kGrowthMm);
+        return inside.depth[n] > 0.0F && ((known != nullptr && known->other[n] != 0) ||
+                                          inside.depth[n] > static_cast<float>(kGrowth) * width[n] +
+                                                                static_cast<float>(kGrowthMm));
       },
       pieces);
   if (pieces == 0) {
@@ -278,7 +281,7 @@ LeakSearch cut_leaks(const Grid& grid, const std::vector<float>& values, double 
   // both sides from wide to narrow, until they meet in the neck
   std::vector<std::size_t> starts = ways;
   for (std::size_t n = 0; n < owner.size(); ++n) {
-    if (owner[n] != 0) {
+    if (owner[n] != 0 || (known != nullptr && known->own[n] != 0)) {
       starts.push_back(n);
     }
   }

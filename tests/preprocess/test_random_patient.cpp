@@ -179,7 +179,7 @@ TEST(RandomPatient, LimbsKissWithinAMillimetre) {
         }
       }
     }
-    EXPECT_GT(least, 0.1);  // 0.3 as drawn, before it is resampled and bent
+    EXPECT_GT(least, 0.1);   // 0.3 as drawn, before it is resampled and bent
     EXPECT_LT(least, 1.15);  // and 1
   }
   EXPECT_GT(loops, 3);

@@ -1,0 +1,254 @@
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <cstdlib>
+#include <limits>
+#include <optional>
+#include <utility>
+
+#include "preprocess/segment/segment_close.h"
+#include "preprocess/segment/segment_lumen.h"
+#include "preprocess/segment/segment_region.h"
+
+namespace wireplan::preprocess {
+namespace {
+
+constexpr double kFieldReachMm = 80.0;       // round the points, in which arteries are looked for
+constexpr double kNearMm = 2.5;              // how far a point may lie beside the lumen it means
+constexpr double kStrongContrastHu = 300.0;  // over veins too, most often
+constexpr double kCorePart = 0.65, kCorePartStrong = 0.75;  // of the contrast
+constexpr double kCorePartElsewhere = 0.5;  // where no CT: values vary more in a vessel
+constexpr double kTunnelVoxels = 1.8;       // radius of tunnels that noise makes
+// Of the contrast at the brightest point: 45 % of this, 30 % of that, may still be lumen.
+constexpr double kLeastOfBrightest = 2.0 / 3.0;
+constexpr double kToldMm = 10.0;  // along the way, between the levels that are told
+
+/// The part of the volume within reach of the points, smoothed.
+LumenField make_field(const Image& image, const std::vector<Vec3>& points,
+                      const SegmentStatistics& statistics, bool hounsfield, Box& box) {
+  const Voxel first = *nearest_voxel(image.grid, points.front());
+  box = {first, first};
+  for (const Vec3& point : points) {
+    const Voxel v = *nearest_voxel(image.grid, point);
+    box = united(box, {v, v});
+  }
+  box = grown(box, kFieldReachMm, image.grid);
+  LumenField field;
+  field.grid = cropped(image.grid, box);
+  field.raw = crop_values(image.grid, box, image.values);
+  field.values = field.raw;
+  field.smoothing_mm = statistics.band.smoothing_mm;
+  field.surroundings = statistics.band.surroundings_hu;
+  field.upper = statistics.band.upper_hu;
+  field.core_part = !hounsfield                                       ? kCorePartElsewhere
+                    : statistics.band.contrast_hu > kStrongContrastHu ? kCorePartStrong
+                                                                      : kCorePart;
+  field.noise = std::numeric_limits<double>::infinity();
+  for (const LumenSample& sample : statistics.samples) {
+    field.noise = std::min(field.noise, sample.noise_hu);
+  }
+  if (field.smoothing_mm > 0.0) smooth(field.grid, field.smoothing_mm, field.values);
+  return field;
+}
+
+/// Takes of the field what may be lumen, and a voxel more on all sides.
+void shrink(LumenField& field, Candidates& candidates, Box& box) {
+  const Voxel none = {field.grid.size[0], field.grid.size[1], field.grid.size[2]};
+  const Box held = bounding_box(field.grid, candidates.labels, {none, {-1, -1, -1}});
+  const Box inner = grown(held, Voxel{1, 1, 1}, field.grid);
+  field.raw = crop_values(field.grid, inner, field.raw);
+  field.values = crop_values(field.grid, inner, field.values);
+  candidates.labels = crop_values(field.grid, inner, candidates.labels);
+  candidates.depth = crop_values(field.grid, inner, candidates.depth);
+  field.grid = cropped(field.grid, inner);
+  const Voxel offset = box.first;
+  for (int axis = 0; axis < 3; ++axis) {
+    box.first[axis] = offset[axis] + inner.first[axis];
+    box.last[axis] = offset[axis] + inner.last[axis];
+  }
+}
+
+/// The voxel in the middle of the vessel at a point: of those that may be lumen the nearest within
+/// reach, and from there uphill in depth as long as it stays so near.
+std::optional<std::size_t> middle_near(const Grid& grid, const Candidates& candidates,
+                                       const Vec3& point) {
+  std::optional<std::size_t> best;
+  double least = std::numeric_limits<double>::infinity();
+  for (const std::size_t n : voxels_in_ball(grid, point, kNearMm)) {
+    const double here = (center_of(grid, n) - point).norm();
+    if (candidates.depth[n] <= 0.0F || here >= least) continue;
+    least = here;
+    best = n;
+  }
+  for (bool climbs = best.has_value(); climbs;) {
+    climbs = false;
+    for_each_neighbour(grid, *best, [&](std::size_t m, const Voxel&) {
+      if (candidates.depth[m] <= candidates.depth[*best] ||
+          (center_of(grid, m) - point).norm() > kNearMm) {
+        return;
+      }
+      best = m;
+      climbs = true;
+    });
+  }
+  return best;
+}
+
+/// Fills pits and tunnels (18 of 26 neighbours inside) and takes off spikes (at most one of six),
+/// twice: what noise leaves on the boundary, and what a surface would fold on.
+void smooth_boundary(const LumenField& field, Labels& labels) {
+  constexpr int kRounds = 2, kMostRound = 18;
+  const Grid& grid = field.grid;
+  for (int round = 0; round < kRounds; ++round) {
+    const Labels before = labels;
+    Labels inside(labels.size(), 0);  // so many of the neighbours are
+    for (std::size_t n = 0; n < before.size(); ++n) {
+      if (before[n] == 0) continue;
+      int beside = 0, all = 0;
+      for_each_neighbour(grid, n, [&](std::size_t m, const Voxel& step) {
+        ++inside[m];
+        if (std::abs(step[0]) + std::abs(step[1]) + std::abs(step[2]) != 1) return;
+        beside += before[m];
+        ++all;
+      });
+      if (beside <= 1 && all == 6) labels[n] = 0;
+    }
+    for (std::size_t n = 0; n < before.size(); ++n) {
+      if (before[n] == 0 && inside[n] >= kMostRound &&
+          static_cast<double>(field.values[n]) <= field.upper) {
+        labels[n] = 1;
+      }
+    }
+  }
+}
+
+/// The levels along a way, every 10 mm and at its end.
+void tell_levels(const Grid& grid, const std::vector<WayLevel>& way,
+                 std::vector<LevelAlong>& along) {
+  double arc = 0.0, told = -kToldMm;
+  for (std::size_t k = 0; k < way.size(); ++k) {
+    const Vec3 place = center_of(grid, way[k].voxel);
+    if (k > 0) arc += (place - center_of(grid, way[k - 1].voxel)).norm();
+    if (arc - told < kToldMm && k + 1 < way.size()) continue;
+    told = arc;
+    along.push_back({place, arc, static_cast<double>(way[k].level)});
+  }
+}
+
+/// The last way as a route, with the narrowest place of all of them.
+Route route_along(const Region& region, const std::vector<std::vector<WayLevel>>& ways) {
+  const std::vector<float> depth = measure_depth(region.grid, region.labels);
+  Route route;
+  std::size_t narrowest = ways.front().front().voxel;
+  for (const auto& way : ways) {
+    route.points.clear();
+    for (const WayLevel& place : way) {
+      route.points.push_back(center_of(region.grid, place.voxel));
+      if (depth[place.voxel] < depth[narrowest]) narrowest = place.voxel;
+    }
+  }
+  route.points = smooth_line(std::move(route.points));
+  route.length_mm = length_of_line(route.points);
+  route.narrowest = center_of(region.grid, narrowest);
+  route.narrowest_radius_mm = static_cast<double>(depth[narrowest]);
+  return route;
+}
+
+/// In voxels of 2 mm or more no vessel is seen that is one voxel wide: what such a way leads
+/// through is texture.
+void require_width(const Grid& grid, const Route& route) {
+  constexpr double kCoarseMm = 2.0;
+  const double voxel = grid.spacing.minCoeff();
+  if (voxel < kCoarseMm || route.narrowest_radius_mm > 0.51 * voxel) return;
+  throw Error("the way from access to target is one voxel (" + to_text(voxel) + " mm) wide at " +
+              to_text(route.narrowest) +
+              " mm, expected two or more: the texture of bone, or voxels too coarse for such an "
+              "artery; move the points into a contrast-filled artery, or take a finer volume");
+}
+
+/// The points' voxels with their levels; throws where there is no lumen at one.
+std::vector<WayLevel> find_points(const LumenField& field, const Candidates& candidates,
+                                  const std::vector<Vec3>& points,
+                                  const SegmentStatistics& statistics, double least_contrast) {
+  std::vector<WayLevel> found;
+  for (std::size_t k = 0; k < points.size(); ++k) {
+    const std::optional<std::size_t> middle = middle_near(field.grid, candidates, points[k]);
+    if (!middle) {
+      throw Error("no lumen within 2.5 mm of " + to_text(points[k]) + " mm: expected values from " +
+                  to_text(std::round(field.surroundings + least_contrast / 2.0)) + " to " +
+                  to_text(std::round(field.upper)) +
+                  " HU, as at the other points; move the point into the artery, or give "
+                  "segmentation.lower_hu and upper_hu");
+    }
+    const double level =
+        std::max(statistics.samples[k].level_hu, field.surroundings + least_contrast);
+    found.push_back({*middle, static_cast<float>(level)});
+  }
+  return found;
+}
+
+}  // namespace
+
+Region find_by_level(const Image& image, const SegmentOptions& options,
+                     SegmentStatistics& statistics) {
+  std::vector<Vec3> points = options.seeds;
+  if (options.target) points.push_back(*options.target);
+  Band& band = statistics.band;
+  band = choose_band(image, statistics.samples, band.surroundings_hu, options.hounsfield,
+                     options.smoothing_mm, options.neck_opening_mm);
+  double least = band.contrast_hu;
+  for (const LumenSample& sample : statistics.samples) {
+    least = std::min(least, sample.level_hu - band.surroundings_hu);
+  }
+  least = std::max(least, kLeastOfBrightest * band.contrast_hu);
+
+  Region region;
+  LumenField field = make_field(image, points, statistics, options.hounsfield, region.box);
+  std::vector<std::size_t> starts;
+  for (const Vec3& point : points) {
+    for (const std::size_t n : voxels_in_ball(field.grid, point, kNearMm)) {
+      const auto value = static_cast<double>(field.values[n]);
+      if (value >= field.surroundings + 0.5 * least && value <= field.upper) starts.push_back(n);
+    }
+  }
+  Candidates candidates = find_candidates(field, std::move(starts), least);
+  find_points(field, candidates, points, statistics, least);  // throws where there is none
+  shrink(field, candidates, region.box);
+  const std::vector<WayLevel> ends = find_points(field, candidates, points, statistics, least);
+  const std::vector<std::vector<WayLevel>> ways = find_level_ways(field, candidates, ends);
+  for (std::size_t k = 0; k < ways.size(); ++k) {
+    if (!ways[k].empty()) continue;
+    const Labels reached = flood(field.grid, {ends.front().voxel},
+                                 [&](std::size_t n) { return candidates.labels[n] != 0; });
+    throw not_connected(image, options, points[k], field.grid,
+                        nearest_label(field.grid, reached, points[k]).voxel, band_text(band));
+  }
+
+  for (const WayLevel& end : ends) region.seeds.push_back(end.voxel);
+  LocalLumen lumen =
+      find_local_lumen(field, candidates, ways, region.seeds, band.neck_mm, options.limits);
+  region.grid = field.grid;
+  region.labels = std::move(lumen.labels);
+  smooth_boundary(field, region.labels);
+  close_tunnels(field.grid, kTunnelVoxels * std::cbrt(field.grid.spacing.prod()), lumen.other,
+                region.labels);
+  region.values = std::move(field.values);
+  region.labels =
+      flood(region.grid, region.seeds, [&](std::size_t n) { return region.labels[n] != 0; });
+
+  double darkest = band.contrast_hu;
+  for (const auto& way : ways) {
+    tell_levels(region.grid, way, statistics.along);
+    for (const WayLevel& place : way) {
+      darkest = std::min(darkest, static_cast<double>(place.level) - band.surroundings_hu);
+    }
+  }
+  region.edge = band.surroundings_hu + 0.5 * darkest;
+  statistics.doubtful = std::move(lumen.doubtful);
+  statistics.search.leaks = std::move(lumen.leaks);
+  statistics.search.route = route_along(region, ways);
+  require_width(region.grid, statistics.search.route);
+  return region;
+}
+
+}  // namespace wireplan::preprocess

@@ -1,0 +1,220 @@
+#include "preprocess/segment/segment_way.h"
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <limits>
+#include <queue>
+#include <utility>
+
+#include "preprocess/segment/segment_leak.h"
+
+namespace wireplan::preprocess {
+namespace {
+
+constexpr double kCandidatePart = 0.45;  // of the least contrast
+constexpr double kBlurMm = 0.6;          // sigma of a scanner's point spread, assumed
+constexpr double kVoxelBlur = 0.4;       // sigma that sampling adds, in voxels, about
+constexpr double kMemoryMm = 10.0;       // over which a level is followed
+constexpr double kLeastSeen = 0.8;       // below, a vessel is too thin to tell its level
+constexpr double kMostChange = 0.12;     // of the contrast, that a single place may tell
+constexpr double kPartSteps = 200.0;     // of the expected contrast: resolution of brightness
+constexpr int kLeastBottleneck = 60;     // of these: 30 %, less joins nothing
+constexpr int kSlack = 4;                // of these: ways a little darker than the brightest
+
+/// 1 - exp(-r^2 / (2 sigma^2)): the middle of a blurred cylinder.
+double seen_part(double radius, double sigma) {
+  return 1.0 - std::exp(-0.5 * radius * radius / (sigma * sigma));
+}
+
+/// What a millimetre through a voxel costs to a way of this level, where `seen` of the contrast is
+/// expected [HU, mm].
+double cost_per_mm(double level, double value, double surroundings, double seen, double radius) {
+  constexpr double kFree = 0.12, kLow = 0.06, kHigh = 0.1, kMost = 300.0, kThinMm = 1.2;
+  const double part = (value - surroundings) / (level - surroundings);
+  const double low = std::max(0.0, seen - part - kFree) / kLow;
+  const double high = std::max(0.0, part - 1.0 - kFree) / kHigh;
+  const double thin = (kThinMm / radius) * (kThinMm / radius);
+  return 1.0 + std::min(kMost, low * low + high * high + thin * thin);
+}
+
+/// Step 1: 0 outside the candidates, else at least 1.
+std::vector<std::uint8_t> bright_parts(const LumenField& field, const Candidates& candidates,
+                                       const std::vector<WayLevel>& points) {
+  const Grid& grid = field.grid;
+  std::vector<Vec3> places;
+  for (const WayLevel& point : points) places.push_back(center_of(grid, point.voxel));
+  const double reach = 1.01 * grid.spacing.minCoeff();
+  std::vector<std::uint8_t> parts(candidates.labels.size(), 0);
+  for (std::size_t n = 0; n < parts.size(); ++n) {
+    if (candidates.labels[n] == 0) continue;
+    float least = field.values[n];
+    for_each_neighbour(grid, n, [&](std::size_t m, const Voxel& step) {
+      const Vec3 away = grid.spacing.cwiseProduct(Vec3(step[0], step[1], step[2]));
+      if (away.norm() <= reach) least = std::min(least, field.values[m]);
+    });
+    const Vec3 here = center_of(grid, n);
+    double sum = 0.0, weights = 0.0;
+    for (std::size_t k = 0; k < points.size(); ++k) {
+      const double weight = 1.0 / (1.0 + (places[k] - here).squaredNorm());
+      weights += weight;
+      sum += weight * (static_cast<double>(points[k].level) - field.surroundings);
+    }
+    const double part = (static_cast<double>(least) - field.surroundings) / (sum / weights);
+    parts[n] = static_cast<std::uint8_t>(std::clamp(kPartSteps * part, 1.0, 250.0));
+  }
+  return parts;
+}
+
+/// The largest part such that voxels of it or more join `start` and `end`; 0 where none do.
+int find_bottleneck(const Grid& grid, const std::vector<std::uint8_t>& parts, std::size_t start,
+                    std::size_t end) {
+  std::vector<std::vector<std::size_t>> waiting(256);
+  Labels seen(parts.size(), 0);
+  seen[start] = 1;
+  waiting[parts[start]].push_back(start);
+  for (int level = 255; level > 0; --level) {
+    std::vector<std::size_t> queue = std::move(waiting[static_cast<std::size_t>(level)]);
+    for (std::size_t next = 0; next < queue.size(); ++next) {
+      if (queue[next] == end) return level;
+      for_each_face_neighbour(grid, queue[next], [&](std::size_t m) {
+        if (seen[m] != 0 || parts[m] == 0) return;
+        seen[m] = 1;
+        (parts[m] >= level ? queue : waiting[parts[m]]).push_back(m);
+      });
+    }
+  }
+  return 0;
+}
+
+/// Step 2: the cheapest way over voxels of `least` or more.
+std::vector<WayLevel> find_way(const LumenField& field, const Candidates& candidates,
+                               const std::vector<std::uint8_t>& parts, int least,
+                               const WayLevel& start, std::size_t end) {
+  constexpr float kFar = std::numeric_limits<float>::infinity();
+  const LevelRule rule(field);
+  const double half_voxel = 0.5 * field.grid.spacing.minCoeff();
+  using Entry = std::pair<float, std::size_t>;
+  std::priority_queue<Entry, std::vector<Entry>, std::greater<>> queue;
+  std::vector<float> cost(parts.size(), kFar), levels(parts.size(), 0.0F), seen(parts.size());
+  std::vector<std::uint32_t> before(parts.size());
+  for (std::size_t n = 0; n < parts.size(); ++n) {
+    if (parts[n] >= least) seen[n] = static_cast<float>(rule.seen(candidates.depth[n]));
+  }
+  cost[start.voxel] = 0.0F;
+  levels[start.voxel] = start.level;
+  queue.push({0.0F, start.voxel});
+  while (!queue.empty() && queue.top().second != end) {
+    const Entry top = queue.top();
+    const std::size_t n = top.second;
+    queue.pop();
+    if (top.first > cost[n]) continue;
+    for_each_neighbour(field.grid, n, [&](std::size_t m, const Voxel& step) {
+      if (parts[m] < least) return;
+      const double length = field.grid.spacing.cwiseProduct(Vec3(step[0], step[1], step[2])).norm();
+      const auto value = static_cast<double>(field.values[m]);
+      const auto seen_here = static_cast<double>(seen[m]);
+      const double price =
+          cost_per_mm(static_cast<double>(levels[n]), value, field.surroundings, seen_here,
+                      static_cast<double>(candidates.depth[m]) + half_voxel);
+      const auto next = static_cast<float>(static_cast<double>(top.first) + length * price);
+      if (next >= cost[m]) return;
+      cost[m] = next;
+      before[m] = static_cast<std::uint32_t>(n);
+      levels[m] = rule.follow(levels[n], value, seen_here, length);
+      queue.push({next, m});
+    });
+  }
+  std::vector<WayLevel> way;
+  if (cost[end] == kFar) return way;
+  for (std::size_t n = end; n != start.voxel; n = before[n]) way.push_back({n, levels[n]});
+  way.push_back(start);
+  std::reverse(way.begin(), way.end());
+  return way;
+}
+
+/// Step 3: thin places, which tell little, count little.
+void average_levels(const LumenField& field, const Candidates& candidates,
+                    std::vector<WayLevel>& way) {
+  constexpr double kSigmaMm = 7.0, kAverageReachMm = 20.0;
+  const LevelRule rule(field);
+  std::vector<double> arc(way.size(), 0.0), value(way.size()), weight(way.size());
+  for (std::size_t k = 0; k < way.size(); ++k) {
+    const std::size_t n = way[k].voxel;
+    if (k > 0) {
+      const Vec3 step = center_of(field.grid, n) - center_of(field.grid, way[k - 1].voxel);
+      arc[k] = arc[k - 1] + step.norm();
+    }
+    const double seen = rule.seen(candidates.depth[n]);
+    const double contrast = static_cast<double>(field.values[n]) - field.surroundings;
+    value[k] = field.surroundings + contrast / seen;
+    weight[k] = std::pow(seen, 8.0) + 1e-6;
+  }
+  for (std::size_t k = 0, first = 0; k < way.size(); ++k) {
+    while (arc[k] - arc[first] > kAverageReachMm) ++first;
+    double sum = 0.0, weights = 0.0;
+    for (std::size_t m = first; m < way.size() && arc[m] - arc[k] <= kAverageReachMm; ++m) {
+      const double away = (arc[m] - arc[k]) / kSigmaMm;
+      const double w = weight[m] * std::exp(-0.5 * away * away);
+      sum += w * value[m];
+      weights += w;
+    }
+    way[k].level = static_cast<float>(sum / weights);
+  }
+}
+
+}  // namespace
+
+LevelRule::LevelRule(const LumenField& field)
+    : surroundings_(field.surroundings),
+      half_voxel_(0.5 * field.grid.spacing.minCoeff()),
+      blur_raw_(std::hypot(kBlurMm, kVoxelBlur * std::cbrt(field.grid.spacing.prod()))),
+      blur_(std::hypot(blur_raw_, field.smoothing_mm)) {}
+
+double LevelRule::seen(float depth) const {
+  return seen_part(static_cast<double>(depth) + half_voxel_, blur_);
+}
+
+double LevelRule::seen_raw(float depth) const {
+  return seen_part(static_cast<double>(depth) + half_voxel_, blur_raw_);
+}
+
+float LevelRule::follow(float level, double value, double seen, double step) const {
+  if (seen < kLeastSeen) return level;
+  const double most = kMostChange * (static_cast<double>(level) - surroundings_);
+  const double here = surroundings_ + (value - surroundings_) / seen;
+  const double change = std::clamp(here - static_cast<double>(level), -most, most);
+  return static_cast<float>(static_cast<double>(level) +
+                            (1.0 - std::exp(-step / kMemoryMm)) * change);
+}
+
+Candidates find_candidates(const LumenField& field, std::vector<std::size_t> starts,
+                           double least_contrast) {
+  const auto floor = static_cast<float>(field.surroundings + kCandidatePart * least_contrast);
+  const auto top = static_cast<float>(field.upper);
+  Candidates found;
+  found.labels = flood(field.grid, std::move(starts), [&](std::size_t n) {
+    return field.values[n] >= floor && field.values[n] <= top;
+  });
+  found.depth = measure_depth(field.grid, found.labels);
+  return found;
+}
+
+std::vector<std::vector<WayLevel>> find_level_ways(const LumenField& field,
+                                                   const Candidates& candidates,
+                                                   const std::vector<WayLevel>& points) {
+  expects(!points.empty());
+  const std::vector<std::uint8_t> parts = bright_parts(field, candidates, points);
+  std::vector<std::vector<WayLevel>> ways;
+  for (const WayLevel& end : points) {
+    const int most = find_bottleneck(field.grid, parts, points.front().voxel, end.voxel);
+    ways.emplace_back();
+    if (most < kLeastBottleneck) continue;
+    ways.back() =
+        find_way(field, candidates, parts, std::max(1, most - kSlack), points.front(), end.voxel);
+    average_levels(field, candidates, ways.back());
+  }
+  return ways;
+}
+
+}  // namespace wireplan::preprocess

@@ -1,0 +1,181 @@
+// Segmentation from two points alone: levels that follow the vessel, and what touches it.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <random>
+#include <string>
+
+#include "preprocess/segment/mask_shape.h"
+#include "preprocess/segment/segment.h"
+#include "preprocess/segment/segment_close.h"
+#include "preprocess/segment/segment_way.h"
+#include "tests/preprocess/segment_answers.h"
+
+namespace wireplan::preprocess {
+namespace {
+
+constexpr double kAround = 40.0;  // soft tissue                                            [HU]
+
+/// Round the z axis, 0 to 90 mm, voxels of 0.8 x 0.8 x 1 mm.
+Grid upright_grid() {
+  return {.size = {60, 60, 91}, .spacing = Vec3(0.8, 0.8, 1.0), .origin = Vec3(-23.6, -23.6, 0)};
+}
+
+/// HU(point), blurred by 0.6 mm, with independent noise of this sigma, from a fixed seed.
+template <typename Hu>
+Image scanned(double sigma, Hu hu) {
+  Image image{.grid = upright_grid(), .values = {}};
+  for (std::size_t n = 0; n < image.grid.voxels(); ++n) {
+    image.values.push_back(static_cast<float>(hu(preprocess::center_of(image.grid, n))));
+  }
+  smooth(image.grid, 0.6, image.values);
+  std::mt19937_64 random(11);
+  for (float& value : image.values) {
+    double sum = -6.0;
+    for (int n = 0; n < 12; ++n) sum += static_cast<double>(random() >> 11) * 0x1.0p-53;
+    value += static_cast<float>(sigma * sum);
+  }
+  return image;
+}
+
+double off_axis(const Vec3& p, double x) { return std::hypot(p.x() - x, p.y()); }
+
+/// From 250 HU at the bottom to 150 at 90 mm.
+double falling(const Vec3& p) { return 250.0 - 100.0 * p.z() / 90.0; }
+
+const Vec3 kBottom(0, 0, 5), kTop(0, 0, 85);
+
+// ---- levels -------------------------------------------------------------------------------------
+
+TEST(SegmentLevel, ContrastThatFallsAlongTheVesselIsFollowed) {
+  const Image image =
+      scanned(15.0, [](const Vec3& p) { return off_axis(p, 0) < 5.0 ? falling(p) : kAround; });
+  const Segmentation found = segment(image, {.seeds = {kBottom}, .target = kTop});
+  EXPECT_GT(dice(found.mask, [](const Vec3& p) { return off_axis(p, 0) < 5.0; }), 0.96);
+  EXPECT_TRUE(found.statistics.search.leaks.empty());
+  EXPECT_EQ(found.statistics.shape.handles, 0U);
+  // Every 10 mm of 80, and the ends. The average of 14 mm of the way is known to a few
+  // HU, at the ends, where it is of one side, to 8 more.
+  ASSERT_GE(found.statistics.along.size(), 9U);
+  for (const LevelAlong& place : found.statistics.along) {
+    EXPECT_NEAR(place.level_hu, falling(place.place), 15.0) << place.place.transpose();
+  }
+}
+
+TEST(SegmentLevel, AVeinOfItsOwnLevelThatTouchesAllAlongIsLeftOut) {
+  // The vein has 150 HU: as much as the artery at the top, and 60 % of it at the bottom. Their
+  // walls touch from 20 to 60 mm; elsewhere 4 mm lie between.
+  const auto vein = [](const Vec3& p) {
+    const double gap = p.z() > 20.0 && p.z() < 60.0 ? 0.0 : 4.0;
+    return off_axis(p, 11.0 + gap) < 6.0;
+  };
+  const Image image = scanned(12.0, [&](const Vec3& p) {
+    return off_axis(p, 0) < 5.0 ? falling(p) : vein(p) ? 150.0 : kAround;
+  });
+  const Segmentation found = segment(image, {.seeds = {kBottom}, .target = kTop});
+  EXPECT_GT(dice(found.mask, [](const Vec3& p) { return off_axis(p, 0) < 5.0; }), 0.93);
+  std::size_t of_vein = 0, inside = 0;
+  for (std::size_t n = 0; n < found.mask.labels.size(); ++n) {
+    if (!vein(preprocess::center_of(found.mask.grid, n))) continue;
+    ++of_vein;
+    inside += found.mask.labels[n];
+  }
+  EXPECT_LT(static_cast<double>(inside), 0.05 * static_cast<double>(of_vein));
+}
+
+TEST(SegmentLevel, AnOrganWhoseNoiseReachesTheArterysLevelIsLeftOut) {
+  // A block of 60 % of the artery's contrast beside it: of its noise, specks reach the artery's.
+  const Image image = scanned(35.0, [](const Vec3& p) {
+    return off_axis(p, 0) < 5.0 ? 200.0 : p.x() > 5.0 && p.x() < 20.0 ? 136.0 : kAround;
+  });
+  const Segmentation found = segment(image, {.seeds = {kBottom}, .target = kTop});
+  EXPECT_GT(dice(found.mask, [](const Vec3& p) { return off_axis(p, 0) < 5.0; }), 0.9);
+}
+
+TEST(SegmentLevel, InOtherUnitsTheNoiseTellsWhetherThereIsContrast) {
+  const auto tube = [](const Vec3& p) { return off_axis(p, 0) < 5.0 ? 1800.0 : 500.0; };
+  const SegmentOptions options{.hounsfield = false, .seeds = {kBottom}, .target = kTop};
+  const Segmentation found = segment(scanned(60.0, tube), options);
+  EXPECT_NEAR(found.statistics.band.surroundings_hu, 500.0, 20.0);
+  EXPECT_GT(dice(found.mask, [](const Vec3& p) { return off_axis(p, 0) < 5.0; }), 0.96);
+  const std::string error = error_of(
+      scanned(60.0, [](const Vec3& p) { return off_axis(p, 0) < 5.0 ? 600.0 : 500.0; }), options);
+  EXPECT_TRUE(has(error, "five times the noise over what surrounds it")) << error;
+}
+
+TEST(SegmentLevel, LittleContrastIsRefusedByWhatItHasOverBlood) {
+  const auto with_level = [](double level) {
+    return scanned(10.0, [&](const Vec3& p) { return off_axis(p, 0) < 5.0 ? level : kAround; });
+  };
+  EXPECT_TRUE(has(error_of(with_level(125.0), {.seeds = {kBottom}, .target = kTop}),
+                  "expected at least 140 HU, 100 HU over blood without contrast"));
+  EXPECT_NO_THROW(segment(with_level(150.0), {.seeds = {kBottom}, .target = kTop}));
+}
+
+TEST(SegmentLevel, APointInMetalIsToldAsOne) {
+  const Image image = scanned(10.0, [](const Vec3& p) {
+    return (p - kTop).norm() < 4.0 ? 2500.0 : off_axis(p, 0) < 5.0 ? 300.0 : kAround;
+  });
+  const std::string error = error_of(image, {.seeds = {kBottom}, .target = kTop});
+  EXPECT_TRUE(has(error, "HU round (0.0, 0.0, 85.0) mm, expected at most 800 HU")) << error;
+}
+
+// ---- tunnels ------------------------------------------------------------------------------------
+
+/// A block of 12 x 12 x 12 voxels of 1 mm in one of 16, without what `hole` says.
+template <typename Hole>
+Labels block_without(const Grid& grid, Hole hole) {
+  Labels labels(grid.voxels(), 0);
+  for (std::size_t n = 0; n < labels.size(); ++n) {
+    const Voxel v = voxel_at(grid, n);
+    const bool inside = std::min({v[0], v[1], v[2]}) >= 2 && std::max({v[0], v[1], v[2]}) < 14;
+    labels[n] = inside && !hole(v) ? 1 : 0;
+  }
+  return labels;
+}
+
+TEST(CloseTunnels, ATunnelIsFilledAndAGapBetweenLimbsIsNot) {
+  const Grid grid{.size = {16, 16, 16}};
+  const Labels nothing(grid.voxels(), 0);
+  const auto tunnel = [](const Voxel& v) { return v[0] == 7 && v[1] == 7; };
+  Labels labels = block_without(grid, tunnel);
+  EXPECT_EQ(measure_shape(grid, labels).handles, 1U);
+  close_tunnels(grid, 1.8, nothing, labels);
+  EXPECT_EQ(measure_shape(grid, labels).handles, 0U);
+  EXPECT_EQ(count(labels), 1728U);
+
+  // A slit that comes from one side, as between limbs, stays; and a tunnel that is another vessel.
+  const Labels limbs = block_without(grid, [](const Voxel& v) { return v[0] == 7 && v[1] > 4; });
+  labels = limbs;
+  close_tunnels(grid, 1.8, nothing, labels);
+  EXPECT_EQ(labels, limbs);
+  labels = block_without(grid, tunnel);
+  Labels other(grid.voxels(), 0);
+  for (std::size_t n = 0; n < other.size(); ++n) other[n] = tunnel(voxel_at(grid, n)) ? 1 : 0;
+  const Labels before = labels;
+  close_tunnels(grid, 1.8, other, labels);
+  EXPECT_EQ(labels, before);
+}
+
+TEST(LevelRule, BlurTakesWhatItTakesOfACylinder) {
+  // The middle of a disc under a Gaussian, by summing it over the disc.
+  const LumenField field{.grid = upright_grid(), .raw = {}, .values = {}, .smoothing_mm = 0.8};
+  const LevelRule rule(field);
+  const double voxel = std::cbrt(0.8 * 0.8 * 1.0),
+               sigma = std::sqrt(0.36 + 0.16 * voxel * voxel + 0.64);
+  for (const double radius : {0.8, 1.5, 3.0}) {
+    double sum = 0.0, all = 0.0;
+    for (double x = -8.0; x <= 8.0; x += 0.02) {
+      for (double y = -8.0; y <= 8.0; y += 0.02) {
+        const double weight = std::exp(-0.5 * (x * x + y * y) / (sigma * sigma));
+        all += weight;
+        sum += std::hypot(x, y) < radius ? weight : 0.0;
+      }
+    }
+    EXPECT_NEAR(rule.seen(static_cast<float>(radius - 0.4)), sum / all, 0.005) << radius;
+  }
+}
+
+}  // namespace
+}  // namespace wireplan::preprocess
