@@ -14,7 +14,7 @@ namespace {
 constexpr int kSlice = 240, kGap = 8, kTitle = 26, kMargin = 16;  // px
 constexpr double kField = 96.0, kBeside = 24.0;                   // mm
 constexpr int kColumns = 6;                                       // slices of two places
-constexpr int kWidth = 2 * kMargin + kColumns * kSlice + (kColumns - 1) * kGap;
+constexpr int kSheetWidth = 2 * kMargin + kColumns * kSlice + (kColumns - 1) * kGap;
 const Color kOutline(1.0F, 0.75F, 0.1F), kMark(0.2F, 0.9F, 1.0F);
 
 void set_pixel(Picture& picture, int x, int y, const Color& color) {
@@ -109,7 +109,7 @@ EvenWay make_even(const std::vector<Vec3>& way, int count) {
 
 int strip_height(const MaskView& view) {
   const double length = make_even(view.way, 1).length;
-  const int width = kWidth - 2 * kMargin;
+  const int width = kSheetWidth - 2 * kMargin;
   return std::clamp(static_cast<int>(2.0 * kBeside * width / std::max(length, 1.0)), 60, 240);
 }
 
@@ -117,7 +117,7 @@ int strip_height(const MaskView& view) {
 /// place is that of the place before, made normal anew, so that the view turns no more than the
 /// way.
 void draw_strip(Picture& picture, const MaskView& view, const Vec3& side, int top, int height) {
-  const int width = kWidth - 2 * kMargin;
+  const int width = kSheetWidth - 2 * kMargin;
   const EvenWay even = make_even(view.way, width);
   std::vector<Vec3> across;
   Vec3 before = side;
@@ -141,8 +141,8 @@ Picture draw_mask_picture(const MaskView& view) {
   const int rows = static_cast<int>(view.places.size() + 1) / 2;
   const int strip = has_way ? strip_height(view) : 0;
   const int row_height = kTitle + kSlice + kGap;
-  Picture picture = blank_picture(
-      kWidth, 2 * kMargin + kTitle + rows * row_height + (has_way ? kTitle + 2 * strip + kGap : 0));
+  Picture picture = blank_picture(kSheetWidth, 2 * kMargin + kTitle + rows * row_height +
+                                                   (has_way ? kTitle + 2 * strip + kGap : 0));
   draw_text(picture,
             "Outline of the mask. Axial, coronal and sagittal slices of 96 mm, the patient's right "
             "at the left" +
