@@ -187,7 +187,7 @@ void look_at_shape(const Case& given, const preprocess::Mask& mask, Json& figure
   std::vector<std::size_t> ends;
   std::vector<Vec3> points;
   for (const auto& [key, point] : end_points(given)) {
-    ends.push_back(find_nearest(part, point).voxel);
+    ends.push_back(preprocess::nearest_label(part.grid, part.labels, point).voxel);
     points.push_back(point);
   }
   add_touches(given, preprocess::find_touches(part.grid, part.labels, ends, points), 0, figures);

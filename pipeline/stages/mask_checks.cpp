@@ -18,7 +18,7 @@ std::string place_in_mask(const Vec3& p) {
 /// for a person to look at.
 Vec3 nearest_of_piece(const preprocess::Grid& grid, const preprocess::Labels& piece,
                       const Vec3& point) {
-  return preprocess::center_of(grid, find_nearest({grid, piece}, point).voxel);
+  return preprocess::center_of(grid, preprocess::nearest_label(grid, piece, point).voxel);
 }
 
 std::string touch_warning(const preprocess::Touch& touch, bool by_values, bool of_labels) {
@@ -46,16 +46,6 @@ std::string touch_warning(const preprocess::Touch& touch, bool by_values, bool o
 
 }  // namespace
 
-NearestOfMask find_nearest(const preprocess::Mask& mask, const Vec3& point) {
-  NearestOfMask nearest;
-  for (std::size_t n = 0; n < mask.labels.size(); ++n) {
-    if (mask.labels[n] == 0) continue;
-    const double here = (preprocess::center_of(mask.grid, n) - point).norm();
-    if (here < nearest.distance) nearest = {n, here};
-  }
-  return nearest;
-}
-
 double reach_beside(const preprocess::Grid& grid) {
   return std::max(3.0, 2.0 * std::cbrt(grid.spacing.prod()));
 }
@@ -71,7 +61,7 @@ bool require_ends_in_one_piece(const Case& given, preprocess::Mask& mask, Json& 
   preprocess::Labels piece;  // that holds the first end
   std::string first;
   for (const auto& [key, point] : end_points(given)) {
-    const NearestOfMask nearest = find_nearest(mask, point);
+    const preprocess::NearestLabel nearest = preprocess::nearest_label(grid, mask.labels, point);
     if (nearest.distance > reach) {
       add(key + " is " + to_json(point).dump() + ", " + format("%.1f", nearest.distance) +
           " mm outside of what was found of the vessel, expected a point inside it (move the "

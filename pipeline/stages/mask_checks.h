@@ -2,7 +2,6 @@
 /// What is asked and told of a mask before a surface is made of it, whether a volume was segmented
 /// or labels were given.
 #include <cstddef>
-#include <limits>
 #include <vector>
 
 #include "pipeline/files/case_file.h"
@@ -13,13 +12,6 @@ namespace wireplan::pipeline {
 
 /// How far beside a mask an access or a target may lie: the surface may hold it still [mm].
 double reach_beside(const preprocess::Grid& grid);
-
-/// The labelled voxel nearest to a point, and how far from it that is [mm].
-struct NearestOfMask {
-  std::size_t voxel = 0;
-  double distance = std::numeric_limits<double>::infinity();
-};
-NearestOfMask find_nearest(const preprocess::Mask& mask, const Vec3& point);
 
 /// Refuses a mask outside of which an access or a target lies, or whose pieces part them; all that
 /// is wrong is told. Takes away all but the piece that holds them where another one is larger,

@@ -46,14 +46,17 @@ std::vector<MarkedPlace> places_to_look_at(const Case& given, const Json& figure
 
 /// Through the middle of the mask, sought in the part of the grid that holds it.
 std::vector<Vec3> way_through(const preprocess::Mask& mask, const Vec3& from, const Vec3& to) {
-  const preprocess::Voxel first = preprocess::voxel_at(mask.grid, find_nearest(mask, from).voxel);
+  const preprocess::Voxel first = preprocess::voxel_at(
+      mask.grid, preprocess::nearest_label(mask.grid, mask.labels, from).voxel);
   const preprocess::Box box =
       preprocess::grown(preprocess::bounding_box(mask.grid, mask.labels, {first, first}),
                         preprocess::Voxel{1, 1, 1}, mask.grid);
   const preprocess::Mask part{.grid = preprocess::cropped(mask.grid, box),
                               .labels = preprocess::crop_values(mask.grid, box, mask.labels)};
-  return preprocess::find_route(
-             part.grid, {find_nearest(part, from).voxel, find_nearest(part, to).voxel}, part.labels)
+  return preprocess::find_route(part.grid,
+                                {preprocess::nearest_label(part.grid, part.labels, from).voxel,
+                                 preprocess::nearest_label(part.grid, part.labels, to).voxel},
+                                part.labels)
       .points;
 }
 

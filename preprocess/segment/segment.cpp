@@ -103,16 +103,6 @@ std::string band_text(const Band& band) {
   return to_text(band.connect_hu) + " to " + to_text(band.upper_hu) + " HU";
 }
 
-NearestLabel nearest_label(const Grid& grid, const Labels& labels, const Vec3& point) {
-  NearestLabel nearest{.voxel = 0, .distance = std::numeric_limits<double>::infinity()};
-  for (std::size_t n = 0; n < labels.size(); ++n) {
-    if (labels[n] == 0) continue;
-    const double here = (center_of(grid, n) - point).norm();
-    if (here < nearest.distance) nearest = {n, here};
-  }
-  return nearest;
-}
-
 Error not_connected(const Image& image, const SegmentOptions& options, const Vec3& point,
                     const Grid& grid, std::size_t nearest, const std::string& values) {
   const Voxel at = *nearest_voxel(image.grid, point);

@@ -38,13 +38,6 @@ Error not_connected(const Image& image, const SegmentOptions& options, const Vec
 /// "160 to 300 HU"
 std::string band_text(const Band& band);
 
-/// Of the labelled voxels the nearest to the point, with its distance [mm].
-struct NearestLabel {
-  std::size_t voxel = 0;
-  double distance = 0.0;
-};
-NearestLabel nearest_label(const Grid& grid, const Labels& labels, const Vec3& point);
-
 /// How far beside what was found a target may lie [mm].
 inline constexpr double kTargetReachMm = 3.0;
 

@@ -222,6 +222,16 @@ std::size_t count(const Labels& labels) {
   return static_cast<std::size_t>(std::count(labels.begin(), labels.end(), 1));
 }
 
+NearestLabel nearest_label(const Grid& grid, const Labels& labels, const Vec3& point) {
+  NearestLabel nearest;
+  for (std::size_t n = 0; n < labels.size(); ++n) {
+    if (labels[n] == 0) continue;
+    const double here = (center_of(grid, n) - point).norm();
+    if (here < nearest.distance) nearest = {n, here};
+  }
+  return nearest;
+}
+
 void fill_cavities(const Grid& grid, Labels& labels, double largest) {
   // what the border reaches is no cavity
   std::vector<std::size_t> border;

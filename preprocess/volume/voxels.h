@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cstdint>
+#include <limits>
 #include <optional>
 #include <vector>
 
@@ -134,6 +135,14 @@ Labels flood(const Grid& grid, std::vector<std::size_t> queue, Inside inside) {
 }
 
 std::size_t count(const Labels& labels);
+
+/// Of the labelled voxels the one whose centre is nearest to the point, with its distance [mm];
+/// infinite where none is labelled.
+struct NearestLabel {
+  std::size_t voxel = 0;
+  double distance = std::numeric_limits<double>::infinity();
+};
+NearestLabel nearest_label(const Grid& grid, const Labels& labels, const Vec3& point);
 
 /// Labels each part of the background that does not reach the border of the grid through voxel
 /// faces and has at most `largest` voxels.
