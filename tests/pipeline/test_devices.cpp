@@ -289,10 +289,10 @@ TEST_F(CaseFile, FrictionOfTheCaseIsThatOfWiresWithoutTheirOwn) {
   // A wire that states its own keeps it, whatever its coating.
   own["coating"] = "hydrophilic";
   own["friction"] = 0.07;
-  json["wires"] = {own};
+  json["wires"] = Json::array({own});
   EXPECT_EQ(read(json).study.wires[0].friction, 0.07);
   own.erase("friction");
-  json["wires"] = {own};
+  json["wires"] = Json::array({own});
   EXPECT_EQ(read(json).study.wires[0].friction, 0.04);
 }
 
