@@ -53,6 +53,20 @@ std::string doubt_warning(const preprocess::Leak& part) {
          "there; if it is no artery, give segmentation.lower_hu and upper_hu, or labels";
 }
 
+// Loops that were wide enough to be arteries.
+std::string loops_warning(const std::vector<preprocess::Loop>& loops) {
+  constexpr std::size_t kLoopsTold = 5;
+  std::string places;
+  for (std::size_t k = 0; k < std::min(loops.size(), kLoopsTold); ++k) {
+    const Vec3& at = loops[k].place;
+    places += (k == 0 ? "" : ", ") + format("(%.1f, %.1f, %.1f)", at.x(), at.y(), at.z()) +
+              format(" mm (%.1f mm in radius)", loops[k].radius_mm);
+  }
+  return "segment: the vessel closes to a loop at " + places +
+         (loops.size() > kLoopsTold ? " and in other places" : "") +
+         ": a ring of arteries, or vessels that touch; look at the outline there";
+}
+
 // Figures of the segment stage. What was chosen for the case is told as the report prints it.
 void add_segmentation(const preprocess::SegmentStatistics& statistics, bool chosen, Json& figures) {
   constexpr std::size_t kLeaksTold = 5;
@@ -98,6 +112,14 @@ void add_segmentation(const preprocess::SegmentStatistics& statistics, bool chos
     if (figures["leaks"].size() <= kLeaksTold) {
       figures["warnings"].push_back(leak_warning(leak));
     }
+  }
+  figures["loops"] = {{"cut", statistics.loops.cut}, {"left", Json::array()}};
+  for (const preprocess::Loop& loop : statistics.loops.left) {
+    figures["loops"]["left"].push_back(
+        {{"place_mm", to_json(loop.place)}, {"radius_mm", loop.radius_mm}});
+  }
+  if (!statistics.loops.left.empty()) {
+    figures["warnings"].push_back(loops_warning(statistics.loops.left));
   }
   for (const preprocess::Leak& part : statistics.doubtful) {
     if (part.volume_mm3 < kDoubtfulPart * statistics.volume_mm3) continue;

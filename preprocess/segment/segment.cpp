@@ -12,6 +12,8 @@ namespace wireplan::preprocess {
 namespace {
 
 constexpr double kMostBright = 0.3;  // of the boundary; more is the inside of a bone
+constexpr int kThinLoops = 4;        // times the handles that may be left, may be cut
+constexpr double kThinVoxels = 1.6;  // inscribed radius of a loop that is cut
 
 /// The voxel itself where it is labelled, as almost always: the boundary was smoothed.
 std::size_t nearest_labelled(const Region& region, std::size_t voxel) {
@@ -142,8 +144,17 @@ Segmentation segment(const Image& image, const SegmentOptions& options) {
       bright_boundary(region.grid, region.values, statistics.band.upper_hu, region.labels);
   require_no_bone(statistics);
   statistics.shape = measure_shape(region.grid, region.labels);
-  require_simple(statistics.shape, options.limits, /*by_labels=*/false);
+  MaskLimits limits = options.limits;
+  if (!options.lower_hu) limits.handles *= kThinLoops;
+  require_simple(statistics.shape, limits, /*by_labels=*/false);
   part_touches(region, region.seeds, options, statistics);
+  if (!options.lower_hu) {
+    const double thin = kThinVoxels * std::cbrt(region.grid.spacing.prod());
+    statistics.loops = cut_loops(region.grid, nearest_labelled(region, region.seeds.front()),
+                                 statistics.search.route.points, thin, region.labels);
+    statistics.shape = measure_shape(region.grid, region.labels);
+    require_simple(statistics.shape, options.limits, /*by_labels=*/false);
+  }
   result.mask = whole_mask(image, region, statistics);
   return result;
 }

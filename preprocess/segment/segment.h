@@ -7,6 +7,7 @@
 #include "preprocess/segment/mask_shape.h"
 #include "preprocess/segment/segment_band.h"
 #include "preprocess/segment/segment_leak.h"
+#include "preprocess/segment/segment_loops.h"
 #include "preprocess/segment/segment_touch.h"
 #include "preprocess/volume/image.h"
 
@@ -49,7 +50,8 @@ struct SegmentStatistics {
   bool touches_border = false;          // of the volume: the vessel is cut there
   LeakSearch search;                    // the way from seed to target, and the leaks cut
   std::vector<Leak> doubtful;           // what was kept, though it may be a vein
-  MaskShape shape;                      // before touches are cut
+  MaskShape shape;                      // where a band was given before touches are cut
+  LoopSearch loops;                     // where none was given
   std::vector<Touch> touches;           // by their values, then by their shape [HU, mm]
   std::size_t dipping = 0;              // of these by their values
 };

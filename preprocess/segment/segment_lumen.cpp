@@ -9,7 +9,7 @@
 namespace wireplan::preprocess {
 namespace {
 
-constexpr double kEdgePart = 0.45;  // of the contrast
+constexpr double kEdgePart = 0.4;   // of the contrast
 constexpr double kNearWayMm = 3.0;  // where less of it is enough
 constexpr double kSpeckMm3 = 15.0;
 constexpr float kMiddlePart = 0.6F;  // of a part's depth: what is deeper is surely its own
@@ -70,6 +70,32 @@ Labels find_core(const LumenField& field, const Candidates& candidates,
   return core;
 }
 
+/// The least of the values one and two voxels on from `n`, in the direction in which `away` grows.
+double value_beyond(const LumenField& field, const std::vector<float>& away, std::size_t n) {
+  const Grid& grid = field.grid;
+  const Voxel v = voxel_at(grid, n);
+  Vec3 on = Vec3::Zero();
+  for (int axis = 0; axis < 3; ++axis) {
+    Voxel low = v, high = v;
+    low[axis] = std::max(v[axis] - 1, 0);
+    high[axis] = std::min(v[axis] + 1, grid.size[axis] - 1);
+    on[axis] = static_cast<double>(away[index_of(grid, high)] - away[index_of(grid, low)]) /
+               grid.spacing[axis];
+  }
+  auto least = static_cast<double>(field.values[n]);
+  if (on.norm() == 0.0) return least;
+  const double voxel = std::cbrt(grid.spacing.prod());
+  for (const double steps : {1.0, 2.0}) {
+    Voxel next = v;
+    for (int axis = 0; axis < 3; ++axis) {
+      const double by = steps * voxel * on[axis] / on.norm() / grid.spacing[axis];
+      next[axis] = std::clamp(v[axis] + static_cast<int>(std::lround(by)), 0, grid.size[axis] - 1);
+    }
+    least = std::min(least, static_cast<double>(field.values[index_of(grid, next)]));
+  }
+  return least;
+}
+
 /// Step 3.
 void add_rim(const LumenField& field, std::vector<float>& level, Labels& artery, Labels& other) {
   constexpr int kLayers = 2;
@@ -95,14 +121,17 @@ void add_rim(const LumenField& field, std::vector<float>& level, Labels& artery,
         if (other[m] != 0) others = std::max(others, level[m]);
       });
       if (mine == 0.0F && others == 0.0F) continue;
-      const auto reaches = [&](float of) {
-        return of != 0.0F && value >= field.surroundings + kEdgePart * contrast_of(of);
+      const auto reaches = [&](float of, const std::vector<float>& distance) {
+        const auto level_of = static_cast<double>(of);
+        if (of == 0.0F || value < field.surroundings + kEdgePart * contrast_of(of)) return false;
+        const double beyond = value_beyond(field, distance, n);
+        return beyond >= level_of || value >= beyond + kEdgePart * (level_of - beyond);
       };
       const auto away = [&](float distance, float of) {
         return static_cast<double>(distance) / voxel +
                kByLevel * std::abs(value - static_cast<double>(of)) / contrast_of(of);
       };
-      const bool is_mine = reaches(mine), is_other = reaches(others);
+      const bool is_mine = reaches(mine, to_artery), is_other = reaches(others, to_other);
       if (!is_mine && !is_other) continue;
       const bool nearer =
           is_mine && (!is_other || away(to_artery[n], mine) <= away(to_other[n], others));

@@ -22,9 +22,9 @@ struct LocalLumen {
 ///      itself. Specks of noise in it are filled.
 ///   2. Parts of it that are other vessels or organs (vessel_parts.h) and leaks (segment_leak.h)
 ///      are cut from it, in the neck.
-///   3. Two layers of voxels are added to either, down to 45 % of the contrast (smoothing makes
-///      vessels thinner); between an artery and what was cut a voxel goes to the nearer, or to the
-///      one whose level it is nearer to.
+///   3. Two layers of voxels are added to either, down to 40 % of the contrast (smoothing makes
+///      vessels thinner) to what lies there, one and two voxels on; between an artery and what was
+///      cut a voxel goes to the nearer, or to the one whose level it is nearer to.
 /// `seeds` are voxels on the ways; contacts narrower than `neck` [mm] connect nothing. Throws
 /// `Error` where the core is more complicated than what a vessel may be (require_no_flood).
 LocalLumen find_local_lumen(const LumenField& field, const Candidates& candidates,

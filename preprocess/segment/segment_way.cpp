@@ -21,6 +21,8 @@ constexpr double kMostChange = 0.12;     // of the contrast, that a single place
 constexpr double kPartSteps = 200.0;     // of the expected contrast: resolution of brightness
 constexpr int kLeastBottleneck = 60;     // of these: 30 %, less joins nothing
 constexpr int kSlack = 4;                // of these: ways a little darker than the brightest
+constexpr double kWideningMm = 40.0;     // that a way may be longer to widen by a factor e less
+constexpr float kWideningFrom = 0.9F;    // of the widest place so far: no more is widening again
 
 /// 1 - exp(-r^2 / (2 sigma^2)): the middle of a blurred cylinder.
 double seen_part(double radius, double sigma) {
@@ -87,9 +89,30 @@ int find_bottleneck(const Grid& grid, const std::vector<std::uint8_t>& parts, st
   return 0;
 }
 
-/// Step 2: the cheapest way over voxels of `least` or more.
+/// How wide a way has been up to a voxel: inscribed radii [mm].
+struct WidthSoFar {
+  float widest = 0.0F;
+  float now = 0.0F;  // after the last narrow place
+};
+
+/// The width after a step to where the radius is `here` [mm]; `log_wider` becomes by how much it
+/// has widened to what it had been before.
+WidthSoFar widen(const WidthSoFar& before, float here, double& log_wider) {
+  const float again = std::min(here, kWideningFrom * before.widest);
+  WidthSoFar next = {std::max(before.widest, here), std::min(before.now, here)};
+  log_wider = 0.0;
+  if (again > before.now) {
+    log_wider = std::log(static_cast<double>(again / before.now));
+    next.now = again;
+  }
+  if (here >= before.widest) next.now = here;
+  return next;
+}
+
+/// Step 2 or 3: the cheapest way over voxels of `least` or more. `widening` is the cost of widening
+/// again by a factor e [mm].
 std::vector<WayLevel> find_way(const LumenField& field, const Candidates& candidates,
-                               const std::vector<std::uint8_t>& parts, int least,
+                               const std::vector<std::uint8_t>& parts, int least, double widening,
                                const WayLevel& start, std::size_t end) {
   constexpr float kFar = std::numeric_limits<float>::infinity();
   const LevelRule rule(field);
@@ -98,11 +121,14 @@ std::vector<WayLevel> find_way(const LumenField& field, const Candidates& candid
   std::priority_queue<Entry, std::vector<Entry>, std::greater<>> queue;
   std::vector<float> cost(parts.size(), kFar), levels(parts.size(), 0.0F), seen(parts.size());
   std::vector<std::uint32_t> before(parts.size());
+  std::vector<WidthSoFar> widths(parts.size());
   for (std::size_t n = 0; n < parts.size(); ++n) {
     if (parts[n] >= least) seen[n] = static_cast<float>(rule.seen(candidates.depth[n]));
   }
   cost[start.voxel] = 0.0F;
   levels[start.voxel] = start.level;
+  const float first = candidates.depth[start.voxel] + static_cast<float>(half_voxel);
+  widths[start.voxel] = {first, first};
   queue.push({0.0F, start.voxel});
   while (!queue.empty() && queue.top().second != end) {
     const Entry top = queue.top();
@@ -114,14 +140,18 @@ std::vector<WayLevel> find_way(const LumenField& field, const Candidates& candid
       const double length = field.grid.spacing.cwiseProduct(Vec3(step[0], step[1], step[2])).norm();
       const auto value = static_cast<double>(field.values[m]);
       const auto seen_here = static_cast<double>(seen[m]);
-      const double price =
-          cost_per_mm(static_cast<double>(levels[n]), value, field.surroundings, seen_here,
-                      static_cast<double>(candidates.depth[m]) + half_voxel);
-      const auto next = static_cast<float>(static_cast<double>(top.first) + length * price);
+      const float radius = candidates.depth[m] + static_cast<float>(half_voxel);
+      double wider = 0.0;
+      const WidthSoFar width = widen(widths[n], radius, wider);
+      const double price = cost_per_mm(static_cast<double>(levels[n]), value, field.surroundings,
+                                       seen_here, static_cast<double>(radius));
+      const auto next =
+          static_cast<float>(static_cast<double>(top.first) + length * price + widening * wider);
       if (next >= cost[m]) return;
       cost[m] = next;
       before[m] = static_cast<std::uint32_t>(n);
       levels[m] = rule.follow(levels[n], value, seen_here, length);
+      widths[m] = width;
       queue.push({next, m});
     });
   }
@@ -133,7 +163,36 @@ std::vector<WayLevel> find_way(const LumenField& field, const Candidates& candid
   return way;
 }
 
-/// Step 3: thin places, which tell little, count little.
+/// Takes all from `parts` but the vessels that the way leads through: from each of its voxels,
+/// where the depth rises most is followed to its maximum; the balls that fit in round both are
+/// kept.
+void keep_vessels(const Grid& grid, const std::vector<float>& depth,
+                  const std::vector<WayLevel>& way, std::vector<std::uint8_t>& parts) {
+  Labels kept(parts.size(), 0), seen(parts.size(), 0);
+  const double voxel = grid.spacing.maxCoeff();
+  const auto keep_ball = [&](std::size_t n) {
+    if (seen[n] != 0) return;
+    seen[n] = 1;
+    const double radius = static_cast<double>(depth[n]) + voxel;
+    for (const std::size_t m : voxels_in_ball(grid, center_of(grid, n), radius)) kept[m] = 1;
+  };
+  for (const WayLevel& place : way) {
+    keep_ball(place.voxel);
+    std::size_t at = place.voxel, best = at;
+    do {
+      at = best;
+      for_each_neighbour(grid, at, [&](std::size_t m, const Voxel&) {
+        if (depth[m] > depth[best]) best = m;
+      });
+    } while (best != at);
+    keep_ball(at);
+  }
+  for (std::size_t n = 0; n < parts.size(); ++n) {
+    if (kept[n] == 0) parts[n] = 0;
+  }
+}
+
+/// Step 4: thin places, which tell little, count little.
 void average_levels(const LumenField& field, const Candidates& candidates,
                     std::vector<WayLevel>& way) {
   constexpr double kSigmaMm = 7.0, kAverageReachMm = 20.0;
@@ -210,8 +269,11 @@ std::vector<std::vector<WayLevel>> find_level_ways(const LumenField& field,
     const int most = find_bottleneck(field.grid, parts, points.front().voxel, end.voxel);
     ways.emplace_back();
     if (most < kLeastBottleneck) continue;
-    ways.back() =
-        find_way(field, candidates, parts, std::max(1, most - kSlack), points.front(), end.voxel);
+    const int least = std::max(1, most - kSlack);
+    ways.back() = find_way(field, candidates, parts, least, kWideningMm, points.front(), end.voxel);
+    std::vector<std::uint8_t> vessels = parts;
+    keep_vessels(field.grid, candidates.depth, ways.back(), vessels);
+    ways.back() = find_way(field, candidates, vessels, least, 0.0, points.front(), end.voxel);
     average_levels(field, candidates, ways.back());
   }
   return ways;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numbers>
 #include <queue>
 #include <unordered_map>
 #include <utility>
@@ -249,6 +250,23 @@ void visit_parts(const LumenField& field, const PartContacts& contacts, double n
   }
 }
 
+/// A part with less volume than the ball that fits in there is no vessel, but a piece of the one
+/// that it touches most widely.
+void adopt_pieces(const Grid& grid, const PartContacts& contacts, std::vector<VesselPart>& parts) {
+  const double voxel = grid.spacing.prod();
+  const std::vector<VesselPart> before = parts;
+  for (std::size_t a = 1; a < parts.size(); ++a) {
+    const auto radius = static_cast<double>(before[a].depth);
+    const double ball = 4.0 / 3.0 * std::numbers::pi * radius * radius * radius;
+    if (before[a].level != 0.0F || before[a].voxels * voxel >= ball) continue;
+    PartContact widest;
+    for (const PartContact& contact : contacts[a]) {
+      if (contact.depth > widest.depth) widest = contact;
+    }
+    parts[a].level = before[widest.to].level;
+  }
+}
+
 }  // namespace
 
 VesselParts divide_vessels(const LumenField& field, const Labels& mask,
@@ -281,6 +299,7 @@ VesselParts divide_vessels(const LumenField& field, const Labels& mask,
     }
   }
   visit_parts(field, contacts, neck, starts, found.parts);
+  adopt_pieces(field.grid, contacts, found.parts);
   for (VesselPart& part : found.parts) {
     if (part.level != 0.0F) continue;
     part.other = true;

@@ -35,6 +35,7 @@ struct VesselParts {
 ///   more than 20 %, and by three standard errors (by half as much, if it is also wider than 1.3
 ///   times the contact); blur is allowed for;
 /// - behind more than 60 % of its boundary the values stay high: it lies in an organ.
+/// A part with less volume than the ball that fits in there belongs to what it touches most widely.
 /// The level is followed from part to part over 10 mm.
 VesselParts divide_vessels(const LumenField& field, const Labels& mask,
                            const std::vector<float>& depth, const std::vector<float>& level,

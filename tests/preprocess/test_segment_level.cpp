@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <random>
 #include <string>
 
@@ -60,6 +61,33 @@ TEST(SegmentLevel, ContrastThatFallsAlongTheVesselIsFollowed) {
   ASSERT_GE(found.statistics.along.size(), 9U);
   for (const LevelAlong& place : found.statistics.along) {
     EXPECT_NEAR(place.level_hu, falling(place.place), 15.0) << place.place.transpose();
+  }
+}
+
+TEST(SegmentLevel, AFalseLumenOfThreeFifthsOfTheContrastEndsAtTheMembrane) {
+  const auto is_true = [](const Vec3& p) { return off_axis(p, 0) < 8.0 && p.x() < 2.0; };
+  const Image image = scanned(12.0, [&](const Vec3& p) {
+    return is_true(p) ? 400.0 : off_axis(p, 0) < 8.0 ? 260.0 : kAround;
+  });
+  const Segmentation found = segment(image, {.seeds = {Vec3(-3, 0, 5)}, .target = Vec3(-3, 0, 85)});
+  EXPECT_GT(dice(found.mask, is_true), 0.95);
+}
+
+TEST(SegmentLevel, TheWayKeepsToItsVesselThoughAWiderOneOfItsLevelTouchesAndIsShorter) {
+  // The artery bows out by 14 mm; a vein of 1.4 times its radius touches it before and behind.
+  const auto bow = [](double z) {
+    const double s = std::sin(std::numbers::pi * (z - 5.0) / 80.0);
+    return -14.0 * s * s;
+  };
+  const auto artery = [&](const Vec3& p) { return off_axis(p, bow(p.z())) < 3.5; };
+  const auto vein = [](const Vec3& p) {
+    return p.z() > 12.0 && p.z() < 78.0 && off_axis(p, 5.6) < 5.0;
+  };
+  const Image image =
+      scanned(10.0, [&](const Vec3& p) { return artery(p) || vein(p) ? 300.0 : kAround; });
+  const Segmentation found = segment(image, {.seeds = {kBottom}, .target = kTop});
+  for (const Vec3& place : found.statistics.search.route.points) {
+    EXPECT_LT(off_axis(place, bow(place.z())), 3.5) << place.transpose();
   }
 }
 
