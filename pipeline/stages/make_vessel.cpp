@@ -34,15 +34,6 @@ std::string leak_warning(const preprocess::Leak& leak) {
          "; if that is artery, add a point in it to segmentation.seeds_mm";
 }
 
-// Whether the volume's values are HU. Where the file does not tell: a CT has air or fat, which no
-// other modality writes below zero, or no values that only others have.
-bool in_hounsfield(const preprocess::Image& image) {
-  constexpr float kLeastAir = -50.0F, kMostHu = 700.0F;
-  if (!image.modality.empty()) return image.modality == "CT";
-  const auto [low, high] = std::minmax_element(image.values.begin(), image.values.end());
-  return *low < kLeastAir || *high < kMostHu;
-}
-
 // What was kept, though it may be another vessel.
 std::string doubt_warning(const preprocess::Leak& part) {
   const Vec3& at = part.place;
@@ -275,7 +266,7 @@ void make_segment(Workspace& work, const fs::path& folder) {
   }
   options.target = given.targets.front().point;
   options.limits = given.mask_limits;
-  options.hounsfield = in_hounsfield(work.image());
+  options.hounsfield = preprocess::in_hounsfield(work.image());
   preprocess::Segmentation segmentation = preprocess::segment(work.image(), options);
   preprocess::SegmentStatistics& statistics = segmentation.statistics;
   Json figures = figures_of("segment");

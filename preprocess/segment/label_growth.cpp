@@ -43,8 +43,10 @@ Vec3 middle_near(const Mask& mask, const Vec3& point) {
 Growth grow_to(const Image& image, const Vec3& point, LabelMask& labels, const MaskLimits& limits) {
   expects(image.values.size() == labels.mask.labels.size());
   constexpr double kWidest = 15.0, kRound = 1.5;
-  const Segmentation found = segment(
-      image, {.seeds = {middle_near(labels.mask, point)}, .target = point, .limits = limits});
+  const Segmentation found = segment(image, {.hounsfield = in_hounsfield(image),
+                                             .seeds = {middle_near(labels.mask, point)},
+                                             .target = point,
+                                             .limits = limits});
   const Grid& grid = labels.mask.grid;
   const std::vector<Vec3>& way = found.statistics.search.route.points;
   const auto voxel_of = [&](const Vec3& p) { return index_of(grid, *nearest_voxel(grid, p)); };

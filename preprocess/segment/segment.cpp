@@ -159,6 +159,13 @@ Segmentation segment(const Image& image, const SegmentOptions& options) {
   return result;
 }
 
+bool in_hounsfield(const Image& image) {
+  constexpr float kLeastAir = -50.0F, kMostHu = 700.0F;
+  if (!image.modality.empty()) return image.modality == "CT";
+  const auto [low, high] = std::minmax_element(image.values.begin(), image.values.end());
+  return *low < kLeastAir || *high < kMostHu;
+}
+
 void measure_mask(const Image& image, const Mask& mask, SegmentStatistics& statistics) {
   std::size_t inside = 0;
   double sum = 0.0;

@@ -78,6 +78,10 @@ struct Segmentation {
 /// connected (with the nearest point reached); and when what was found lies in a shell of bone.
 Segmentation segment(const Image& image, const SegmentOptions& options);
 
+/// Whether the volume's values are HU. Where its file does not tell: a CT has air or fat, which no
+/// other modality writes below zero, or no values that only others have.
+bool in_hounsfield(const Image& image);
+
 /// Volume, mean and whether the border is touched, of a mask on the image's grid.
 void measure_mask(const Image& image, const Mask& mask, SegmentStatistics& statistics);
 

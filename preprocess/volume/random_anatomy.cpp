@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 namespace wireplan::preprocess {
 namespace {
@@ -91,6 +92,15 @@ PhantomTube vein_beside(const std::string& name, const PhantomTube& artery, doub
   }
   return tube_through(name, PhantomTubeKind::kVein, 0.4, points,
                       std::vector<double>(points.size(), radius));
+}
+
+void add_vein(PhantomTube vein, double level, const DrawnScan& scan, Draws& draws,
+              DrawnAnatomy& body) {
+  const double own = std::clamp(level + draws.between(-0.1, 0.1), 0.5, 0.95);
+  vein.hu = draws.between(40.0, 70.0);
+  body.tubes.push_back(std::move(vein));
+  body.level.resize(body.tubes.size(), 0.0);
+  if (scan.veins) body.level.back() = own;
 }
 
 void add_bends(PhantomTube& tube, double amplitude, double waves, const Vec3& across) {

@@ -75,6 +75,10 @@ PhantomTube with_points_every(const PhantomTube& tube, double spacing);
 PhantomTube vein_beside(const std::string& name, const PhantomTube& artery, double from, double to,
                         const Vec3& side, double radius, double gap);
 
+/// Adds a vein; where veins have contrast, of about `level` of the arteries', 0.5 to 0.95.
+void add_vein(PhantomTube vein, double level, const DrawnScan& scan, Draws& draws,
+              DrawnAnatomy& body);
+
 /// Bends part of a tube to either side of its course: by a sine of this amplitude across it that is
 /// zero at both ends.
 void add_bends(PhantomTube& tube, double amplitude, double waves, const Vec3& across);

@@ -96,13 +96,7 @@ void add_arteries(Draws& draws, DrawnAnatomy& body) {
 void add_neck_veins(const DrawnScan& scan, Draws& draws, DrawnAnatomy& body) {
   const double base = draws.between(0.5, 0.95);
   const auto gap = [&] { return draws.between(0.0, 1.0); };
-  const auto add = [&](PhantomTube vein) {
-    const double level = std::clamp(base + draws.between(-0.1, 0.1), 0.5, 0.95);
-    vein.hu = draws.between(40.0, 70.0);
-    body.tubes.push_back(std::move(vein));
-    body.level.resize(body.tubes.size(), 0.0);
-    if (scan.veins) body.level.back() = level;
-  };
+  const auto add = [&](PhantomTube vein) { add_vein(std::move(vein), base, scan, draws, body); };
   const auto through = [&](const char* name, const std::vector<Vec3>& points, double radius) {
     add(tube_through(name, PhantomTubeKind::kVein, 0.4, points, same(points.size(), radius)));
   };

@@ -457,6 +457,14 @@ TEST(GrowLabels, FollowsTheArteryToThePointAndNoFurther) {
   LabelMask other = before;
   EXPECT_THROW(grow_to(image, Vec3(45, 20, 50), other), Error);
   EXPECT_EQ(other.mask.labels, before.mask.labels);
+
+  // In other units, where 100 HU of contrast mean nothing.
+  for (float& value : image.values) value = value > 100.0F ? 40.0F : 4.0F;
+  LabelMask as_ct = before, as_mr = before;
+  EXPECT_THROW(grow_to(image, Vec3(20, 20, 50), as_ct), Error);
+  image.modality = "MR";
+  grow_to(image, Vec3(20, 20, 50), as_mr);
+  EXPECT_EQ(as_mr.mask.labels, labels.mask.labels);
 }
 
 }  // namespace
