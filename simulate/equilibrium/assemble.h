@@ -54,6 +54,11 @@ Energy assemble(const Problem& problem, const RodState& state, Sink& sink,
       energy.load -= f.dot(state.x.col(i));
     }
   }
+  if (problem.springs != nullptr) {
+    for (int i = problem.first; i < problem.last; ++i) {
+      energy.load += add_spring(*problem.springs, state, i, sink);
+    }
+  }
   if (problem.plane) {
     for (int i = std::max(1, problem.first); i < problem.last; ++i) {
       energy.contact += add_plane(problem, state, i, sink);

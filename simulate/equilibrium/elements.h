@@ -438,4 +438,14 @@ double add_plane(const Problem& problem, const RodState& state, int i, Sink& sin
   return 0.5 * k * height * height;
 }
 
+/// Spring that holds node i near its place.
+template <class Sink>
+double add_spring(const Springs& springs, const RodState& state, int i, Sink& sink) {
+  const double k = springs.stiffness[i];
+  const Vec3 off = state.x.col(i) - springs.place.col(i);
+  sink.gradient(i, k * off);
+  if constexpr (Sink::kHessian) sink.hessian(i, i, k * Mat3::Identity());
+  return 0.5 * k * off.squaredNorm();
+}
+
 }  // namespace wireplan::simulate

@@ -37,7 +37,8 @@ class Newton {
         options_(options),
         count_(problem.last - problem.first),
         out_of_introducer_(problem.first > 0 && problem.last == problem.rod->nodes()),
-        polynomial_(problem.contact == nullptr && D == 3 && !problem.tip_moment && !problem.plane),
+        polynomial_(problem.contact == nullptr && D == 3 && !problem.tip_moment && !problem.plane &&
+                    problem.springs == nullptr),
         banded_(D == 3 && out_of_introducer_ && !problem.distal.hold_along &&
                 !problem.distal.hold_across && contact_ != nullptr &&
                 contact_->remainder_is_banded()),

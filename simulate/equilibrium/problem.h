@@ -30,6 +30,12 @@ struct TipMoment {
   double size = 0.0;          //                                                         [N mm]
 };
 
+/// Springs that hold free nodes near places.
+struct Springs {
+  Eigen::Matrix3Xd place;     // (3, n)                                                   [mm]
+  Eigen::VectorXd stiffness;  // (n)                                                      [N/mm]
+};
+
 /// What is in equilibrium. Nodes first..last-1 are free, apart from what the end supports hold;
 /// nodes before and after are where they are, and their edges' theta too. Terms that are absent
 /// cost nothing.
@@ -38,6 +44,7 @@ struct Problem {
   int first = 0, last = 0;
   EndSupport proximal, distal;             // of nodes 0 and n-1, where those are free
   const Eigen::Matrix3Xd* load = nullptr;  // (3, n) dead forces on the nodes                [N]
+  const Springs* springs = nullptr;        // their energy counts as load's
   std::optional<TipMoment> tip_moment;
   std::optional<Vec3>
       plane;  // unit normal of a table on which the wire lies: every node is held to the

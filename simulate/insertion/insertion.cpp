@@ -23,15 +23,12 @@ WireContact contact_of(const Touch& touch, double wire_radius, const TriangleLoc
 
 namespace {
 
-constexpr double kTipRegion = 2.0;  // wire that counts as tip for its force            [mm]
-constexpr double kFoldTurn = 150.0 * kRadPerDeg;  // turning beyond the rest shape's that is one
-constexpr double kFoldLead = 10.0;    // ... with the bow so far ahead of the tip            [mm]
-constexpr double kFoldLength = 60.0;  // ... within so much wire                [mm]
-constexpr double kDriftInto = 0.5;    // a wire's drift may lead this much deeper into the wall
-                                      // than the wire did [mm]
-constexpr double kSnap = 2.0;         // way off the path per push that is a jump, not to go on
-constexpr double kDriftLasts = 5.0;   // push that a wire's drift falls to 1/e in               [mm]
-constexpr double kBent = 16.0;        // wire that a guess bends to keep its tip off the wall [mm]
+constexpr double kTipRegion = 2.0;   // wire that counts as tip for its force            [mm]
+constexpr double kDriftInto = 0.5;   // a wire's drift may lead this much deeper into the wall
+                                     // than the wire did [mm]
+constexpr double kSnap = 2.0;        // way off the path per push that is a jump, not to go on
+constexpr double kDriftLasts = 5.0;  // push that a wire's drift falls to 1/e in               [mm]
+constexpr double kBent = 16.0;       // wire that a guess bends to keep its tip off the wall [mm]
 constexpr double kSmallestPart = 0.01;  // of a node's share of wire that bends at the exit
 constexpr double kLongestPart = 2.0;  // of a push: friction turns with the path               [mm]
 constexpr double kLongestTurn = 15.0 * kRadPerDeg;  // of the hub in one go
@@ -108,6 +105,10 @@ Insertion::Insertion(const Wire& wire, const Introducer& introducer, const Vesse
   problem_.first = n;
   problem_.last = n;
   problem_.contact = &contact_;
+  if (!options.gravity.isZero(0.0)) {
+    weight_ = options.gravity * rod_.mass.transpose();
+    problem_.load = &weight_;
+  }
   newton_ = {.residual_tolerance = options.residual_tolerance,
              .max_iterations = options.max_iterations};
   contact_.start_at(state_.x);
@@ -123,23 +124,15 @@ template <class Part>
 std::optional<Push> Insertion::move(double amount, double longest_part, const Part& part) {
   Push record;
   slipped_out_.reset();
-  const auto ran_out = [&](const NewtonResult& solve) {
-    return !solve.converged && solve.iterations == newton_.max_iterations;
-  };
   save(before_move_);
   const Snapshot* before = &before_move_;  // the part that is next
   double done = 0.0, cut = std::min(std::abs(amount), longest_part);
   for (;;) {
     const double now = std::copysign(std::min(cut, std::abs(amount - done)), amount);
-    NewtonResult solve = part(now);
-    record.iterations += solve.iterations;
-    for (int k = 0; k < kFollowed && ran_out(solve); ++k) {
-      solve = follow_jump();
-      record.iterations += solve.iterations;
-    }
+    const NewtonResult solve = followed(part(now), record.iterations);
     if (solve.converged) {
       record.residual = solve.residual;
-      totals_.stored_energy = solve.energy;
+      totals_.stored_energy = stored_energy(solve);
       wall_energy_ = solve.wall_energy;
       settle(depth_ - before->depth, hub_angle_ - before->hub_angle);
       done += now;
@@ -331,6 +324,17 @@ NewtonResult Insertion::settle_guess(double distance) {
   return statics_.solve(problem_, state_, newton_);
 }
 
+/// The solve, gone on from as long as it runs out of iterations; counts them.
+NewtonResult Insertion::followed(NewtonResult solve, int& iterations) {
+  iterations += solve.iterations;
+  for (int k = 0; k < kFollowed; ++k) {
+    if (solve.converged || solve.iterations != newton_.max_iterations) break;
+    solve = follow_jump();
+    iterations += solve.iterations;
+  }
+  return solve;
+}
+
 /// Goes on from where a solve ran out of iterations. That wire jumps, and its points slide by
 /// millimetres: friction that is held to where they were, and lagged with points that others took
 /// over from at the wall, may have no equilibrium. So anchors follow, and friction opposes the
@@ -433,6 +437,14 @@ Vec3 Insertion::turn_at(int i) const {
   return edge(i) / rod_.rest_length[i] - edge(i - 1) / rod_.rest_length[i - 1];
 }
 
+/// Weight counts from where the wire comes out of the introducer, so that a node adds nothing as it
+/// does.
+double Insertion::stored_energy(const NewtonResult& solve) const {
+  if (problem_.load == nullptr) return solve.energy;
+  const Vec3 free = weight_.rightCols(rod_.nodes() - problem_.first).rowwise().sum();
+  return solve.energy + free.dot(introducer_.point);
+}
+
 /// After an equilibrium: what slipped, and the work of the hand's forces before and after.
 void Insertion::settle(double distance, double angle) {
   touches_ = contact_.touches();
@@ -529,6 +541,7 @@ PushTerms Insertion::terms() const {
   Eigen::Matrix3Xd unused(3, rod_.nodes());
   terms.energy = Statics::evaluate(wire, state_, unused);
   terms.energy.wall = wall_energy_;
+  terms.energy.load += stored_energy({});
   terms.energy.contact = totals_.stored_energy - terms.energy.total();
   terms.tip_roll = introducer_.roll + hub_angle_;
   if (!rod_.twisted) return terms;
@@ -553,38 +566,6 @@ std::vector<TriangleForce> Insertion::peak_forces() const {
   std::vector<TriangleForce> list;
   for (const auto& [triangle, force] : peak_forces_) list.push_back({triangle, force});
   return list;
-}
-
-std::optional<Vec3> Insertion::find_fold() const {
-  const int n = rod_.nodes();
-  for (int i = problem_.first; i + 1 < n; ++i) {
-    const Vec3 from = edge(i).normalized();
-    double rest = 0.0, length = 0.0;
-    Vec3 bow = state_.x.col(i);
-    for (int j = i + 1; j + 1 < n && length < kFoldLength; ++j) {
-      length += rod_.rest_length[j];
-      rest += std::abs(rod_.rest_angle[j]);
-      if (from.dot(state_.x.col(j) - bow) > 0.0) bow = state_.x.col(j);
-      const double turn = std::acos(std::clamp(from.dot(edge(j).normalized()), -1.0, 1.0));
-      const bool leads = from.dot(bow - tip()) > kFoldLead &&
-                         (bow - introducer_.point).norm() > (tip() - introducer_.point).norm();
-      if (turn - rest > kFoldTurn && leads) return bow;
-    }
-  }
-  return {};
-}
-
-std::optional<int> Insertion::left_through() const {
-  return preprocess::left_through(vessel_.lumen.openings(),
-                                  state_.x.rightCols(rod_.nodes() - problem_.first));
-}
-
-Vec3 Insertion::most_bent() const {
-  int most = std::min(problem_.first, rod_.nodes() - 2);
-  for (int i = most; i + 1 < rod_.nodes(); ++i) {
-    if (turn_at(i).norm() / rod_.share[i] > turn_at(most).norm() / rod_.share[most]) most = i;
-  }
-  return state_.x.col(most);
 }
 
 }  // namespace wireplan::simulate

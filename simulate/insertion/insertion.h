@@ -9,6 +9,7 @@
 #include "simulate/equilibrium/solver.h"
 #include "simulate/insertion/push.h"
 #include "simulate/insertion/push_balance.h"
+#include "simulate/insertion/start_line.h"
 #include "simulate/wall/vessel_model.h"
 #include "simulate/wire/rod.h"
 
@@ -29,6 +30,7 @@ struct InsertionOptions {
   double residual_tolerance = 1e-6;  // largest nodal force out of balance               [N]
   int max_iterations = 50;           // Newton iterations per solve; see Insertion::push()
   double record_every = 5.0;         // spacing of the stored shapes                     [mm]
+  Vec3 gravity = Vec3::Zero();       // on the wire outside the introducer, less buoyancy  [mm/s^2]
   bool map_forces = true;            // whether the wall's triangles remember their peak forces
   bool record_terms = false;         // whether each push records its energy by term
   bool push_on = false;              // whether a wire whose tip is stuck, or that folds back, is
@@ -83,6 +85,13 @@ class Insertion {
   Insertion(const Wire& wire, const Introducer& introducer, const VesselModel& vessel,
             const InsertionOptions& options);
 
+  /// Lays the wire along a line and finds the equilibrium nearest to it: springs hold the wire to
+  /// the line, brought into the lumen, and fade away in steps. Friction acts from where the wire
+  /// first touches, so that it stays where that holds it. Its shape, with what the hand did until
+  /// then counted as the energy stored. Empty where there is no such equilibrium; nothing else may
+  /// then be asked of the insertion. Expects that nothing was pushed in yet.
+  std::optional<Push> start(const StartLine& start);
+
   /// Pushes the wire in by `distance`, or pulls it back by -`distance` [mm], in parts that are
   /// short enough for friction to follow. A part that runs out of iterations is taken for a jump:
   /// the solve goes on from where it got, up to six times. A part that has no equilibrium is cut
@@ -101,9 +110,10 @@ class Insertion {
   std::optional<int> left_through() const;
   std::optional<int> slipped_out() const { return slipped_out_; }
 
-  double longest() const { return longest_; }      // that can be brought into the body      [mm]
-  double depth() const { return depth_; }          // wire in the body                       [mm]
-  double hub_angle() const { return hub_angle_; }  // since the start               [rad]
+  double longest() const { return longest_; }       // that can be brought into the body      [mm]
+  double depth() const { return depth_; }           // wire in the body                       [mm]
+  double hub_angle() const { return hub_angle_; }   // since the start               [rad]
+  double roll() const { return introducer_.roll; }  // of the hub at the start       [rad]
   /// Of the hand on the wire at this very place, with the ripple of the elements (PushBalance) [N].
   double hand_force() const { return totals_.push_force; }
   const Rod& rod() const { return rod_; }
@@ -142,9 +152,12 @@ class Insertion {
   NewtonResult advance(double distance);
   NewtonResult spin(double angle);
   NewtonResult settle_guess(double distance);
+  NewtonResult followed(NewtonResult solve, int& iterations);
   NewtonResult follow_jump();
   template <class Part>
   std::optional<Push> move(double amount, double longest_part, const Part& part);
+  double roll_of_shape() const;
+  void lay_along(const StartLine& start, Springs& springs);
   void turn_with_the_hub(RodState& state) const;
   void bend_at_the_exit();
   double length_outside(int i) const;
@@ -158,6 +171,7 @@ class Insertion {
   double push_force(const HeldEnd& held) const;
   Vec3 edge(int i) const { return state_.x.col(i + 1) - state_.x.col(i); }
   Vec3 turn_at(int i) const;
+  double stored_energy(const NewtonResult& solve) const;
   void settle(double distance, double angle);
   void find_work(Push& record);
   void measure(Push& record);
@@ -188,6 +202,7 @@ class Insertion {
   Eigen::Matrix3Xd path_;     // where the wire ahead of each node was before the last push   [mm]
   Eigen::Matrix3Xd drift_;    // off that path, per length of push
   Eigen::Matrix3Xd moved_;    // each node in the last push, per length of it
+  Eigen::Matrix3Xd weight_;  // (3, n) of each node; empty without gravity                    [N]
   Eigen::Matrix3Xd forces_, guess_ahead_;
   std::vector<Touch> touches_;
   std::vector<Vec3> force_sums_;                         // scratch

@@ -73,7 +73,9 @@ Trial::Trial(const Wire& wire, const Introducer& introducer, const std::vector<G
     expects(goals_[k].at_section || goals_.size() == 1);
     pursuits_[k].best_distance = (insertion_.tip() - goals_[k].point).norm();
   }
-  record_.terms = name_terms(insertion_.rod(), {}, &vessel, friction_of(wire, options));
+  std::vector<std::string> own;
+  if (!options.gravity.isZero(0.0)) own.push_back("gravity");
+  record_.terms = name_terms(insertion_.rod(), own, &vessel, friction_of(wire, options));
 }
 
 bool Trial::ended() const {
@@ -81,8 +83,37 @@ bool Trial::ended() const {
                      [](const Pursuit& pursuit) { return pursuit.outcome.has_value(); });
 }
 
+bool Trial::start(const StartLine& line) {
+  expects(record_.pushes.empty() && !ended());
+  const std::optional<Push> push = insertion_.start(line);
+  if (!push) {
+    return end_all(Outcome::kNotConverged,
+                   "no equilibrium near the line that the wire is to start from");
+  }
+  record_.pushes.push_back(*push);
+  if (options_.record_terms) record_.push_terms.push_back(insertion_.terms());
+  record_.start = shape_here();
+  record_.shapes.push_back(*record_.start);
+  pushing_since_ = 1;
+  for (std::size_t k = 0; k < goals_.size(); ++k) {
+    pursuits_[k].best_distance = (push->tip - goals_[k].point).norm();
+    check_place(k);
+  }
+  return !ended();
+}
+
 void Trial::make(const Move& move) {
-  expects(move.push == 0.0 || move.turn == 0.0);
+  const double pushes = std::abs(move.push) / options_.step,
+               turns = std::abs(move.turn) / kTurnStep;
+  if (pushes > 0.0 && turns > 0.0) {  // one after the other, in steps as short as either asks for
+    constexpr double kMostParts = 1e9;
+    const double parts = std::ceil(std::max(pushes, turns) - 1e-9);
+    const int count = static_cast<int>(std::clamp(parts, 1.0, kMostParts));
+    for (int k = 0; k < count; ++k) {
+      if (!step({.push = move.push / count}) || !step({.turn = move.turn / count})) return;
+    }
+    return;
+  }
   const double whole = std::abs(move.push) + std::abs(move.turn);
   const double most = move.turn == 0.0 ? options_.step : kTurnStep;
   for (double done = 0.0; whole - done > 1e-9; done += most) {
@@ -92,6 +123,7 @@ void Trial::make(const Move& move) {
 }
 
 bool Trial::step(const Move& move) {
+  expects(move.push == 0.0 || move.turn == 0.0);
   if (ended()) return false;
   // Some wire stays in the body, so that there is something to find an equilibrium of.
   const double depth = insertion_.depth();
@@ -346,6 +378,8 @@ std::vector<TrialResult> Trial::finish_all() {
     TrialResult& result = results.emplace_back(std::move(pursuit.end));
     result.stuck = pursuit.stuck;
     result.terms = record_.terms;
+    result.start = record_.start;
+    result.roll = insertion_.roll();
     result.pushes.assign(record_.pushes.data(), record_.pushes.data() + pursuit.pushes);
     if (options_.record_terms) {
       result.push_terms.assign(record_.push_terms.data(),

@@ -58,9 +58,12 @@ struct TrialResult {
   std::vector<TriangleForce> peak_forces;  // over all pushes, ascending triangles; if mapped
   std::vector<Shape> shapes;       // every `record_every` of the hand's way, and the final one
   std::vector<std::string> terms;  // energy terms that the scene built: "stretch", "bend", ...
+  std::optional<Shape> start;      // the equilibrium that it started from, if from a line
+  double roll = 0.0;               // of the hub before the first move                    [rad]
 };
 
-/// What the hand does: pushes the wire in, pulls it back, or turns the hub. One of both is 0.
+/// What the hand does: pushes the wire in, pulls it back, or turns the hub, or turns it as it
+/// pushes.
 struct Move {
   double push = 0.0;  // negative: pulls back                                            [mm]
   double turn = 0.0;  // of the hub, right-handed about the introducer's direction      [rad]
@@ -83,10 +86,15 @@ class Trial {
         const InsertionOptions& options)
       : Trial(wire, introducer, std::vector<Goal>{goal}, vessel, options) {}
 
+  /// Lays the wire along the line before the first move, see Insertion::start(). Its equilibrium is
+  /// the first record. False where there is none, which ends the trial.
+  bool start(const StartLine& line);
   /// Makes a move, in steps of the options' length or 15 degrees, as far as there is wire to push
-  /// or to pull and the trial has not ended.
+  /// or to pull and the trial has not ended. A move that does both turns by its share after each
+  /// step of its push.
   void make(const Move& move);
-  /// One such step. False where the trial has ended, or no wire is left for it.
+  /// One such step, of a push or a turn. False where the trial has ended, or no wire is left for
+  /// it.
   bool step(const Move& move);
   /// Whether it has ended for all goals, and whether it reached the first.
   bool ended() const;
@@ -139,7 +147,7 @@ class Trial {
   const VesselModel& vessel_;
   InsertionOptions options_;
   Insertion insertion_;
-  TrialResult record_;             // of all goals: pushes, shapes on the way and terms
+  TrialResult record_;             // of all goals: start, pushes, shapes on the way and terms
   std::vector<Pursuit> pursuits_;  // one per goal
   double since_shape_ = 0.0;       // way of the hand since a shape was recorded          [mm]
   std::size_t pushing_since_ = 0;  // all records from here on are pushes

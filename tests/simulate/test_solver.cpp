@@ -134,6 +134,11 @@ TEST(Energy, GradientAndHessianAgreeWithFiniteDifferences) {
     expect_exact_derivatives(c, 1e-6, 1e-4);
     c.problem.contact = nullptr;
     expect_exact_derivatives(c, 1e-8, 1e-7);
+    const Springs springs{.place = c.state.x.colwise() + Vec3(0.3, -0.2, 0.5),
+                          .stiffness = Eigen::VectorXd::LinSpaced(c.rod.nodes(), 0.5, 2.0)};
+    c.problem.springs = &springs;
+    expect_exact_derivatives(c, 1e-8, 1e-7);
+    c.problem.springs = nullptr;
 
     // Bending and the clamps alone, so that no stiff term hides them.
     c.rod.stretch.setZero();
