@@ -50,6 +50,35 @@ std::vector<std::string> look_at_entry(const SceneFile& scene, const Surface& su
   return {};
 }
 
+/// "roll_45", as the scene counts it.
+std::string roll_name(const InsertionScene& scene, double roll) {
+  return "roll_" + format("%.10g", (roll - scene.roll_zero) / kRadPerDeg);
+}
+
+constexpr double kFarOutside = 10.0;  // of a line to start from                           [mm]
+
+/// Refuses a line to start from that leaves the vessel by more than a measurement may.
+void look_at_start(const SceneFile& scene, const Surface& surface) {
+  if (!scene.insertion || !scene.insertion->start) return;
+  const Eigen::Matrix3Xd line =
+      simulate::line_from_entry(scene.insertion->start->nodes, scene.insertion->introducer.point);
+  double most = 0.0;
+  Vec3 where = line.col(0);
+  for (Eigen::Index k = 1; k < line.cols(); ++k) {
+    const preprocess::InsideAnswer answer = preprocess::locate_point(surface, line.col(k));
+    if (answer.inside || answer.distance <= most) continue;
+    most = answer.distance;
+    where = line.col(k);
+  }
+  if (most <= kFarOutside) return;
+  Problems problems(scene.file.string());
+  problems.add("start.nodes_mm",
+               format("%.1f mm outside the vessel at ", most) + to_json(where).dump(),
+               format("a line in the vessel, or at most %.0f mm through its wall", kFarOutside),
+               "correct the points, or the surface's unit or frame");
+  problems.throw_if_any();
+}
+
 /// The surface of a scene's vessel, sound and with the wire's entry in it.
 struct SceneSurface {
   Surface surface;
@@ -61,6 +90,7 @@ SceneSurface read_scene_surface(const SceneFile& scene) {
   preprocess::RepairedSurface repaired =
       preprocess::read_sound_surface(file.path, file.unit, file.frame);
   std::vector<std::string> entry = look_at_entry(scene, repaired.surface);
+  look_at_start(scene, repaired.surface);
   return {std::move(repaired.surface), preprocess::tell_mends(repaired.mends), std::move(entry)};
 }
 
@@ -183,16 +213,32 @@ SceneAnswer run_bench_scene(const SceneFile& file, const LoadedVessel* vessel,
                      tip.y(), tip.z(), result.residual, result.iterations)};
 }
 
-SceneAnswer run_insertion_scene(const SceneFile& file, const LoadedVessel& vessel,
-                                const fs::path& folder) {
-  const InsertionScene& scene = *file.insertion;
+/// How the equilibrium lies to the line that the wire started from.
+std::string tell_start(const Json& start) {
+  const Json& distance = start.at("distance_mm");
+  if (distance.is_null()) return "";
+  return format(
+             "\nstart: the nearest equilibrium lies %.2f mm from the line on average, %.2f mm at "
+             "most, its tip %.2f mm",
+             distance.at("mean").get<double>(), distance.at("largest").get<double>(),
+             distance.at("tip").get<double>()) +
+         (start.at("roll_found").get<bool>() ? format("; the hub's roll is %.1f deg by the line",
+                                                      start.at("roll_deg").get<double>())
+                                             : std::string());
+}
+
+SceneAnswer run_insertion_scene(const SceneFile& file, const InsertionScene& scene,
+                                const LoadedVessel& vessel, const fs::path& folder) {
+  fs::create_directories(folder);
   const double start = plan::thread_cpu_seconds();
-  simulate::TrialResult result =
-      simulate::run_trial(scene.wire, scene.introducer, scene.goal, *vessel.model, scene.options);
+  simulate::TrialResult result = run_hand(scene, *vessel.model, scene.options);
   const double seconds = plan::thread_cpu_seconds() - start;
   for (simulate::PushTerms& terms : result.push_terms) terms.tip_roll -= scene.roll_zero;
   if (!scene.has_target && result.outcome == simulate::Outcome::kMissed) {
-    result.reason = "all of the wire went in; the scene has no target";
+    result.reason = std::string(!scene.moves.empty() ? "all moves were made"
+                                : scene.start ? "the wire went from its start to where it was to go"
+                                              : "all of the wire went in") +
+                    "; the scene has no target";
   }
   for (const auto& [from, to] : result.stuck) {
     result.reason +=
@@ -201,8 +247,12 @@ SceneAnswer run_insertion_scene(const SceneFile& file, const LoadedVessel& vesse
 
   const Sensitivity sensitivity = check_sensitivity(scene, *vessel.model, result);
   Json json = result_json(result, scene.options.record_every, seconds);
+  if (scene.start) {
+    json["start"] = start_json(result, *scene.start, scene.introducer.point, scene.roll_zero);
+  }
   json["sensitivity"] = sensitivity.json;
   if (!sensitivity.reason.empty()) json["sensitivity_reason"] = sensitivity.reason;
+  const std::string told = scene.start ? tell_start(json.at("start")) : "";
   write_result(std::move(json), file, &vessel, folder);
   write_forces(vessel, result.peak_forces, folder);
   preprocess::write_polyline(result.nodes, {}, folder / "wire.vtp");
@@ -228,10 +278,25 @@ SceneAnswer run_insertion_scene(const SceneFile& file, const LoadedVessel& vesse
                    last.tip.x(), last.tip.y(), last.tip.z(), last.residual);
   }
   if (!result.reason.empty()) line += "; " + result.reason;
+  line += told;
   if (!sensitivity.warning.empty()) line += "\n" + sensitivity.warning;
   return {result.outcome != simulate::Outcome::kNotConverged &&
               result.outcome != simulate::Outcome::kFailed,
           line};
+}
+
+/// One result per roll, in folders named by it; the vessel is the same.
+SceneAnswer run_rolls(const SceneFile& file, const LoadedVessel& vessel, const fs::path& folder) {
+  SceneAnswer all{.solved = true, .line = {}};
+  for (const double roll : file.insertion->rolls) {
+    InsertionScene scene = *file.insertion;
+    scene.introducer.roll = roll;
+    const std::string name = roll_name(*file.insertion, roll);
+    const SceneAnswer one = run_insertion_scene(file, scene, vessel, folder / name);
+    all.solved = all.solved && one.solved;
+    all.line += (all.line.empty() ? "" : "\n") + name + ": " + one.line;
+  }
+  return all;
 }
 
 }  // namespace
@@ -248,8 +313,9 @@ SceneAnswer run_scene_file(const SceneFile& scene, const fs::path& folder) {
   std::optional<LoadedVessel> vessel;
   if (scene.vessel) vessel = load_vessel(scene);
   fs::create_directories(folder);
-  return scene.bench ? run_bench_scene(scene, vessel ? &*vessel : nullptr, folder)
-                     : run_insertion_scene(scene, *vessel, folder);
+  if (scene.bench) return run_bench_scene(scene, vessel ? &*vessel : nullptr, folder);
+  if (!scene.insertion->rolls.empty()) return run_rolls(scene, *vessel, folder);
+  return run_insertion_scene(scene, *scene.insertion, *vessel, folder);
 }
 
 }  // namespace wireplan::pipeline

@@ -17,6 +17,9 @@ struct SceneAnswer {
 /// returns in sentences what was mended, and that it touches the wall where it enters.
 std::vector<std::string> check_scene_vessel(const SceneFile& scene);
 
+/// Of a scene with a list of rolls all this is written for each, into a folder named by it
+/// (roll_45), with the vessel built once.
+///
 /// Writes into `folder`: result.json, wire.vtp and wire.png; of an insertion also the shapes on the
 /// way, shapes.pvd; in a vessel also forces.vtu, the wall with the force that each triangle took
 /// (`peak_force_n`). Throws Error where check_scene_vessel() does or a file cannot be written.

@@ -26,23 +26,10 @@ double count_work(const simulate::TrialResult& result) {
   return work * static_cast<double>(result.nodes.cols()) / result.pushes.back().insertion;
 }
 
-/// The nearest point of a polyline.
-Vec3 nearest_on(const Eigen::Matrix3Xd& nodes, const Vec3& point) {
-  Vec3 nearest = nodes.col(0);
-  for (Eigen::Index i = 0; i + 1 < nodes.cols(); ++i) {
-    const Vec3 a = nodes.col(i), edge = nodes.col(i + 1) - a;
-    const double squared = edge.squaredNorm();
-    const double part = squared > 0.0 ? std::clamp((point - a).dot(edge) / squared, 0.0, 1.0) : 0.0;
-    const Vec3 here = a + part * edge;
-    if ((here - point).squaredNorm() < (nearest - point).squaredNorm()) nearest = here;
-  }
-  return nearest;
-}
-
 double farthest_from(const Eigen::Matrix3Xd& nodes, const Eigen::Matrix3Xd& other) {
   double most = 0.0;
   for (Eigen::Index i = 0; i < nodes.cols(); ++i) {
-    most = std::max(most, (nearest_on(other, nodes.col(i)) - nodes.col(i)).norm());
+    most = std::max(most, (simulate::nearest_on_line(other, nodes.col(i)) - nodes.col(i)).norm());
   }
   return most;
 }
@@ -80,7 +67,7 @@ double width_at_tip(const Eigen::Matrix3Xd& nodes, const simulate::Lumen& lumen)
 /// wide, with lumen all along the line between.
 bool passes_tip(const Eigen::Matrix3Xd& other, const Eigen::Matrix3Xd& nodes,
                 const simulate::Lumen& lumen) {
-  const Vec3 tip = nodes.rightCols<1>(), way = nearest_on(other, tip) - tip;
+  const Vec3 tip = nodes.rightCols<1>(), way = simulate::nearest_on_line(other, tip) - tip;
   const double distance = way.norm();
   if (distance == 0.0) return true;
   return distance <= width_at_tip(nodes, lumen) + kSightStep &&
@@ -161,6 +148,19 @@ std::string tell_apart(const OtherRun& run, const simulate::TrialResult& other,
 
 }  // namespace
 
+simulate::TrialResult run_hand(const InsertionScene& scene, const simulate::VesselModel& vessel,
+                               const simulate::InsertionOptions& options) {
+  if (!scene.start && scene.moves.empty()) {
+    return simulate::run_trial(scene.wire, scene.introducer, scene.goal, vessel, options);
+  }
+  simulate::Trial trial(scene.wire, scene.introducer, scene.goal, vessel, options);
+  if (!scene.start || trial.start(*scene.start)) {
+    for (const simulate::Move& move : scene.moves) trial.make(move);
+    if (scene.depth) trial.make({.push = *scene.depth - trial.depth()});
+  }
+  return trial.finish();
+}
+
 double largest_distance(const Eigen::Matrix3Xd& nodes_a, const Eigen::Matrix3Xd& nodes_b) {
   return std::max(farthest_from(nodes_a, nodes_b), farthest_from(nodes_b, nodes_a));
 }
@@ -188,8 +188,7 @@ Sensitivity check_sensitivity(const InsertionScene& scene, const simulate::Vesse
   std::string apart;
   Json rows = Json::array();
   for (const OtherRun& run : other_runs(scene.options)) {
-    const simulate::TrialResult other =
-        simulate::run_trial(scene.wire, scene.introducer, scene.goal, vessel, run.options);
+    const simulate::TrialResult other = run_hand(scene, vessel, run.options);
     const Comparison compared = compare_ends(result, other, scene.introducer.point, vessel.lumen);
     rows.push_back(row_of_run(run, other, compared));
     largest = std::max(largest, compared.distance);

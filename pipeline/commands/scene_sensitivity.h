@@ -16,6 +16,10 @@ struct Sensitivity {
   std::string warning;  // where one ends more than 1 mm, a branch or an outcome apart; else empty
 };
 
+/// What the hand does in the scene, once: from its start, if it has one, its moves or its push.
+simulate::TrialResult run_hand(const InsertionScene& scene, const simulate::VesselModel& vessel,
+                               const simulate::InsertionOptions& options);
+
 /// Runs the scene five times more: with a quarter, half, twice and four times the push's step, and
 /// with elements a tenth shorter. Where the scene does not say whether, it does so after a short
 /// first run, of which `result` is what came.

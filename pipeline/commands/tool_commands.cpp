@@ -100,7 +100,11 @@ int simulate_file(const std::string& path, const std::string& given_output) {
   const fs::path output =
       given_output.empty() ? fs::path("wireplan-out") / scene.name : fs::path(given_output);
   const SceneAnswer answer = run_scene_file(scene, output);
-  std::cout << answer.line << "\nresult: " << (output / "result.json").string() << "\n";
+  const bool listed = scene.insertion && !scene.insertion->rolls.empty();
+  std::cout << answer.line << "\n"
+            << (listed ? "results: " + (output / "roll_*" / "result.json").string()
+                       : "result: " + (output / "result.json").string())
+            << "\n";
   return answer.solved ? kDone : kNoPlan;
 }
 

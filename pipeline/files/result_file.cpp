@@ -78,6 +78,7 @@ Json energy_json(const simulate::Energy& energy) {
   put(json, "stretch", energy.stretch);
   put(json, "bend", energy.bend);
   put(json, "twist", energy.twist);
+  if (energy.load != 0.0) put(json, "gravity", energy.load);
   put(json, "contact", energy.contact);
   put(json, "wall", energy.wall);
   put(json, "total", energy.total());
@@ -99,10 +100,26 @@ void put_work(Json& json, const simulate::Push& push) {
   put(json, "energy_unbalanced_n_mm", push.unbalanced);
 }
 
-/// One row per `every_mm` of insertion, and one for the last push.
+/// How far the hand went until after each push: as far as the wire is in, and twice what it pulled
+/// back, and for each turn by 30 degrees as far as one row is from the next [mm].
+std::vector<double> ways_of_hand(const std::vector<simulate::Push>& pushes, double every_mm) {
+  std::vector<double> ways;
+  double back = 0.0, turned = 0.0;
+  for (std::size_t i = 0; i < pushes.size(); ++i) {
+    if (i > 0) {
+      back += std::max(0.0, pushes[i - 1].insertion - pushes[i].insertion);
+      turned += std::abs(pushes[i].hub_angle - pushes[i - 1].hub_angle);
+    }
+    ways.push_back(pushes[i].insertion + 2.0 * back + turned / (30.0 * kRadPerDeg) * every_mm);
+  }
+  return ways;
+}
+
+/// One row per `every_mm` of the hand's way, and one for the last push.
 Json history_json(const simulate::TrialResult& result, double every_mm) {
   const std::vector<simulate::Push>& pushes = result.pushes;
   Json rows = Json::array();
+  const std::vector<double> ways = ways_of_hand(pushes, every_mm);
   double next = every_mm, peak = 0.0, peak_tip = 0.0, penetration = 0.0, displacement = 0.0;
   for (std::size_t i = 0; i < pushes.size(); ++i) {
     const simulate::Push& push = pushes[i];
@@ -110,9 +127,10 @@ Json history_json(const simulate::TrialResult& result, double every_mm) {
     peak_tip = std::max(peak_tip, push.tip_force);
     penetration = std::max(penetration, push.max_penetration);
     displacement = std::max(displacement, push.wall_displacement);
-    if (push.insertion < next && i + 1 < pushes.size()) continue;
+    if (ways[i] < next && i + 1 < pushes.size()) continue;
     Json row;
     put(row, "insertion_mm", push.insertion);
+    put(row, "hub_turn_deg", push.hub_angle / kRadPerDeg);
     put_hand(row, push, result.push_terms.at(i));
     put_points(row, "tip_mm", push.tip);
     put(row, "peak_tip_force_n", peak_tip);
@@ -127,7 +145,7 @@ Json history_json(const simulate::TrialResult& result, double every_mm) {
     row["iterations"] = push.iterations;
     rows.push_back(row);
     peak = peak_tip = penetration = displacement = 0.0;
-    while (next <= push.insertion) next += every_mm;
+    while (next <= ways[i]) next += every_mm;
   }
   return rows;
 }
@@ -189,6 +207,26 @@ Json result_json(const simulate::TrialResult& result, double every_mm, double cp
   put(json, "max_wall_displacement_mm", displacement);
   if (!result.stuck.empty()) json["stuck_mm"] = result.stuck;
   json["history"] = history_json(result, every_mm);
+  return json;
+}
+
+Json start_json(const simulate::TrialResult& result, const simulate::StartLine& line,
+                const Vec3& entry, double roll_zero) {
+  Json json = {{"length_mm", line.length}};
+  put(json, "roll_deg", std::remainder(result.roll - roll_zero, 2.0 * kPi) / kRadPerDeg);
+  json["roll_found"] = line.find_roll;
+  if (!result.start) {
+    json["distance_mm"] = nullptr;
+    json["distance_mm_reason"] = "no equilibrium was found near the line";
+    return json;
+  }
+  Eigen::Matrix3Xd wire(3, result.start->nodes.cols() + 1);
+  wire << entry, result.start->nodes;
+  const simulate::LineDistance distance =
+      simulate::find_distance(wire, simulate::line_from_entry(line.nodes, entry));
+  json["distance_mm"] = {
+      {"mean", distance.mean}, {"largest", distance.largest}, {"tip", distance.tip}};
+  put_points(json, "nodes_mm", result.start->nodes);
   return json;
 }
 

@@ -17,4 +17,9 @@ Json result_json(const simulate::SceneResult& result,
 /// whose forces are the largest since the row before.
 Json result_json(const simulate::TrialResult& result, double every_mm, double cpu_time_s);
 
+/// Of one that started from a line: how the equilibrium lies to the line, from `entry` on. The
+/// hub's roll is told as a scene counts it, whose 0 is `roll_zero`.
+Json start_json(const simulate::TrialResult& result, const simulate::StartLine& line,
+                const Vec3& entry, double roll_zero);
+
 }  // namespace wireplan::pipeline

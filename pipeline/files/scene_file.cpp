@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "pipeline/files/catalogue.h"
+#include "pipeline/files/hand_file.h"
 #include "pipeline/files/json_reader.h"
 #include "pipeline/files/markups_file.h"
 
@@ -486,28 +487,18 @@ InsertionScene read_insertion_scene(JsonReader& root, const simulate::Scene& wir
   refuse(root, "supports", "supports beside the introducer are");
   refuse(root, "plane_normal", "tables in a vessel are");
   const simulate::Loads loads = read_loads(root);
-  if (!loads.gravity.isZero(0.0) || !loads.tip_force.isZero(0.0) || !loads.tip_moment.isZero(0.0) ||
-      loads.tip_torque != 0.0) {
-    root.problems().add("loads", root.raw("loads").dump(), "none but 0",
-                        "loads on a wire in a vessel are not in this version");
+  if (!loads.tip_force.isZero(0.0) || !loads.tip_moment.isZero(0.0) || loads.tip_torque != 0.0) {
+    root.problems().add("loads", root.raw("loads").dump(), "none but 0, and gravity",
+                        "forces and moments on a wire in a vessel are not in this version");
   }
-
-  // The introducer and the push.
-  JsonReader insertion = root.object("insertion", true);
-  scene.introducer.point = insertion.point("point_mm", std::nullopt);
-  scene.introducer.direction = insertion.direction("direction", std::nullopt);
-  scene.roll_zero = roll_of_anterior(scene.introducer.direction);
-  scene.introducer.roll =
-      scene.roll_zero +
-      insertion.number("roll_deg", 0.0, {.min = -360.0, .max = 360.0}) * kRadPerDeg;
-  scene.options.length = insertion.number("length_mm", std::nullopt, kAboveZero);
-  scene.options.step = insertion.number("step_mm", scene.options.step, kAboveZero);
-  scene.options.push_on = insertion.choice("when_stuck", "stop", {"stop", "push_on"}) == "push_on";
-  insertion.finish();
-  if (root.problems().empty() && scene.options.length > scene.wire.length()) {
-    root.problems().add("insertion.length_mm", Json(scene.options.length).dump(),
-                        "at most the wire's length, " + Json(scene.wire.length()).dump());
+  const auto massless = [](const simulate::Section& s) { return s.mass_per_length == 0.0; };
+  const std::vector<simulate::Section>& sections = scene.wire.sections;
+  if (!loads.gravity.isZero(0.0) && std::all_of(sections.begin(), sections.end(), massless)) {
+    root.problems().add("loads.gravity_m_per_s2", "not 0", "a wire with a mass",
+                        "give mass_kg_per_m in wire.sections");
   }
+  scene.options.gravity = loads.gravity;
+  read_hand(root, scene);
 
   // How finely.
   const simulate::SolverOptions solver = read_solver(root);
@@ -541,14 +532,6 @@ double axial_stiffness_from_paper(double stretch_coefficient, double edge_length
 double bending_stiffness_from_paper(double bend_coefficient, double edge_length) {
   const double h = edge_length / kMmPerM;                   // [m]
   return bend_coefficient * h * h * h * kMmPerM * kMmPerM;  // N m^2 -> N mm^2
-}
-
-double roll_of_anterior(const Vec3& direction) {
-  constexpr double kAlongY = 1e-6;  // sine
-  const Vec3 anterior = -Vec3::UnitY(), from = simulate::reference_normal(direction);
-  const Vec3 square = anterior - anterior.dot(direction) * direction;
-  if (square.norm() < kAlongY || from.isApprox(square.normalized(), 1e-12)) return 0.0;
-  return std::atan2(square.dot(direction.cross(from)), square.dot(from));
 }
 
 SceneFile read_scene(const std::filesystem::path& path) {

@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "pipeline/files/case_file.h"
 #include "simulate/insertion/scene.h"
@@ -31,6 +32,12 @@ double roll_of_anterior(const Vec3& direction);
 struct InsertionScene {
   simulate::Wire wire;
   simulate::Introducer introducer;
+  std::vector<double> rolls = {};  // where the scene lists several: of the introducer, one per
+                                   // result, as its own roll [rad]
+  std::vector<simulate::Move> moves = {};         // empty: pushed in by options.length, or, from a
+                                                  // start, on to `depth`
+  std::optional<double> depth = {};               // in the end, from a start              [mm]
+  std::optional<simulate::StartLine> start = {};  // the line that the wire starts from
   double roll_zero = 0.0;  // of the scene, in the introducer's roll: see roll_of_anterior()  [rad]
   simulate::Goal goal;     // where the scene gives none: one so far away that no tip reaches it
   bool has_target = false;

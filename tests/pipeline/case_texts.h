@@ -259,4 +259,25 @@ inline Json voxel_case(bool listed) {
   return json;
 }
 
+/// Scenes in order but for one value.
+class SceneMistakes : public CaseFile {
+ protected:
+  struct Mistake {
+    Json scene;
+    std::string pointer;
+    Json value;
+    std::vector<std::string> told;
+  };
+
+  void expect_each_told(const std::vector<Mistake>& mistakes) const {
+    for (const Mistake& mistake : mistakes) {
+      SCOPED_TRACE(mistake.pointer);
+      Json scene = mistake.scene;
+      EXPECT_EQ(scene_problem(scene), "");
+      scene[Json::json_pointer(mistake.pointer)] = mistake.value;
+      expect_mentions(scene_problem(scene), mistake.told);
+    }
+  }
+};
+
 }  // namespace wireplan::pipeline

@@ -4,8 +4,10 @@
 #include <array>
 #include <chrono>
 #include <functional>
+#include <set>
 
 #include "pipeline/files/catalogue.h"
+#include "pipeline/files/text.h"
 #include "preprocess/volume/image.h"
 #include "tests/dicom.h"
 #include "tests/pipeline/finished_case.h"
@@ -275,6 +277,111 @@ TEST_F(CommandLine, PushesAStuckWireOnWhereASceneSaysSo) {
   const double end = before.at("history").back().at("insertion_mm");
   EXPECT_NEAR(after.at("stuck_mm")[0][0].get<double>(), end - 20.0, 1e-9);
   EXPECT_GT(after.at("history").back().at("insertion_mm").get<double>(), end);
+}
+
+/// The text of a result but for what it took.
+std::string text_without_time(const fs::path& result) {
+  Json json = read_json(result, "wireplan.result/1");
+  json.erase("cpu_time_s");
+  return json.dump();
+}
+
+TEST_F(CommandLine, AListOfRollsGivesWhatEachGivesAlone) {
+  Json scene = tube_scene();
+  Json tip = scene["wire"]["sections"][0];
+  tip["length_mm"] = 8;
+  tip["rest_curvature_per_mm"] = 0.1;
+  scene["wire"]["sections"].insert(scene["wire"]["sections"].begin(), tip);
+  scene["vessel"]["wall"]["model"] = "rigid";
+  scene["insertion"]["roll_deg"] = {0, 137.5, -20};
+  write_json(scene, folder_ / "scene.json");
+  const Answer answer = call("simulate scene.json -o listed");
+  ASSERT_EQ(answer.code, 0) << answer.log;
+  std::set<std::string> texts;
+  for (const double roll : {0.0, 137.5, -20.0}) {
+    const std::string name = "roll_" + format("%g", roll);
+    EXPECT_NE(answer.out.find(name + ": "), std::string::npos) << answer.out;
+    scene["insertion"]["roll_deg"] = roll;
+    write_json(scene, folder_ / "scene.json");
+    ASSERT_EQ(call("simulate scene.json -o alone").code, 0);
+    const std::string text = text_without_time(folder_ / "listed" / name / "result.json");
+    EXPECT_EQ(text, text_without_time(folder_ / "alone" / "result.json"));
+    texts.insert(text);
+  }
+  EXPECT_EQ(texts.size(), 3u) << "a roll changes something";
+}
+
+TEST_F(CommandLine, MovesOfASceneAreThoseOfThePushAndComeBack) {
+  Json scene = tube_scene();
+  scene["vessel"].erase("friction");
+  write_json(scene, folder_ / "scene.json");
+  ASSERT_EQ(call("simulate scene.json -o pushed").code, 0);
+  const auto nodes_after = [&](const Json& moves, const std::string& folder) {
+    scene["insertion"].erase("length_mm");
+    scene["insertion"]["moves"] = moves;
+    write_json(scene, folder_ / "scene.json");
+    const Answer answer = call("simulate scene.json -o " + folder);
+    EXPECT_EQ(answer.code, 0) << answer.log;
+    EXPECT_NE(answer.out.find("all moves were made"), std::string::npos) << answer.out;
+    return read_json(folder_ / folder / "result.json", "wireplan.result/1").at("nodes_mm");
+  };
+  const Json once =
+      read_json(folder_ / "pushed" / "result.json", "wireplan.result/1").at("nodes_mm");
+  EXPECT_EQ(nodes_after(Json::array({{{"push_mm", 12}}, {{"push_mm", 8}}}), "twice"), once);
+  const Json back = nodes_after(
+      Json::array({{{"push_mm", 30}}, {{"turn_deg", 90}}, {{"pull_mm", 10}, {"turn_deg", 30}}}),
+      "back");
+  ASSERT_EQ(back.size(), once.size());
+  EXPECT_LT((points_of(back) - points_of(once)).colwise().norm().maxCoeff(), 0.05);
+  const Json history =
+      read_json(folder_ / "back" / "result.json", "wireplan.result/1").at("history");
+  EXPECT_NEAR(history.back().at("insertion_mm").get<double>(), 20.0, 1e-9);
+  EXPECT_NEAR(history.back().at("hub_turn_deg").get<double>(), 120.0, 1e-9);
+}
+
+TEST_F(CommandLine, ASceneStartsFromTheShapeOfAnother) {
+  Json scene = tube_scene();
+  write_json(scene, folder_ / "scene.json");
+  ASSERT_EQ(call("simulate scene.json -o pushed").code, 0);
+  const Json pushed = read_json(folder_ / "pushed" / "result.json", "wireplan.result/1");
+  scene["insertion"].erase("length_mm");
+  scene["start"] = {{"nodes_mm", pushed.at("nodes_mm")}, {"length_mm", 20}};
+  write_json(scene, folder_ / "scene.json");
+  const Answer answer = call("simulate scene.json -o lying");
+  ASSERT_EQ(answer.code, 0) << answer.log;
+  EXPECT_NE(answer.out.find("start: the nearest equilibrium lies 0."), std::string::npos)
+      << answer.out;
+  const Json lying = read_json(folder_ / "lying" / "result.json", "wireplan.result/1");
+  const Json& start = lying.at("start");
+  EXPECT_EQ(start.at("nodes_mm"), lying.at("nodes_mm"));
+  EXPECT_EQ(start.at("length_mm"), 20.0);
+  // Friction pushed as it came in, and holds as it lies: that much it gives way.
+  EXPECT_LT(start.at("distance_mm").at("largest").get<double>(), 0.1);
+  EXPECT_LT((points_of(lying.at("nodes_mm")) - points_of(pushed.at("nodes_mm")))
+                .colwise()
+                .norm()
+                .maxCoeff(),
+            0.1);
+
+  // On to another depth, as pushing there would.
+  scene["insertion"]["length_mm"] = 26;
+  write_json(scene, folder_ / "scene.json");
+  ASSERT_EQ(call("simulate scene.json -o on").code, 0);
+  EXPECT_NEAR(read_json(folder_ / "on" / "result.json", "wireplan.result/1")
+                  .at("history")
+                  .back()
+                  .at("insertion_mm")
+                  .get<double>(),
+              26.0, 1e-9);
+
+  scene["start"] = {{"nodes_mm", {{0, 0, 6}, {0, 0, 14}, {19, 0, 14}}}};
+  write_json(scene, folder_ / "scene.json");
+  for (const char* command : {"check scene.json", "simulate scene.json -o far"}) {
+    const Answer far = call(command);
+    EXPECT_EQ(far.code, 2) << command;
+    EXPECT_NE(far.log.find("start.nodes_mm is 15.0 mm outside the vessel"), std::string::npos)
+        << far.log;
+  }
 }
 
 TEST_F(CommandLine, SimulatesABenchWithinAVessel) {

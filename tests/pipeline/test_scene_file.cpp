@@ -16,6 +16,7 @@
 
 #include "pipeline/files/case_file.h"
 #include "pipeline/files/catalogue.h"
+#include "pipeline/files/hand_file.h"
 #include "pipeline/files/result_file.h"
 #include "pipeline/files/scene_file.h"
 #include "tests/pipeline/case_texts.h"
@@ -300,27 +301,6 @@ TEST_F(CaseFile, BenchTakesFrictionAndSpacingFromItsVessel) {
   EXPECT_EQ(file.bench->contact.spacing, 0.5);
 }
 
-/// Scenes in order but for one value.
-class SceneMistakes : public CaseFile {
- protected:
-  struct Mistake {
-    Json scene;
-    std::string pointer;
-    Json value;
-    std::vector<std::string> told;
-  };
-
-  void expect_each_told(const std::vector<Mistake>& mistakes) const {
-    for (const Mistake& mistake : mistakes) {
-      SCOPED_TRACE(mistake.pointer);
-      Json scene = mistake.scene;
-      EXPECT_EQ(scene_problem(scene), "");
-      scene[Json::json_pointer(mistake.pointer)] = mistake.value;
-      expect_mentions(scene_problem(scene), mistake.told);
-    }
-  }
-};
-
 TEST_F(SceneMistakes, ThatTheMethodCannotDoAreTold) {
   const std::vector<Mistake> mistakes = {
       {cantilever(), "/solver/method", "newtn", {"solver.method is \"newtn\"", "\"newton\""}},
@@ -419,7 +399,7 @@ TEST_F(SceneMistakes, AreToldAndWhatIsNotInThisVersion) {
       {pushed_wire(), "/vessel/surface/path", "none.stl", {"vessel.surface.path", "none.stl"}},
       {pushed_wire(), "/insertion/length_mm", 50, {"insertion.length_mm is 50", "40"}},
       {pushed_wire(), "/insertion/when_stuck", "push", {"insertion.when_stuck", "\"push_on\""}},
-      {pushed_wire(), "/loads/gravity_m_per_s2", {0, 0, -9.81}, {"loads is", "version"}},
+      {pushed_wire(), "/loads/tip_force_n", {0, 0, 1}, {"loads is", "version"}},
       {pushed_wire(), "/supports", Json::array({1}), {"supports is given", "version"}},
   };
   expect_each_told(mistakes);

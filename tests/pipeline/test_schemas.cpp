@@ -94,6 +94,12 @@ TEST(Schemas, WhatTheProgramWritesKeepsToThem) {
   pushed["insertion"] = {{"point_mm", {0, 0, 6}}, {"direction", {0.3, 0, 1}}, {"length_mm", 20}};
   write_json(pushed, folder / "pushed.json");
   ASSERT_EQ(run_program(folder.path(), "simulate pushed.json -o pushed").code, 0);
+  pushed["insertion"].erase("length_mm");
+  pushed["insertion"]["roll_deg"] = {0, 45};
+  pushed["insertion"]["moves"] = Json::array({{{"push_mm", 5}}, {{"pull_mm", 2}, {"turn_deg", 9}}});
+  pushed["start"] = {{"nodes_mm", {{0, 0, 6}, {1, 0, 12}, {2, 0, 18}}}};
+  write_json(pushed, folder / "moved.json");
+  ASSERT_EQ(run_program(folder.path(), "simulate moved.json -o moved").code, 0);
   expect_follows_schemas(folder.path());
 }
 

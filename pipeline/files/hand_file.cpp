@@ -1,0 +1,220 @@
+#include "pipeline/files/hand_file.h"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+
+#include "pipeline/files/text.h"
+
+namespace wireplan::pipeline {
+namespace {
+
+constexpr Range kMoreThanNothing{.min = 0.0, .open_min = true};
+constexpr Range kHubTurn{.min = -36000.0, .max = 36000.0};
+constexpr Range kHubRoll{.min = -360.0, .max = 360.0};
+constexpr double kFarFromEntry = 10.0;  // that a line to start from may pass it by          [mm]
+constexpr std::size_t kMostRolls = 360, kMostMoves = 10000;
+
+/// One roll, or a list of them; none where a wire that starts from a line is to tell its own.
+void read_rolls(JsonReader& insertion, bool starts, InsertionScene& scene) {
+  scene.roll_zero = roll_of_anterior(scene.introducer.direction);
+  scene.introducer.roll = scene.roll_zero;
+  if (scene.start) scene.start->find_roll = !insertion.has("roll_deg");
+  if (starts && !insertion.has("roll_deg")) return;
+  if (!insertion.raw("roll_deg").is_array()) {
+    scene.introducer.roll += insertion.number("roll_deg", 0.0, kHubRoll) * kRadPerDeg;
+    return;
+  }
+  const std::vector<double> given = insertion.numbers("roll_deg", std::nullopt, kHubRoll);
+  for (std::size_t k = 0; k < given.size(); ++k) {
+    if (std::find(given.begin(), given.begin() + static_cast<std::ptrdiff_t>(k), given[k]) !=
+        given.begin() + static_cast<std::ptrdiff_t>(k)) {
+      insertion.problems().add(insertion.path_of("roll_deg") + "[" + std::to_string(k) + "]",
+                               Json(given[k]).dump() + " again", "each roll once",
+                               "its result has the roll's name");
+    }
+    scene.rolls.push_back(scene.roll_zero + given[k] * kRadPerDeg);
+  }
+  if (given.size() > kMostRolls) {
+    insertion.problems().add(insertion.path_of("roll_deg"), std::to_string(given.size()) + " rolls",
+                             "at most " + std::to_string(kMostRolls));
+  }
+  if (!scene.rolls.empty()) scene.introducer.roll = scene.rolls.front();
+}
+
+/// {"push_mm": 50}, {"pull_mm": 10}, {"turn_deg": 90}, or a turn beside one of the others.
+simulate::Move read_move(JsonReader& reader) {
+  simulate::Move move;
+  const bool pushes = reader.has("push_mm"), pulls = reader.has("pull_mm");
+  const bool turns = reader.has("turn_deg");
+  if (pushes) move.push = reader.number("push_mm", std::nullopt, kMoreThanNothing);
+  if (pulls) {
+    const double pull = reader.number("pull_mm", std::nullopt, kMoreThanNothing);
+    if (!pushes) move.push = -pull;
+  }
+  if (turns) {
+    move.turn = reader.number("turn_deg", std::nullopt, kHubTurn) * kRadPerDeg;
+    if (move.turn == 0.0) {
+      reader.problems().add(reader.path_of("turn_deg"), "0", "an angle other than 0",
+                            "right-handed about the direction; leave it out for no turn");
+    }
+  }
+  if (pushes && pulls) {
+    reader.problems().add(reader.path_of("pull_mm"), "given beside push_mm", "one of both",
+                          "make two moves of it");
+  }
+  reader.finish();
+  if (!pushes && !pulls && !turns) {
+    reader.problems().add(reader.path_of("push_mm"), "missing",
+                          "push_mm, pull_mm, turn_deg, or a turn beside a push or a pull");
+  }
+  return move;
+}
+
+/// Follows the wire in the vessel through the moves, from `depth` on: some stays there, and no more
+/// goes in than there is.
+void check_moves(JsonReader& insertion, double depth, InsertionScene& scene) {
+  const double whole = scene.wire.length(), least = scene.options.step;
+  scene.options.length = std::max(scene.options.length, depth);
+  for (std::size_t k = 0; k < scene.moves.size(); ++k) {
+    const simulate::Move& move = scene.moves[k];
+    const std::string key = insertion.path_of("moves") + "[" + std::to_string(k) + "]";
+    const double before = depth;
+    depth += move.push;
+    if (move.push < 0.0 && depth < least - 1e-9) {
+      insertion.problems().add(key + ".pull_mm", Json(-move.push).dump(),
+                               "at most " + format("%.6g", std::max(0.0, before - least)) +
+                                   ", so that step_mm of the wire stays in the vessel",
+                               format("%.6g mm are in it by then", before));
+      return;
+    }
+    if (depth > whole + 1e-9) {
+      insertion.problems().add(
+          key + ".push_mm", Json(move.push).dump(), "at most " + format("%.6g", whole - before),
+          format("the wire is %.6g mm long, and %.6g mm are in by then", whole, before));
+      return;
+    }
+    if (depth <= 0.0) {
+      insertion.problems().add(key + ".turn_deg", "given before a push", "a push first",
+                               "the wire is not in the vessel yet; roll_deg rolls the hub");
+      return;
+    }
+    scene.options.length = std::max(scene.options.length, depth);
+  }
+}
+
+void read_moves(JsonReader& insertion, InsertionScene& scene) {
+  if (insertion.raw("moves").is_array() && insertion.raw("moves").empty()) {
+    insertion.problems().add(insertion.path_of("moves"), "[]", "one move at least",
+                             "for a straight push give length_mm");
+  }
+  std::vector<JsonReader> readers = insertion.objects("moves", true);
+  if (readers.size() > kMostMoves) {
+    insertion.problems().add(insertion.path_of("moves"), std::to_string(readers.size()) + " moves",
+                             "at most " + std::to_string(kMostMoves));
+    return;
+  }
+  for (JsonReader& reader : readers) scene.moves.push_back(read_move(reader));
+  if (insertion.has("length_mm")) {
+    insertion.problems().add(insertion.path_of("length_mm"), "given beside moves", "no such key",
+                             "the moves tell how far; delete either");
+  }
+}
+
+/// The line that the wire starts from; what it is to the entry is checked once that is known.
+simulate::StartLine read_start(JsonReader& root) {
+  simulate::StartLine line;
+  JsonReader start = root.object("start", true);
+  const std::vector<Vec3> nodes = start.points("nodes_mm", true);
+  line.nodes.resize(3, static_cast<Eigen::Index>(nodes.size()));
+  for (std::size_t k = 0; k < nodes.size(); ++k)
+    line.nodes.col(static_cast<Eigen::Index>(k)) = nodes[k];
+  if (start.has("length_mm"))
+    line.length = start.number("length_mm", std::nullopt, kMoreThanNothing);
+  start.finish();
+  if (nodes.size() == 1) {
+    root.problems().add("start.nodes_mm", "one point", "two points at least, proximal to distal");
+  }
+  return line;
+}
+
+/// Makes the length that is in the vessel at the start sure.
+void check_start(Problems& problems, InsertionScene& scene) {
+  simulate::StartLine& start = *scene.start;
+  const double whole = scene.wire.length();
+  if (start.length > whole) {
+    problems.add("start.length_mm", Json(start.length).dump(),
+                 "at most the wire's length, " + Json(whole).dump());
+  }
+  if (!problems.empty()) return;
+  const Vec3& entry = scene.introducer.point;
+  const double off = (simulate::nearest_on_line(start.nodes, entry) - entry).norm();
+  if (off > kFarFromEntry) {
+    problems.add("start.nodes_mm", format("%.1f mm from insertion.point_mm at the nearest", off),
+                 format("a line that comes within %.0f mm of it", kFarFromEntry),
+                 "the wire goes from there on along the line; move the point onto it");
+    return;
+  }
+  const Eigen::Matrix3Xd line = simulate::line_from_entry(start.nodes, entry);
+  const double length = simulate::arc_length(line);
+  const double least = 4.0 * scene.options.step;
+  if (length < least) {
+    problems.add("start.nodes_mm", format("%.3g mm long from insertion.point_mm on", length),
+                 format("at least four steps, %.3g mm", least),
+                 "points go from proximal to distal; give the other order?");
+    return;
+  }
+  if (start.length == 0.0) start.length = length;
+  if (start.length > whole) {
+    problems.add("start.nodes_mm", format("%.6g mm long from insertion.point_mm on", length),
+                 "at most the wire's length, " + Json(whole).dump(),
+                 "make the wire longer, or say with start.length_mm how much of it lies there");
+  } else if (std::abs(length - start.length) > 0.05 * start.length) {
+    problems.add("start.length_mm", Json(start.length).dump(),
+                 format("the line's length from insertion.point_mm on, %.6g, within 5 %%", length),
+                 "leave it out to take that");
+  }
+}
+
+}  // namespace
+
+double roll_of_anterior(const Vec3& direction) {
+  constexpr double kAlongY = 1e-6;  // sine
+  const Vec3 anterior = -Vec3::UnitY(), from = simulate::reference_normal(direction);
+  const Vec3 square = anterior - anterior.dot(direction) * direction;
+  if (square.norm() < kAlongY || from.isApprox(square.normalized(), 1e-12)) return 0.0;
+  return std::atan2(square.dot(direction.cross(from)), square.dot(from));
+}
+
+void read_hand(JsonReader& root, InsertionScene& scene) {
+  if (root.has("start")) scene.start = read_start(root);
+  JsonReader insertion = root.object("insertion", true);
+  scene.introducer.point = insertion.point("point_mm", std::nullopt);
+  scene.introducer.direction = insertion.direction("direction", std::nullopt);
+  read_rolls(insertion, scene.start.has_value(), scene);
+  scene.options.step = insertion.number("step_mm", scene.options.step, kMoreThanNothing);
+  const bool moves = insertion.has("moves");
+  if (moves) read_moves(insertion, scene);
+  const bool pushed = insertion.has("length_mm") || (!moves && !scene.start);
+  if (pushed) {
+    scene.options.length = insertion.number("length_mm", std::nullopt, kMoreThanNothing);
+  }
+  scene.options.push_on = insertion.choice("when_stuck", "stop", {"stop", "push_on"}) == "push_on";
+  insertion.finish();
+  if (scene.start) check_start(root.problems(), scene);
+  if (!root.problems().empty()) return;
+  if (pushed && !moves && scene.options.length > scene.wire.length()) {
+    root.problems().add("insertion.length_mm", Json(scene.options.length).dump(),
+                        "at most the wire's length, " + Json(scene.wire.length()).dump());
+  }
+  const double depth = scene.start ? scene.start->length : 0.0;
+  if (moves) {
+    scene.options.length = 0.0;
+    check_moves(insertion, depth, scene);
+  } else if (scene.start) {
+    scene.depth = pushed ? scene.options.length : depth;
+    scene.options.length = std::max(depth, *scene.depth);
+  }
+}
+
+}  // namespace wireplan::pipeline
