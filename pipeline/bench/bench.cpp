@@ -82,10 +82,12 @@ void run_bench(const std::string& name, const std::filesystem::path& folder,
                            : name == "throughput"   ? bench_throughput
                            : name == "preprocess"   ? bench_preprocess
                            : name == "segmentation" ? bench_segmentation
+                           : name == "measured"     ? bench_measured
                                                     : nullptr;
   if (make_report == nullptr) {
-    throw Error("bench: NAME is '" + name +
-                "', expected accuracy, stability, throughput, preprocess or segmentation");
+    throw Error(
+        "bench: NAME is '" + name +
+        "', expected accuracy, stability, throughput, preprocess, segmentation or measured");
   }
   if (make_report != bench_throughput && !options.case_path.empty()) {
     throw Error("bench: --case is '" + options.case_path +
@@ -95,8 +97,16 @@ void run_bench(const std::string& name, const std::filesystem::path& folder,
     throw Error("bench: " + name +
                 " is given patients or --data, expected none: only segmentation takes them");
   }
+  if (make_report != bench_measured && !options.measured.empty()) {
+    throw Error("bench: " + name + " is given the folder '" + options.measured.string() +
+                "', expected none: only measured takes one");
+  }
   std::filesystem::create_directories(folder);
   const BenchReport report = make_report(options);
+  if (report.rows.empty()) {
+    std::cout << report.text;
+    return;
+  }
 
   Json file;
   file["schema"] = kBenchSchema;
@@ -111,6 +121,9 @@ void run_bench(const std::string& name, const std::filesystem::path& folder,
   write_png(report.plot, folder / (name + ".png"));
   for (const BenchSurface& vessel : report.surfaces) {
     preprocess::write_surface(vessel.surface, folder / (vessel.name + ".vtp"));
+  }
+  for (const BenchPicture& one : report.pictures) {
+    write_png(one.picture, folder / (one.name + ".png"));
   }
   std::cout << report.text << "\n"
             << "files: " << (folder / name).string() << ".json, .csv, .png\n";

@@ -1,6 +1,6 @@
 #pragma once
 /// `wireplan bench NAME`: error against run time, stability, throughput, the cost of the
-/// preprocessing and how well patients are segmented (design section 8).
+/// preprocessing, how well patients are segmented (design section 8), and wires that were measured.
 /// Every bench writes NAME.json, NAME.csv and NAME.png into its folder and prints what it found.
 #include <cstdint>
 #include <filesystem>
@@ -21,10 +21,13 @@ struct BenchOptions {
   int patients = 0;
   std::uint64_t first_seed = 1;
   std::filesystem::path data = {};
+  /// Measured alone: the folder with frames.json and phantom.stl; empty: guide3d beside the data
+  /// that WIREPLAN_DATA names, and nothing is run where that is not there.
+  std::filesystem::path measured = {};
 };
 
-/// Names: "accuracy", "stability", "throughput", "preprocess", "segmentation". Throws Error for
-/// another name and where a file cannot be written.
+/// Names: "accuracy", "stability", "throughput", "preprocess", "segmentation", "measured". Throws
+/// Error for another name and where a file cannot be written.
 void run_bench(const std::string& name, const std::filesystem::path& folder,
                const BenchOptions& options);
 

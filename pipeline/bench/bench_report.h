@@ -19,13 +19,21 @@ struct BenchSurface {
   Surface surface;
 };
 
+/// A picture of its own, written to NAME.png.
+struct BenchPicture {
+  std::string name;
+  Picture picture;
+};
+
 struct BenchReport {
   Json description;        // scenes, methods, what the columns mean: the same on every machine
-  std::vector<Json> rows;  // plain objects with the same keys in the same order
+  std::vector<Json> rows;  // plain objects with the same keys in the same order; none: nothing was
+                           // run, the text says why, and nothing is written
   Json results;            // what the rows come to
   std::string text;        // for standard output
   Picture plot;
   std::vector<BenchSurface> surfaces = {};
+  std::vector<BenchPicture> pictures = {};
 };
 
 BenchReport bench_accuracy(const BenchOptions& options);
@@ -33,6 +41,7 @@ BenchReport bench_stability(const BenchOptions& options);
 BenchReport bench_throughput(const BenchOptions& options);
 BenchReport bench_preprocess(const BenchOptions& options);
 BenchReport bench_segmentation(const BenchOptions& options);
+BenchReport bench_measured(const BenchOptions& options);
 
 /// Rows as a table for people: columns aligned, numbers with 4 digits.
 std::string table_text(const std::vector<Json>& rows);

@@ -1,3 +1,4 @@
+#include <charconv>
 #include <fstream>
 #include <iostream>
 #include <memory>
@@ -141,6 +142,17 @@ int make_patient_files(std::uint64_t seed, const std::string& output) {
             << patient.access.name << " to the " << patient.target.name << "\n"
             << "case: " << (fs::path(output) / "case.json").string() << "\n";
   return kDone;
+}
+
+// A whole number from 1 to a million.
+int patients_of(const std::string& text) {
+  int patients = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), patients);
+  if (error != std::errc() || end != text.data() + text.size() || patients < 1 ||
+      patients > 1'000'000) {
+    throw Error("bench: N is '" + text + "', expected how many patients, from 1 to 1000000");
+  }
+  return patients;
 }
 
 }  // namespace
@@ -295,17 +307,20 @@ void add_bench(CLI::App& app, int& code) {
   struct Arguments {
     std::string name;
     std::string output = "wireplan-out/bench";
+    std::string of;  // how many patients, or where the measured wires are
     BenchOptions options;
   };
   const auto arguments = std::make_shared<Arguments>();
   CLI::App* bench = app.add_subcommand(
-      "bench", "Error against run time, stability, throughput, preprocessing, segmentation");
+      "bench",
+      "Error against run time, stability, throughput, preprocessing, segmentation, measured wires");
   bench
       ->add_option("NAME", arguments->name,
-                   "accuracy, stability, throughput, preprocess or segmentation")
+                   "accuracy, stability, throughput, preprocess, segmentation or measured")
       ->required();
-  bench->add_option("N", arguments->options.patients, "Segmentation: how many patients [100]")
-      ->check(CLI::Range(1, 1'000'000));
+  bench->add_option("N|FOLDER", arguments->of,
+                    "Segmentation: how many patients [100]; measured: the folder of the frames "
+                    "[guide3d beside WIREPLAN_DATA]");
   bench->add_option("-o,--output", arguments->output, "Folder for results [wireplan-out/bench]");
   bench->add_flag("--quick", arguments->options.quick, "A small size, under 20 s");
   bench->add_option("--seed", arguments->options.first_seed, "Segmentation: of the first [1]")
@@ -324,8 +339,16 @@ void add_bench(CLI::App& app, int& code) {
       "  throughput insertions per second and core, rigid and yielding, with their error\n"
       "  segmentation  patients drawn at random (see phantom --random) and real ones with labels,\n"
       "             each from two points: overlap, surface, way, leaks, refusals\n"
+      "  measured   real wires in a phantom, measured by X-ray: one push at eight rolls, and from "
+      "an\n"
+      "             earlier frame's shape on to the next; a picture of each frame\n"
       "Example: wireplan bench accuracy -o out");
   bench->callback([&code, arguments] {
+    if (arguments->name == "measured") {
+      arguments->options.measured = arguments->of;
+    } else if (!arguments->of.empty()) {
+      arguments->options.patients = patients_of(arguments->of);
+    }
     run_bench(arguments->name, arguments->output, arguments->options);
     code = kDone;
   });

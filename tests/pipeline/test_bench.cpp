@@ -8,6 +8,7 @@
 #include "pipeline/bench/bench.h"
 #include "pipeline/bench/bench_report.h"
 #include "pipeline/bench/bench_walls.h"
+#include "pipeline/bench/measured_frames.h"
 #include "pipeline/bench/segmented_patient.h"
 #include "preprocess/surface/surface.h"
 #include "preprocess/surface/surface_repair.h"
@@ -238,6 +239,87 @@ TEST(Bench, SegmentationHoldsPatientsAgainstTheirTruth) {
   expect_written(segmentation, "segmentation", "dice_way");
 }
 
+/// Frames of a wire that was pushed into a bent tube, as a file of measurements has them.
+void write_frames(const fs::path& folder) {
+  const Surface tube = shapes::bend_tube(4.0, 60.0, 0.5 * kPi, 40.0, 60.0, 2.0);
+  write_stl(tube, folder / "phantom.stl");
+  const simulate::VesselModel vessel(tube, simulate::follow(tube));
+  Json frames = Json::array();
+  for (const double length : {90.0, 70.0}) {
+    simulate::Trial trial(make_wire({}, true), {.point = Vec3(0.0, 0.0, 2.0), .roll = 0.6},
+                          simulate::Goal{.point = Vec3(0.0, 0.0, -1e3)}, vessel,
+                          {.length = 120.0, .friction = 0.05});
+    trial.make({.push = length});
+    const Eigen::Matrix3Xd nodes = trial.finish().nodes;
+    frames.push_back(
+        {{"recording", "tube"},
+         {"frame", static_cast<int>(length)},
+         {"wire", "angled"},
+         {"polyline_mm", to_json(nodes)},
+         {"sigma_mm", std::vector<double>(static_cast<std::size_t>(nodes.cols()), 0.4)}});
+  }
+  write_json({{"frames", frames}}, folder / "frames.json");
+}
+
+TEST(Bench, MeasuredWiresAreMetByThoseOfTheirOwnParameters) {
+  const TemporaryFolder data, folder;
+  write_frames(data.path());
+  testing::internal::CaptureStdout();
+  run_bench("measured", folder.path(), {.quick = true, .measured = data.path()});
+  const std::string text = testing::internal::GetCapturedStdout();
+  EXPECT_NE(text.find("shaft_bending_stiffness_n_mm2 150"), std::string::npos) << text;
+  const Json result = read_json(folder / "measured.json", kBenchSchema);
+  int best = 0;
+  for (const Json& row : result.at("rows")) {
+    SCOPED_TRACE(row.dump());
+    EXPECT_EQ(row.at("outcome"), "done");
+    EXPECT_NEAR(row.at("sigma_mm").get<double>(), 0.4, 1e-12);
+    best += row.at("best").get<bool>() ? 1 : 0;
+    // The frames are equilibria of this very wire.
+    const bool starts = row.at("test") == "start", goes_on = row.at("test") == "on";
+    EXPECT_LT(row.at("mean_mm").get<double>(), starts ? 0.3 : 10.0);
+    EXPECT_LT(row.at("tip_mm").get<double>(), goes_on ? 4.0 : 20.0);
+    EXPECT_TRUE(row.at("branch_right").get<bool>()) << "there is only one";
+    EXPECT_EQ(row.at("from").is_null(), row.at("test") == "push" || row.at("test") == "last");
+  }
+  // Two frames pushed, pushed at their ends and started; one pair, led on and steered.
+  EXPECT_EQ(best, 2 * 3 + 2);
+  EXPECT_EQ(result.at("results").at("aims").size(), 5u);
+  for (const char* frame : {"measured_tube_070.png", "measured_tube_090.png", "measured.png"}) {
+    EXPECT_EQ(read_text(folder / frame).substr(1, 3), "PNG") << frame;
+  }
+  expect_same_rows(result.at("rows"), folder / "measured.csv");
+  expect_follows_schemas(folder.path());
+}
+
+TEST(Bench, MeasuredWiresThatAreNotThereAreToldAndMistakesInThem) {
+  const TemporaryFolder data, folder;
+  EXPECT_THROW(run_bench("measured", folder.path(), {.measured = data.path()}), Error);
+  EXPECT_THROW(run_bench("accuracy", folder.path(), {.measured = data.path()}), Error);
+  write_frames(data.path());
+  Json frames = Json::parse(read_text(data / "frames.json"));
+  frames["frames"][1]["wire"] = "bent";
+  write_json(frames, data / "frames.json");
+  try {
+    run_bench("measured", folder.path(), {.measured = data.path()});
+    FAIL() << "no error";
+  } catch (const Error& error) {
+    EXPECT_NE(std::string(error.what()).find("frames[1].wire is \"bent\""), std::string::npos)
+        << error.what();
+  }
+  // Where the folder is not named and not there, that is said and nothing fails.
+  const char* before = std::getenv("WIREPLAN_DATA");
+  const std::string kept = before != nullptr ? before : "";
+  ::setenv("WIREPLAN_DATA", (data / "none" / "data").c_str(), 1);
+  testing::internal::CaptureStdout();
+  run_bench("measured", folder.path(), {});
+  EXPECT_NE(testing::internal::GetCapturedStdout().find("skipped: no measured wires"),
+            std::string::npos);
+  EXPECT_FALSE(fs::exists(folder / "measured.json"));
+  if (before != nullptr) ::setenv("WIREPLAN_DATA", kept.c_str(), 1);
+  if (before == nullptr) ::unsetenv("WIREPLAN_DATA");
+}
+
 Centerline line_through(const std::vector<Vec3>& corners, double radius) {
   std::vector<Vec3> points;
   for (std::size_t k = 0; k + 1 < corners.size(); ++k) {
@@ -317,8 +399,8 @@ TEST(Bench, UnknownNameIsToldWithTheKnownOnes) {
     FAIL() << "no error";
   } catch (const Error& error) {
     EXPECT_EQ(std::string(error.what()),
-              "bench: NAME is 'speed', expected accuracy, stability, throughput, preprocess or "
-              "segmentation");
+              "bench: NAME is 'speed', expected accuracy, stability, throughput, preprocess, "
+              "segmentation or measured");
   }
 }
 
