@@ -53,8 +53,8 @@ struct VerdictRules {
   /// its border counts in full.
   double tip_error_part = 0.5;
   /// Of all trials: where more end without telling whether the wire would reach (at an end of the
-  /// image, without equilibrium, by our fault), "none reaches" is no finding. Chosen: the trials
-  /// that reach are fewer than this in most cases.
+  /// image, in a loop that crosses itself, without equilibrium, by our fault), "none reaches" is no
+  /// finding. Chosen: the trials that reach are fewer than this in most cases.
   double unclear_part = 0.25;
 };
 

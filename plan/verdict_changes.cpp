@@ -98,6 +98,9 @@ void add_ending(Endings& endings, const Measured& trial, const simulate::Wire& w
     case Outcome::kProlapsed:
       ++endings.prolapsed;
       return;
+    case Outcome::kCrossesItself:
+      ++endings.crossed;
+      return;
     case Outcome::kLeftLumen:
       ++endings.left_lumen;
       return;
@@ -116,6 +119,7 @@ std::string describe_endings(const Endings& endings) {
       {endings.wrong_branch, "took a wrong branch"},
       {endings.stuck, "got stuck"},
       {endings.prolapsed, "folded back on the way"},
+      {endings.crossed, "crossed themselves in a loop"},
       {endings.left_lumen, "went through the wall"},
       {endings.all_wire_in, "ended with all wire in"},
       {endings.missed, "missed the target"},
@@ -169,6 +173,9 @@ std::vector<std::string> changes_by(const Endings& endings, const Known& known,
   add(endings.left_image,
       "A scan that shows more of the vessel: " + part_of(endings.left_image, endings, noun) +
           " came to an end of the imaged vessel.");
+  add(endings.crossed,
+      "A stiffer wire, or a catheter around it: " + part_of(endings.crossed, endings, noun) +
+          " looped until the wire crossed itself.");
   add(endings.no_equilibrium + endings.our_fault,
       "A finer computation: " + part_of(endings.no_equilibrium + endings.our_fault, endings, noun) +
           " gave no result, as no balance of forces was found or the program failed.");

@@ -57,8 +57,9 @@ std::vector<Json> summarize_stability(const std::vector<Json>& rows) {
     };
     entry["rows"] = count("method", method);
     for (const std::string& verdict : kVerdicts) entry[verdict] = count("verdict", verdict);
-    for (const char* outcome : {"converged", "finished", "not_converged", "unstable", "reached",
-                                "missed", "stuck", "prolapsed", "left_image", "left_lumen"}) {
+    for (const char* outcome :
+         {"converged", "finished", "not_converged", "unstable", "reached", "missed", "stuck",
+          "prolapsed", "crosses_itself", "left_image", "left_lumen"}) {
       entry[outcome] = count("outcome", outcome);
     }
     summary.push_back(entry);

@@ -207,10 +207,13 @@ SceneAnswer run_bench_scene(const SceneFile& file, const LoadedVessel* vessel,
                      {.title = file.name}, folder);
 
   const Vec3 tip = result.nodes.col(result.nodes.cols() - 1);
-  return {result.outcome == simulate::SceneOutcome::kConverged,
-          std::string(outcome_name(result.outcome)) +
-              format(": tip (%.4f, %.4f, %.4f) mm, residual %.2g N, %d iterations", tip.x(),
-                     tip.y(), tip.z(), result.residual, result.iterations)};
+  return {
+      result.outcome == simulate::SceneOutcome::kConverged,
+      std::string(outcome_name(result.outcome)) +
+          format(": tip (%.4f, %.4f, %.4f) mm, residual %.2g N, %d iterations", tip.x(), tip.y(),
+                 tip.z(), result.residual, result.iterations) +
+          (result.crossing ? "; " + simulate::describe_crossing(*result.crossing, scene.wire.radius)
+                           : "")};
 }
 
 /// How the equilibrium lies to the line that the wire started from.
@@ -245,6 +248,9 @@ SceneAnswer run_insertion_scene(const SceneFile& file, const InsertionScene& sce
         format("; the tip did not advance from %.1f mm of insertion to %.1f mm", from, to);
   }
 
+  if (result.crossing && result.outcome != simulate::Outcome::kCrossesItself) {
+    result.reason += "; " + simulate::describe_crossing(*result.crossing, scene.wire.radius);
+  }
   const Sensitivity sensitivity = check_sensitivity(scene, *vessel.model, result);
   Json json = result_json(result, scene.options.record_every, seconds);
   if (scene.start) {

@@ -115,6 +115,16 @@ std::vector<double> ways_of_hand(const std::vector<simulate::Push>& pushes, doub
   return ways;
 }
 
+Json crossing_json(const std::optional<simulate::SelfCrossing>& crossing) {
+  if (!crossing) return nullptr;
+  Json json;
+  json["insertion_mm"] = crossing->insertion > 0.0 ? Json(crossing->insertion) : Json(nullptr);
+  json["point_mm"] = to_json(crossing->point);
+  json["from_tip_mm"] = {crossing->from_tip, crossing->other_from_tip};
+  json["distance_mm"] = crossing->distance;
+  return json;
+}
+
 /// One row per `every_mm` of the hand's way, and one for the last push.
 Json history_json(const simulate::TrialResult& result, double every_mm) {
   const std::vector<simulate::Push>& pushes = result.pushes;
@@ -175,6 +185,7 @@ Json result_json(const simulate::SceneResult& result,
     json["reactions"].push_back(reaction_json(reaction));
   }
   json["contacts"] = contacts_json(contacts);
+  json["crosses_itself"] = crossing_json(result.crossing);
   put(json, "friction_work_n_mm", result.friction_work);
   return json;
 }
@@ -205,6 +216,7 @@ Json result_json(const simulate::TrialResult& result, double every_mm, double cp
   json["contacts"] = contacts_json(result.contacts);
   put(json, "max_penetration_mm", penetration);
   put(json, "max_wall_displacement_mm", displacement);
+  json["crosses_itself"] = crossing_json(result.crossing);
   if (!result.stuck.empty()) json["stuck_mm"] = result.stuck;
   json["history"] = history_json(result, every_mm);
   return json;

@@ -26,9 +26,9 @@ constexpr const char* kSchema = "wireplan.trial/3";
 constexpr std::string_view kShapesMagic = "wireplan.shapes/1\n";
 
 constexpr std::array kOutcomes = {
-    Outcome::kReached,      Outcome::kMissed, Outcome::kPassedBy,  Outcome::kWrongBranch,
-    Outcome::kLeftImage,    Outcome::kStuck,  Outcome::kProlapsed, Outcome::kLeftLumen,
-    Outcome::kNotConverged, Outcome::kFailed};
+    Outcome::kReached,       Outcome::kMissed,       Outcome::kPassedBy,  Outcome::kWrongBranch,
+    Outcome::kLeftImage,     Outcome::kStuck,        Outcome::kProlapsed, Outcome::kLeftLumen,
+    Outcome::kCrossesItself, Outcome::kNotConverged, Outcome::kFailed};
 
 // Numbers of a trial that failed may not be finite: null, with the trial's reason beside them.
 Json value_json(double value) { return value; }

@@ -250,7 +250,7 @@ std::vector<Stage> stages_of(const Case& given) {
        .parameters = {"/wall/thickness_mm", "/wall/young_modulus_kpa", "/wall/poisson_ratio"},
        .make = make_wall});
   Stage trials{.name = "trials",
-               .version = 25,
+               .version = 26,
                .after = {"surface", "centerline"},
                .parameters = {"/access", "/target", "/wires", "/tip_roll_deg", "/friction",
                               "/friction_factor", "/wall/model", "/insertion"},
@@ -263,7 +263,7 @@ std::vector<Stage> stages_of(const Case& given) {
   stages.push_back(trials);
   Stage manoeuvres = trials;
   manoeuvres.name = "manoeuvres";
-  manoeuvres.version = 20;
+  manoeuvres.version = 21;
   manoeuvres.after.push_back("trials");
   read_too(manoeuvres, {"/manoeuvres"});
   if (given.manoeuvres == Manoeuvring::kWhenNeeded) {

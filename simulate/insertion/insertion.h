@@ -119,6 +119,10 @@ class Insertion {
   const Rod& rod() const { return rod_; }
   Vec3 tip() const { return state_.x.rightCols<1>(); }
   int first_free() const { return problem_.first; }  // node
+  /// The nodes from there on, as long as no move is made.
+  Eigen::Ref<const Eigen::Matrix3Xd> free_wire() const {
+    return state_.x.rightCols(rod_.nodes() - problem_.first);
+  }
   Eigen::Matrix3Xd free_nodes() const { return state_.x.rightCols(rod_.nodes() - problem_.first); }
   /// (3, n) of the wall on the nodes, after the last move [N].
   const Eigen::Matrix3Xd& forces() const { return forces_; }
@@ -202,7 +206,7 @@ class Insertion {
   Eigen::Matrix3Xd path_;     // where the wire ahead of each node was before the last push   [mm]
   Eigen::Matrix3Xd drift_;    // off that path, per length of push
   Eigen::Matrix3Xd moved_;    // each node in the last push, per length of it
-  Eigen::Matrix3Xd weight_;  // (3, n) of each node; empty without gravity                    [N]
+  Eigen::Matrix3Xd weight_;   // (3, n) of each node; empty without gravity                    [N]
   Eigen::Matrix3Xd forces_, guess_ahead_;
   std::vector<Touch> touches_;
   std::vector<Vec3> force_sums_;                         // scratch

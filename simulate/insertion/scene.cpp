@@ -477,6 +477,9 @@ SceneResult run_scene(const Scene& scene) {
   }
   result.cpu_time_s = thread_seconds() - begin;
   describe(scene, setup, result);
+  if (result.outcome == SceneOutcome::kConverged) {
+    result.crossing = CrossingFinder().find(result.nodes, scene.wire.radius);
+  }
   return result;
 }
 

@@ -8,6 +8,7 @@
 
 #include "simulate/contact/wall_contact.h"
 #include "simulate/equilibrium/solver.h"
+#include "simulate/insertion/self_crossing.h"
 
 namespace wireplan::simulate {
 
@@ -120,6 +121,7 @@ struct SceneResult {
   std::vector<Reaction> reactions;
   std::vector<Touch> contacts;  // with the vessel, proximal to distal
   double friction_work = 0.0;   // turned into heat, Newton's load steps together      [N mm]
+  std::optional<SelfCrossing> crossing;  // of a shape that converged
 };
 
 /// Static equilibrium on the paper's energy. Expects supports that hold the wire against rigid

@@ -26,6 +26,8 @@ const char* outcome_name(Outcome outcome) {
       return "stuck";
     case Outcome::kProlapsed:
       return "prolapsed";
+    case Outcome::kCrossesItself:
+      return "crosses_itself";
     case Outcome::kLeftLumen:
       return "left_lumen";
     case Outcome::kNotConverged:
@@ -148,6 +150,7 @@ bool Trial::step(const Move& move) {
   record_.pushes.push_back(*push);
   if (options_.record_terms) record_.push_terms.push_back(insertion_.terms());
   if (distance <= 0.0) pushing_since_ = record_.pushes.size();
+  if (ends_by_crossing()) return false;
   since_shape_ += std::abs(distance) + std::abs(move.turn) / kTurnPerShape * options_.record_every;
   for (std::size_t k = 0; k < goals_.size(); ++k) {
     if (!pursuits_[k].outcome) check_place(k);
@@ -159,6 +162,17 @@ bool Trial::step(const Move& move) {
     since_shape_ = 0.0;
     record_.shapes.push_back(shape_here());
   }
+  return true;
+}
+
+/// Whether the last step brought the wire through itself; notes it where it is pushed on.
+bool Trial::ends_by_crossing() {
+  if (record_.crossing) return false;
+  record_.crossing = crossings_.find(insertion_.free_wire(), insertion_.rod().radius);
+  if (!record_.crossing) return false;
+  record_.crossing->insertion = insertion_.depth();
+  if (options_.push_on) return false;
+  end_all(Outcome::kCrossesItself, describe_crossing(*record_.crossing, insertion_.rod().radius));
   return true;
 }
 
@@ -312,7 +326,7 @@ void Trial::end_where_it_is(std::size_t goal, Outcome outcome, const std::string
 bool Trial::end_all(Outcome outcome, const std::string& reason) {
   for (std::size_t k = 0; k < goals_.size(); ++k) {
     if (pursuits_[k].outcome) continue;
-    if (outcome == Outcome::kNotConverged) {
+    if (outcome == Outcome::kNotConverged || outcome == Outcome::kCrossesItself) {
       end(k, outcome, reason);
     } else {
       end_where_it_is(k, outcome, reason);
@@ -330,6 +344,7 @@ void Trial::end(std::size_t goal, Outcome outcome, const std::string& reason) {
   TrialResult& ended = pursuit.end;
   ended.outcome = outcome;
   ended.reason = reason + balance_text();
+  ended.crossing = record_.crossing;
   ended.nodes = insertion_.free_nodes();
   ended.contacts = insertion_.contacts();
   ended.peak_forces = insertion_.peak_forces();
@@ -398,6 +413,7 @@ void Trial::save(Mark& mark) const {
   mark.shapes = record_.shapes.size();
   mark.pushing_since = pushing_since_;
   mark.since_shape = since_shape_;
+  mark.crossing = record_.crossing;
   mark.pursuits = pursuits_;
 }
 
@@ -408,6 +424,7 @@ void Trial::restore(const Mark& mark) {
   record_.shapes.resize(mark.shapes);
   pushing_since_ = mark.pushing_since;
   since_shape_ = mark.since_shape;
+  record_.crossing = mark.crossing;
   pursuits_ = mark.pursuits;
 }
 

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "simulate/insertion/insertion.h"
+#include "simulate/insertion/self_crossing.h"
 #include "simulate/insertion/way.h"
 
 namespace wireplan::simulate {
@@ -24,16 +25,17 @@ struct Goal {
 };
 
 enum class Outcome {
-  kReached,       // the tip passed the goal's cross-section, or came within its radius
-  kMissed,        // all wire was pushed in, or the tip went by a sphere; the goal not reached
-  kPassedBy,      // the tip went on in a vessel that the way leaves: it overshot the branch
-  kWrongBranch,   // the tip took a branch that is not on the way
-  kLeftImage,     // the tip came to an end of the imaged vessel, which goes on in the patient
-  kStuck,         // pushing no longer advances the tip
-  kProlapsed,     // the wire folded back on itself instead of advancing its tip
-  kLeftLumen,     // the wire went further through the wall than contact explains
-  kNotConverged,  // a push had no equilibrium to the tolerance, also when cut smaller
-  kFailed,        // our fault; the reason holds the message
+  kReached,        // the tip passed the goal's cross-section, or came within its radius
+  kMissed,         // all wire was pushed in, or the tip went by a sphere; the goal not reached
+  kPassedBy,       // the tip went on in a vessel that the way leaves: it overshot the branch
+  kWrongBranch,    // the tip took a branch that is not on the way
+  kLeftImage,      // the tip came to an end of the imaged vessel, which goes on in the patient
+  kStuck,          // pushing no longer advances the tip
+  kProlapsed,      // the wire folded back on itself instead of advancing its tip
+  kCrossesItself,  // the wire ran through itself, which it does not feel
+  kLeftLumen,      // the wire went further through the wall than contact explains
+  kNotConverged,   // a push had no equilibrium to the tolerance, also when cut smaller
+  kFailed,         // our fault; the reason holds the message
 };
 const char* outcome_name(Outcome outcome);  // "reached", "missed", "stuck", ...
 
@@ -53,6 +55,8 @@ struct TrialResult {
   std::vector<PushTerms> push_terms;  // one per push, if recorded
   /// Where the tip did not advance, if pushed on: wire in the body from and to [mm].
   std::vector<std::pair<double, double>> stuck;
+  /// Where the wire ran through itself first. The trial ends by that, unless it is pushed on.
+  std::optional<SelfCrossing> crossing;
   Eigen::Matrix3Xd nodes;  // (3, k) final shape beyond the introducer, proximal to distal
   std::vector<WireContact> contacts;       // of the final shape
   std::vector<TriangleForce> peak_forces;  // over all pushes, ascending triangles; if mapped
@@ -124,6 +128,7 @@ class Trial {
     Insertion::Snapshot insertion;
     std::size_t pushes = 0, shapes = 0, pushing_since = 0;
     double since_shape = 0.0;
+    std::optional<SelfCrossing> crossing;
     std::vector<Pursuit> pursuits;
   };
   void save(Mark& mark) const;
@@ -138,6 +143,7 @@ class Trial {
   void check_advance(std::size_t goal, double distance);
   void check_motion(std::size_t goal);
   bool pushed_on(std::size_t goal, double from, double to);
+  bool ends_by_crossing();
   std::string reached_reason(std::size_t goal) const;
   std::string balance_text() const;
   std::string place_of(int opening) const;
@@ -147,7 +153,8 @@ class Trial {
   const VesselModel& vessel_;
   InsertionOptions options_;
   Insertion insertion_;
-  TrialResult record_;             // of all goals: start, pushes, shapes on the way and terms
+  CrossingFinder crossings_;
+  TrialResult record_;  // of all goals: start, pushes, shapes on the way, terms and crossing
   std::vector<Pursuit> pursuits_;  // one per goal
   double since_shape_ = 0.0;       // way of the hand since a shape was recorded          [mm]
   std::size_t pushing_since_ = 0;  // all records from here on are pushes
