@@ -9,6 +9,7 @@
 #include <random>
 #include <vector>
 
+#include "simulate/insertion/insertion.h"
 #include "simulate/insertion/scene.h"
 #include "tests/shapes.h"
 #include "tests/simulate/contact_bench.h"
@@ -94,6 +95,42 @@ TEST(SceneWithAVessel, AStretchedWireRubsAlongTheFloor) {
   EXPECT_GE(held.x(), -friction * weight - 21 * 1e-6);
   EXPECT_GT(result.friction_work, 0.0);
   EXPECT_LT(result.friction_work, pull * (result.nodes(0, 20) - 20.0));
+}
+
+// ---------------------------------------------------------------- a wire end-on at a wall
+
+TEST(EndOn, AStraightWireIsNotPushedAside) {
+  // Head first against a flat wall that lies askew to the grid of its distances, up to three
+  // quarters of the load at which it would buckle: its tip held by friction, or free to slide.
+  const double EI = 50.0, radius = 0.4, free_length = 25.0;
+  for (const Vec3& axis : {Vec3(0.0, 0.0, 1.0), Vec3(1.0, 2.0, -1.0), Vec3(-3.0, 1.0, 0.5)}) {
+    for (const double friction : {0.0, 0.3}) {
+      SCOPED_TRACE(std::to_string(axis.x()) + ", friction " + std::to_string(friction));
+      const double buckling =
+          (friction > 0.0 ? 20.19 : 0.25 * kPi * kPi) * EI / (free_length * free_length);
+      const Mat3 R = Eigen::AngleAxisd(1.1, axis.normalized()).toRotationMatrix();
+      Surface walls = shapes::divided_box(Vec3(-20.0, -20.0, 0.0), Vec3(20.0, 20.0, 30.0), 6);
+      walls.vertices = R * walls.vertices;
+      const VesselModel vessel(walls, {.grid_spacing = 0.7});
+      const Vec3 along = R * Vec3::UnitZ();
+      Insertion insertion(
+          round_wire(60.0, radius, EI),
+          {.point = R * Vec3(0.7, -0.4, 30.0 - radius - free_length), .direction = along}, vessel,
+          {.length = 40.0, .friction = friction});
+      ASSERT_TRUE(insertion.push(free_length - 0.05));
+      double pressed = 0.0;
+      while (pressed < 0.75 * buckling && insertion.depth() < free_length + 2.0) {
+        ASSERT_TRUE(insertion.push(0.005));
+        const Vec3 force = insertion.forces().rowwise().sum();
+        pressed = -force.dot(along);
+        // The distances' error tilts their gradient by 1e-6 at most; the solve leaves 1e-6 N.
+        EXPECT_LT((force + pressed * along).norm(), 2e-6 + 1e-5 * pressed);
+        const Vec3 aside = insertion.tip() - R * Vec3(0.7, -0.4, 0.0);
+        EXPECT_LT((aside - aside.dot(along) * along).norm(), 1e-3);
+      }
+      EXPECT_GE(pressed, 0.75 * buckling);  // it did press
+    }
+  }
 }
 
 }  // namespace
