@@ -16,7 +16,9 @@ Judgement judge(const Study& study, const Plan& plan, const Limits& limits,
   }
   Findings findings{.repeated = judgement.repeated};
   if (!plan.refinements.empty()) {
-    findings.errors = errors_by_trial(plan.refinements, static_cast<int>(plan.candidates.size()));
+    const int count = static_cast<int>(plan.candidates.size());
+    findings.errors = errors_by_trial(plan.refinements, count);
+    findings.sensitive = sensitivity_by_trial(plan.refinements, count);
   }
   for (const Level level : plan.levels) findings.scouted.push_back(level != Level::kFull);
   judgement.ranking = rank(study, plan.candidates, plan.trials, limits, weights, findings);

@@ -21,6 +21,39 @@ constexpr int kTurnsOfScouts = 3, kTurns = 1;
 constexpr int kFirstRepeats = 32;
 constexpr int kRepeatRounds = 3;
 
+}  // namespace
+
+std::vector<Run> refinement_runs(int id, const Candidate& candidate, double insertion) {
+  std::vector<Run> runs;
+  const auto add = [&](const OtherElements& elements) {
+    runs.push_back({.id = id, .candidate = candidate, .elements = elements});
+  };
+  for (const double factor : kRefineFactors) add({.factor = factor, .insertion = insertion});
+  add({.insertion = insertion, .setting = kSettingTried});
+  return runs;
+}
+
+Refinement estimate_error_of(const Study& study, int id, const std::vector<Run>& runs,
+                             const std::vector<Measured>& trials) {
+  expects(runs.size() == trials.size());
+  std::vector<RefinedRun> rows;
+  std::vector<SettingRun> others;
+  double insertion = 0.0;
+  for (std::size_t k = 0; k < runs.size(); ++k) {
+    if (runs[k].id != id || !runs[k].elements) continue;
+    const auto& [factor, to, setting] = *runs[k].elements;
+    insertion = to;
+    if (setting) {
+      others.push_back({*setting, trials[k]});
+    } else {
+      rows.push_back({factor * study.insertion.element_length, trials[k]});
+    }
+  }
+  return estimate_error(id, insertion, rows, others);
+}
+
+namespace {
+
 class Planner {
  public:
   Planner(const Study& study, const PlanVessel& vessel, const PlanOptions& options, TrialLog& log)
@@ -163,20 +196,14 @@ class Planner {
       if (chosen.empty()) return;
       std::vector<Run> runs;
       for (const int id : chosen) {
-        for (const double factor : kRefineFactors) {
-          runs.push_back({.id = id,
-                          .candidate = candidate(id),
-                          .elements = OtherElements{factor, trial(id).metrics.insertion}});
-        }
+        const std::vector<Run> own =
+            refinement_runs(id, candidate(id), trial(id).metrics.insertion);
+        runs.insert(runs.end(), own.begin(), own.end());
       }
       const std::vector<Measured> found =
           find_or_run(study_, vessel_, runs, log_, silent_, plan_.full);
-      for (std::size_t k = 0; k < runs.size(); k += kRefineFactors.size()) {
-        std::vector<RefinedRun> rows;
-        for (std::size_t f = 0; f < kRefineFactors.size(); ++f) {
-          rows.push_back({kRefineFactors[f] * study_.insertion.element_length, found[k + f]});
-        }
-        plan_.refinements.push_back(estimate_error(runs[k].id, runs[k].elements->insertion, rows));
+      for (const int id : chosen) {
+        plan_.refinements.push_back(estimate_error_of(study_, id, runs, found));
       }
     }
   }

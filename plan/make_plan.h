@@ -58,6 +58,12 @@ struct Plan {
   Spent scouts, probes, full, repeats;
 };
 
+/// The runs that tell a plan's error: with other elements, then with a setting changed. And the
+/// error that those of `runs` with its id come to.
+std::vector<Run> refinement_runs(int id, const Candidate& candidate, double insertion);
+Refinement estimate_error_of(const Study& study, int id, const std::vector<Run>& runs,
+                             const std::vector<Measured>& trials);
+
 /// Finds in the log what is known and simulates the rest. All decisions follow from the trials, the
 /// study and Yardstick, so the same comes out whatever was known. Throws Interrupted.
 Plan make_plan(const Study& study, const PlanVessel& vessel, const PlanOptions& options,

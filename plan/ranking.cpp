@@ -87,7 +87,7 @@ double typical_safe_part(const std::vector<RankedPlan>& plans,
 
 void sort_plans(std::vector<RankedPlan>& plans) {
   const auto key = [](const RankedPlan& plan) {
-    return std::tuple(-plan.expected_safe, plan.expected_score, plan.trial);
+    return std::tuple(is_sensitive(plan), -plan.expected_safe, plan.expected_score, plan.trial);
   };
   std::sort(plans.begin(), plans.end(),
             [&](const RankedPlan& a, const RankedPlan& b) { return key(a) < key(b); });
@@ -134,7 +134,7 @@ void find_ties(std::vector<RankedPlan>& plans, const std::vector<RepeatedPlan>& 
   for (RankedPlan& a : plans) {
     const RepeatedPlan* repeats_a = find_repeated(repeated, a.trial);
     for (const RankedPlan& b : plans) {
-      if (a.trial == b.trial) continue;
+      if (a.trial == b.trial || is_sensitive(a) != is_sensitive(b)) continue;
       const double error = a.score_error + b.score_error;
       const double difference = std::abs(a.score.total - b.score.total);
       const RepeatedPlan* repeats_b = find_repeated(repeated, b.trial);
@@ -196,7 +196,9 @@ std::string compare_with_first(const RankedPlan& plan, const RankedPlan& first,
                      compare_forces(metrics[plan.trial].peak_contact_force,
                                     metrics[first.trial].peak_contact_force) +
                      " the first plan";
-  if (plan.robust_score && plan.expected_safe < first.expected_safe) {
+  if (is_sensitive(plan) && !is_sensitive(first)) {
+    text += "; behind it because it is sensitive";
+  } else if (plan.robust_score && plan.expected_safe < first.expected_safe) {
     text += "; behind it because it is safe less often";
   } else if (plan.score.total > first.score.total) {
     text += std::string("; behind it mostly by ") + largest->name;
@@ -214,6 +216,7 @@ std::string compare_with_first(const RankedPlan& plan, const RankedPlan& first,
 std::string warnings_of(const RankedPlan& plan, const Metrics& m, const simulate::Goal& goal,
                         const Limits& limits) {
   std::string text;
+  if (is_sensitive(plan)) text += "; sensitive: " + *plan.sensitive;
   if (!goal.at_section && plan.tip_error && m.tip_to_target + *plan.tip_error >= goal.radius) {
     text += "; warning: the tip's numerical error of " + two_digits(*plan.tip_error) +
             " mm may put it outside the target (radius " + two_digits(goal.radius) + " mm)";
@@ -338,12 +341,15 @@ const RepeatedPlan* find_repeated(const std::vector<RepeatedPlan>& repeated, int
   return found == repeated.end() ? nullptr : &*found;
 }
 
+bool is_sensitive(const RankedPlan& plan) { return plan.sensitive && !plan.sensitive->empty(); }
+
 NumericalError assumed_error(const Metrics& metrics) {
   return {.position = kAssumedPositionError,
           .tip = kAssumedPositionError,
           .peak_force = kAssumedRelativeForceError * metrics.peak_contact_force,
           .mean_force = kAssumedRelativeForceError * metrics.mean_contact_force,
-          .tip_force = kAssumedRelativeForceError * metrics.peak_tip_force};
+          .tip_force = kAssumedRelativeForceError * metrics.peak_tip_force,
+          .push_force = kAssumedRelativeForceError * metrics.peak_push_force};
 }
 
 Score compute_score(const Metrics& metrics, const simulate::Goal& goal, const Limits& limits,
@@ -419,6 +425,7 @@ Ranking rank(const Study& study, const std::vector<Candidate>& candidates,
   const std::vector<std::optional<NumericalError>>& errors = findings.errors;
   expects(trials.size() == candidates.size());
   expects(errors.empty() || errors.size() == candidates.size());
+  expects(findings.sensitive.empty() || findings.sensitive.size() == candidates.size());
   expects(findings.scouted.empty() || findings.scouted.size() == candidates.size());
   expects_valid(limits, weights);
 
@@ -441,6 +448,7 @@ Ranking rank(const Study& study, const std::vector<Candidate>& candidates,
       plan.position_error = known->position;
       plan.tip_error = known->tip;
     }
+    if (!findings.sensitive.empty()) plan.sensitive = findings.sensitive[k];
     plan.score_error = compute_score_error(metrics[k], known.value_or(assumed_error(metrics[k])),
                                            study.goal, limits, weights);
     const RepeatedPlan* repeated = find_repeated(findings.repeated, k);

@@ -38,13 +38,15 @@ struct Score {
   double reach = 0.0, peak_force = 0.0, mean_force = 0.0, margin = 0.0;
 };
 
-/// How far a trial's numbers may be from those of infinitely short elements (refine.h).
+/// How far a trial's numbers may be from those of infinitely short elements, on whichever path the
+/// solver takes (refine.h): the true value lies within this of the trial's in 95 % of cases.
 struct NumericalError {
   double position = 0.0;    // of the final shape, where it is largest                      [mm]
   double tip = 0.0;         // of the final tip                                             [mm]
   double peak_force = 0.0;  // of Metrics::peak_contact_force                               [N]
   double mean_force = 0.0;  // of Metrics::mean_contact_force                               [N]
   double tip_force = 0.0;   // of Metrics::peak_tip_force                                   [N]
+  double push_force = 0.0;  // of Metrics::peak_push_force                                  [N]
 };
 
 /// What is assumed of a trial that was not refined. Refining 15 plans in a bent tube at elements of
@@ -86,11 +88,13 @@ struct RankedPlan {
   double score_error = 0.0;              // from the known error, else from the assumed one
   std::optional<double> position_error;  // from halving the elements; empty if not known   [mm]
   std::optional<double> tip_error;       // as that, of the tip alone                       [mm]
-  std::optional<double> robust_score;    // mean over its repeats; empty without them
-  double expected_safe = 1.0;            // part of its repeats in which it is safe, see rank()
-  double expected_score = 0.0;           // mean over as many repeats as any plan has, see rank()
-  std::vector<int> tied_with;            // trials that cannot be told from it, best first
-  std::string sentence;                  // why it stands here
+  /// Empty if not known; else why its end hangs on how it is solved, "" where it does not.
+  std::optional<std::string> sensitive;
+  std::optional<double> robust_score;  // mean over its repeats; empty without them
+  double expected_safe = 1.0;          // part of its repeats in which it is safe, see rank()
+  double expected_score = 0.0;         // mean over as many repeats as any plan has, see rank()
+  std::vector<int> tied_with;          // trials that cannot be told from it, best first
+  std::string sentence;                // why it stands here
 };
 
 struct ExcludedTrial {
@@ -119,20 +123,23 @@ struct Ranking {
 /// What was found out about single plans besides their trials.
 struct Findings {
   std::vector<std::optional<NumericalError>> errors = {};  // per trial; empty: nothing was refined
+  /// Per trial, as RankedPlan::sensitive; empty: nothing was refined.
+  std::vector<std::optional<std::string>> sensitive = {};
   std::vector<RepeatedPlan> repeated = {};
   std::vector<bool> scouted = {};  // per trial: its numbers are a scout's (search.h); empty: none
 };
 
 /// Orders the plans, and says which of them are tied.
 ///
-/// Order: by the part of its repeats in which a plan is safe; then by the mean score over all
+/// Order: plans that are known to be sensitive come behind all others. Then by the part of its
+/// repeats in which a plan is safe; then by the mean score over all
 /// repeats, in which one that is not safe costs 1; equals by index of the candidate. A plan without
 /// repeats stands as if it were safe as often as those with them, in the median. Fewer repeats than
 /// others, or none, count in the score as it is expected to be: the mean over the repeats it has
 /// (its own score without any) plus what the repeats that it lacks typically add, which is the
 /// median over the plans that have them.
 ///
-/// Ties: two plans are tied
+/// Ties: two plans, both or none of them sensitive, are tied
 ///   - if their scores differ by no more than the sum of their errors; or
 ///   - if both have repeats, and the central 90 % of their paired differences over the repeats that
 ///     both have, widened by both errors, holds 0: then the unknowns decide which is better; or
@@ -143,6 +150,9 @@ struct Findings {
 Ranking rank(const Study& study, const std::vector<Candidate>& candidates,
              const std::vector<Measured>& trials, const Limits& limits, const Weights& weights,
              const Findings& findings = {});
+
+/// Whether it is known that the plan's end hangs on how it is solved.
+bool is_sensitive(const RankedPlan& plan);
 
 /// Why a trial is no plan, in a sentence; empty if it is one.
 std::string exclusion_reason(const Measured& trial, const Study& study, const Limits& limits);

@@ -5,13 +5,15 @@
 #include <cmath>
 #include <cstdio>
 
+#include "plan/number_text.h"
+
 namespace wireplan::plan {
 namespace {
 
 /// Below this a change of position is rounding, and says nothing of the order [mm].
 constexpr double kRoundingDistance = 1e-9;
 
-/// The least order that is reckoned with; and that of forces, see estimate_error().
+/// The least order that is reckoned with; and that of what is stated, see estimate_error().
 constexpr double kLeastOrder = 0.5;
 
 std::string in_mm(double length) {
@@ -30,27 +32,37 @@ std::vector<double> arc_from_tip(const Eigen::Matrix3Xd& nodes) {
 }
 
 /// Why the run cannot be compared; empty if it came to the insertion.
-std::string why_incomplete(const RefinedRun& run, double insertion) {
-  const double reached = run.trial.metrics.insertion;
-  if (std::abs(reached - insertion) <= 1e-6 * insertion && run.trial.nodes.cols() > 0) return "";
-  const std::string why =
-      run.trial.reason.empty() ? outcome_name(run.trial.outcome) : run.trial.reason;
-  return "with elements of " + in_mm(run.element_length) + " the wire came to " + in_mm(reached) +
-         " of " + in_mm(insertion) + ": " + why;
+std::string why_incomplete(const Measured& trial, const std::string& with, double insertion) {
+  const double reached = trial.metrics.insertion;
+  if (std::abs(reached - insertion) <= 1e-6 * insertion && trial.nodes.cols() > 0) return "";
+  const std::string why = trial.reason.empty() ? outcome_name(trial.outcome) : trial.reason;
+  return with + " the wire came to " + in_mm(reached) + " of " + in_mm(insertion) + ": " + why;
 }
 
-/// The change from one run to the next finer one.
-struct Change {
-  double position = 0.0, tip = 0.0, peak_force = 0.0, mean_force = 0.0, tip_force = 0.0;
-};
+std::string why_incomplete(const RefinedRun& run, double insertion) {
+  return why_incomplete(run.trial, "with elements of " + in_mm(run.element_length), insertion);
+}
 
-Change compare_runs(const RefinedRun& coarse, const RefinedRun& fine) {
-  const Metrics &a = coarse.trial.metrics, &b = fine.trial.metrics;
-  return {.position = shape_distance(coarse.trial.nodes, fine.trial.nodes),
-          .tip = (coarse.trial.nodes.rightCols<1>() - fine.trial.nodes.rightCols<1>()).norm(),
-          .peak_force = std::abs(a.peak_contact_force - b.peak_contact_force),
-          .mean_force = std::abs(a.mean_contact_force - b.mean_contact_force),
-          .tip_force = std::abs(a.peak_tip_force - b.peak_tip_force)};
+/// Of two runs alike but for a setting; the first came to the insertion.
+OtherEnd compare_ends(const Measured& plan, const SettingRun& other, double insertion) {
+  OtherEnd end{
+      .setting = other.setting,
+      .change = {},
+      .incomplete = why_incomplete(other.trial, describe_setting(other.setting), insertion)};
+  const bool failed = other.trial.outcome == simulate::Outcome::kFailed;
+  if (!failed && other.trial.nodes.cols() > 0) end.change = find_difference(plan, other.trial);
+  return end;
+}
+
+constexpr std::array kErrorParts = {&NumericalError::position,   &NumericalError::tip,
+                                    &NumericalError::peak_force, &NumericalError::mean_force,
+                                    &NumericalError::tip_force,  &NumericalError::push_force};
+
+/// Whether the change is one of the value. The hand's force is a mean over a push: over shorter
+/// ones it is another figure, as long as the wire goes the same way.
+bool is_of_value(const OtherEnd& other, double NumericalError::*part) {
+  return part != &NumericalError::push_force || other.setting != Setting::kStep ||
+         other.change.tip > kTipsApart;
 }
 
 /// The error of the study's run: that of the change to the finer one, but no less than what second
@@ -59,8 +71,8 @@ double stated_error(double factor, double fine, double coarse) {
   return std::max(factor * fine, coarse / 3.0);
 }
 
-std::optional<double> find_order(const std::optional<Change>& coarse,
-                                 const std::optional<Change>& fine) {
+std::optional<double> find_order(const std::optional<NumericalError>& coarse,
+                                 const std::optional<NumericalError>& fine) {
   if (!coarse || !fine) return std::nullopt;
   if (coarse->position < kRoundingDistance || fine->position < kRoundingDistance) {
     return std::nullopt;
@@ -103,7 +115,8 @@ Study refined_study(const Study& study, double factor, double insertion) {
   return changed;
 }
 
-Refinement estimate_error(int trial, double insertion, const std::vector<RefinedRun>& runs) {
+Refinement estimate_error(int trial, double insertion, const std::vector<RefinedRun>& runs,
+                          const std::vector<SettingRun>& others) {
   expects(runs.size() == 3 && runs[0].element_length > runs[1].element_length &&
           runs[1].element_length > runs[2].element_length);
   Refinement result;
@@ -116,23 +129,30 @@ Refinement estimate_error(int trial, double insertion, const std::vector<Refined
   }
 
   // The order from both changes, and from it the share of a change that is still missing.
-  std::optional<Change> coarse, fine;
-  if (complete[0] && complete[1]) coarse = compare_runs(runs[0], runs[1]);
-  if (complete[1] && complete[2]) fine = compare_runs(runs[1], runs[2]);
+  std::optional<NumericalError> coarse, fine;
+  if (complete[0] && complete[1]) coarse = find_difference(runs[0].trial, runs[1].trial);
+  if (complete[1] && complete[2]) fine = find_difference(runs[1].trial, runs[2].trial);
   result.observed_order = find_order(coarse, fine);
   const double ratio = std::exp2(std::clamp(result.observed_order.value_or(2.0), kLeastOrder, 2.0));
   const double of_longer = ratio / (ratio - 1.0), of_shorter = 1.0 / (ratio - 1.0);
 
-  // The study's own run, by comparison with the finer one.
+  // Ends that the solver finds with a setting changed.
+  for (const SettingRun& other : others) {
+    if (complete[1]) result.others.push_back(compare_ends(runs[1].trial, other, insertion));
+  }
+
+  // The study's own run, by comparison with the finer one and with those ends.
   if (fine) {
-    const Change longer = coarse.value_or(Change{});
-    const double least = std::exp2(kLeastOrder), of_force = least / (least - 1.0);
-    result.error =
-        NumericalError{.position = stated_error(of_longer, fine->position, longer.position),
-                       .tip = stated_error(of_longer, fine->tip, longer.tip),
-                       .peak_force = stated_error(of_force, fine->peak_force, longer.peak_force),
-                       .mean_force = stated_error(of_force, fine->mean_force, longer.mean_force),
-                       .tip_force = stated_error(of_force, fine->tip_force, longer.tip_force)};
+    const NumericalError longer = coarse.value_or(NumericalError{});
+    const double least = std::exp2(kLeastOrder), of_change = least / (least - 1.0);
+    result.error = NumericalError{};
+    for (const auto part : kErrorParts) {
+      double& error = (*result.error).*part;
+      error = stated_error(of_change, (*fine).*part, longer.*part);
+      for (const OtherEnd& other : result.others) {
+        if (is_of_value(other, part)) error = std::max(error, other.change.*part);
+      }
+    }
   }
 
   // The table.
@@ -150,6 +170,29 @@ Refinement estimate_error(int trial, double insertion, const std::vector<Refined
     result.cpu_seconds.push_back(runs[k].trial.cpu_seconds);
   }
   return result;
+}
+
+NumericalError find_difference(const Measured& one, const Measured& other) {
+  const Metrics &a = one.metrics, &b = other.metrics;
+  return {.position = shape_distance(one.nodes, other.nodes),
+          .tip = (one.nodes.rightCols<1>() - other.nodes.rightCols<1>()).norm(),
+          .peak_force = std::abs(a.peak_contact_force - b.peak_contact_force),
+          .mean_force = std::abs(a.mean_contact_force - b.mean_contact_force),
+          .tip_force = std::abs(a.peak_tip_force - b.peak_tip_force),
+          .push_force = std::abs(a.peak_push_force - b.peak_push_force)};
+}
+
+std::optional<std::string> find_sensitivity(const Refinement& refinement) {
+  if (refinement.others.empty()) return std::nullopt;
+  std::string text;
+  for (const OtherEnd& other : refinement.others) {
+    if (other.incomplete.empty() && other.change.tip <= kTipsApart) continue;
+    if (!text.empty()) text += "; ";
+    text += other.incomplete.empty() ? describe_setting(other.setting) + " its tip ends " +
+                                           one_decimal(other.change.tip) + " mm away"
+                                     : other.incomplete;
+  }
+  return text;
 }
 
 double shape_distance(const Eigen::Matrix3Xd& coarse, const Eigen::Matrix3Xd& fine) {
@@ -178,6 +221,16 @@ std::vector<std::optional<NumericalError>> errors_by_trial(
     errors[refinement.trial] = refinement.error;
   }
   return errors;
+}
+
+std::vector<std::optional<std::string>> sensitivity_by_trial(
+    const std::vector<Refinement>& refinements, int trial_count) {
+  std::vector<std::optional<std::string>> sensitive(trial_count);
+  for (const Refinement& refinement : refinements) {
+    expects(refinement.trial >= 0 && refinement.trial < trial_count);
+    sensitive[refinement.trial] = find_sensitivity(refinement);
+  }
+  return sensitive;
 }
 
 }  // namespace wireplan::plan

@@ -12,8 +12,10 @@ simulate::TrialResult simulate_run(const Study& study, const Run& run,
                                    const simulate::VesselModel& vessel) {
   if (run.disturbance) return run_disturbed(study, run.candidate, vessel, *run.disturbance);
   if (run.elements) {
-    return run_candidate(refined_study(study, run.elements->factor, run.elements->insertion),
-                         run.candidate, vessel);
+    Study changed = refined_study(study, run.elements->factor, run.elements->insertion);
+    Candidate candidate = run.candidate;
+    if (run.elements->setting) change_setting(*run.elements->setting, changed, candidate);
+    return run_candidate(changed, candidate, vessel);
   }
   simulate::TrialResult trial = run_candidate(study, run.candidate, vessel);
   const bool may_be_played = trial.outcome == simulate::Outcome::kReached || run.shapes;

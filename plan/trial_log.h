@@ -8,6 +8,7 @@
 
 #include "plan/batch.h"
 #include "plan/robustness.h"
+#include "plan/settings.h"
 
 namespace wireplan::plan {
 
@@ -19,10 +20,12 @@ enum class Level {
 };
 const char* level_name(Level level);  // "scout", "probe", "full"
 
-/// The run of a plan with other elements, up to the insertion at which the plan ended (refine.h).
+/// The run of a plan with other elements, or with a setting changed that should not matter, up to
+/// the insertion at which the plan ended (refine.h).
 struct OtherElements {
-  double factor = 1.0;     // of the study's length
-  double insertion = 0.0;  //                                                              [mm]
+  double factor = 1.0;                  // of the study's length
+  double insertion = 0.0;               //                                             [mm]
+  std::optional<Setting> setting = {};  // that is changed; empty: none
 };
 
 /// One simulated trial: all that tells it from the others of a case.

@@ -155,6 +155,7 @@ class Weighing {
     weigh_share(first, repeats);
     weigh_tip_force(first, repeats);
     weigh_tip_error(first);
+    weigh_sensitivity(first);
     if (!doubts_.empty()) {
       headline_ = "In the computation the wire " + wire_of(first.trial).name +
                   " reaches the target within all limits, but " + list_words(doubts_) + ".";
@@ -269,6 +270,19 @@ class Weighing {
     find(large ? Answer::kUnsure : Answer::kFeasible, text + ".");
     if (large) doubts_.push_back("the tip's error is too large to tell that it is in the target");
     if (large) change("A computation with finer elements, for a smaller error of the tip.");
+  }
+
+  void weigh_sensitivity(const RankedPlan& first) {
+    if (!first.sensitive) return;  // its error is not known either, or it stands behind none
+    if (!is_sensitive(first)) {
+      find(Answer::kFeasible, "Settings that should not matter do not move the tip by more than " +
+                                  one_decimal(kTipsApart) + " mm.");
+      return;
+    }
+    find(Answer::kUnsure, "The end of the plan hangs on how it is computed: " + *first.sensitive +
+                              ". Settings that should not matter decide where the wire goes.");
+    doubts_.push_back("where its tip ends hangs on how it is computed");
+    change("Another wire, angle or roll whose end does not hang on how it is computed.");
   }
 
   /// The best other plan that `merit` has something to say of.

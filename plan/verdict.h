@@ -75,7 +75,8 @@ struct Known {
 ///                       count, since what clearly fails in one is not run in full), or more than
 ///                       `unclear_part` of all did not, or one reached that was not run in full.
 ///                       A plan, but: it was not repeated, its share of safe repeats is not known
-///                       well enough, or its tip's error is not known or too large
+///                       well enough, its tip's error is not known or too large, or its end hangs
+///                       on how it is computed (RankedPlan::sensitive)
 ///   feasible with risk  tip force, also that of 19 in 20 repeats, above the level to warn of;
 ///                       share of safe repeats too low; wall moved beyond linear theory; sheath at
 ///                       its largest ratio to the lumen, or device as wide as the lumen; way or

@@ -83,11 +83,12 @@ void run_bench(const std::string& name, const std::filesystem::path& folder,
                            : name == "preprocess"   ? bench_preprocess
                            : name == "segmentation" ? bench_segmentation
                            : name == "measured"     ? bench_measured
+                           : name == "truth"        ? bench_truth
                                                     : nullptr;
   if (make_report == nullptr) {
-    throw Error(
-        "bench: NAME is '" + name +
-        "', expected accuracy, stability, throughput, preprocess, segmentation or measured");
+    throw Error("bench: NAME is '" + name +
+                "', expected accuracy, stability, throughput, preprocess, segmentation, measured "
+                "or truth");
   }
   if (make_report != bench_throughput && !options.case_path.empty()) {
     throw Error("bench: --case is '" + options.case_path +
@@ -100,6 +101,10 @@ void run_bench(const std::string& name, const std::filesystem::path& folder,
   if (make_report != bench_measured && !options.measured.empty()) {
     throw Error("bench: " + name + " is given the folder '" + options.measured.string() +
                 "', expected none: only measured takes one");
+  }
+  if (make_report != bench_truth && (!options.cases.empty() || options.trials > 0)) {
+    throw Error("bench: " + name +
+                " is given cases or --trials, expected none: only truth takes them");
   }
   std::filesystem::create_directories(folder);
   const BenchReport report = make_report(options);

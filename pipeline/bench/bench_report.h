@@ -42,6 +42,7 @@ BenchReport bench_throughput(const BenchOptions& options);
 BenchReport bench_preprocess(const BenchOptions& options);
 BenchReport bench_segmentation(const BenchOptions& options);
 BenchReport bench_measured(const BenchOptions& options);
+BenchReport bench_truth(const BenchOptions& options);
 
 /// Rows as a table for people: columns aligned, numbers with 4 digits.
 std::string table_text(const std::vector<Json>& rows);

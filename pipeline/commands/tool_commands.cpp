@@ -144,15 +144,16 @@ int make_patient_files(std::uint64_t seed, const std::string& output) {
   return kDone;
 }
 
-// A whole number from 1 to a million.
-int patients_of(const std::string& text) {
-  int patients = 0;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), patients);
-  if (error != std::errc() || end != text.data() + text.size() || patients < 1 ||
-      patients > 1'000'000) {
-    throw Error("bench: N is '" + text + "', expected how many patients, from 1 to 1000000");
+/// The N of segmentation, from what stands behind the name.
+int patient_count(const std::vector<std::string>& of) {
+  int count = 0;
+  const char* end = of.front().data() + of.front().size();
+  const auto [last, failure] = std::from_chars(of.front().data(), end, count);
+  if (failure != std::errc() || last != end || count < 1 || count > 1'000'000 || of.size() > 1) {
+    throw Error("bench: N is '" + of.front() + (of.size() > 1 ? " " + of[1] : "") +
+                "', expected one whole number of patients from 1 to 1000000");
   }
-  return patients;
+  return count;
 }
 
 }  // namespace
@@ -307,20 +308,22 @@ void add_bench(CLI::App& app, int& code) {
   struct Arguments {
     std::string name;
     std::string output = "wireplan-out/bench";
-    std::string of;  // how many patients, or where the measured wires are
+    std::vector<std::string> of = {};  // what stands behind the name
     BenchOptions options;
   };
   const auto arguments = std::make_shared<Arguments>();
   CLI::App* bench = app.add_subcommand(
       "bench",
-      "Error against run time, stability, throughput, preprocessing, segmentation, measured wires");
+      "Error against run time, stability, throughput, segmentation, measured wires, truth");
   bench
       ->add_option("NAME", arguments->name,
-                   "accuracy, stability, throughput, preprocess, segmentation or measured")
+                   "accuracy, stability, throughput, preprocess, segmentation, measured or truth")
       ->required();
-  bench->add_option("N|FOLDER", arguments->of,
-                    "Segmentation: how many patients [100]; measured: the folder of the frames "
-                    "[guide3d beside WIREPLAN_DATA]");
+  bench->add_option("N|FOLDER|CASE", arguments->of,
+                    "Segmentation: how many patients [100]; measured: folder of the frames "
+                    "[guide3d]; truth: cases [all]");
+  bench->add_option("--trials", arguments->options.trials, "Truth: trials of each case [12]")
+      ->check(CLI::Range(1, 100'000));
   bench->add_option("-o,--output", arguments->output, "Folder for results [wireplan-out/bench]");
   bench->add_flag("--quick", arguments->options.quick, "A small size, under 20 s");
   bench->add_option("--seed", arguments->options.first_seed, "Segmentation: of the first [1]")
@@ -331,7 +334,8 @@ void add_bench(CLI::App& app, int& code) {
                     "Throughput: the case whose vessel to take");
   bench->add_option("--set", arguments->options.overrides, "Throughput: key=value of that case")
       ->allow_extra_args(false);
-  bench->add_option("--cache", arguments->options.cache, "Throughput: store of that case's stages");
+  bench->add_option("--cache", arguments->options.cache,
+                    "Throughput, truth: store of the case's stages");
   bench->footer(
       "Writes NAME.json, NAME.csv and the plot NAME.png, and prints the table.\n"
       "  accuracy   each method's error and time on scenes whose answer is known\n"
@@ -339,15 +343,22 @@ void add_bench(CLI::App& app, int& code) {
       "  throughput insertions per second and core, rigid and yielding, with their error\n"
       "  segmentation  patients drawn at random (see phantom --random) and real ones with labels,\n"
       "             each from two points: overlap, surface, way, leaks, refusals\n"
-      "  measured   real wires in a phantom, measured by X-ray: one push at eight rolls, and from "
-      "an\n"
-      "             earlier frame's shape on to the next; a picture of each frame\n"
+      "  measured   real wires in a phantom, measured by X-ray: one push at eight rolls, and from\n"
+      "             an earlier frame's shape on to the next; a picture of each frame\n"
+      "  truth      stated errors of trials of cases against the run with elements of a quarter,\n"
+      "             and how far tips end apart where settings change that should not matter\n"
       "Example: wireplan bench accuracy -o out");
   bench->callback([&code, arguments] {
-    if (arguments->name == "measured") {
-      arguments->options.measured = arguments->of;
+    if (arguments->name == "truth") {
+      arguments->options.cases = arguments->of;
+    } else if (arguments->name == "measured" && !arguments->of.empty()) {
+      if (arguments->of.size() > 1) {
+        throw Error("bench: measured is given '" + arguments->of[0] + "' and '" + arguments->of[1] +
+                    "', expected one folder");
+      }
+      arguments->options.measured = arguments->of.front();
     } else if (!arguments->of.empty()) {
-      arguments->options.patients = patients_of(arguments->of);
+      arguments->options.patients = patient_count(arguments->of);
     }
     run_bench(arguments->name, arguments->output, arguments->options);
     code = kDone;

@@ -349,6 +349,10 @@ std::filesystem::path resolve_path(const std::string& given, const std::filesyst
   return path.has_filename() ? path : path.parent_path();  // "folder/" is "folder"
 }
 
+std::filesystem::path cases_folder() {
+  return std::filesystem::path(WIREPLAN_SOURCE_DIR) / "cases";
+}
+
 void expect_exists(JsonReader& reader, const std::string& key, const std::string& given,
                    const std::filesystem::path& path, const std::string& expected) {
   std::error_code unreachable;  // a folder on the way may not be searched: told as absent

@@ -98,6 +98,9 @@ Json case_parameters(const Case& input);
 /// beside the checkout; what is relative counts from `folder`.
 std::filesystem::path resolve_path(const std::string& given, const std::filesystem::path& folder);
 
+/// The folder of the cases that come with the checkout.
+std::filesystem::path cases_folder();
+
 /// Adds a problem where nothing is at the path that stands under the key.
 void expect_exists(JsonReader& reader, const std::string& key, const std::string& given,
                    const std::filesystem::path& path, const std::string& expected);

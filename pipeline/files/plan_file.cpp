@@ -76,26 +76,48 @@ plan::Measured measured_of(const Json& json) {
           .last_tip = point_of(json.at("last_tip_mm"))};
 }
 
+plan::Setting setting_of(const std::string& name) {
+  using plan::Setting;
+  for (const Setting setting :
+       {Setting::kStep, Setting::kRoll, Setting::kFriction, Setting::kTolerance}) {
+    if (name == plan::setting_name(setting)) return setting;
+  }
+  throw Error("setting is " + name + ", expected step, roll, friction or tolerance");
+}
+
+Json error_to_json(const plan::NumericalError& error) {
+  return {{"position_mm", error.position},    {"tip_mm", error.tip},
+          {"peak_force_n", error.peak_force}, {"mean_force_n", error.mean_force},
+          {"tip_force_n", error.tip_force},   {"push_force_n", error.push_force}};
+}
+
+plan::NumericalError error_of(const Json& json) {
+  return {.position = json.at("position_mm"),
+          .tip = json.at("tip_mm"),
+          .peak_force = json.at("peak_force_n"),
+          .mean_force = json.at("mean_force_n"),
+          .tip_force = json.at("tip_force_n"),
+          .push_force = json.at("push_force_n")};
+}
+
 Json refinement_to_json(const plan::Refinement& refinement) {
-  Json rows = Json::array(), error = nullptr;
+  Json rows = Json::array(), error = nullptr, others = Json::array();
   for (const plan::NumericsRow& row : refinement.rows) {
     rows.push_back({{"element_length_mm", row.element_length},
                     {"position_error_mm", number_or_null(row.position_error)},
                     {"peak_force_n", row.peak_force},
                     {"iterations", row.iterations}});
   }
-  if (refinement.error) {
-    error = {{"position_mm", refinement.error->position},
-             {"tip_mm", refinement.error->tip},
-             {"peak_force_n", refinement.error->peak_force},
-             {"mean_force_n", refinement.error->mean_force},
-             {"tip_force_n", refinement.error->tip_force}};
+  if (refinement.error) error = error_to_json(*refinement.error);
+  for (const plan::OtherEnd& other : refinement.others) {
+    others.push_back({{"setting", plan::setting_name(other.setting)},
+                      {"change", error_to_json(other.change)},
+                      {"incomplete", other.incomplete}});
   }
-  return {{"trial", refinement.trial},
-          {"rows", std::move(rows)},
-          {"error", std::move(error)},
-          {"observed_order", number_or_null(refinement.observed_order)},
-          {"reason", refinement.reason}};
+  return {
+      {"trial", refinement.trial},   {"rows", std::move(rows)},
+      {"error", std::move(error)},   {"observed_order", number_or_null(refinement.observed_order)},
+      {"reason", refinement.reason}, {"others", std::move(others)}};
 }
 
 plan::Refinement refinement_of(const Json& json) {
@@ -110,12 +132,11 @@ plan::Refinement refinement_of(const Json& json) {
                                .iterations = row.at("iterations")});
   }
   const Json& error = json.at("error");
-  if (!error.is_null()) {
-    refinement.error = plan::NumericalError{.position = error.at("position_mm"),
-                                            .tip = error.at("tip_mm"),
-                                            .peak_force = error.at("peak_force_n"),
-                                            .mean_force = error.at("mean_force_n"),
-                                            .tip_force = error.at("tip_force_n")};
+  if (!error.is_null()) refinement.error = error_of(error);
+  for (const Json& other : json.at("others")) {
+    refinement.others.push_back({.setting = setting_of(other.at("setting")),
+                                 .change = error_of(other.at("change")),
+                                 .incomplete = other.at("incomplete")});
   }
   return refinement;
 }

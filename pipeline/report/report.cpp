@@ -20,6 +20,7 @@ constexpr const char* kStatement =
 
 constexpr const char* kRigidWall = "the wall is rigid";
 constexpr const char* kRigidScout = "the wall of a scout or a probe is rigid";
+constexpr const char* kNotRefined = "only the first plans and those tied with the best are refined";
 constexpr const char* kNoRepeats = "only the best plans are repeated, and the best of each wire";
 
 bool is_rigid(const ReportInput& input) {
@@ -240,8 +241,7 @@ Json trial_json(const ReportInput& input, std::size_t k) {
   }
   const plan::Refinement* refined = find_refinement(input, static_cast<int>(k));
   if (refined == nullptr) {
-    row.put_optional("position_error_mm", {},
-                     "only the first plans and those tied with the best are refined");
+    row.put_optional("position_error_mm", {}, kNotRefined);
   } else {
     row.put_optional("position_error_mm",
                      refined->error ? std::optional(refined->error->position) : std::nullopt,
@@ -298,6 +298,13 @@ Json ranked_json(const ReportInput& input, std::size_t k) {
   row.put("expected_score", plan.expected_score);
   row.put("tied_with", plan.tied_with);
   put_weakest(row, input, plan.trial);
+  if (plan.sensitive) {
+    row.put("sensitive", plan::is_sensitive(plan));
+  } else {
+    const plan::Refinement* refined = find_refinement(input, plan.trial);
+    row.put_optional("sensitive", {}, refined == nullptr ? kNotRefined : refined->reason);
+  }
+  row.put("sensitive_reason", plan.sensitive.value_or(""));
   row.put("sentence", plan.sentence);
   return row.finish();
 }
@@ -355,6 +362,15 @@ Json numerics_json(const ReportInput& input) {
                      refinement.reason);
     row.put_optional("peak_tip_force_error_n", part(&plan::NumericalError::tip_force),
                      refinement.reason);
+    row.put_optional("peak_push_force_error_n", part(&plan::NumericalError::push_force),
+                     refinement.reason);
+    Json others = Json::array();
+    for (const plan::OtherEnd& other : refinement.others) {
+      others.push_back({{"setting", plan::setting_name(other.setting)},
+                        {"tip_apart_mm", other.change.tip},
+                        {"incomplete", other.incomplete}});
+    }
+    row.put("settings", std::move(others));
     row.put_optional("observed_order", refinement.observed_order,
                      refinement.reason.empty() ? "the runs do not differ" : refinement.reason);
     plans.push_back(row.finish());

@@ -70,6 +70,10 @@ void add_plans(Table& table, const Json& report) {
     }
     const Json* errors = find_by_trial(report.at("numerics").at("plans"), plan.at("trial"));
     if (errors != nullptr) table.row("stated error of the tip", errors->at("tip_error_mm"), "mm");
+    if (plan.contains("sensitive")) {
+      table.row("end hangs on how it is computed", plan.at("sensitive"), "", nullptr,
+                plan.at("sensitive_reason"));
+    }
   }
 }
 

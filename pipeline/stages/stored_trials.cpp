@@ -85,7 +85,9 @@ std::string StoredTrials::key_of(const plan::Run& run, const std::string& shared
                                 {"level", plan::level_name(run.level)},
                                 {"element", Json(study.insertion.element_length).dump()}};
   if (run.elements) {
-    lines.push_back({"elements", Json({run.elements->factor, run.elements->insertion}).dump()});
+    const auto& [factor, insertion, setting] = *run.elements;
+    lines.push_back({"elements", Json({factor, insertion}).dump()});
+    if (setting) lines.push_back({"setting", plan::setting_name(*setting)});
   }
   if (run.disturbance) {
     const plan::Disturbance& d = *run.disturbance;

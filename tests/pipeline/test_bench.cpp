@@ -387,6 +387,46 @@ TEST(Bench, PreprocessSaysThatItNeedsImages) {
   }
 }
 
+TEST(Bench, TruthHoldsStatedErrorsAgainstFinerRuns) {
+  const QuickRun truth("truth");
+  const Json& rows = truth.result.at("rows");
+  ASSERT_GE(rows.size(), 2u);
+  int compared = 0;
+  for (const Json& row : rows) {
+    SCOPED_TRACE(row.dump());
+    EXPECT_TRUE(row.at("rank").is_null());
+    ASSERT_FALSE(row.at("tip_true_mm").is_null());
+    EXPECT_GT(row.at("tip_true_mm").get<double>(), 0.0);
+    EXPECT_GT(row.at("tip_stated_mm").get<double>(), 0.0);
+    // A straight wire does not feel the roll; both feel the length of a push.
+    EXPECT_EQ(row.at("roll_apart_mm").is_null(), row.at("wire") == "straight");
+    EXPECT_FALSE(row.at("step_apart_mm").is_null());
+    EXPECT_FALSE(row.at("tolerance_apart_mm").is_null());
+    ++compared;
+  }
+  // The results are counted again from the rows.
+  for (const Json& own : truth.result.at("results").at("coverage")) {
+    const std::string name = own.at("quantity"), unit = own.at("unit");
+    const double nothing = unit == "mm" ? 1e-4 : 1e-5;
+    int covered = 0;
+    for (const Json& row : rows) {
+      covered += row.at(name + "_true_" + unit).get<double>() <=
+                 row.at(name + "_stated_" + unit).get<double>() + nothing;
+    }
+    EXPECT_EQ(own.at("compared"), compared);
+    EXPECT_EQ(own.at("covered"), covered);
+    EXPECT_EQ(own.at("not_covered").size(), static_cast<std::size_t>(compared - covered));
+  }
+  EXPECT_EQ(truth.result.at("results").at("path_dependence").at("compared"), compared);
+  expect_written(truth, "truth", "tip_stated_mm");
+}
+
+TEST(Bench, TruthIsToldOfACaseThatIsNotThere) {
+  const TemporaryFolder folder;
+  EXPECT_THROW(run_bench("truth", folder.path(), {.cases = {"no-such-case"}}), Error);
+  EXPECT_THROW(run_bench("accuracy", folder.path(), {.cases = {"no-such-case"}}), Error);
+}
+
 TEST(Bench, CaseIsForThroughputAlone) {
   const TemporaryFolder folder;
   EXPECT_THROW(run_bench("accuracy", folder.path(), {.case_path = "cases/abdomen"}), Error);
@@ -400,7 +440,7 @@ TEST(Bench, UnknownNameIsToldWithTheKnownOnes) {
   } catch (const Error& error) {
     EXPECT_EQ(std::string(error.what()),
               "bench: NAME is 'speed', expected accuracy, stability, throughput, preprocess, "
-              "segmentation or measured");
+              "segmentation, measured or truth");
   }
 }
 

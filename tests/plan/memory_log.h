@@ -28,6 +28,7 @@ inline std::string text_of(const Run& run) {
     text += " elements";
     add(run.elements->factor);
     add(run.elements->insertion);
+    if (run.elements->setting) text += std::string(" ") + setting_name(*run.elements->setting);
   }
   if (run.disturbance) {
     const Disturbance& d = *run.disturbance;

@@ -153,6 +153,37 @@ TEST(MakePlan, RefinesTheFirstThreeAndWhatIsTiedWithTheFirst) {
   EXPECT_EQ(refined.front(), tube.judged(plan).ranking.plans.front().trial);
 }
 
+/// Of a run with a setting changed the tip ends this far aside, where it is the push's length.
+Measured with_end(Measured trial, const plan::Run& run, double aside) {
+  const bool of_step = run.elements && run.elements->setting == Setting::kStep;
+  trial.metrics.insertion = 30.0;
+  trial.nodes.resize(3, 2);
+  trial.nodes << 0.0, of_step ? aside : 0.0, 0.0, 0.0, 0.0, 30.0;
+  return trial;
+}
+
+TEST(MakePlan, RunsPlansWithOtherSettingsAndRefinesWhatComesUpBehindSensitiveOnes) {
+  // The first four by score are sensitive, the other four not.
+  const Tube tube(4);  // all run in full
+  KnowingLog log([](const plan::Run& run) {
+    return with_end(reached(0.05 + 2.0 * roll_of(run)), run, roll_of(run) < 0.15 ? 2.0 : 0.5);
+  });
+  const Plan plan = tube.plan(log, without_repeats());
+  const Ranking ranking = tube.judged(plan).ranking;
+  ASSERT_GE(ranking.plans.size(), 4u);
+  int sensitive = 0;
+  for (std::size_t k = 0; k < ranking.plans.size(); ++k) {
+    sensitive += is_sensitive(ranking.plans[k]);
+    if (k > 0) {
+      EXPECT_GE(is_sensitive(ranking.plans[k]), is_sensitive(ranking.plans[k - 1]));
+    }
+    if (k < 3) {
+      EXPECT_EQ(ranking.plans[k].sensitive, "") << "what is first is known";
+    }
+  }
+  EXPECT_GT(sensitive, 0);
+}
+
 TEST(MakePlan, ShowsTheClosestAttemptOfAWireWithoutAPlan) {
   const Tube tube(20);
   KnowingLog log([](const plan::Run& run) {

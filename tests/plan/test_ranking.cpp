@@ -252,6 +252,32 @@ TEST(Rank, SaysWhyThePlansStandWhereTheyDo) {
             "as much as the first plan; behind it mostly by its distance from the centre");
 }
 
+TEST(Rank, PutsSensitivePlansBehindAllOthersWithTheReason) {
+  Bench bench(1);
+  for (const double force : {0.1, 0.2, 0.3, 0.4}) bench.add(0, 1.0, force);
+  bench.errors.assign(4, NumericalError{.tip = 3.0});  // so large that all scores are tied
+  Findings findings{.errors = bench.errors};
+  const std::string why = "with pushes half as long its tip ends 4.6 mm away";
+  findings.sensitive = {why, "", std::nullopt, why};
+  const Ranking ranking =
+      rank(bench.study, bench.candidates, bench.trials, bench.limits, bench.weights, findings);
+  EXPECT_EQ(order_of(ranking), (std::vector<int>{1, 2, 0, 3}));
+  // What stands apart for this reason is not tied.
+  EXPECT_EQ(ranking.plans[0].tied_with, std::vector<int>{2});
+  EXPECT_EQ(ranking.plans[2].tied_with, std::vector<int>{3});
+  for (const RankedPlan& plan : ranking.plans) {
+    const bool last = plan.trial == 0 || plan.trial == 3;
+    EXPECT_EQ(is_sensitive(plan), last);
+    EXPECT_EQ(plan.sentence.find("; behind it because it is sensitive") != std::string::npos, last);
+    EXPECT_EQ(plan.sentence.find("; sensitive: " + why) != std::string::npos, last);
+  }
+  // Where all are, their order is as ever.
+  findings.sensitive.assign(4, why);
+  EXPECT_EQ(order_of(rank(bench.study, bench.candidates, bench.trials, bench.limits, bench.weights,
+                          findings)),
+            (std::vector<int>{0, 1, 2, 3}));
+}
+
 TEST(Rank, ComparesPlansThatDoNotTouchTheWall) {
   Bench bench;
   bench.add(0, 1.0, 0.0);

@@ -17,6 +17,9 @@ using simulate::Outcome;
 
 constexpr double kLength = 40.0;  // of the wires made by hand                          [mm]
 
+/// Richardson's factor for half an order.
+const double kHalfOrder = std::sqrt(2.0) / (std::sqrt(2.0) - 1.0);
+
 /// A wire along x with its tip at x = 0, displaced sideways by `offset` (h, distance from the tip).
 RefinedRun run_of(double h, const std::function<double(double h, double s)>& offset, double force) {
   RefinedRun run;
@@ -72,17 +75,17 @@ TEST(ShapeDistance, ComparesAsFarAsBothReach) {
   EXPECT_LT(shape_distance(a.trial.nodes, b.trial.nodes.rightCols(61)), 1e-13);
 }
 
-TEST(EstimateError, IsExactForErrorsOfSecondOrder) {
+TEST(EstimateError, KnowsTheErrorsOfSecondOrderAndStatesMore) {
   const Refinement result = estimate_error(4, kLength, runs_of_order(2.0, 0.03));
   EXPECT_EQ(result.trial, 4);
   EXPECT_EQ(result.reason, "");
   ASSERT_TRUE(result.observed_order.has_value());
   EXPECT_NEAR(*result.observed_order, 2.0, 1e-12);  // rounding
   ASSERT_TRUE(result.error.has_value());
-  EXPECT_NEAR(result.error->position, 0.03, 1e-13);
-  EXPECT_NEAR(result.error->tip, 0.03, 1e-13);
-  // Of forces half an order is assumed: the change to h/2 is three quarters of 0.03 N.
-  const double force = 0.75 * 0.03 * std::sqrt(2.0) / (std::sqrt(2.0) - 1.0);
+  // Half an order is assumed for what is stated: the change to h/2 is three quarters of 0.03.
+  const double force = 0.75 * 0.03 * kHalfOrder;
+  EXPECT_NEAR(result.error->position, force, 1e-13);
+  EXPECT_NEAR(result.error->tip, force, 1e-13);
   EXPECT_NEAR(result.error->peak_force, force, 1e-13);
   EXPECT_NEAR(result.error->tip_force, force, 1e-13);
   EXPECT_NEAR(result.error->mean_force, 0.5 * force, 1e-13);  // from rest: half the last force
@@ -101,7 +104,8 @@ TEST(EstimateError, IsExactForErrorsOfSecondOrder) {
 TEST(EstimateError, FollowsALowerOrder) {
   const Refinement result = estimate_error(0, kLength, runs_of_order(1.0, 0.03));
   EXPECT_NEAR(result.observed_order.value(), 1.0, 1e-12);
-  EXPECT_NEAR(result.error.value().position, 0.03, 1e-13);
+  EXPECT_NEAR(result.rows[1].position_error.value(), 0.03, 1e-13);
+  EXPECT_NEAR(result.error.value().position, 0.5 * 0.03 * kHalfOrder, 1e-13);
 }
 
 TEST(EstimateError, DoesNotTrustAHigherOrderThanTheRodHas) {
@@ -117,8 +121,7 @@ TEST(EstimateError, StaysFiniteWhereTheRunsDoNotConverge) {
   const Refinement result = estimate_error(
       0, kLength, {run_of(2.0, offset, 1.0), run_of(1.0, offset, 1.0), run_of(0.5, offset, 1.0)});
   EXPECT_LT(result.observed_order.value(), 0.0);
-  const double half_order = std::sqrt(2.0) / (std::sqrt(2.0) - 1.0);
-  EXPECT_NEAR(result.error.value().position, 0.05 * half_order, 1e-13);
+  EXPECT_NEAR(result.error.value().position, 0.05 * kHalfOrder, 1e-13);
 }
 
 TEST(EstimateError, AChangeThatHappensToBeSmallIsNotTrusted) {
@@ -157,10 +160,110 @@ TEST(EstimateError, NeedsNoCoarseRunForTheError) {
   auto runs = runs_of_order(2.0, 0.03);
   runs[0].trial = Measured{};
   const Refinement result = estimate_error(0, kLength, runs);
-  EXPECT_NEAR(result.error.value().position, 0.03, 1e-13);
+  EXPECT_NEAR(result.error.value().position, 0.75 * 0.03 * kHalfOrder, 1e-13);
   EXPECT_FALSE(result.observed_order.has_value());
   EXPECT_EQ(result.rows.size(), 2u);
   EXPECT_NE(result.reason.find("with elements of 2 mm"), std::string::npos);
+}
+
+/// Another end of the runs of an error of 0.03 mm: its wire lies `aside` mm off, and presses so.
+SettingRun end_of(Setting setting, double aside, double force) {
+  return {setting, run_of(
+                       1.0, [&](double, double) { return 0.03 + aside; }, force)
+                       .trial};
+}
+
+TEST(EstimateError, IsNoLessThanWhatSettingsMakeOfIt) {
+  auto runs = runs_of_order(2.0, 0.03);
+  for (RefinedRun& run : runs) run.trial.metrics.peak_push_force = 1.0;
+  SettingRun step = end_of(Setting::kStep, 0.4, 1.03);
+  step.trial.metrics.peak_push_force = 1.25;
+  const SettingRun roll = end_of(Setting::kRoll, 0.01, 2.03);
+  const Refinement result = estimate_error(0, kLength, runs, {step, roll});
+  ASSERT_TRUE(result.error.has_value());
+  EXPECT_NEAR(result.error->tip, 0.4, 1e-13);  // of the step
+  EXPECT_NEAR(result.error->position, 0.4, 1e-13);
+  EXPECT_NEAR(result.error->tip_force, 1.0, 1e-13);  // of the roll
+  // The hand's force over shorter pushes is another figure, unless they lead elsewhere.
+  EXPECT_NEAR(result.error->push_force, 1.0, 1e-13);  // of the roll too
+  EXPECT_EQ(estimate_error(0, kLength, runs, {step}).error->push_force, 0.0);
+  SettingRun far = end_of(Setting::kStep, 1.1, 1.03);
+  far.trial.metrics.peak_push_force = 1.25;
+  EXPECT_NEAR(estimate_error(0, kLength, runs, {far}).error->push_force, 0.25, 1e-13);
+  ASSERT_EQ(result.others.size(), 2u);
+  EXPECT_NEAR(result.others[0].change.push_force, 0.25, 1e-13);
+  EXPECT_EQ(find_sensitivity(result), "");
+  // What is smaller than the error of the elements leaves it as it is.
+  const Refinement same = estimate_error(0, kLength, runs_of_order(2.0, 0.03),
+                                         {end_of(Setting::kFriction, 0.02, 1.03)});
+  EXPECT_NEAR(same.error.value().tip, 0.75 * 0.03 * kHalfOrder, 1e-13);
+}
+
+TEST(Sensitivity, IsToldWithTheSettingAndHowFarAwayItEnds) {
+  const auto runs = runs_of_order(2.0, 0.03);
+  const Refinement result =
+      estimate_error(0, kLength, runs,
+                     {end_of(Setting::kStep, 4.6, 1.03), end_of(Setting::kRoll, 0.99, 1.03),
+                      end_of(Setting::kFriction, 1.01, 1.03)});
+  EXPECT_EQ(find_sensitivity(result),
+            "with pushes half as long its tip ends 4.6 mm away; with 0.1 % more friction its tip "
+            "ends 1.0 mm away");
+  EXPECT_FALSE(find_sensitivity(estimate_error(0, kLength, runs)).has_value());
+}
+
+TEST(Sensitivity, KnowsAnEndThatCameLessFar) {
+  SettingRun stuck = end_of(Setting::kStep, 0.0, 1.03);
+  stuck.trial.metrics.insertion = 31.5;
+  stuck.trial.reason = "stuck at the bend";
+  const Refinement result = estimate_error(3, kLength, runs_of_order(2.0, 0.03), {stuck});
+  const std::string told =
+      "with pushes half as long the wire came to 31.5 mm of 40 mm: stuck at the bend";
+  EXPECT_EQ(find_sensitivity(result), told);
+  const auto by_trial = sensitivity_by_trial({result}, 5);
+  EXPECT_EQ(by_trial[3], told);
+  EXPECT_FALSE(by_trial[2].has_value());
+}
+
+TEST(Sensitivity, IsNotKnownWhereThePlanItselfDidNotComeAsFar) {
+  auto runs = runs_of_order(2.0, 0.03);
+  runs[1].trial.metrics.insertion = 31.5;
+  const Refinement result = estimate_error(0, kLength, runs, {end_of(Setting::kStep, 4.6, 1.03)});
+  EXPECT_FALSE(find_sensitivity(result).has_value());
+  EXPECT_FALSE(result.error.has_value());
+}
+
+TEST(SettingsThatAct, LeaveOutWhatTheWireDoesNotFeel) {
+  Study study = TubeCase().study;
+  study.wires = {{.name = "straight",
+                  .radius = 0.4,
+                  .sections = {{.length = 60.0, .bending_stiffness = 50.0}}},
+                 {.name = "curved",
+                  .radius = 0.4,
+                  .sections = {{.length = 60.0, .bending_stiffness = 50.0, .rest_curvature = 0.05}},
+                  .friction = 0.1}};
+  study.insertion.friction = 0.0;
+  EXPECT_EQ(settings_that_act(study, {.wire = 0}),
+            (std::vector<Setting>{Setting::kStep, Setting::kTolerance}));
+  EXPECT_EQ(settings_that_act(study, {.wire = 1}),
+            (std::vector<Setting>{Setting::kStep, Setting::kTolerance, Setting::kRoll,
+                                  Setting::kFriction}));
+}
+
+TEST(ChangeSetting, ChangesTheOneThatItNames) {
+  for (const Setting setting :
+       {Setting::kStep, Setting::kRoll, Setting::kFriction, Setting::kTolerance}) {
+    SCOPED_TRACE(setting_name(setting));
+    const Study before = TubeCase().study;
+    Study study = before;
+    Candidate candidate{.roll = 1.0};
+    change_setting(setting, study, candidate);
+    const simulate::InsertionOptions &is = study.insertion, &was = before.insertion;
+    EXPECT_EQ(is.step / was.step, setting == Setting::kStep ? 0.5 : 1.0);
+    EXPECT_NEAR(candidate.roll - 1.0, setting == Setting::kRoll ? 0.01 * kRadPerDeg : 0.0, 1e-15);
+    EXPECT_EQ(is.friction_factor, setting == Setting::kFriction ? 1.001 : 1.0);
+    EXPECT_NEAR(is.residual_tolerance / was.residual_tolerance,
+                setting == Setting::kTolerance ? 0.1 : 1.0, 1e-12);
+  }
 }
 
 TEST(ErrorsByTrial, PutsEachErrorIntoTheSlotOfItsTrial) {
@@ -184,7 +287,8 @@ TEST(EstimateError, TellsTheTipFromTheRestOfTheWire) {
         1.0));
   }
   const Refinement result = estimate_error(0, kLength, runs);
-  EXPECT_NEAR(result.error.value().position, 0.03, 1e-4);  // the slope lengthens the coarse wire
+  // The slope lengthens the coarse wire.
+  EXPECT_NEAR(result.error.value().position, 0.75 * 0.03 * kHalfOrder, 3e-4);
   EXPECT_LT(result.error.value().tip, 1e-15);
 }
 
@@ -257,6 +361,10 @@ TEST(RefinePlans, EstimatesASmallErrorOfAWireAgainstTheWall) {
     EXPECT_LT(r.rows[2].position_error.value(), r.rows[1].position_error.value());
     EXPECT_GT(r.rows[1].peak_force, 1e-3);  // it does press on the wall
     for (const double seconds : r.cpu_seconds) EXPECT_GT(seconds, 0.0);
+    ASSERT_EQ(r.others.size(), 1u);  // straight, without friction: only the push's length
+    EXPECT_EQ(r.others[0].setting, Setting::kStep);
+    EXPECT_LT(r.others[0].change.tip, 0.1);  // no path to depend on
+    EXPECT_EQ(find_sensitivity(r), "");
   }
 }
 

@@ -59,7 +59,8 @@ struct WhatIsKnown {
                                 .error = NumericalError{.tip = tip_error},
                                 .observed_order = {},
                                 .reason = "",
-                                .cpu_seconds = {}});
+                                .cpu_seconds = {},
+                                .others = {}});
   }
   /// A plan without anything against it.
   static WhatIsKnown good() {
@@ -220,6 +221,18 @@ TEST(Verdict, TipErrorThatIsUnknownOrLargeIsUnsure) {
     const Verdict verdict = bench.verdict();
     EXPECT_EQ(verdict.answer, error < 0.5 ? Answer::kFeasible : Answer::kUnsure);
     EXPECT_EQ(tells(verdict.reasons, "so it may not be in the target"), error > 0.5);
+  }
+}
+
+TEST(Verdict, AnEndThatHangsOnHowItIsComputedIsUnsure) {
+  for (const double apart : {0.99, 1.01}) {
+    WhatIsKnown bench = WhatIsKnown::good();
+    bench.plan.refinements[0].others = {
+        {.setting = Setting::kStep, .change = {.tip = apart}, .incomplete = ""}};
+    const Verdict verdict = bench.verdict();
+    EXPECT_EQ(verdict.answer, apart < 1.0 ? Answer::kFeasible : Answer::kUnsure);
+    EXPECT_EQ(tells(verdict.reasons, "with pushes half as long its tip ends 1.0 mm away"),
+              apart > 1.0);
   }
 }
 

@@ -155,6 +155,7 @@ const uncertainBlock = ({report, trials}) => {
     items.push(error === undefined || error === null
       ? "Plan 1: the error of the tip's place is not known."
       : `Plan 1: the tip is where it is told to within ${mm(Number(error.toPrecision(2)))}, by the computation alone.`);
+    if (first.sensitive) items.push(`Plan 1 is sensitive: ${shown(first.sensitive_reason)}.`);
     const repeats = report.robustness?.plans?.find((row) => row.trial === first.trial);
     items.push(repeats
       ? `Plan 1: safe in ${safeText(repeats)} repeats with other angles, entry, friction, stiffness of wire and wall, and lumen; the share lies between ${repeats.success_rate_interval.map(wholePercent).join(" and ")}.`

@@ -54,7 +54,7 @@ export const answerSection = (page) => {
       `. Its tip ends ${withError(t.tip_to_target_mm, errors.position_error_mm)}\u00a0mm from the target's middle, with at most ` +
       `${withError(t.peak_contact_force_n, errors.peak_contact_force_error_n)}\u00a0N on any 5\u00a0mm of wire and ${withError(t.peak_tip_force_n, errors.peak_tip_force_error_n)}\u00a0N at the tip.`),
     el("p", {}, ties ? `${plural(ties, "other plan")} cannot be told apart from it: ${best.tied_with.map((id) => `plan ${trials[id].plan?.rank ?? "?"}`).join(", ")}. ` : "No other plan is as good within the errors. ", rate),
-    el("p", {class: "note"}, "\u00b1 is the estimated numerical error alone; see what is uncertain below."));
+    el("p", {class: "note"}, "\u00b1 is the estimated numerical error alone, which holds the true value in 95\u00a0% of cases; see what is uncertain below."));
 };
 
 const rangeOf = (values) => [...new Set([Math.min(...values), Math.max(...values)].map(number))].join(" to ");
@@ -110,6 +110,11 @@ export const uncertainSection = (page) => {
     rows.push(["Length of the wire's elements", e.position_error_mm === undefined || e.position_error_mm === null ? `error not estimated${e.null_reasons?.position_error_mm ? `: ${shown(e.null_reasons.position_error_mm)}` : ""}` : `best plan run with elements twice and half as long`,
       e.position_error_mm === undefined || e.position_error_mm === null ? "not known" :
       `position \u00b1\u00a0${number(e.position_error_mm)}\u00a0mm, largest contact \u00b1\u00a0${number(e.peak_contact_force_error_n)}\u00a0N; score \u00b1\u00a0${number(first.score_error)}, which ties ${plural(first.tied_with.length, "plan")} with the best`]);
+    if (first.sensitive !== undefined) {
+      rows.push(["Length of a push, which should not matter",
+        first.sensitive === null ? "not known" : `best plan run with pushes half as long: its tip ends at most ${number(Math.max(...(e.settings ?? []).map((row) => row.tip_apart_mm)))}\u00a0mm away`,
+        first.sensitive ? `sensitive: ${shown(first.sensitive_reason)}` : first.sensitive === null ? "not known" : "within the errors above"]);
+    }
     rows.push(sensitivity(page, best, "inclination_deg", "Inclination of the introducer"));
     rows.push(sensitivity(page, best, "azimuth_deg", "Azimuth of the introducer"));
     rows.push(sensitivity(page, best, "roll_deg", "Roll of the tip"));
