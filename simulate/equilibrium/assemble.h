@@ -2,6 +2,7 @@
 /// Energy and derivatives of the whole wire, and what its supports take out of them.
 #include "simulate/equilibrium/elements.h"
 #include "simulate/equilibrium/sinks.h"
+#include "simulate/equilibrium/tool_elements.h"
 #include "simulate/wire/twist_chain.h"
 
 namespace wireplan::simulate {
@@ -33,10 +34,12 @@ Energy assemble(const Problem& problem, const RodState& state, Sink& sink,
     energy.bend += add_clamp(state, n - 2, rod.rest_length[n - 2], rod.distal_bend,
                              *problem.distal.tangent, sink);
   }
-  if (rod.twisted) {
+  if (problem.tools != nullptr) {
+    add_tools(problem, state, sink, energy);
+  } else if (rod.twisted) {
     for (int i = std::max(1, problem.first - 1); i <= std::min(n - 2, problem.last); ++i) {
       if (chain.has(i)) continue;  // it has no shape either
-      energy.twist += add_twist(problem, state, i, sink);
+      energy.twist += add_twist(rod.twist[i], state, i, sink);
       if (rod.rest_angle[i] != 0.0) energy.bend += add_rest_bend(problem, state, i, sink);
       if (rod.strip[i] != 0.0) energy.bend += add_strip(problem, state, i, sink);
     }
@@ -74,8 +77,8 @@ template <int D>
 void hold(const Mat3& P, bool hold_theta, int k, BlockBand<D>& H) {
   typename BlockBand<D>::Block Q = BlockBand<D>::Block::Identity();
   Q.template topLeftCorner<3, 3>() = P;
-  if constexpr (D == 4) {
-    if (hold_theta) Q(3, 3) = 0.0;
+  if (hold_theta) {
+    for (int r = 3; r < D; ++r) Q(r, r) = 0.0;
   }
   H.own(k) = (Q * H.own(k).template selfadjointView<Eigen::Lower>() * Q).eval();
   H.own(k) += BlockBand<D>::Block::Identity() - Q;
@@ -91,7 +94,7 @@ void project(const Problem& problem, Eigen::VectorXd& v) {
   const int n = problem.rod->nodes();
   const auto project_end = [&](const EndSupport& support, int node, int edge) {
     v.segment<3>(D * node) = (free_directions(support) * v.segment<3>(D * node)).eval();
-    if (D == 4 && support.hold_roll && edge >= 0) v[D * edge + 3] = 0.0;
+    if (D > 3 && support.hold_roll && edge >= 0) v.segment<D - 3>(D * edge + 3).setZero();
   };
   if (problem.first == 0) project_end(problem.proximal, 0, 0);
   if (problem.last == n) project_end(problem.distal, n - 1 - problem.first, n - 2 - problem.first);
@@ -106,7 +109,7 @@ void apply_supports(const Problem& problem, BlockBand<D>& H) {
   }
   if (problem.last == n) {
     hold<D>(free_directions(problem.distal), true, n - 1 - problem.first, H);  // no edge n-1
-    if (D == 4 && problem.distal.hold_roll && n - 2 >= problem.first) {
+    if (D > 3 && problem.distal.hold_roll && n - 2 >= problem.first) {
       hold<D>(Mat3::Identity(), true, n - 2 - problem.first, H);
     }
   }

@@ -116,13 +116,15 @@ struct Edge {
   Vec3 t, m, n;
 };
 
-inline Edge edge_at(const RodState& state, int i) {
+/// `tool`: of several, whose thetas stand one after the other (tool_stack.h).
+inline Edge edge_at(const RodState& state, int i, int tool = 0) {
   const Vec3 e = state.x.col(i + 1) - state.x.col(i);
   Edge edge;
   edge.length = e.norm();
   edge.t = e / edge.length;
   const Vec3 d = state.director.col(i);
-  const double c = std::cos(state.theta[i]), s = std::sin(state.theta[i]);
+  const double theta = state.theta[i + tool * state.director.cols()];
+  const double c = std::cos(theta), s = std::sin(theta);
   edge.m = c * d + s * edge.t.cross(d);
   edge.n = edge.t.cross(edge.m);
   return edge;
@@ -188,16 +190,32 @@ struct Lean {
   double s;
 
   template <class Direction>
-  Lean(const Rod& rod, const RodState& state, int node, const Direction& direction)
+  Lean(const Rod& rod, const RodState& state, int node, const Direction& direction, int tool = 0)
       : i(node),
         l_a(rod.rest_length[node - 1]),
         l_b(rod.rest_length[node]),
-        a(edge_at(state, node - 1)),
-        b(edge_at(state, node)),
+        a(edge_at(state, node - 1, tool)),
+        b(edge_at(state, node, tool)),
         u((b.length / l_b) * b.t - (a.length / l_a) * a.t),
         d_a(direction(a)),
         d_b(direction(b)),
         s(0.5 * u.dot(d_a.d + d_b.d)) {}
+};
+
+/// First derivatives of a lean with its edges and their thetas.
+struct LeanSlopes {
+  double ua, ub;  // of u along the edges, over their lengths
+  Vec3 s_a, s_b;
+  double s_theta_a, s_theta_b;
+
+  explicit LeanSlopes(const Lean& lean)
+      : ua(lean.u.dot(lean.a.t) / lean.a.length), ub(lean.u.dot(lean.b.t) / lean.b.length) {
+    const Vec3 sum = lean.d_a.d + lean.d_b.d;
+    s_a = -0.5 * (sum / lean.l_a + ua * lean.d_a.d);
+    s_b = 0.5 * (sum / lean.l_b - ub * lean.d_b.d);
+    s_theta_a = 0.5 * lean.u.dot(lean.d_a.by_theta);
+    s_theta_b = 0.5 * lean.u.dot(lean.d_b.by_theta);
+  }
 };
 
 /// Derivatives of W(s), given W' and W''.
@@ -205,12 +223,10 @@ template <class Sink>
 void add_lean(const Lean& lean, double first, double second, Sink& sink) {
   const Edge &a = lean.a, &b = lean.b;
   const Across &d_a = lean.d_a, &d_b = lean.d_b;
-  const Vec3 sum = d_a.d + d_b.d;
-  const double ua = lean.u.dot(a.t) / a.length, ub = lean.u.dot(b.t) / b.length;
-  const Vec3 s_a = -0.5 * (sum / lean.l_a + ua * d_a.d);  // derivatives of s
-  const Vec3 s_b = 0.5 * (sum / lean.l_b - ub * d_b.d);
-  const double s_theta_a = 0.5 * lean.u.dot(d_a.by_theta);
-  const double s_theta_b = 0.5 * lean.u.dot(d_b.by_theta);
+  const LeanSlopes slopes(lean);
+  const double ua = slopes.ua, ub = slopes.ub;
+  const Vec3 &s_a = slopes.s_a, &s_b = slopes.s_b;
+  const double s_theta_a = slopes.s_theta_a, s_theta_b = slopes.s_theta_b;
   const int i = lean.i;
   add_edge_gradient(i, first * s_a, first * s_b, sink);
   sink.gradient_theta(i - 1, first * s_theta_a);
@@ -269,6 +285,28 @@ double add_strip(const Problem& problem, const RodState& state, int i, Sink& sin
   return 0.5 * S * excess * excess;
 }
 
+/// Derivatives of W(s) of a clamp's lean s = w . d toward a direction d across its edge, given W'
+/// and W''. For a distal tangent w is the tangent, for a proximal one minus the tangent.
+template <class Sink>
+void add_clamp_lean(int edge, const Edge& e, const Vec3& w, const Across& across, double first,
+                    double second, Sink& sink) {
+  const Vec3 s_e = -(w.dot(e.t) / e.length) * across.d;
+  const double s_theta = w.dot(across.by_theta);
+  sink.gradient(edge, -first * s_e);
+  sink.gradient(edge + 1, first * s_e);
+  sink.gradient_theta(edge, first * s_theta);
+  if constexpr (Sink::kHessian) {
+    const Mat3 H = first * carried_hessian(e, across.d, w) + outer_product(second * s_e, s_e);
+    sink.hessian(edge, edge, H);
+    sink.hessian(edge + 1, edge + 1, H);
+    sink.hessian(edge + 1, edge, -H);
+    const Vec3 h = second * s_theta * s_e - (first * w.dot(e.t) / e.length) * across.by_theta;
+    sink.hessian_theta(edge, edge, -h);
+    sink.hessian_theta(edge, edge + 1, h);
+    sink.hessian_theta_theta(edge, edge, second * s_theta * s_theta - first * w.dot(across.d));
+  }
+}
+
 /// What rest angle and strip add to add_clamp: the same as at an interior node, between the edge
 /// and the tangent, to which the edge's directors are carried. The lean toward a direction d of the
 /// edge is then t . d for a distal tangent t and -t . d for a proximal one.
@@ -283,21 +321,7 @@ double add_clamp_shape(const Problem& problem, const RodState& state, int edge, 
   const Vec3 w = proximal ? Vec3(-tangent) : tangent;
   const Edge e = edge_at(state, edge);
   const auto add = [&](const Across& across, double first, double second) {
-    const Vec3 s_e = -(w.dot(e.t) / e.length) * across.d;
-    const double s_theta = w.dot(across.by_theta);
-    sink.gradient(edge, -first * s_e);
-    sink.gradient(edge + 1, first * s_e);
-    sink.gradient_theta(edge, first * s_theta);
-    if constexpr (Sink::kHessian) {
-      const Mat3 H = first * carried_hessian(e, across.d, w) + outer_product(second * s_e, s_e);
-      sink.hessian(edge, edge, H);
-      sink.hessian(edge + 1, edge + 1, H);
-      sink.hessian(edge + 1, edge, -H);
-      const Vec3 h = second * s_theta * s_e - (first * w.dot(e.t) / e.length) * across.by_theta;
-      sink.hessian_theta(edge, edge, -h);
-      sink.hessian_theta(edge, edge + 1, h);
-      sink.hessian_theta_theta(edge, edge, second * s_theta * s_theta - first * w.dot(across.d));
-    }
+    add_clamp_lean(edge, e, w, across, first, second, sink);
   };
   double energy = 0.0;
   if (r != 0.0) {
@@ -342,10 +366,10 @@ struct ReferenceTwist {
 
 /// Twist at node i, W = T/2 (theta_b - theta_a + reference twist)^2.
 template <class Sink>
-double add_twist(const Problem& problem, const RodState& state, int i, Sink& sink) {
-  const double T = problem.rod->twist[i];
+double add_twist(double T, const RodState& state, int i, Sink& sink, int tool = 0) {
+  const Eigen::Index b = i + tool * state.director.cols();  // of theta_b
   const ReferenceTwist twist(tangent_at(state, i - 1), tangent_at(state, i));
-  const double angle = state.theta[i] - state.theta[i - 1] + state.reference_twist[i];
+  const double angle = state.theta[b] - state.theta[b - 1] + state.reference_twist[i];
   const Vec3 &m_a = twist.by_a, &m_b = twist.by_b;
   add_edge_gradient(i, T * angle * m_a, T * angle * m_b, sink);
   sink.gradient_theta(i - 1, -T * angle);

@@ -18,11 +18,17 @@ constexpr double kEpsilon = std::numeric_limits<double>::epsilon();
 constexpr int kKrylov = kTuning.most_directions;
 
 /// Residual that 64 bit numbers leave in the stiffest element.
-double find_rounding_floor(const Rod& rod, double extent) {
+double find_rounding_floor(const Problem& problem, double extent) {
+  const Rod& rod = *problem.rod;
   const double shortest = rod.rest_length.minCoeff();
-  return 8.0 * kEpsilon * extent *
-         (rod.stretch.cwiseProduct(rod.per_length).maxCoeff() +
-          4.0 * rod.largest_bend() / (shortest * shortest));
+  double floor = 0.0;
+  if (problem.tools != nullptr) {  // of angles of a turn and more
+    floor = 8.0 * kEpsilon * 2.0 * kPi / rod.radius *
+            std::max(problem.tools->twist.maxCoeff(), problem.tools->lead.maxCoeff());
+  }
+  return floor + 8.0 * kEpsilon * extent *
+                     (rod.stretch.cwiseProduct(rod.per_length).maxCoeff() +
+                      4.0 * rod.largest_bend() / (shortest * shortest));
 }
 
 /// One solve: the iterate, and what is remembered from step to step.
@@ -42,7 +48,9 @@ class Newton {
         banded_(D == 3 && out_of_introducer_ && !problem.distal.hold_along &&
                 !problem.distal.hold_across && contact_ != nullptr &&
                 contact_->remainder_is_banded()),
-        chain_(D == 4 && out_of_introducer_ ? find_chain(rod_, problem.first) : TwistChain{}),
+        chain_(D == 4 && problem.tools == nullptr && out_of_introducer_
+                   ? find_chain(rod_, problem.first)
+                   : TwistChain{}),
         extent_(state.x.cwiseAbs().maxCoeff()),
         state_(state),
         memory_(memory),
@@ -82,7 +90,7 @@ class Newton {
     gradient_.resize(D * count_);
     step_.resize(D * count_);
     gather_chain(chain_, state_);
-    result_.rounding_floor = find_rounding_floor(rod_, extent_);
+    result_.rounding_floor = find_rounding_floor(problem_, extent_);
     trial_ = state_;
     if (contact_ != nullptr) contact_->begin(state_.x);
     wire_energy_ = differentiate(state_);
@@ -121,9 +129,11 @@ class Newton {
       residual = std::max(residual, gradient_.template segment<3>(D * k).squaredNorm());
     }
     residual = std::sqrt(residual);
-    if constexpr (D == 4) {  // a torque out of balance counts as a force at the wire's radius
+    if constexpr (D > 3) {  // a torque out of balance counts as a force at the wire's radius
       for (int k = 0; k < count_; ++k) {
-        residual = std::max(residual, std::abs(gradient_[D * k + 3]) / rod_.radius);
+        for (int r = 3; r < D; ++r) {
+          residual = std::max(residual, std::abs(gradient_[D * k + r]) / rod_.radius);
+        }
       }
     }
     return residual;
@@ -241,7 +251,7 @@ class Newton {
       if (shift_ == 0.0 && !unsymmetric_ && contact_->has_remainder()) slope_ = refine_step();
       cap_ = contact_->largest_safe_part(motion(), looks_);
     }
-    if (D == 4) cap_ = std::min(cap_, largest_turning_step<D>(problem_, step_));
+    if (D > 3) cap_ = std::min(cap_, largest_turning_step<D>(problem_, step_));
   }
 
   double refine_step();
@@ -293,11 +303,12 @@ class Newton {
 
   /// The trial state's energy, and whether it falls as it should.
   double try_trial(double length) {
-    if constexpr (D == 4) {
+    if constexpr (D > 3) {
       const int n = rod_.nodes();
       for (int k = chain_.edges(); k < count_ && problem_.first + k < n - 1; ++k) {
-        trial_.theta[problem_.first + k] =
-            state_.theta[problem_.first + k] + length * step_[D * k + 3];
+        for (int r = 3, e = problem_.first + k; r < D; ++r, e += n - 1) {
+          trial_.theta[e] = state_.theta[e] + length * step_[D * k + r];
+        }
       }
       transport_frames(state_, trial_, std::max(0, problem_.first - 1),
                        std::min(n - 2, problem_.last - 1), chain_.first, chain_.edges());
@@ -387,7 +398,7 @@ class Newton {
       state_.tip_angle = tip_angle(*problem_.tip_moment, state_, last_edge(state_));
       trial_.tip_angle = state_.tip_angle;
     }
-    if constexpr (D == 4) {
+    if constexpr (D > 3) {
       trial_.director = state_.director;
       trial_.reference_twist = state_.reference_twist;
     }
@@ -530,5 +541,9 @@ template NewtonResult solve_newton<3>(const Problem&, RodState&, const NewtonOpt
                                       BandMemory<3>&);
 template NewtonResult solve_newton<4>(const Problem&, RodState&, const NewtonOptions&, SolveMemory&,
                                       BandMemory<4>&);
+template NewtonResult solve_newton<5>(const Problem&, RodState&, const NewtonOptions&, SolveMemory&,
+                                      BandMemory<5>&);
+template NewtonResult solve_newton<6>(const Problem&, RodState&, const NewtonOptions&, SolveMemory&,
+                                      BandMemory<6>&);
 
 }  // namespace wireplan::simulate

@@ -82,8 +82,8 @@ struct NewtonTuning {
 };
 
 /// Moves `state` to equilibrium, starting from where it is; on failure it is the last iterate. D is
-/// 4 where the rod is twisted, else 3. The memory is reused: nothing is allocated once it has
-/// grown.
+/// 3 and one for each twist: that of the rod or those of the tools. The memory is reused: nothing
+/// is allocated once it has grown.
 template <int D>
 NewtonResult solve_newton(const Problem& problem, RodState& state, const NewtonOptions& options,
                           SolveMemory& memory, BandMemory<D>& bands);
@@ -91,5 +91,9 @@ extern template NewtonResult solve_newton<3>(const Problem&, RodState&, const Ne
                                              SolveMemory&, BandMemory<3>&);
 extern template NewtonResult solve_newton<4>(const Problem&, RodState&, const NewtonOptions&,
                                              SolveMemory&, BandMemory<4>&);
+extern template NewtonResult solve_newton<5>(const Problem&, RodState&, const NewtonOptions&,
+                                             SolveMemory&, BandMemory<5>&);
+extern template NewtonResult solve_newton<6>(const Problem&, RodState&, const NewtonOptions&,
+                                             SolveMemory&, BandMemory<6>&);
 
 }  // namespace wireplan::simulate

@@ -6,6 +6,7 @@
 
 #include "simulate/contact/wall_contact.h"
 #include "simulate/wire/rod.h"
+#include "simulate/wire/tool_stack.h"
 
 namespace wireplan::simulate {
 
@@ -49,7 +50,10 @@ struct Problem {
   std::optional<Vec3>
       plane;  // unit normal of a table on which the wire lies: every node is held to the
               // plane through node 0, by springs as stiff as the wire's stretch
-  WallContact* contact = nullptr;  // of this rod; the solver samples it at its own states
+  const ToolTerms* tools = nullptr;  // of which the rod is made; null: one wire
+  WallContact* contact = nullptr;    // of this rod; the solver samples it at its own states
+
+  int twists() const { return tools != nullptr ? tools->twists() : rod->twisted ? 1 : 0; }
 };
 
 /// The terms of energy that a scene has, by name: those of the rod, `own` of the scene, and, where

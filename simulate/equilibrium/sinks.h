@@ -13,7 +13,7 @@ namespace wireplan::simulate {
 struct EnergySink {
   static constexpr bool kHessian = false;
   void gradient(int, const Vec3&) {}
-  void gradient_theta(int, double) {}
+  void gradient_theta(int, double, int = 0) {}
 };
 
 /// Sum of the gradient over the nodes and edges before `first`.
@@ -24,7 +24,7 @@ struct HeldSink {
   void gradient(int i, const Vec3& g) {
     if (i < first) sum.force += g;
   }
-  void gradient_theta(int e, double g) {
+  void gradient_theta(int e, double g, int = 0) {
     if (e < first) sum.torque += g;
   }
 };
@@ -34,10 +34,10 @@ struct GradientSink {
   static constexpr bool kHessian = false;
   Eigen::Ref<Eigen::Matrix3Xd> target;
   void gradient(int i, const Vec3& g) { target.col(i) += g; }
-  void gradient_theta(int, double) {}
+  void gradient_theta(int, double, int = 0) {}
 };
 
-/// Gradient and dense Hessian over all x, then all theta.
+/// Gradient and dense Hessian over all x, then all theta, tool by tool.
 struct DenseSink {
   static constexpr bool kHessian = true;
   int n;
@@ -45,7 +45,8 @@ struct DenseSink {
   Eigen::MatrixXd& H;
 
   void gradient(int i, const Vec3& v) { g.segment<3>(3 * i) += v; }
-  void gradient_theta(int e, double v) { g[3 * n + e] += v; }
+  int theta(int e, int tool) const { return 3 * n + tool * (n - 1) + e; }
+  void gradient_theta(int e, double v, int tool = 0) { g[theta(e, tool)] += v; }
   void hessian(int i, int j, const Mat3& block) {
     H.block<3, 3>(3 * i, 3 * j) += block;
     if (i != j) H.block<3, 3>(3 * j, 3 * i) += block.transpose();
@@ -59,17 +60,19 @@ struct DenseSink {
     hessian(i + 1, i, -block);
   }
   void hessian_scaled_identity(int i, int j, double v) { hessian(i, j, v * Mat3::Identity()); }
-  void hessian_theta(int e, int i, const Vec3& v) {
-    H.block<3, 1>(3 * i, 3 * n + e) += v;
-    H.block<1, 3>(3 * n + e, 3 * i) += v.transpose();
+  void hessian_theta(int e, int i, const Vec3& v, int tool = 0) {
+    H.block<3, 1>(3 * i, theta(e, tool)) += v;
+    H.block<1, 3>(theta(e, tool), 3 * i) += v.transpose();
   }
-  void hessian_theta_theta(int e, int f, double v) {
-    H(3 * n + e, 3 * n + f) += v;
-    if (e != f) H(3 * n + f, 3 * n + e) += v;
+  void hessian_theta_theta(int e, int f, double v, int tool = 0, int other = 0) {
+    const int row = theta(e, tool), column = theta(f, other);
+    H(row, column) += v;
+    if (row != column) H(column, row) += v;
   }
 };
 
-/// Gradient of the free nodes: block k holds x and, for D = 4, theta of node first + k.
+/// Gradient of the free nodes: block k holds x of node first + k and, for D > 3, theta of its edge,
+/// one for each of D - 3 tools.
 template <int D>
 struct FreeSink {
   static constexpr bool kHessian = false;
@@ -82,8 +85,8 @@ struct FreeSink {
     if (is_free(i)) vector.template segment<3>(D * (i - first)) += v;
   }
   void gradient(int i, const Vec3& v) { add_to(g, i, v); }
-  void gradient_theta(int e, double v) {
-    if (D == 4 && is_free(e)) g[D * (e - first) + 3] += v;
+  void gradient_theta(int e, double v, int tool = 0) {
+    if (D > 3 && is_free(e)) g[D * (e - first) + 3 + tool] += v;
   }
   WirePass::Energy add_wire(const Rod& rod, const RodState& state) {
     return pass.add_gradient<D>(rod, first, last, state.x, g);
@@ -135,20 +138,23 @@ struct BandSink : FreeSink<D> {
     if (is_free(i) && is_free(j))
       block(i, j).template topLeftCorner<3, 3>().diagonal().array() += v;
   }
-  void hessian_theta(int e, int i, const Vec3& v) {
-    if constexpr (D == 4) {
+  void hessian_theta(int e, int i, const Vec3& v, int tool = 0) {
+    if constexpr (D > 3) {
       if (!is_free(e) || !is_free(i)) return;
       if (e >= i) {
-        block(e, i).template block<1, 3>(3, 0) += v.transpose();
+        block(e, i).template block<1, 3>(3 + tool, 0) += v.transpose();
       }
       if (i >= e) {
-        block(i, e).template block<3, 1>(0, 3) += v;
+        block(i, e).template block<3, 1>(0, 3 + tool) += v;
       }
     }
   }
-  void hessian_theta_theta(int e, int f, double v) {
-    if constexpr (D == 4) {
-      if (is_free(e) && is_free(f)) block(e, f)(3, 3) += v;
+  /// e >= f.
+  void hessian_theta_theta(int e, int f, double v, int tool = 0, int other = 0) {
+    if constexpr (D > 3) {
+      if (!is_free(e) || !is_free(f)) return;
+      block(e, f)(3 + tool, 3 + other) += v;
+      if (e == f && tool != other) block(e, f)(3 + other, 3 + tool) += v;
     }
   }
 };

@@ -46,8 +46,16 @@ std::vector<std::string> name_terms(const Rod& rod, const std::vector<std::strin
 NewtonResult Statics::solve(const Problem& problem, RodState& state, const NewtonOptions& options) {
   expects(problem.rod != nullptr && problem.first >= 0 && problem.first < problem.last &&
           problem.last <= problem.rod->nodes());
-  if (problem.rod->twisted) return solve_newton<4>(problem, state, options, memory_, bands4_);
-  return solve_newton<3>(problem, state, options, memory_, bands3_);
+  switch (problem.twists()) {
+    case 0:
+      return solve_newton<3>(problem, state, options, memory_, bands3_);
+    case 1:
+      return solve_newton<4>(problem, state, options, memory_, bands4_);
+    case 2:
+      return solve_newton<5>(problem, state, options, memory_, bands5_);
+    default:
+      return solve_newton<6>(problem, state, options, memory_, bands6_);
+  }
 }
 
 Energy Statics::evaluate(const Problem& problem, const RodState& state,
@@ -92,8 +100,9 @@ double Statics::bend_per_length(const Rod& rod, const RodState& state, int i, do
 void Statics::derivatives(const Problem& problem, const RodState& state, Eigen::VectorXd& gradient,
                           Eigen::MatrixXd& hessian) {
   const int n = problem.rod->nodes();
-  gradient.setZero(4 * n - 1);
-  hessian.setZero(4 * n - 1, 4 * n - 1);
+  const int size = 3 * n + std::max(1, problem.twists()) * (n - 1);
+  gradient.setZero(size);
+  hessian.setZero(size, size);
   DenseSink sink{n, gradient, hessian};
   assemble_with_contact(problem, state, sink);
 }

@@ -23,7 +23,8 @@ class Statics {
   /// bent now, its turn and the wire's shape elsewhere given: -M^2/(2 EI) of a straight round wire
   /// under a moment M [N].
   static double bend_per_length(const Rod& rod, const RodState& state, int i, double length);
-  /// For tests: gradient and dense Hessian over all x, then all theta (4n-1), supports ignored.
+  /// For tests: gradient and dense Hessian over all x, then all theta (4n-1; with
+  /// tools tool by tool), supports ignored.
   static void derivatives(const Problem& problem, const RodState& state, Eigen::VectorXd& gradient,
                           Eigen::MatrixXd& hessian);
 
@@ -31,6 +32,8 @@ class Statics {
   SolveMemory memory_;
   BandMemory<3> bands3_;
   BandMemory<4> bands4_;
+  BandMemory<5> bands5_;
+  BandMemory<6> bands6_;
 };
 
 }  // namespace wireplan::simulate

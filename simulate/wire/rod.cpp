@@ -6,6 +6,17 @@
 
 namespace wireplan::simulate {
 
+double Section::EI(double from) const {
+  if (!tapered()) return bending_stiffness;
+  const double part = from / length;
+  if (taper == Taper::kLinear) {
+    return bending_stiffness + part * (proximal_bending_stiffness - bending_stiffness);
+  }
+  const double q_0 = std::pow(bending_stiffness, 0.25);
+  const double q_1 = std::pow(proximal_bending_stiffness, 0.25);
+  return std::pow(q_0 + part * (q_1 - q_0), 4);
+}
+
 // A cone: with q, the fourth root of EI, linear from a to b, the integral of q^-4 over a length l
 // is l (a^2 + a b + b^2) / (3 a^3 b^3).
 double Section::bend_compliance(double from, double part) const {
@@ -196,7 +207,7 @@ RodState rest_state(const Rod& rod, const Vec3& point, const Vec3& direction, do
 
 void transport_frames(const RodState& base, RodState& moved, int first_edge, int last_edge,
                       int first_plain, int plain_edges) {
-  const int edges = static_cast<int>(base.theta.size());
+  const int edges = static_cast<int>(base.director.cols());
   const auto tangent = [](const RodState& state, int i) -> Vec3 {
     const Vec3 e = state.x.col(i + 1) - state.x.col(i);
     return (1.0 / e.norm()) * e;

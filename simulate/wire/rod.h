@@ -40,6 +40,8 @@ struct Section {
   }
   /// EI at the section's end away from the tip [N mm^2].
   double proximal_EI() const { return tapered() ? proximal_bending_stiffness : bending_stiffness; }
+  /// EI so far from the end toward the tip [N mm^2].
+  double EI(double from) const;
   /// Integrals of 1/EI, 1/EA and 1/GJ over a part of the section, which begins `from` its end
   /// toward the tip [mm]: what springs in series give way. The radius is the wire's.
   double bend_compliance(double from, double part) const;                  // [1/(N mm)]
@@ -100,7 +102,8 @@ Rod build_rod(const Wire& wire, double length, int elements);
 /// Where the wire is. One per trial, never shared.
 struct RodState {
   Eigen::Matrix3Xd x;               // (3, n)  node positions                             [mm]
-  Eigen::VectorXd theta;            // (n-1)   reference to material director, per edge   [rad]
+  Eigen::VectorXd theta;            // (n-1)   reference to material director, per edge; of
+                                    //         several tools one after the other          [rad]
   Eigen::Matrix3Xd director;        // (3, n-1) reference director, normal to the edge    [-]
   Eigen::VectorXd reference_twist;  // (n)     of the reference directors, at nodes       [rad]
   double tip_angle = 0.0;  // of the last edge about a moment's axis, all turns counted [rad]

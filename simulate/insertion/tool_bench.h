@@ -1,0 +1,153 @@
+#pragma once
+/// Tools in one another on the laboratory bench: a wire in a catheter, in a sheath, that a hand
+/// pushes, pulls and turns one by one or together, out of an introducer (tool_stack.h).
+///
+/// Nodes lie evenly along the centreline, from the introducer's point to the foremost tip, and
+/// slide along the tools. Hands feel the derivatives of the energy: the force on a tool is what the
+/// energy gains per length of push with all nodes held, the torque what it gains per turn of the
+/// hub. That has in it the configurational forces at the mouths of outer tools and at the
+/// introducer.
+///
+/// Friction between tools acts on the hands alone, not on the shape. Where the inner tool of a pair
+/// slides, its normal force on the outer is summed from the mouth to the introducer, with the force
+/// H of the hand on it growing as on a capstan: per node |H| theta + |M''| l, M the inner tool's
+/// moment, theta the centreline's turn and l the node's share of length. M'' is a difference over
+/// the length that the play between the tools lets the inner one bridge.
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "simulate/equilibrium/solver.h"
+#include "simulate/insertion/scene.h"
+#include "simulate/wire/tool_stack.h"
+
+namespace wireplan::simulate {
+
+/// What the hand does to all tools at once, from the outside in.
+struct ToolMove {
+  std::vector<double> push;  // negative: pulled                                          [mm]
+  std::vector<double> turn;  // of the hubs, right-handed about the introducer's direction [rad]
+};
+
+struct ToolScene {
+  std::vector<Tool> tools;        // from the outside in
+  std::vector<ToolPlace> places;  // where they start
+  Vec3 point = Vec3::Zero();      // of the introducer, where the tools become free       [mm]
+  Vec3 direction = Vec3::UnitX();
+  std::optional<Support> distal;  // of the foremost tip, clamped or pinned; holds no roll
+  Loads loads;                    // no tip torque
+  std::optional<Vec3> plane;      // as in Scene
+  double friction = 0.0;          // Coulomb's coefficient between tools
+  double element_length = 1.0;    // where the tools are furthest in                      [mm]
+  std::vector<ToolMove> moves;
+  double residual_tolerance = 1e-6;  // largest nodal force out of balance                 [N]
+  int max_iterations = 200;          // of a solve
+};
+
+/// What one tool does after a move. Forces and torques of the hand on it.
+struct ToolReport {
+  ToolPlace place;
+  double push_force = 0.0;  // into the body, with friction                               [N]
+  double hub_torque = 0.0;  // about the introducer's direction                        [N mm]
+  Vec3 tip = Vec3::Zero();  //                                                           [mm]
+  double twist = 0.0;       // of its tip against its hub; 0 of a straight tool         [rad]
+};
+
+/// What tool i does to tool i + 1 inside it.
+struct ToolContact {
+  double normal_force = 0.0;     // sum of its amounts, friction's growth included         [N]
+  double friction_force = 0.0;   // along the tools, of the inner on the outer; signed     [N]
+  double friction_torque = 0.0;  //                                                   [N mm]
+};
+
+/// After a move, or at the start.
+struct ToolRecord {
+  std::vector<ToolReport> tools;
+  std::vector<ToolContact> contacts;  // between each tool and the next one inside
+  Energy energy;                      //                                              [N mm]
+  double work = 0.0;      // of the hands since the start                             [N mm]
+  double heat = 0.0;      // of friction between tools, of that work                  [N mm]
+  double released = 0.0;  // of it by jumps                                           [N mm]
+  /// What forces at the ends of parts of moves do more than the energy gained, without jumps.
+  double unbalanced = 0.0;  //                                                        [N mm]
+  double residual = 0.0;    //                                                             [N]
+  int iterations = 0;       // of this move
+};
+
+class ToolBench {
+ public:
+  /// Expects what ToolScene says; the tools are then at their places in equilibrium if settled().
+  explicit ToolBench(const ToolScene& scene);
+  bool settled() const { return settled_; }
+
+  /// In parts that are short enough for the tools to follow. False where even the shortest part
+  /// has no equilibrium: the tools are then where they were before that part. Expects tools that
+  /// stay within 0 and their lengths, one of them beyond 0.
+  bool move(const ToolMove& by);
+
+  const ToolRecord& record() const { return record_; }
+  const RodState& state() const { return now_.state; }
+  const Composite& composite() const { return now_.composite; }
+  const std::vector<ToolPlace>& places() const { return now_.places; }
+  /// Angle of a tool's director along the edges, counted as its hub's roll and carried along the
+  /// centreline without twist; empty of a straight tool [rad].
+  Eigen::VectorXd angles(int tool) const;
+  /// The centreline up to a tool's tip, (3, m) [mm].
+  Eigen::Matrix3Xd nodes_of(int tool) const;
+  /// Force of the introducer, and of a distal support, on the tools [N].
+  Vec3 introducer_force() const;
+  Vec3 distal_force() const;
+  /// The hand's force on a tool without friction [N].
+  double free_force(int tool) const;
+
+  /// The problem of the present places; refers to this bench.
+  Problem problem() const;
+
+ private:
+  struct State {
+    std::vector<ToolPlace> places;
+    Composite composite;
+    Eigen::Matrix3Xd load;
+    RodState state;
+    Energy energy;
+    std::vector<double> force, torque;  // without friction
+  };
+
+  Problem problem_of(const State& at) const;
+  void place(const std::vector<ToolPlace>& places, State& at) const;
+  RodState unloaded(const State& at) const;
+  RodState follow(const State& from, const State& to) const;
+  void bend_to_support(const State& to, Eigen::Matrix3Xd& x) const;
+  void set_frames(const std::vector<Eigen::VectorXd>& angles, RodState& state) const;
+  bool solve(State& at);
+  void feel(State& at, const ToolMove& direction) const;
+  double energy_at(const State& at, const std::vector<ToolPlace>& places) const;
+  double force_on(const State& at, std::size_t tool, double direction) const;
+  Eigen::Matrix3Xd moments(int tool) const;
+  double bridged_length(std::size_t outer, const Eigen::Matrix3Xd& moment) const;
+  ToolContact find_contact(std::size_t outer, const ToolMove& by) const;
+  void report(const ToolMove& by);
+
+  const ToolScene scene_;
+  int elements_ = 0;
+  State now_;
+  ToolRecord record_;
+  Statics statics_;
+  bool settled_ = false;
+};
+
+struct ToolSceneResult {
+  SceneOutcome outcome = SceneOutcome::kNotConverged;
+  std::string reason;               // why it did not converge; else empty
+  std::vector<ToolRecord> history;  // at the start and after each move
+  Eigen::Matrix3Xd nodes;           // of the centreline                                 [mm]
+  std::vector<Eigen::Matrix3Xd> tool_nodes;  // up to each tool's tip                     [mm]
+  std::vector<Eigen::VectorXd> angles;       // see ToolBench::angles()                  [rad]
+  Vec3 introducer_force = Vec3::Zero();      // on the tools                               [N]
+  std::optional<Vec3> distal_force;          // of the support                             [N]
+};
+
+/// All moves of the scene, as far as they have an equilibrium.
+ToolSceneResult run_tool_scene(const ToolScene& scene);
+
+}  // namespace wireplan::simulate
