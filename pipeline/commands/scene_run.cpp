@@ -230,6 +230,40 @@ std::string tell_start(const Json& start) {
                                              : std::string());
 }
 
+SceneAnswer run_tools(const SceneFile& file, const fs::path& folder) {
+  const simulate::ToolScene& scene = file.tools->scene;
+  const double start = plan::thread_cpu_seconds();
+  const simulate::ToolSceneResult result = simulate::run_tool_scene(scene);
+  const double seconds = plan::thread_cpu_seconds() - start;
+  write_json(result_json(result, scene, file.tools->roll_zero, seconds), folder / "result.json");
+  std::vector<PictureWire> drawn;
+  for (std::size_t i = 0; i < scene.tools.size(); ++i) {
+    const simulate::Wire& tool = scene.tools[i].wire;
+    const Eigen::Matrix3Xd& nodes = result.tool_nodes[i];
+    if (nodes.cols() < 2 || !nodes.allFinite()) continue;  // it is not out of the introducer
+    preprocess::write_polyline(nodes, {}, folder / (tool.name + ".vtp"));
+    drawn.push_back({.name = tool.name,
+                     .nodes = nodes,
+                     .contact_force = {},
+                     .radius = tool.radius,
+                     .color = wire_color(static_cast<int>(i))});
+  }
+  if (!drawn.empty()) {
+    const std::string outcome = outcome_name(result.outcome);
+    write_picture(Surface(), drawn, {.title = file.name + ": " + outcome}, folder / "wire.png");
+  }
+
+  std::string line = outcome_name(result.outcome);
+  for (std::size_t i = 0; i < scene.tools.size(); ++i) {
+    const simulate::ToolReport& tool = result.history.back().tools[i];
+    line += format("%s %s %.1f mm in, tip (%.4f, %.4f, %.4f) mm, pushed by %.4g N",
+                   i == 0 ? ":" : ";", scene.tools[i].wire.name.c_str(), tool.place.insertion,
+                   tool.tip.x(), tool.tip.y(), tool.tip.z(), tool.push_force);
+  }
+  if (!result.reason.empty()) line += "\n" + result.reason;
+  return {result.outcome == simulate::SceneOutcome::kConverged, line};
+}
+
 SceneAnswer run_insertion_scene(const SceneFile& file, const InsertionScene& scene,
                                 const LoadedVessel& vessel, const fs::path& folder) {
   fs::create_directories(folder);
@@ -319,6 +353,7 @@ SceneAnswer run_scene_file(const SceneFile& scene, const fs::path& folder) {
   std::optional<LoadedVessel> vessel;
   if (scene.vessel) vessel = load_vessel(scene);
   fs::create_directories(folder);
+  if (scene.tools) return run_tools(scene, folder);
   if (scene.bench) return run_bench_scene(scene, vessel ? &*vessel : nullptr, folder);
   if (!scene.insertion->rolls.empty()) return run_rolls(scene, *vessel, folder);
   return run_insertion_scene(scene, *scene.insertion, *vessel, folder);

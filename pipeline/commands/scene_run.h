@@ -20,8 +20,10 @@ std::vector<std::string> check_scene_vessel(const SceneFile& scene);
 /// Of a scene with a list of rolls all this is written for each, into a folder named by it
 /// (roll_45), with the vessel built once.
 ///
-/// Writes into `folder`: result.json, wire.vtp and wire.png; of an insertion also the shapes on the
-/// way, shapes.pvd; in a vessel also forces.vtu, the wall with the force that each triangle took
+/// Writes into `folder`: result.json, wire.vtp, of several tools NAME.vtp of
+/// each that is out of the introducer, and wire.png; of
+/// an insertion also the shapes on the way, shapes.pvd; in a vessel also forces.vtu, the wall with
+/// the force that each triangle took
 /// (`peak_force_n`). Throws Error where check_scene_vessel() does or a file cannot be written.
 SceneAnswer run_scene_file(const SceneFile& scene, const std::filesystem::path& folder);
 

@@ -282,7 +282,7 @@ void resolve_scene_points(Json& file, const fs::path& folder, Problems& problems
       owner["point_mm"] = finder.find(owner["point_mm"], key + ".point_mm");
     }
   };
-  for (const char* one : {"insertion", "target"}) {
+  for (const char* one : {"insertion", "introducer", "target"}) {
     if (file.contains(one)) resolve(file[one], one);
   }
   if (!file.contains("supports") || !file["supports"].is_array()) return;

@@ -85,6 +85,45 @@ Json energy_json(const simulate::Energy& energy) {
   return json;
 }
 
+// ---- of several tools
+
+Json tool_json(const simulate::ToolReport& tool, const std::string& name, double roll_zero) {
+  Json json = {{"name", name}};
+  put(json, "insertion_mm", tool.place.insertion);
+  put(json, "hub_angle_deg", (tool.place.roll - roll_zero) / kRadPerDeg);
+  put(json, "push_force_n", tool.push_force);
+  put(json, "hub_torque_n_mm", tool.hub_torque);
+  put_points(json, "tip_mm", tool.tip);
+  put(json, "twist_deg", tool.twist / kRadPerDeg);
+  return json;
+}
+
+/// What the tools do to each other, and the hands to all of them.
+void put_record(Json& json, const simulate::ToolRecord& record,
+                const std::vector<std::string>& names, double roll_zero) {
+  json["tools"] = Json::array();
+  for (std::size_t i = 0; i < names.size(); ++i) {
+    json["tools"].push_back(tool_json(record.tools[i], names[i], roll_zero));
+  }
+  json["between_tools"] = Json::array();
+  for (std::size_t i = 0; i + 1 < names.size(); ++i) {
+    const simulate::ToolContact& contact = record.contacts[i];
+    Json row = {{"outer", names[i]}, {"inner", names[i + 1]}};
+    put(row, "normal_force_n", contact.normal_force);
+    put(row, "friction_force_n", contact.friction_force);
+    put(row, "friction_torque_n_mm", contact.friction_torque);
+    json["between_tools"].push_back(row);
+  }
+  json["energy_n_mm"] = energy_json(record.energy);
+  put(json["energy_n_mm"], "load", record.energy.load);
+  put(json, "hand_work_n_mm", record.work);
+  put(json, "friction_work_n_mm", record.heat);
+  put(json, "energy_released_n_mm", record.released);
+  put(json, "energy_unbalanced_n_mm", record.unbalanced);
+  put(json, "residual_n", record.residual);
+  json["iterations"] = record.iterations;
+}
+
 /// What the hand does to the wire after a push, and what became of it at the tip.
 void put_hand(Json& json, const simulate::Push& push, const simulate::PushTerms& terms) {
   put(json, "push_force_n", push.push_force);
@@ -239,6 +278,53 @@ Json start_json(const simulate::TrialResult& result, const simulate::StartLine& 
   json["distance_mm"] = {
       {"mean", distance.mean}, {"largest", distance.largest}, {"tip", distance.tip}};
   put_points(json, "nodes_mm", result.start->nodes);
+  return json;
+}
+
+Json result_json(const simulate::ToolSceneResult& result, const simulate::ToolScene& scene,
+                 double roll_zero, double cpu_time_s) {
+  Json json = {{"schema", kResultSchema}, {"outcome", simulate::outcome_name(result.outcome)}};
+  if (!result.reason.empty()) json["reason"] = result.reason;
+  json["terms"] = result.terms;
+  put_points(json, "nodes_mm", result.nodes);
+  std::vector<std::string> names;
+  for (const simulate::Tool& tool : scene.tools) names.push_back(tool.wire.name);
+  const simulate::ToolRecord& last = result.history.back();
+  put_record(json, last, names, roll_zero);
+  int iterations = 0;
+  for (const simulate::ToolRecord& record : result.history) iterations += record.iterations;
+  json["iterations"] = iterations;
+  json["steps"] = result.history.size() - 1;
+  put(json, "cpu_time_s", cpu_time_s);
+
+  // Nodes lie evenly up to the foremost tip.
+  double foremost = 0.0;
+  for (const simulate::ToolReport& tool : last.tools) {
+    foremost = std::max(foremost, tool.place.insertion);
+  }
+  const Eigen::Index edges = result.nodes.cols() - 1;
+  json["tools_at_nodes"] = Json::array();
+  for (Eigen::Index k = 0; k <= edges; ++k) {
+    const double s = foremost * static_cast<double>(k) / static_cast<double>(edges);
+    Json present = Json::array();
+    for (std::size_t i = 0; i < names.size(); ++i) {
+      if (last.tools[i].place.insertion >= s - 1e-9 * foremost) present.push_back(names[i]);
+    }
+    json["tools_at_nodes"].push_back(present);
+  }
+  for (std::size_t i = 0; i < names.size(); ++i) {
+    put_angles(json["tools"][i], "angle_rad", result.angles[i],
+               "the tool is straight at rest, so no twist was solved for");
+  }
+  put_points(json, "introducer_force_n", result.introducer_force);
+  if (result.distal_force) put_points(json, "distal_force_n", *result.distal_force);
+  json["contacts"] = Json::array();
+  json["moves"] = Json::array();
+  for (const simulate::ToolRecord& record : result.history) {
+    Json row = Json::object();
+    put_record(row, record, names, roll_zero);
+    json["moves"].push_back(row);
+  }
   return json;
 }
 

@@ -8,6 +8,7 @@
 #include "pipeline/files/hand_file.h"
 #include "pipeline/files/json_reader.h"
 #include "pipeline/files/markups_file.h"
+#include "pipeline/files/tool_scene_file.h"
 
 namespace wireplan::pipeline {
 namespace {
@@ -229,27 +230,6 @@ simulate::Scene read_wire_of_scene(JsonReader& root) {
   return scene;
 }
 
-simulate::Support read_support(JsonReader& reader) {
-  using simulate::SupportKind;
-  simulate::Support support;
-  support.at = reader.choice("at", std::nullopt, {"proximal", "distal"}) == "proximal"
-                   ? simulate::WireEnd::kProximal
-                   : simulate::WireEnd::kDistal;
-  const std::string kind = reader.choice("kind", std::nullopt, {"clamped", "pinned", "guided"});
-  support.kind = kind == "clamped"  ? SupportKind::kClamped
-                 : kind == "pinned" ? SupportKind::kPinned
-                                    : SupportKind::kGuided;
-  support.point = reader.point("point_mm", std::nullopt);
-  support.direction = reader.direction("direction", Vec3(Vec3::UnitX()));
-  support.roll = reader.number("roll_deg", 0.0, {.min = -36000.0, .max = 36000.0}) * kRadPerDeg;
-  if (support.kind == SupportKind::kPinned && support.roll != 0.0) {
-    reader.problems().add(reader.path_of("roll_deg"), reader.raw("roll_deg").dump(), "0",
-                          "a pinned end turns freely; give \"clamped\" or \"guided\"");
-  }
-  reader.finish();
-  return support;
-}
-
 /// The supports must hold the wire against rigid motion, or it has no equilibrium.
 void check_supports(const std::vector<simulate::Support>& supports, Problems& problems) {
   using simulate::SupportKind;
@@ -278,17 +258,6 @@ void count_from_anterior(std::vector<simulate::Support>& supports) {
     if (support.at == simulate::WireEnd::kProximal) zero = roll_of_anterior(support.direction);
   }
   for (simulate::Support& support : supports) support.roll += zero;
-}
-
-simulate::Loads read_loads(JsonReader& root) {
-  JsonReader reader = root.object("loads", false);
-  simulate::Loads loads;
-  loads.gravity = reader.point("gravity_m_per_s2", Vec3(Vec3::Zero())) * kMmPerM;
-  loads.tip_force = reader.point("tip_force_n", Vec3(Vec3::Zero()));
-  loads.tip_moment = reader.point("tip_moment_n_mm", Vec3(Vec3::Zero()));
-  loads.tip_torque = reader.number("tip_torque_n_mm", 0.0, {});
-  reader.finish();
-  return loads;
 }
 
 simulate::SolverOptions read_solver(JsonReader& root) {
@@ -543,6 +512,12 @@ SceneFile read_scene(const std::filesystem::path& path) {
   resolve_scene_points(file, path.parent_path(), problems);
   JsonReader root(file, "", problems);
   root.text("schema", std::nullopt);
+  if (root.has("tools")) {
+    scene.tools = read_tool_bench(root);
+    root.finish();
+    problems.throw_if_any();
+    return scene;
+  }
   const simulate::Scene wire = read_wire_of_scene(root);
   JsonReader output = root.object("output", false);
   const double every = output.number("every_mm", simulate::InsertionOptions().record_every,

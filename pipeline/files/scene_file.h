@@ -1,13 +1,14 @@
 #pragma once
-/// SCENE.json -> one wire on the laboratory bench, with or without a vessel round it, or one
-/// insertion into a vessel (design section 5). What the design has and this version not is refused
-/// by name.
+/// SCENE.json -> one wire on the laboratory bench, with or without a vessel round it, several tools
+/// in one another there, or one insertion into a vessel (design section 5). What the design has and
+/// this version not is refused by name.
 #include <filesystem>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "pipeline/files/case_file.h"
+#include "pipeline/files/tool_scene_file.h"
 #include "simulate/insertion/scene.h"
 #include "simulate/insertion/trial.h"
 
@@ -21,12 +22,6 @@ struct SceneVessel {
   double contact_spacing = 1.0;  // [mm]
   simulate::ContactLaw contact_law = {};
 };
-
-/// What a roll of a scene lacks to that of simulate, which counts from reference_normal() [rad].
-/// Scenes count from anterior (-y) made square to the direction, however near to y that runs: so
-/// the zero turns evenly with the direction, and it is superior (+z) only along y itself, where no
-/// choice is without a jump.
-double roll_of_anterior(const Vec3& direction);
 
 /// A wire pushed into a vessel: what run_trial asks for.
 struct InsertionScene {
@@ -45,12 +40,13 @@ struct InsertionScene {
   std::optional<bool> check_sensitivity;  // see scene_sensitivity.h; empty: if it costs little
 };
 
-/// Exactly one of bench and insertion is there, the latter with a vessel.
+/// Exactly one of bench, tools and insertion is there, the last with a vessel.
 struct SceneFile {
   std::filesystem::path file;
   std::string name;  // of the file without its ending, of the folder if it is scene.json
   std::optional<SceneVessel> vessel;
   std::optional<simulate::Scene> bench;  // its vessel is not set
+  std::optional<ToolBenchScene> tools;
   std::optional<InsertionScene> insertion;
 };
 

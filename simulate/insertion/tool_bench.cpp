@@ -19,6 +19,7 @@ struct BenchTuning {
   double least_work = 1e-7;                 // that counts so                                [N mm]
   double step = 1e-5;   // of differences by insertion: with 1e-3 the stretch of an edge, whose
                         // energy is no parabola, makes an error of 1e-4 N                  [mm]
+  double nudge = 1e-3;  // of the tip of each tool but the first curved one, in a guess       [rad]
   int most_solves = 4;  // of a part that runs out of iterations, from where it got
   int load_steps = 10;  // where the full loads have no equilibrium at once
 };
@@ -122,12 +123,13 @@ bool ToolBench::move(const ToolMove& by) {
   }
   const double longest = 1.0 / parts, shortest = kBench.shortest * longest;
   feel(now_, by);  // where tips meet, the force hangs on which way they go
+  const std::vector<ToolPlace> start = now_.places;
   double done = 0.0, size = longest;
   while (done < 1.0 - 1e-12) {
     const double part = 1.0 - done < 1.01 * size ? 1.0 - done : size;
     const bool may_cut = part > 1.01 * shortest;
     State next;
-    place(moved(now_.places, by, part), next);
+    place(moved(start, by, done + part), next);
     next.state = follow(now_, next);
     if (!solve(next)) {
       if (!may_cut) {
@@ -251,6 +253,9 @@ RodState ToolBench::follow(const State& from, const State& to) const {
     for (Eigen::Index e = 0; e < edges; ++e) {
       moved_angles[e] = between_middles((static_cast<double>(e) + 0.5) * h_new, h, edges,
                                         [&](Eigen::Index k) { return old[k]; });
+      // Tools that lie in one plane, curved to opposite sides, would stay so when that is a saddle.
+      moved_angles[e] += kBench.nudge * static_cast<double>(angles_now.size()) *
+                         static_cast<double>(e) / static_cast<double>(edges);
     }
     angles_now.push_back(moved_angles);
   }
@@ -539,6 +544,12 @@ ToolSceneResult run_tool_scene(const ToolScene& scene) {
                   bench.record().residual, scene.residual_tolerance);
     result.reason = text;
   }
+  std::vector<std::string> own = {"tools"};
+  if (!scene.loads.gravity.isZero(0.0)) own.push_back("gravity");
+  if (!scene.loads.tip_force.isZero(0.0)) own.push_back("tip_force");
+  if (!scene.loads.tip_moment.isZero(0.0)) own.push_back("tip_moment");
+  if (scene.plane) own.push_back("plane");
+  result.terms = name_terms(bench.composite().rod, own, nullptr, 0.0);
   result.nodes = bench.state().x;
   for (std::size_t i = 0; i < scene.tools.size(); ++i) {
     result.tool_nodes.push_back(bench.nodes_of(static_cast<int>(i)));

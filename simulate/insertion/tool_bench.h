@@ -139,6 +139,7 @@ class ToolBench {
 struct ToolSceneResult {
   SceneOutcome outcome = SceneOutcome::kNotConverged;
   std::string reason;               // why it did not converge; else empty
+  std::vector<std::string> terms;            // energy terms that were built
   std::vector<ToolRecord> history;  // at the start and after each move
   Eigen::Matrix3Xd nodes;           // of the centreline                                 [mm]
   std::vector<Eigen::Matrix3Xd> tool_nodes;  // up to each tool's tip                     [mm]

@@ -100,6 +100,18 @@ TEST(Schemas, WhatTheProgramWritesKeepsToThem) {
   pushed["start"] = {{"nodes_mm", {{0, 0, 6}, {1, 0, 12}, {2, 0, 18}}}};
   write_json(pushed, folder / "moved.json");
   ASSERT_EQ(run_program(folder.path(), "simulate moved.json -o moved").code, 0);
+  const Json tool = {{"insertion_mm", 40}, {"device", "cobra-c2"}, {"name", "catheter"}},
+             inner = {{"insertion_mm", 20}, {"device", "rosen-cook"}, {"name", "wire"}};
+  Json tools = {{"schema", "wireplan.scene/1"}, {"tools", Json::array({tool, inner})}};
+  tools["introducer"] = {{"direction", {0, 0, 1}}};
+  tools["supports"] =
+      Json::array({{{"at", "distal"}, {"kind", "pinned"}, {"point_mm", {5, 0, 37}}}});
+  tools["moves"] = Json::array(
+      {{{"tool", "wire"}, {"push_mm", 5}},
+       {{"together", Json::array({{{"tool", "wire"}, {"turn_deg", 20}},
+                                  {{"tool", "catheter"}, {"push_mm", 1}, {"turn_deg", 5}}})}}});
+  write_json(tools, folder / "tools.json");
+  ASSERT_EQ(run_program(folder.path(), "simulate tools.json -o tools").code, 0);
   expect_follows_schemas(folder.path());
 }
 

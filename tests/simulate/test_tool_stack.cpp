@@ -27,7 +27,7 @@ Tool curved_tool(double tip_EI, double shaft_EI, double curvature) {
                                 {.length = 40.0,
                                  .bending_stiffness = shaft_EI,
                                  .axial_stiffness = 900.0,
-                                 .rest_curvature = 0.2 * curvature}}},
+                                 .rest_curvature = -0.3 * curvature}}},
           .inner_radius = 0.6};
 }
 

@@ -1,0 +1,295 @@
+#include "pipeline/files/tool_scene_file.h"
+
+#include <algorithm>
+#include <cmath>
+#include <set>
+
+#include "pipeline/files/case_file.h"
+#include "pipeline/files/catalogue.h"
+#include "pipeline/files/hand_file.h"
+
+namespace wireplan::pipeline {
+namespace {
+
+constexpr Range kMoreThanZero{.min = 0.0, .open_min = true};
+constexpr Range kZeroOrMore{.min = 0.0};
+constexpr double kLeastInsertion = 1.0;  // of the foremost tool                          [mm]
+
+std::string in_quotes(const std::string& text) { return "\"" + text + "\""; }
+
+std::string mm(double value) { return Json(value).dump(); }
+
+simulate::Section read_tool_section(JsonReader& reader) {
+  simulate::Section section;
+  section.length = reader.number("length_mm", std::nullopt, kMoreThanZero);
+  section.bending_stiffness = reader.number("bending_stiffness_n_mm2", std::nullopt, kMoreThanZero);
+  section.axial_stiffness = reader.number("axial_stiffness_n", 0.0, kZeroOrMore);
+  section.twist_stiffness = reader.number("twist_stiffness_n_mm2", 0.0, kZeroOrMore);
+  section.mass_per_length =
+      reader.number("mass_kg_per_m", 0.0, kZeroOrMore) * kTonnePerMmFromKgPerM;
+  section.rest_curvature =
+      reader.number("rest_curvature_per_mm", 0.0, {.min = -2.0, .max = 2.0}, "given in 1/m?");
+  reader.finish();
+  return section;
+}
+
+/// A wire or a catheter of the catalogue.
+void read_known_tool(JsonReader& reader, simulate::Tool& tool) {
+  const Catalogue known = catalogue();
+  const std::string name = reader.text("device", std::nullopt);
+  if (const CatalogueWire* wire = find_wire(known, name); wire != nullptr) {
+    tool.wire = wire->wire;
+    return;
+  }
+  for (const Catheter& catheter : known.catheters) {
+    if (catheter.tube.name != name) continue;
+    tool.wire = catheter.tube;
+    tool.inner_radius = 0.5 * catheter.inner_diameter;
+    return;
+  }
+  std::vector<std::string> names;
+  for (const CatalogueWire& wire : known.wires) names.push_back(wire.wire.name);
+  for (const Catheter& catheter : known.catheters) names.push_back(catheter.tube.name);
+  const std::string nearest = nearest_name(name, names);
+  reader.problems().add(reader.path_of("device"), in_quotes(name),
+                        "a wire or catheter of the catalogue",
+                        nearest.empty() ? "`wireplan devices` lists them"
+                                        : "did you mean " + in_quotes(nearest) + "?");
+  tool.wire = known.wires.front().wire;
+}
+
+void read_own_tool(JsonReader& reader, simulate::Tool& tool) {
+  const Range diameter{.min = 0.002, .max = 20.0};
+  tool.wire.radius =
+      0.5 * reader.number("outer_diameter_mm", std::nullopt, diameter, "given in m?");
+  const double inner = reader.number("inner_diameter_mm", 0.0, kZeroOrMore);
+  if (inner >= 2.0 * tool.wire.radius && inner > 0.0) {
+    reader.problems().add(reader.path_of("inner_diameter_mm"), mm(inner),
+                          "less than outer_diameter_mm, " + mm(2.0 * tool.wire.radius));
+  }
+  tool.inner_radius = 0.5 * inner;
+  for (JsonReader& section : reader.objects("sections", true)) {
+    tool.wire.sections.push_back(read_tool_section(section));
+  }
+}
+
+/// A name is part of a file's.
+bool is_file_name(const std::string& name) {
+  return !name.empty() && std::all_of(name.begin(), name.end(), [](char c) {
+    return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '-' ||
+           c == '_';
+  });
+}
+
+void read_tool(JsonReader& reader, ToolBenchScene& into) {
+  simulate::Tool tool;
+  const bool known = reader.has("device");
+  known ? read_known_tool(reader, tool) : read_own_tool(reader, tool);
+  tool.wire.name = reader.text(
+      "name", known ? std::optional<std::string>(tool.wire.name) : std::optional<std::string>());
+  if (!is_file_name(tool.wire.name)) {
+    reader.problems().add(reader.path_of("name"), in_quotes(tool.wire.name),
+                          "letters, digits, - and _", "files are named after it");
+  }
+  simulate::ToolPlace place;
+  place.insertion = reader.number("insertion_mm", std::nullopt, kZeroOrMore);
+  place.roll = into.roll_zero +
+               reader.number("roll_deg", 0.0, {.min = -36000.0, .max = 36000.0}) * kRadPerDeg;
+  if (!tool.wire.round()) {
+    reader.problems().add(reader.path_of("device"), "a strip somewhere", "round all along",
+                          "strips in other tools are not in this version");
+  }
+  reader.finish();
+  into.scene.tools.push_back(std::move(tool));
+  into.scene.places.push_back(place);
+}
+
+/// Each tool in the one before it.
+void check_stack(const ToolBenchScene& bench, Problems& problems) {
+  const std::vector<simulate::Tool>& tools = bench.scene.tools;
+  if (tools.empty() || tools.size() > simulate::kMostTools) {
+    problems.add("tools", "of " + std::to_string(tools.size()),
+                 "1 to " + std::to_string(simulate::kMostTools) + ", from the outside in");
+    return;
+  }
+  std::set<std::string> names;
+  for (std::size_t i = 0; i < tools.size(); ++i) {
+    const std::string key = "tools[" + std::to_string(i) + "]";
+    if (!names.insert(tools[i].wire.name).second) {
+      problems.add(key + ".name", in_quotes(tools[i].wire.name), "a name that no other tool has");
+    }
+    if (i == 0 || tools[i].wire.radius < tools[i - 1].inner_radius) continue;
+    const double lumen = 2.0 * tools[i - 1].inner_radius;
+    problems.add(key, mm(2.0 * tools[i].wire.radius) + " mm thick",
+                 lumen > 0.0
+                     ? "less than the inner diameter of " + in_quotes(tools[i - 1].wire.name) +
+                           " round it, " + mm(lumen) + " mm"
+                     : "an inner_diameter_mm of " + in_quotes(tools[i - 1].wire.name) + " round it",
+                 "tools are listed from the outside in");
+  }
+}
+
+/// One line of a move into it.
+void read_one_move(JsonReader& reader, const ToolBenchScene& bench, simulate::ToolMove& move) {
+  const std::vector<simulate::Tool>& tools = bench.scene.tools;
+  const std::string name = reader.text("tool", std::nullopt);
+  const double push = reader.number("push_mm", 0.0, {.min = -1e4, .max = 1e4}, "given in m?");
+  const double turn = reader.number("turn_deg", 0.0, {.min = -36000.0, .max = 36000.0});
+  const auto found = std::find_if(tools.begin(), tools.end(), [&](const simulate::Tool& tool) {
+    return tool.wire.name == name;
+  });
+  if (found == tools.end()) {
+    std::vector<std::string> names;
+    for (const simulate::Tool& tool : tools) names.push_back(tool.wire.name);
+    const std::string nearest = nearest_name(name, names);
+    reader.problems().add(reader.path_of("tool"), in_quotes(name), "the name of one of the tools",
+                          nearest.empty() ? "" : "did you mean " + in_quotes(nearest) + "?");
+  } else {
+    const auto i = static_cast<std::size_t>(found - tools.begin());
+    if (move.push[i] != 0.0 || move.turn[i] != 0.0) {
+      reader.problems().add(reader.path_of("tool"), in_quotes(name), "each tool once in a move");
+    }
+    if (push == 0.0 && turn == 0.0) {
+      reader.problems().add(reader.path_of("push_mm"), "0, and turn_deg too",
+                            "one of them other than 0");
+    }
+    move.push[i] = push;
+    move.turn[i] = turn * kRadPerDeg;
+  }
+  reader.finish();
+}
+
+void read_moves(JsonReader& root, ToolBenchScene& bench) {
+  const std::size_t count = bench.scene.tools.size();
+  for (JsonReader& reader : root.objects("moves", false)) {
+    simulate::ToolMove move{std::vector<double>(count, 0.0), std::vector<double>(count, 0.0)};
+    if (reader.has("together")) {
+      for (JsonReader& one : reader.objects("together", true)) read_one_move(one, bench, move);
+      reader.finish();
+    } else {
+      read_one_move(reader, bench, move);
+    }
+    bench.scene.moves.push_back(std::move(move));
+  }
+}
+
+/// No tool leaves the introducer or goes in with its hub, and one of them is always in.
+void check_insertions(const ToolBenchScene& bench, Problems& problems) {
+  std::vector<simulate::ToolPlace> places = bench.scene.places;
+  const auto check = [&](const auto& key_of) {
+    double foremost = 0.0;
+    for (std::size_t i = 0; i < places.size(); ++i) {
+      const double length = bench.scene.tools[i].wire.length();
+      foremost = std::max(foremost, places[i].insertion);
+      if (places[i].insertion >= 0.0 && places[i].insertion <= length) continue;
+      problems.add(key_of(i), "an insertion of " + mm(places[i].insertion) + " mm",
+                   "0 to the length of " + in_quotes(bench.scene.tools[i].wire.name) + ", " +
+                       mm(length) + " mm");
+      return false;
+    }
+    if (foremost >= kLeastInsertion) return true;
+    problems.add(key_of(0), mm(foremost) + " mm of the foremost tool",
+                 "at least " + mm(kLeastInsertion) + " mm of it out of the introducer");
+    return false;
+  };
+  const auto at_start = [](std::size_t i) {
+    return "tools[" + std::to_string(i) + "].insertion_mm";
+  };
+  if (!check(at_start)) return;
+  for (std::size_t k = 0; k < bench.scene.moves.size(); ++k) {
+    for (std::size_t i = 0; i < places.size(); ++i) {
+      // What adds up to 0 but for rounding is 0.
+      places[i].insertion += bench.scene.moves[k].push[i];
+      if (std::abs(places[i].insertion) < 1e-9) places[i].insertion = 0.0;
+    }
+    if (!check([&](std::size_t) { return "moves[" + std::to_string(k) + "]"; })) return;
+  }
+}
+
+/// What holds the foremost tip; the introducer is the proximal support.
+void read_distal(JsonReader& root, simulate::ToolScene& scene) {
+  for (JsonReader& reader : root.objects("supports", false)) {
+    const simulate::Support support = read_support(reader);
+    const std::string at = reader.path_of("at");
+    if (support.at != simulate::WireEnd::kDistal || scene.distal) {
+      root.problems().add(at, "not the only distal one", "one support, at the distal end",
+                          "the introducer holds the tools' proximal ends");
+    } else if (support.kind == simulate::SupportKind::kGuided || support.roll != 0.0) {
+      root.problems().add(reader.path_of("kind"), "guided, or with a roll_deg",
+                          "clamped or pinned, without roll_deg",
+                          "of several tools the tip's roll is not held in this version");
+    }
+    scene.distal = support;
+  }
+}
+
+}  // namespace
+
+ToolBenchScene read_tool_bench(JsonReader& root) {
+  ToolBenchScene bench;
+  simulate::ToolScene& scene = bench.scene;
+  Problems& problems = root.problems();
+  JsonReader introducer = root.object("introducer", true);
+  scene.point = introducer.point("point_mm", Vec3(Vec3::Zero()));
+  scene.direction = introducer.direction("direction", Vec3(Vec3::UnitX()));
+  introducer.finish();
+  bench.roll_zero = roll_of_anterior(scene.direction);
+  for (JsonReader& reader : root.objects("tools", true)) read_tool(reader, bench);
+  const bool sound = problems.empty();
+  check_stack(bench, problems);
+  read_moves(root, bench);
+  read_distal(root, scene);
+  scene.loads = read_loads(root);
+  if (scene.loads.tip_torque != 0.0) {
+    problems.add("loads.tip_torque_n_mm", mm(scene.loads.tip_torque), "0", "turn a hub in a move");
+  }
+  if (root.has("plane_normal")) scene.plane = root.direction("plane_normal", std::nullopt);
+  scene.friction = root.number("friction_between_tools", 0.0, {.min = 0.0, .max = 1.0});
+  scene.element_length =
+      root.number("element_length_mm", scene.element_length, {.min = 0.05, .max = 20.0});
+  JsonReader solver = root.object("solver", false);
+  scene.residual_tolerance =
+      solver.number("residual_tolerance_n", scene.residual_tolerance, {.min = 1e-14, .max = 1.0});
+  scene.max_iterations = solver.integer("max_iterations", scene.max_iterations, 1, 10000000);
+  solver.finish();
+  refuse(root, "wire", "a wire beside \"tools\", of which the last one is the wire, is");
+  refuse(root, "vessel", "vessels round several tools are");
+  refuse(root, "insertion", "insertions of several tools are");
+  refuse(root, "target", "targets of several tools are");
+  if (sound && problems.empty()) check_insertions(bench, problems);
+  return bench;
+}
+
+simulate::Support read_support(JsonReader& reader) {
+  using simulate::SupportKind;
+  simulate::Support support;
+  support.at = reader.choice("at", std::nullopt, {"proximal", "distal"}) == "proximal"
+                   ? simulate::WireEnd::kProximal
+                   : simulate::WireEnd::kDistal;
+  const std::string kind = reader.choice("kind", std::nullopt, {"clamped", "pinned", "guided"});
+  support.kind = kind == "clamped"  ? SupportKind::kClamped
+                 : kind == "pinned" ? SupportKind::kPinned
+                                    : SupportKind::kGuided;
+  support.point = reader.point("point_mm", std::nullopt);
+  support.direction = reader.direction("direction", Vec3(Vec3::UnitX()));
+  support.roll = reader.number("roll_deg", 0.0, {.min = -36000.0, .max = 36000.0}) * kRadPerDeg;
+  if (support.kind == SupportKind::kPinned && support.roll != 0.0) {
+    reader.problems().add(reader.path_of("roll_deg"), reader.raw("roll_deg").dump(), "0",
+                          "a pinned end turns freely; give \"clamped\" or \"guided\"");
+  }
+  reader.finish();
+  return support;
+}
+
+simulate::Loads read_loads(JsonReader& root) {
+  JsonReader reader = root.object("loads", false);
+  simulate::Loads loads;
+  loads.gravity = reader.point("gravity_m_per_s2", Vec3(Vec3::Zero())) * kMmPerM;
+  loads.tip_force = reader.point("tip_force_n", Vec3(Vec3::Zero()));
+  loads.tip_moment = reader.point("tip_moment_n_mm", Vec3(Vec3::Zero()));
+  loads.tip_torque = reader.number("tip_torque_n_mm", 0.0, {});
+  reader.finish();
+  return loads;
+}
+
+}  // namespace wireplan::pipeline

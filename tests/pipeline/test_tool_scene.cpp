@@ -1,0 +1,206 @@
+// Scenes of several tools: what is read, in which units, what is said about mistakes, and what
+// comes out.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <fstream>
+#include <string>
+#include <vector>
+
+#include "pipeline/commands/scene_run.h"
+#include "pipeline/files/scene_file.h"
+#include "tests/pipeline/case_texts.h"
+
+namespace wireplan::pipeline {
+namespace {
+
+Json curved_catheter() {
+  const Json tip = {{"length_mm", 30},
+                    {"bending_stiffness_n_mm2", 332},
+                    {"rest_curvature_per_mm", 1.0 / 15.0}},
+             shaft = {{"length_mm", 400}, {"bending_stiffness_n_mm2", 332}};
+  return {{"name", "catheter"},
+          {"outer_diameter_mm", 1.667},
+          {"inner_diameter_mm", 0.991},
+          {"insertion_mm", 60},
+          {"sections", Json::array({tip, shaft})}};
+}
+
+Json straight_wire() {
+  return {{"name", "wire"},
+          {"outer_diameter_mm", 0.889},
+          {"insertion_mm", 90},
+          {"sections", Json::array({{{"length_mm", 1000}, {"bending_stiffness_n_mm2", 150}}})}};
+}
+
+Json wire_in_catheter() {
+  return {{"schema", "wireplan.scene/1"},
+          {"tools", Json::array({curved_catheter(), straight_wire()})},
+          {"introducer", {{"point_mm", {0, 0, 5}}, {"direction", {0, 0, 2}}}},
+          {"moves", Json::array({{{"tool", "wire"}, {"push_mm", -80}}})}};
+}
+
+TEST_F(CaseFile, ToolsAreReadInInternalUnits) {
+  Json json = wire_in_catheter();
+  json["tools"][0]["roll_deg"] = 90;
+  json["friction_between_tools"] = 0.1;
+  json["element_length_mm"] = 2;
+  json["loads"] = {{"gravity_m_per_s2", {0, -9.81, 0}}};
+  json["moves"].push_back(
+      {{"together", Json::array({{{"tool", "wire"}, {"turn_deg", 180}},
+                                 {{"tool", "catheter"}, {"push_mm", 7}, {"turn_deg", -90}}})}});
+  const SceneFile file = read_scene(write("scene.json", json.dump()));
+  ASSERT_TRUE(file.tools);
+  EXPECT_FALSE(file.bench || file.insertion || file.vessel);
+  const simulate::ToolScene& scene = file.tools->scene;
+  ASSERT_EQ(scene.tools.size(), 2u);
+  EXPECT_EQ(scene.tools[0].wire.name, "catheter");
+  EXPECT_DOUBLE_EQ(scene.tools[0].wire.radius, 0.8335);
+  EXPECT_DOUBLE_EQ(scene.tools[0].inner_radius, 0.4955);
+  EXPECT_DOUBLE_EQ(scene.tools[0].wire.sections[0].rest_curvature, 1.0 / 15.0);
+  EXPECT_EQ(scene.tools[1].inner_radius, 0.0);
+  EXPECT_EQ(scene.places[0].insertion, 60.0);
+  EXPECT_NEAR(scene.places[0].roll - file.tools->roll_zero, 0.5 * kPi, 1e-12);
+  EXPECT_EQ(scene.direction, Vec3(0.0, 0.0, 1.0));
+  EXPECT_EQ(scene.friction, 0.1);
+  EXPECT_EQ(scene.element_length, 2.0);
+  EXPECT_EQ(scene.loads.gravity.y(), -9810.0);
+  ASSERT_EQ(scene.moves.size(), 2u);
+  EXPECT_EQ(scene.moves[0].push, std::vector<double>({0.0, -80.0}));
+  EXPECT_EQ(scene.moves[1].push, std::vector<double>({7.0, 0.0}));
+  EXPECT_NEAR(scene.moves[1].turn[0], -0.5 * kPi, 1e-12);
+  EXPECT_NEAR(scene.moves[1].turn[1], kPi, 1e-12);
+}
+
+TEST_F(CaseFile, CathetersAndWiresOfTheCatalogueAreTools) {
+  for (const Catheter& catheter : catalogue().catheters) {
+    Json json = wire_in_catheter();
+    json["tools"] =
+        Json::array({{{"device", catheter.tube.name}, {"insertion_mm", 50}},
+                     {{"device", "floppy-014"}, {"name", "wire"}, {"insertion_mm", 100}}});
+    const simulate::ToolScene scene = read_scene(write("scene.json", json.dump())).tools->scene;
+    EXPECT_EQ(scene.tools[0].wire.length(), catheter.tube.length());
+    EXPECT_EQ(scene.tools[0].inner_radius, 0.5 * catheter.inner_diameter);
+    EXPECT_EQ(scene.tools[0].wire.name, catheter.tube.name);
+    EXPECT_EQ(scene.tools[1].wire.name, "wire");
+  }
+}
+
+TEST_F(CaseFile, MistakesInToolsAreToldByKey) {
+  struct Row {
+    std::string said;
+    std::function<void(Json&)> spoil;
+  };
+  const std::vector<Row> rows = {
+      {"tools[1] is 1.2 mm thick, expected less than the inner diameter of \"catheter\" round it, "
+       "0.991 mm (tools are listed from the outside in)",
+       [](Json& json) { json["tools"][1]["outer_diameter_mm"] = 1.2; }},
+      {"tools[1] is 0.889 mm thick, expected an inner_diameter_mm of \"catheter\" round it",
+       [](Json& json) { json["tools"][0].erase("inner_diameter_mm"); }},
+      {"tools[0].inner_diameter_mm is 2.0, expected less than outer_diameter_mm, 1.667",
+       [](Json& json) { json["tools"][0]["inner_diameter_mm"] = 2; }},
+      {"tools[1].name is \"catheter\", expected a name that no other tool has",
+       [](Json& json) { json["tools"][1]["name"] = "catheter"; }},
+      {"tools[1].name is \"a/b\", expected letters, digits, - and _",
+       [](Json& json) { json["tools"][1]["name"] = "a/b"; }},
+      {"moves[0].tool is \"wir\", expected the name of one of the tools (did you mean \"wire\"?)",
+       [](Json& json) { json["moves"][0]["tool"] = "wir"; }},
+      {"moves[0].push_mm is 0, and turn_deg too, expected one of them other than 0",
+       [](Json& json) { json["moves"][0].erase("push_mm"); }},
+      {"moves[0].together[1].tool is \"wire\", expected each tool once in a move",
+       [](Json& json) {
+         json["moves"][0] = {{"together", Json::array({{{"tool", "wire"}, {"push_mm", 1}},
+                                                       {{"tool", "wire"}, {"turn_deg", 1}}})}};
+       }},
+      {"moves[0] is an insertion of -10.0 mm, expected 0 to the length of \"wire\", 1000.0 mm",
+       [](Json& json) { json["moves"][0]["push_mm"] = -100; }},
+      {"moves[0] is an insertion of 490.0 mm, expected 0 to the length of \"catheter\", 430.0 mm",
+       [](Json& json) {
+         json["moves"][0] = {{"tool", "catheter"}, {"push_mm", 430}};
+       }},
+      {"tools[0].insertion_mm is 0.5 mm of the foremost tool, expected at least 1.0 mm",
+       [](Json& json) {
+         json["tools"][0]["insertion_mm"] = 0.5;
+         json["tools"][1]["insertion_mm"] = 0;
+       }},
+      {"tools[0].device is \"cobra-c22\", expected a wire or catheter of the catalogue (did you "
+       "mean \"cobra-c2\"?)",
+       [](Json& json) {
+         json["tools"][0] = {{"device", "cobra-c22"}, {"insertion_mm", 60}};
+       }},
+      {"supports[0].kind is guided, or with a roll_deg, expected clamped or pinned",
+       [](Json& json) {
+         json["supports"] =
+             Json::array({{{"at", "distal"}, {"kind", "guided"}, {"point_mm", {0, 0, 80}}}});
+       }},
+      {"supports[0].at is not the only distal one, expected one support, at the distal end",
+       [](Json& json) {
+         json["supports"] =
+             Json::array({{{"at", "proximal"}, {"kind", "clamped"}, {"point_mm", {0, 0, 0}}}});
+       }},
+      {"vessel is given, expected no such key yet (vessels round several tools are not in this "
+       "version; delete the key)",
+       [](Json& json) { json["vessel"] = Json::object(); }},
+      {"loads.tip_torque_n_mm is 1.0, expected 0 (turn a hub in a move)",
+       [](Json& json) {
+         json["loads"] = {{"tip_torque_n_mm", 1}};
+       }},
+      {"tools is of 4, expected 1 to 3, from the outside in",
+       [](Json& json) {
+         for (int k = 0; k < 2; ++k) json["tools"].push_back(straight_wire());
+       }},
+      {"introducer is missing", [](Json& json) { json.erase("introducer"); }},
+  };
+  for (const Row& row : rows) {
+    Json json = wire_in_catheter();
+    EXPECT_EQ(scene_problem(json), "");
+    row.spoil(json);
+    EXPECT_NE(scene_problem(json).find(row.said), std::string::npos) << row.said << "\n  but:\n"
+                                                                     << scene_problem(json);
+  }
+  // All of them at once.
+  Json json = wire_in_catheter();
+  json["tools"][1]["outer_diameter_mm"] = 1.2;
+  json["moves"][0]["tool"] = "wir";
+  json["friction_between_tools"] = 2;
+  const std::string said = scene_problem(json);
+  for (const char* key : {"tools[1]", "moves[0].tool", "friction_between_tools"}) {
+    EXPECT_NE(said.find(key), std::string::npos) << key;
+  }
+}
+
+TEST_F(CaseFile, CatheterTakesItsCurveAsTheWireIsWithdrawn) {
+  const SceneFile file = read_scene(write("scene.json", wire_in_catheter().dump()));
+  const SceneAnswer answer = run_scene_file(file, folder_ / "out");
+  EXPECT_TRUE(answer.solved) << answer.line;
+  for (const char* name : {"catheter.vtp", "wire.vtp", "wire.png"}) {
+    EXPECT_TRUE(fs::exists(folder_ / "out" / name)) << name;
+  }
+  std::ifstream stream(folder_ / "out" / "result.json");
+  const Json result = Json::parse(stream);
+  EXPECT_EQ(result["outcome"], "converged");
+  ASSERT_EQ(result["moves"].size(), 2u);
+
+  // Over the wire it keeps 0.689 of its curvature, without it turns by 30 mm / 15 mm.
+  const auto bend_of = [](const Json& tools) {
+    const Json& tip = tools[0]["tip_mm"];
+    return std::hypot(tip[0].get<double>(), tip[1].get<double>());
+  };
+  const double over = 332.0 / 482.0 / 15.0, free = 1.0 / 15.0;
+  EXPECT_NEAR(bend_of(result["moves"][0]["tools"]), (1.0 - std::cos(30.0 * over)) / over, 0.05);
+  EXPECT_NEAR(bend_of(result["tools"]), (1.0 - std::cos(30.0 * free)) * 15.0, 0.05);
+  // It bends toward anterior.
+  EXPECT_LT(result["tools"][0]["tip_mm"][1].get<double>(), -10.0);
+  EXPECT_EQ(result["tools"][1]["insertion_mm"], 10.0);
+
+  // At the foremost node the catheter is alone, at the first both are.
+  EXPECT_EQ(result["tools_at_nodes"].size(), result["nodes_mm"].size());
+  EXPECT_EQ(result["tools_at_nodes"].front(), Json({"catheter", "wire"}));
+  EXPECT_EQ(result["tools_at_nodes"].back(), Json::array({"catheter"}));
+  // The hands get back what bent the wire: k_c k_w / (2 (k_c + k_w)) kappa^2 over 30 mm.
+  const double stored = 0.5 * 332.0 * 150.0 / 482.0 / 225.0 * 30.0;
+  EXPECT_NEAR(result["hand_work_n_mm"].get<double>(), -stored, 0.01 * stored);
+}
+
+}  // namespace
+}  // namespace wireplan::pipeline
