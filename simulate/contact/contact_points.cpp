@@ -77,6 +77,10 @@ ContactPoints::ContactPoints(const Rod& rod, const Lumen& lumen, double spacing,
     : lumen_(lumen), reach_(reach) {
   expects(spacing > 0.0 && lumen.band() > reach);
   points_ = build_points(rod, spacing);
+  if (rod.thinner.size() > 0) {
+    thinner_.resize(size());
+    for (int k = 0; k < size(); ++k) thinner_[k] = at_point(rod.thinner, (*this)[k]);
+  }
   x_.setZero(3, rod.nodes());
   asleep_until_.setConstant(size(), kAwake);
   known_position_.setConstant(3, size(), std::numeric_limits<double>::infinity());
@@ -151,7 +155,7 @@ double ContactPoints::least_distance(int k, const Vec3& position) const {
 WallSample ContactPoints::look_at(int k, const Vec3& position, double near) {
   const bool touched = touched_[static_cast<std::size_t>(k)] != 0;
   WallSample wall;
-  if (!touched) wall.distance = lumen_.distance(position);
+  if (!touched) wall.distance = lumen_.distance(position) + thinner(k);
   if (touched || wall.distance < near) {
     WallSample& known = known_[static_cast<std::size_t>(k)];
     const Vec3 moved = position - known_position_.col(k);
@@ -162,7 +166,9 @@ WallSample ContactPoints::look_at(int k, const Vec3& position, double near) {
       wall.hessian = known.hessian;
       return wall;
     }
-    wall = known = lumen_.sample(position);
+    known = lumen_.sample(position);
+    known.distance += thinner(k);
+    wall = known;
   }
   known_position_.col(k) = position;
   known_distance_[k] = wall.distance;
@@ -179,7 +185,7 @@ double ContactPoints::largest_safe_part(const WireMotion& motion, int looks) con
     const double distance = least_distance(k, from);
     const double room = kInto + std::max(0.0, distance), length = move.norm();
     if (length > room && room < cap * length) {
-      cap = std::min(cap, way_inside(from, move / length, length, distance, looks) / length);
+      cap = std::min(cap, way_inside(k, from, move / length, length, distance, looks) / length);
     }
   }
   return cap;
@@ -187,14 +193,14 @@ double ContactPoints::largest_safe_part(const WireMotion& motion, int looks) con
 
 /// How far a point may go from a place that is `distance` inside the wall, of `length`; infinite:
 /// as far as it likes. Looks ahead in strides that are safe by the distance where they start.
-double ContactPoints::way_inside(const Vec3& from, const Vec3& toward, double length,
+double ContactPoints::way_inside(int k, const Vec3& from, const Vec3& toward, double length,
                                  double distance, int looks) const {
   const double deepest = std::min(0.0, distance);
   double way = 0.0;
   for (int look = 0; look < looks; ++look) {
     const double next = way + kInto + std::max(0.0, distance);
     if (next >= length) return std::numeric_limits<double>::infinity();
-    distance = lumen_.distance(from + next * toward);
+    distance = lumen_.distance(from + next * toward) + thinner(k);
     if (distance < deepest - kInto) return look == 0 ? next : way;
     way = next;
   }

@@ -27,6 +27,12 @@ struct ContactPoint {
 /// than two apart.
 bool in_band(const ContactPoint& p, const ContactPoint& q);
 
+/// Values at nodes, at a point.
+inline double at_point(const Eigen::VectorXd& nodes, const ContactPoint& point) {
+  const double here = nodes[point.edge];
+  return point.part > 0.0 ? here + point.part * (nodes[point.edge + 1] - here) : here;
+}
+
 /// A motion of the wire, node by node with `stride` numbers each, of which the first three are the
 /// node's; nodes from `first` to before `last`, the others are at rest.
 struct WireMotion {
@@ -75,6 +81,9 @@ class ContactPoints {
   /// The state in which they were looked for last.
   const Eigen::Matrix3Xd& nodes() const { return x_; }
   Vec3 position(int k) const { return (*this)[k].at(x_); }
+  /// By how much the wire is thinner there than its radius: distances from the wall, as samples
+  /// have them, are by so much larger [mm].
+  double thinner(int k) const { return thinner_.size() > 0 ? thinner_[k] : 0.0; }
 
   /// Largest part of a motion from that state that takes no point across the wall, see WallContact.
   double largest_safe_part(const WireMotion& motion, int looks) const;
@@ -82,12 +91,13 @@ class ContactPoints {
  private:
   WallSample look_at(int k, const Vec3& position, double near);
   double least_distance(int k, const Vec3& position) const;
-  double way_inside(const Vec3& from, const Vec3& toward, double length, double distance,
+  double way_inside(int k, const Vec3& from, const Vec3& toward, double length, double distance,
                     int looks) const;
 
   const Lumen& lumen_;
   double reach_;
   std::vector<ContactPoint> points_;  // proximal to distal
+  Eigen::VectorXd thinner_;           // per point, see Rod; distances from the wall have it in them
   int first_free_ = 0;
 
   // How far any node went at most, from state to state. Until that comes to a point's

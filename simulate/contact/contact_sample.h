@@ -21,6 +21,7 @@ struct Touch {
   double wall_displacement = 0.0;  // outward                                             [mm]
   double tip_distance = 0.0;       // along the wire                                      [mm]
   double share = 0.0;              // length of wire that it stands for                   [mm]
+  double thinner = 0.0;            // there than the rod's radius, of several tools       [mm]
 };
 
 /// Energies of the contact [N mm].

@@ -100,7 +100,7 @@ void Friction::find_rubbing(const ContactPoints& points, const ContactMemory& me
     rubbing_[static_cast<std::size_t>(k)] = {
         .length = length,
         .toward = length > 0.0 ? Vec3(along / length) : Vec3::Zero(),
-        .limit = coefficient_ * lag_.force[k],
+        .limit = coefficient(k) * lag_.force[k],
         .energy = potential.energy,
         .slope = potential.slope,
         .curvature = potential.curvature};

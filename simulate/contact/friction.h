@@ -1,6 +1,7 @@
 #pragma once
 /// Coulomb's friction between wire and wall.
 #include <Eigen/Core>
+#include <utility>
 #include <vector>
 
 #include "simulate/contact/contact_points.h"
@@ -27,6 +28,8 @@ class Friction {
  public:
   Friction(double coefficient, double slip, int points);
   bool acts() const { return coefficient_ > 0.0; }
+  /// Of the coefficient, per point.
+  void take_parts(Eigen::VectorXd parts) { part_ = std::move(parts); }
 
   // ---- the lag
 
@@ -54,7 +57,7 @@ class Friction {
     return -(rubbing(point).limit * rubbing(point).slope) * rubbing(point).toward;
   }
   /// Size of the force per normal force on the point, if the lag is the state's own.
-  double per_normal_force(int point) const { return coefficient_ * rubbing(point).slope; }
+  double per_normal_force(int point) const { return coefficient(point) * rubbing(point).slope; }
 
   /// Has points that slipped remember so: one that rubbed keeps its anchor the slip behind it, one
   /// that does not touch, where it is. Returns the heat, the friction now times the way that the
@@ -66,7 +69,12 @@ class Friction {
   void add(const ContactPoints& points, Sink& sink) const;
 
  private:
+  double coefficient(int point) const {
+    return part_.size() > 0 ? coefficient_ * part_[point] : coefficient_;
+  }
+
   double coefficient_, slip_;
+  Eigen::VectorXd part_;  // per point, of the coefficient; empty: all
 
   struct Lag {
     Eigen::VectorXd force;    // normal, per point                                          [N]

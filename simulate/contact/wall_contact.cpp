@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <utility>
 
 namespace wireplan::simulate {
 
@@ -28,6 +29,11 @@ WallContact::WallContact(const Rod& rod, const VesselModel& vessel, const Contac
   memory_.anchor.setZero(3, m);
   memory_.normal_force.setZero(m);
   if (forces_.yielding()) memory_.triangle.assign(static_cast<std::size_t>(m), -1);
+  if (rod.rubs.size() > 0) {
+    Eigen::VectorXd parts(m);
+    for (int k = 0; k < m; ++k) parts[k] = at_point(rod.rubs, points_[k]);
+    friction_.take_parts(std::move(parts));
+  }
   predicted_.setZero(m);
   latest_.active.reserve(static_cast<std::size_t>(m));
   touches_.reserve(static_cast<std::size_t>(m));
@@ -69,7 +75,8 @@ const std::vector<Touch>& WallContact::touches() {
                         .penetration = std::max(0.0, radius_ - active.wall.distance - active.yield),
                         .wall_displacement = active.yield,
                         .tip_distance = point.tip_distance,
-                        .share = point.share});
+                        .share = point.share,
+                        .thinner = points_.thinner(active.point)});
   }
   return touches_;
 }

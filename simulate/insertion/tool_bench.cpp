@@ -3,7 +3,6 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 
 #include "simulate/wire/bend_to.h"
 
@@ -16,9 +15,12 @@ struct BenchTuning {
   double largest_turn = 5.0 * kPi / 180.0;  //                                            [rad]
   double shortest = 1.0 / 16.0;             // of such a part, where it is cut
   double unbalanced = 0.02;                 // of the work of a part: more, and it is cut
-  double least_work = 1e-7;                 // that counts so                                [N mm]
-  double step = 1e-5;   // of differences by insertion: with 1e-3 the stretch of an edge, whose
-                        // energy is no parabola, makes an error of 1e-4 N                  [mm]
+  double unbalanced_in_vessel = 0.2;  // there friction and ridges of the wall are in the forces
+  double jump = 0.5;  // of a node off its guess, in the shortest part in a vessel              [mm]
+  double deepest = 1.0;      // past the wall                                  [mm]
+  double least_work = 1e-7;  // that counts so                                [N mm]
+  double step = 1e-5;        // of differences by insertion: with 1e-3 the stretch of an edge, whose
+                       // energy is no parabola, makes an error of 1e-4 N                  [mm]
   double nudge = 1e-3;  // of the tip of each tool but the first curved one, in a guess       [rad]
   int most_solves = 4;  // of a part that runs out of iterations, from where it got
   int load_steps = 10;  // where the full loads have no equilibrium at once
@@ -48,10 +50,6 @@ int count_elements(const ToolScene& scene) {
     longest = std::max(longest, largest_insertion(places));
   }
   return std::max(4, static_cast<int>(std::ceil(longest / scene.element_length - 1e-9)));
-}
-
-Vec3 edge_tangent(const RodState& state, Eigen::Index e) {
-  return (state.x.col(e + 1) - state.x.col(e)).normalized();
 }
 
 /// A list of values at the middles of edges of length h, at s; beyond the ends that of the ends.
@@ -93,10 +91,29 @@ double edge_length_of(const Composite& composite) { return composite.rod.rest_le
 
 }  // namespace
 
-ToolBench::ToolBench(const ToolScene& scene) : scene_(scene), elements_(count_elements(scene)) {
+double friction_with_wall(const ToolScene& scene, std::size_t tool) {
+  return scene.tools[tool].wire.friction.value_or(scene.contact.friction);
+}
+
+/// Points of contact are the nodes, so that they stay as many: no edge is as long as half of their
+/// spacing. Friction is that of the roughest tool, of which the others have a part.
+ToolScene for_contact(ToolScene scene) {
+  scene.contact.spacing = 3.0 * scene.element_length;
+  double most = 0.0;
+  for (std::size_t i = 0; i < scene.tools.size(); ++i) {
+    scene.tools[i].wire.friction = friction_with_wall(scene, i);
+    most = std::max(most, *scene.tools[i].wire.friction);
+  }
+  scene.contact.friction = most;
+  return scene;
+}
+
+ToolBench::ToolBench(const ToolScene& scene)
+    : scene_(for_contact(scene)), elements_(count_elements(scene)) {
   expects(scene.places.size() == scene.tools.size() && scene.loads.tip_torque == 0.0);
   place(scene.places, now_);
   now_.state = unloaded(now_);
+  if (now_.contact != nullptr) now_.contact->start_at(now_.state.x);
   const RodState start = now_.state;
   settled_ = solve(now_);
   if (!settled_) {
@@ -108,6 +125,7 @@ ToolBench::ToolBench(const ToolScene& scene) : scene_(scene), elements_(count_el
       if (!settled_) break;
     }
   }
+  if (now_.contact != nullptr) now_.contact->settle();
   const std::vector<double> none(scene.tools.size(), 0.0);
   feel(now_, {none, none});
   report({none, none});
@@ -131,6 +149,8 @@ bool ToolBench::move(const ToolMove& by) {
     State next;
     place(moved(start, by, done + part), next);
     next.state = follow(now_, next);
+    carry_contact(now_, next);
+    const Eigen::Matrix3Xd guess = next.state.x;
     if (!solve(next)) {
       if (!may_cut) {
         report(by);
@@ -139,6 +159,7 @@ bool ToolBench::move(const ToolMove& by) {
       size = 0.5 * part;
       continue;
     }
+    const double rubbed = next.contact != nullptr ? next.contact->settle() : 0.0;
     feel(next, by);
 
     // The work of the hands against what the energy gained.
@@ -149,17 +170,23 @@ bool ToolBench::move(const ToolMove& by) {
       work += push + turn;
       scale += std::abs(push) + std::abs(turn);
     }
-    const double gained = next.energy.total() - now_.energy.total(), excess = work - gained;
-    const bool jumped = std::abs(excess) > kBench.unbalanced * scale + kBench.least_work;
+    const double gained = next.energy.total() - now_.energy.total();
+    const double excess = work - gained - rubbed;
+    const double allowed =
+        next.contact != nullptr ? kBench.unbalanced_in_vessel : kBench.unbalanced;
+    const bool jumped = std::abs(excess) > allowed * scale + kBench.least_work;
     if (jumped && may_cut) {
       size = 0.5 * part;
       continue;
     }
+    const double off = std::sqrt((next.state.x - guess).colwise().squaredNorm().maxCoeff());
+    const bool ripples = next.contact != nullptr && off < kBench.jump;
+    const double released = jumped && !ripples ? std::max(0.0, excess) : 0.0;
     now_ = std::move(next);
-    const double released = jumped ? std::max(0.0, excess) : 0.0;
     record_.released += released;
     record_.unbalanced += excess - released;
-    record_.work += gained + released;
+    record_.heat += rubbed;
+    record_.work += gained + rubbed + released;
     for (std::size_t i = 0; i + 1 < by.push.size(); ++i) {
       const ToolContact contact = find_contact(i, by);
       const double heat = part * (contact.friction_force * (by.push[i + 1] - by.push[i]) +
@@ -190,6 +217,7 @@ Problem ToolBench::problem_of(const State& at) const {
     }
   }
   problem.load = &at.load;
+  problem.contact = at.contact.get();
   problem.plane = scene_.plane;
   const Vec3& moment = scene_.loads.tip_moment;
   if (!moment.isZero(0.0)) {
@@ -205,6 +233,48 @@ void ToolBench::place(const std::vector<ToolPlace>& places, State& at) const {
   at.composite = build_composite(scene_.tools, places, elements_);
   at.load = scene_.loads.gravity * at.composite.rod.mass.transpose();
   at.load.rightCols<1>() += scene_.loads.tip_force;
+  if (scene_.vessel == nullptr) return;
+  if (scene_.contact.friction > 0.0) {
+    const Eigen::Index n = at.load.cols();
+    at.composite.rod.rubs.resize(n);
+    for (Eigen::Index i = 0; i < n; ++i) {
+      const double arc = static_cast<double>(i) * edge_length_of(at.composite);
+      at.composite.rod.rubs[i] =
+          friction_with_wall(scene_, outermost(at, arc)) / scene_.contact.friction;
+    }
+  }
+  at.contact = std::make_unique<WallContact>(at.composite.rod, *scene_.vessel, scene_.contact);
+}
+
+/// The outermost tool at an arc length; at the foremost tip the one that leads.
+std::size_t ToolBench::outermost(const State& at, double arc) const {
+  std::size_t foremost = 0;
+  for (std::size_t i = 0; i < at.places.size(); ++i) {
+    if (at.places[i].insertion >= arc) return i;
+    if (at.places[i].insertion > at.places[foremost].insertion) foremost = i;
+  }
+  return foremost;
+}
+
+/// What holds the nodes at the wall is held against the tool there, not against the node, which
+/// slides along it.
+void ToolBench::carry_contact(const State& from, State& to) const {
+  if (to.contact == nullptr) return;
+  ContactMemory memory = from.contact->memory();
+  const Eigen::Index n = from.state.x.cols();
+  expects(memory.anchor.cols() == n);
+  const double h = edge_length_of(from.composite), h_new = edge_length_of(to.composite);
+  for (Eigen::Index i = 0; i < n; ++i) {
+    const double arc = static_cast<double>(i) * h;
+    const std::size_t tool = outermost(from, arc);
+    const double slide = to.places[tool].insertion - from.places[tool].insertion -
+                         static_cast<double>(i) * (h_new - h);
+    const Vec3 along = slide * edge_tangent(from.state, std::min(i, n - 2));
+    memory.x.col(i) -= along;
+    memory.anchor.col(i) -= along;
+  }
+  to.contact->restore(memory);
+  to.contact->predict(0.0);
 }
 
 /// As the tools lie together without loads, each in one plane with its hub.
@@ -300,6 +370,10 @@ void ToolBench::set_frames(const std::vector<Eigen::VectorXd>& angles, RodState&
   }
 }
 
+Vec3 ToolBench::edge_tangent(const RodState& state, Eigen::Index e) {
+  return (state.x.col(e + 1) - state.x.col(e)).normalized();
+}
+
 Eigen::VectorXd ToolBench::angles(int tool) const {
   const std::vector<int>& twisted = now_.composite.terms.tool;
   const auto found = std::find(twisted.begin(), twisted.end(), tool);
@@ -328,7 +402,12 @@ bool ToolBench::solve(State& at) {
     if (found.iterations < scene_.max_iterations) break;
   }
   record_.residual = found.residual;
-  return found.converged;
+  if (!found.converged || at.contact == nullptr) return found.converged;
+  through_wall_ = at.contact->latest().lost;
+  for (const Touch& touch : at.contact->touches()) {
+    through_wall_ = through_wall_ || touch.penetration > kBench.deepest;
+  }
+  return !through_wall_;
 }
 
 // ---------------------------------------------------------------- what the hands feel
@@ -376,96 +455,21 @@ void ToolBench::feel(State& at, const ToolMove& direction) const {
     at.torque[static_cast<std::size_t>(terms.tool[static_cast<std::size_t>(t)])] =
         terms.lead[t] * (terms.roll[t] - at.state.theta[t * edges]);
   }
+  if (at.contact == nullptr) return;
+  // A tool is pushed along the nodes, against the friction of the wall on it.
+  at.touches = at.contact->touches();
+  const double h = edge_length_of(at.composite);
+  for (const Touch& touch : at.touches) {
+    const std::size_t tool = outermost(at, (touch.edge + touch.part) * h);
+    const Eigen::Index edge = std::min<Eigen::Index>(touch.edge, edges - 1);
+    at.force[tool] -= touch.friction.dot(edge_tangent(at.state, edge));
+  }
 }
+
+std::vector<Touch> ToolBench::touches() const { return now_.touches; }
 
 double ToolBench::free_force(int tool) const {
   return now_.force.at(static_cast<std::size_t>(tool));
-}
-
-/// Of a tool at the nodes, (3, n): EI times how much it is bent away from its natural curve [N mm].
-Eigen::Matrix3Xd ToolBench::moments(int tool) const {
-  const RodState& state = now_.state;
-  const Rod& rod = now_.composite.rod;
-  const Eigen::Index n = state.x.cols();
-  const Wire& wire = scene_.tools[static_cast<std::size_t>(tool)].wire;
-  const double insertion = now_.places[static_cast<std::size_t>(tool)].insertion;
-  const Eigen::VectorXd angle = angles(tool);
-  Eigen::Matrix3Xd moment = Eigen::Matrix3Xd::Zero(3, n);
-  Vec3 t_a = scene_.direction, d = reference_normal(t_a);
-  for (Eigen::Index i = 0; i + 1 < n; ++i) {
-    const Vec3 t_b = edge_tangent(state, i);
-    const ToolSpot spot = look_at(wire, insertion - static_cast<double>(i) * rod.rest_length[0]);
-    d = parallel_transport(d, t_a, t_b);
-    if (spot.there) {
-      const Vec3 turn = (2.0 / (1.0 + t_a.dot(t_b))) * t_a.cross(t_b);
-      moment.col(i) = (spot.EI / rod.share[i]) * turn;
-      if (angle.size() > 0) {
-        const double a = i > 0 ? 0.5 * (angle[i - 1] + angle[i]) : angle[0];
-        const Vec3 toward = std::cos(a) * d + std::sin(a) * t_b.cross(d);
-        moment.col(i) -= spot.EI * spot.curvature * t_b.cross(toward);
-      }
-    }
-    t_a = t_b;
-  }
-  return moment;
-}
-
-/// Where the inner tool is to bend at once by a curvature k, as at a mouth, the play c lets it do
-/// so over the length sqrt(2 c / k), and no force acts over less.
-double ToolBench::bridged_length(std::size_t outer, const Eigen::Matrix3Xd& moment) const {
-  const Tool& inner = scene_.tools[outer + 1];
-  const double play = scene_.tools[outer].inner_radius - inner.wire.radius;
-  double most = 0.0;
-  for (Eigen::Index i = 0; i < moment.cols(); ++i) {
-    const double s = static_cast<double>(i) * now_.composite.rod.rest_length[0];
-    const double EI = look_at(inner.wire, now_.places[outer + 1].insertion - s).EI;
-    most = std::max(most, moment.col(i).norm() / EI);
-  }
-  return most > 0.0 && play > 0.0 ? std::sqrt(2.0 * play / most) : 0.0;
-}
-
-ToolContact ToolBench::find_contact(std::size_t outer, const ToolMove& by) const {
-  const std::size_t inner = outer + 1;
-  const double h = now_.composite.rod.rest_length[0];
-  const double overlap = std::min(now_.places[outer].insertion, now_.places[inner].insertion);
-  const Eigen::Matrix3Xd moment = moments(static_cast<int>(inner));
-  const Eigen::Index n = moment.cols();
-  // Moments go on beyond the ends as they end: straight in the introducer, free at the tip.
-  const auto at = [&](double place) -> Vec3 {
-    const double inside = std::max(0.0, place);
-    const auto i = static_cast<Eigen::Index>(inside);
-    if (i + 1 >= n) return Vec3::Zero();
-    const double part = inside - static_cast<double>(i);
-    return (1.0 - part) * moment.col(i) + part * moment.col(i + 1);
-  };
-  const double reach = std::max(h, bridged_length(outer, moment)), stride = reach / h;
-  const double along = std::abs(now_.force[inner]);
-  double hand = along;  // grows from the mouth to the introducer
-  ToolContact contact;
-  Vec3 t_b = Vec3::Zero();
-  for (Eigen::Index i = n - 2; i >= 0; --i) {
-    const Vec3 t_a = i > 0 ? edge_tangent(now_.state, i - 1) : scene_.direction;
-    t_b = edge_tangent(now_.state, i);
-    const auto node = static_cast<double>(i);
-    if (node * h > overlap + reach) continue;
-    const double bent =
-        (at(node + stride) - 2.0 * at(node) + at(node - stride)).norm() * h / (reach * reach);
-    // Of a node of which the outer tool covers a part.
-    const double part = std::clamp((overlap - (node - 0.5) * h) / h, 0.0, 1.0);
-    const double turn = part * std::atan2(t_a.cross(t_b).norm(), t_a.dot(t_b));
-    const double grown = std::exp(scene_.friction * turn);
-    const double normal =
-        bent + (scene_.friction > 0.0 ? hand * (grown - 1.0) / scene_.friction : hand * turn);
-    contact.normal_force += normal;
-    hand += scene_.friction * normal;
-  }
-  const double slide = by.push[inner] - by.push[outer];
-  const double spin = scene_.tools[inner].wire.radius * (by.turn[inner] - by.turn[outer]);
-  const double slip = std::hypot(slide, spin);
-  if (slip == 0.0) return contact;
-  contact.friction_force = (hand - along) * slide / slip;
-  contact.friction_torque = (hand - along) * scene_.tools[inner].wire.radius * spin / slip;
-  return contact;
 }
 
 void ToolBench::report(const ToolMove& by) {
@@ -486,6 +490,10 @@ void ToolBench::report(const ToolMove& by) {
                                    [&](Eigen::Index k) { return angle[k]; }) -
                    tool.place.roll;
     }
+  }
+  for (const Touch& touch : now_.touches) {
+    const double arc = (touch.edge + touch.part) * edge_length_of(now_.composite);
+    record_.tools[outermost(now_, arc)].wall_force += touch.normal_force;
   }
   for (std::size_t i = 0; i + 1 < count; ++i) {
     const ToolContact contact = find_contact(i, by);
@@ -521,43 +529,6 @@ Vec3 ToolBench::distal_force() const {
   Eigen::Matrix3Xd gradient(3, now_.state.x.cols());
   Statics::evaluate(problem_of(now_), now_.state, gradient);
   return gradient.rightCols<1>();
-}
-
-// ---------------------------------------------------------------- a scene
-
-ToolSceneResult run_tool_scene(const ToolScene& scene) {
-  ToolBench bench(scene);
-  ToolSceneResult result;
-  result.history.push_back(bench.record());
-  bool good = bench.settled();
-  std::string when = "at the start";
-  for (std::size_t k = 0; k < scene.moves.size() && good; ++k) {
-    good = bench.move(scene.moves[k]);
-    when = "in moves[" + std::to_string(k) + "]";
-    result.history.push_back(bench.record());
-  }
-  result.outcome = good ? SceneOutcome::kConverged : SceneOutcome::kNotConverged;
-  if (!good) {
-    char text[160];
-    std::snprintf(text, sizeof text,
-                  "no equilibrium was found %s: residual %.3g N, asked for %.3g N", when.c_str(),
-                  bench.record().residual, scene.residual_tolerance);
-    result.reason = text;
-  }
-  std::vector<std::string> own = {"tools"};
-  if (!scene.loads.gravity.isZero(0.0)) own.push_back("gravity");
-  if (!scene.loads.tip_force.isZero(0.0)) own.push_back("tip_force");
-  if (!scene.loads.tip_moment.isZero(0.0)) own.push_back("tip_moment");
-  if (scene.plane) own.push_back("plane");
-  result.terms = name_terms(bench.composite().rod, own, nullptr, 0.0);
-  result.nodes = bench.state().x;
-  for (std::size_t i = 0; i < scene.tools.size(); ++i) {
-    result.tool_nodes.push_back(bench.nodes_of(static_cast<int>(i)));
-    result.angles.push_back(bench.angles(static_cast<int>(i)));
-  }
-  result.introducer_force = bench.introducer_force();
-  if (scene.distal) result.distal_force = bench.distal_force();
-  return result;
 }
 
 }  // namespace wireplan::simulate

@@ -1,6 +1,6 @@
 #pragma once
-/// Tools in one another on the laboratory bench: a wire in a catheter, in a sheath, that a hand
-/// pushes, pulls and turns one by one or together, out of an introducer (tool_stack.h).
+/// Tools in one another, on the laboratory bench or in a vessel: a wire in a catheter, in a sheath,
+/// that a hand pushes, pulls and turns one by one or together, out of an introducer (tool_stack.h).
 ///
 /// Nodes lie evenly along the centreline, from the introducer's point to the foremost tip, and
 /// slide along the tools. Hands feel the derivatives of the energy: the force on a tool is what the
@@ -13,8 +13,12 @@
 /// H of the hand on it growing as on a capstan: per node |H| theta + |M''| l, M the inner tool's
 /// moment, theta the centreline's turn and l the node's share of length. M'' is a difference over
 /// the length that the play between the tools lets the inner one bridge.
+///
+/// In a vessel the nodes touch the wall, as thick and as rough as the outermost tool there. What
+/// friction holds is the tool: before each solve anchors go back along the node's tangent by as
+/// much as the tool slides past the node, and on the hand acts the wall's friction along it.
+#include <memory>
 #include <optional>
-#include <string>
 #include <vector>
 
 #include "simulate/equilibrium/solver.h"
@@ -34,11 +38,13 @@ struct ToolScene {
   std::vector<ToolPlace> places;  // where they start
   Vec3 point = Vec3::Zero();      // of the introducer, where the tools become free       [mm]
   Vec3 direction = Vec3::UnitX();
-  std::optional<Support> distal;  // of the foremost tip, clamped or pinned; holds no roll
-  Loads loads;                    // no tip torque
-  std::optional<Vec3> plane;      // as in Scene
-  double friction = 0.0;          // Coulomb's coefficient between tools
-  double element_length = 1.0;    // where the tools are furthest in                      [mm]
+  std::optional<Support> distal;        // of the foremost tip, clamped or pinned; holds no roll
+  Loads loads;                          // no tip torque
+  std::optional<Vec3> plane;            // as in Scene
+  const VesselModel* vessel = nullptr;  // round the tools; null: none
+  ContactOptions contact;  // with it; points of contact are the nodes, tools may rub by their own
+  double friction = 0.0;   // Coulomb's coefficient between tools
+  double element_length = 1.0;  // where the tools are furthest in                      [mm]
   std::vector<ToolMove> moves;
   double residual_tolerance = 1e-6;  // largest nodal force out of balance                 [N]
   int max_iterations = 200;          // of a solve
@@ -51,6 +57,7 @@ struct ToolReport {
   double hub_torque = 0.0;  // about the introducer's direction                        [N mm]
   Vec3 tip = Vec3::Zero();  //                                                           [mm]
   double twist = 0.0;       // of its tip against its hub; 0 of a straight tool         [rad]
+  double wall_force = 0.0;  // sum of the wall's normal forces on it                      [N]
 };
 
 /// What tool i does to tool i + 1 inside it.
@@ -66,7 +73,7 @@ struct ToolRecord {
   std::vector<ToolContact> contacts;  // between each tool and the next one inside
   Energy energy;                      //                                              [N mm]
   double work = 0.0;      // of the hands since the start                             [N mm]
-  double heat = 0.0;      // of friction between tools, of that work                  [N mm]
+  double heat = 0.0;      // of friction, of that work                                [N mm]
   double released = 0.0;  // of it by jumps                                           [N mm]
   /// What forces at the ends of parts of moves do more than the energy gained, without jumps.
   double unbalanced = 0.0;  //                                                        [N mm]
@@ -100,6 +107,10 @@ class ToolBench {
   /// The hand's force on a tool without friction [N].
   double free_force(int tool) const;
 
+  /// Where the tools touch the wall.
+  std::vector<Touch> touches() const;
+  bool through_wall() const { return through_wall_; }  // why the last move ended
+
   /// The problem of the present places; refers to this bench.
   Problem problem() const;
 
@@ -108,8 +119,10 @@ class ToolBench {
     std::vector<ToolPlace> places;
     Composite composite;
     Eigen::Matrix3Xd load;
+    std::unique_ptr<WallContact> contact;  // with the vessel
     RodState state;
     Energy energy;
+    std::vector<Touch> touches;
     std::vector<double> force, torque;  // without friction
   };
 
@@ -119,10 +132,13 @@ class ToolBench {
   RodState follow(const State& from, const State& to) const;
   void bend_to_support(const State& to, Eigen::Matrix3Xd& x) const;
   void set_frames(const std::vector<Eigen::VectorXd>& angles, RodState& state) const;
+  void carry_contact(const State& from, State& to) const;
+  std::size_t outermost(const State& at, double arc) const;
   bool solve(State& at);
   void feel(State& at, const ToolMove& direction) const;
   double energy_at(const State& at, const std::vector<ToolPlace>& places) const;
   double force_on(const State& at, std::size_t tool, double direction) const;
+  static Vec3 edge_tangent(const RodState& state, Eigen::Index e);
   Eigen::Matrix3Xd moments(int tool) const;
   double bridged_length(std::size_t outer, const Eigen::Matrix3Xd& moment) const;
   ToolContact find_contact(std::size_t outer, const ToolMove& by) const;
@@ -133,22 +149,7 @@ class ToolBench {
   State now_;
   ToolRecord record_;
   Statics statics_;
-  bool settled_ = false;
+  bool settled_ = false, through_wall_ = false;
 };
-
-struct ToolSceneResult {
-  SceneOutcome outcome = SceneOutcome::kNotConverged;
-  std::string reason;               // why it did not converge; else empty
-  std::vector<std::string> terms;            // energy terms that were built
-  std::vector<ToolRecord> history;  // at the start and after each move
-  Eigen::Matrix3Xd nodes;           // of the centreline                                 [mm]
-  std::vector<Eigen::Matrix3Xd> tool_nodes;  // up to each tool's tip                     [mm]
-  std::vector<Eigen::VectorXd> angles;       // see ToolBench::angles()                  [rad]
-  Vec3 introducer_force = Vec3::Zero();      // on the tools                               [N]
-  std::optional<Vec3> distal_force;          // of the support                             [N]
-};
-
-/// All moves of the scene, as far as they have an equilibrium.
-ToolSceneResult run_tool_scene(const ToolScene& scene);
 
 }  // namespace wireplan::simulate

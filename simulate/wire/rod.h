@@ -79,6 +79,8 @@ struct Rod {
   Eigen::VectorXd mass;          // (n)                                                   [t]
   Eigen::VectorXd tip_distance;  // (n)    arc length from the tip                        [mm]
   double radius = 0.0;           //                                                       [mm]
+  Eigen::VectorXd thinner;       // (n)    than `radius`, of several tools; empty: nowhere [mm]
+  Eigen::VectorXd rubs;          // (n)    part of the coefficient of friction; empty: all  [-]
   // Half a bend element, over half of the first and of the last edge: a clamp needs it to be second
   // order (design 7).
   double proximal_bend = 0.0, distal_bend = 0.0;              // EI / (l/2)              [N mm]

@@ -53,7 +53,7 @@ class Builder {
       if (!tools[i].wire.straight()) terms_.tool.push_back(static_cast<int>(i));
     }
     const int T = terms_.twists();
-    compliance_ = axial_ = mass_ = Eigen::VectorXd::Zero(n_);
+    compliance_ = axial_ = mass_ = radius_ = Eigen::VectorXd::Zero(n_);
     torsional_ = terms_.rest = terms_.twist = Eigen::MatrixXd::Zero(T, n_);
     terms_.mutual = Eigen::MatrixXd::Zero(T * (T - 1) / 2, n_);
     terms_.lead = terms_.roll = Eigen::VectorXd::Zero(T);
@@ -98,10 +98,11 @@ class Builder {
 
   void add_point(double s, double length, const std::array<Share, 2>& shares) {
     std::array<ToolSpot, kMostTools> local;
-    double K = 0.0, EA = 0.0, mass = 0.0;
+    double K = 0.0, EA = 0.0, mass = 0.0, radius = 0.0;
     for (std::size_t i = 0; i < tools_.size(); ++i) {
       local[i] = look_at(tools_[i].wire, places_[i].insertion - s);
       if (!local[i].there) continue;
+      if (K == 0.0) radius = tools_[i].wire.radius;  // of the outermost
       K += local[i].EI;
       EA += local[i].EA;
       mass += local[i].mass;
@@ -111,6 +112,7 @@ class Builder {
       compliance_[share.node] += w / K;
       axial_[share.node] += w / EA;
       mass_[share.node] += w * mass;
+      radius_[share.node] += w * radius;
       for (int t = 0; t < terms_.twists(); ++t) add_curve(t, share.node, w, K, local);
     }
   }
@@ -170,6 +172,7 @@ class Builder {
     rod.share = Eigen::VectorXd::Constant(n_, h_);
     rod.share[0] = rod.share[n_ - 1] = 0.5 * h_;
     rod.mass = mass_;
+    rod.thinner = (rod.radius - (radius_.array() / rod.share.array())).max(0.0);
     // An edge stretches as the hats of its ends do: it must not jump either.
     rod.stretch.resize(n_ - 1);
     for (int e = 0; e + 1 < n_; ++e) {
@@ -183,8 +186,9 @@ class Builder {
   const std::vector<ToolPlace>& places_;
   const int n_;  // nodes
   double length_ = 0.0, h_ = 0.0;
-  Eigen::VectorXd compliance_, axial_, mass_;  // (n) integrals of w/K, w/EA and w times mass
-  Eigen::MatrixXd torsional_;                  // (T, n) of w/GJ
+  Eigen::VectorXd compliance_, axial_;  // (n) integrals of w/K, w/EA
+  Eigen::VectorXd mass_, radius_;       // (n) of w times mass, and times radius
+  Eigen::MatrixXd torsional_;           // (T, n) of w/GJ
   ToolTerms terms_;
 };
 

@@ -1,0 +1,27 @@
+#pragma once
+/// All moves of several tools, one after the other, and what came of them.
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "simulate/insertion/tool_bench.h"
+
+namespace wireplan::simulate {
+
+struct ToolSceneResult {
+  SceneOutcome outcome = SceneOutcome::kNotConverged;
+  std::string reason;               // why it did not converge; else empty
+  std::vector<std::string> terms;   // energy terms that were built
+  std::vector<ToolRecord> history;  // at the start and after each move
+  Eigen::Matrix3Xd nodes;           // of the centreline                                 [mm]
+  std::vector<Eigen::Matrix3Xd> tool_nodes;  // up to each tool's tip                     [mm]
+  std::vector<Eigen::VectorXd> angles;       // see ToolBench::angles()                  [rad]
+  Vec3 introducer_force = Vec3::Zero();      // on the tools                               [N]
+  std::optional<Vec3> distal_force;          // of the support                             [N]
+  std::vector<Touch> contacts;               // with the vessel
+};
+
+/// All moves of the scene, as far as they have an equilibrium.
+ToolSceneResult run_tool_scene(const ToolScene& scene);
+
+}  // namespace wireplan::simulate

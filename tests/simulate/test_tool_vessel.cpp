@@ -1,0 +1,202 @@
+// Tools in one another in a vessel: against what one wire does there, and a Cobra in an aorta.
+#include <gtest/gtest.h>
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <random>
+#include <utility>
+#include <vector>
+
+#include "simulate/insertion/insertion.h"
+#include "simulate/insertion/tool_bench.h"
+#include "tests/shapes.h"
+#include "tests/simulate/random_values.h"
+#include "tests/simulate/tool_bench.h"
+
+namespace wireplan::simulate {
+namespace {
+
+/// Lumen of 4 mm radius that bends by 90 degrees round 40 mm, from +z to +x.
+const VesselModel& tool_bend() {
+  static const VesselModel vessel(shapes::bend_tube(4.0, 40.0, 0.5 * kPi, 40.0, 60.0, 1.5),
+                                  {.grid_spacing = 0.6});
+  return vessel;
+}
+
+ToolScene near_the_bend(std::vector<Tool> tools, std::vector<ToolPlace> places) {
+  ToolScene scene = tools_along_x(std::move(tools), std::move(places));
+  scene.point = Vec3(0.0, 0.0, 20.0);
+  scene.direction = Vec3::UnitZ();
+  scene.vessel = &tool_bend();
+  scene.residual_tolerance = 1e-7;
+  return scene;
+}
+
+TEST(ToolVessel, GradientAgreesWithDifferencesWhereTheThicknessChanges) {
+  const VesselModel vessel(shapes::straight_tube(3.0, 30.0, 1.0), {.grid_spacing = 0.5});
+  Tool catheter = uniform_tool(40.0, 60.0, 0.02), wire = uniform_tool(40.0, 20.0, 0.05);
+  catheter.wire.radius = 0.8;
+  const Composite composite = build_composite({catheter, wire}, {{6.4, 0.3}, {12.0, 0.8}}, 12);
+  EXPECT_NEAR(composite.rod.thinner[2], 0.0, 1e-12);
+  EXPECT_NEAR(composite.rod.thinner[9], 0.3, 1e-12);
+  EXPECT_GT(composite.rod.thinner[6], 0.01);
+  EXPECT_LT(composite.rod.thinner[6], 0.29);
+  ContactOptions options;
+  options.spacing = 3.0;
+  WallContact contact(composite.rod, vessel, options);
+  Problem problem;
+  problem.rod = &composite.rod;
+  problem.tools = &composite.terms;
+  problem.last = composite.rod.nodes();
+  problem.contact = &contact;
+  const RodState straight = straight_state(composite.rod, Vec3(2.35, 0.0, 8.0), Vec3::UnitZ(), 0.0);
+  RodState state = straight;
+  state.theta = Eigen::VectorXd::Zero(2 * (composite.rod.nodes() - 1));
+  std::mt19937_64 random(4);
+  for (double& value : state.x.reshaped()) value += 0.05 * uniform(random);
+  transport_frames(straight, state, 0, composite.rod.nodes() - 2);
+  Eigen::Matrix3Xd gradient(3, composite.rod.nodes()), unused(3, composite.rod.nodes());
+  EXPECT_GT(Statics::evaluate(problem, state, gradient).contact, 1e-3);
+  for (int k = 0; k < 20; ++k) {
+    Eigen::Matrix3Xd move(3, composite.rod.nodes());
+    for (double& value : move.reshaped()) value = uniform(random);
+    const double h = 1e-5;
+    const auto energy = [&](double part) {
+      RodState moved = state;
+      moved.x += part * move;
+      transport_frames(state, moved, 0, composite.rod.nodes() - 2);
+      return Statics::evaluate(problem, moved, unused).total();
+    };
+    const double slope = (energy(h) - energy(-h)) / (2.0 * h);
+    EXPECT_NEAR(gradient.cwiseProduct(move).sum(), slope, 1e-5 * (1.0 + std::abs(slope)));
+  }
+}
+
+TEST(ToolVessel, OneStraightToolIsTheWireThatAnInsertionPushes) {
+  const Wire wire{
+      .name = "wire", .radius = 0.445, .sections = {{.length = 300.0, .bending_stiffness = 60.0}}};
+  for (const double friction : {0.0, 0.15}) {
+    SCOPED_TRACE(friction);
+    Insertion insertion(wire, {.point = Vec3(0.0, 0.0, 20.0), .direction = Vec3::UnitZ()},
+                        tool_bend(), {.length = 100.0, .friction = friction});
+    double work = 0.0;
+    for (int k = 0; k < 90; ++k) {
+      const auto push = insertion.push(1.0);
+      ASSERT_TRUE(push);
+      work = push->push_work;
+    }
+    ToolScene scene = near_the_bend({{.wire = wire}}, {{5.0, 0.0}});
+    scene.contact.friction = friction;
+    scene.moves = {push_of({85.0})};
+    ToolBench bench(scene);
+    ASSERT_TRUE(bench.settled() && bench.move(scene.moves[0]));
+    EXPECT_GT(bench.record().tools[0].tip.x(), 20.0);
+    EXPECT_LT((bench.record().tools[0].tip - insertion.tip()).norm(), 0.2);
+    // The first 5 mm are without a wall: no work. Elements do not lie at the same places.
+    EXPECT_NEAR(bench.record().work, work, 0.05 * work);
+    EXPECT_GT(work, 0.5);
+
+    // Two halves of it in one another are the same tool.
+    Wire half = wire;
+    half.sections[0].bending_stiffness *= 0.5;
+    ToolScene both = near_the_bend({{.wire = half}, {.wire = half}}, {{5.0, 0.0}, {5.0, 0.0}});
+    both.contact.friction = friction;
+    both.moves = {push_of({85.0, 85.0})};
+    ToolBench halves(both);
+    ASSERT_TRUE(halves.settled() && halves.move(both.moves[0]));
+    EXPECT_LT((halves.state().x - bench.state().x).colwise().norm().maxCoeff(), 0.01);
+  }
+}
+
+TEST(ToolVessel, EachToolRubsByItsOwnFriction) {
+  const auto heat = [](double of_sheath, double of_wire) {
+    Tool sheath = uniform_tool(300.0, 40.0), wire = uniform_tool(300.0, 30.0);
+    wire.wire.radius = 0.4;
+    sheath.wire.friction = of_sheath;
+    wire.wire.friction = of_wire;
+    ToolScene scene = near_the_bend({sheath, wire}, {{5.0, 0.0}, {10.0, 0.0}});
+    scene.contact.friction = 0.9;  // not taken: each has its own
+    scene.moves = {push_of({60.0, 90.0})};
+    ToolBench bench(scene);
+    EXPECT_TRUE(bench.settled() && bench.move(scene.moves[0]));
+    EXPECT_GT(bench.record().tools[0].wall_force, 0.01);
+    EXPECT_GT(bench.record().tools[1].wall_force, 0.01);
+    return bench.record().heat;
+  };
+  const double none = heat(0.0, 0.0), by_sheath = heat(0.2, 0.0), by_both = heat(0.2, 0.2);
+  EXPECT_EQ(none, 0.0);
+  EXPECT_GT(by_sheath, 0.1);
+  EXPECT_GT(by_both, 1.1 * by_sheath);
+}
+
+/// Aorta of 12 mm along z, with a branch of 7 mm toward anterior at 100 mm, 15 degrees upward.
+const VesselModel& aorta() {
+  static const VesselModel vessel(
+      shapes::level_set(
+          [](const Vec3& p) {
+            const double up = 15.0 * kPi / 180.0;
+            const Vec3 start(0.0, 0.0, 100.0), out(0.0, -std::cos(up), std::sin(up));
+            const double trunk = shapes::depth_in_tube(p, Vec3::Zero(), Vec3(0.0, 0.0, 170.0), 6.0);
+            const double branch = shapes::depth_in_tube(p, start, start + 45.0 * out, 3.5);
+            const auto soft = [](double depth) { return std::exp(depth / 0.5); };
+            return 0.5 * std::log(soft(trunk) + soft(branch));
+          },
+          Vec3(-8.0, -47.0, -2.0), Vec3(8.0, 8.0, 172.0), 1.1),
+      LumenOptions{.grid_spacing = 0.6});
+  return vessel;
+}
+
+TEST(ToolVessel, CobraHooksABranchAndHoldsItWhileTheWireGoesOut) {
+  // A Cobra C2 of the catalogue over a Rosen shaft with a floppy, straight tip.
+  const Wire cobra{
+      .name = "cobra",
+      .radius = 0.8335,
+      .sections = {{.length = 8.0, .bending_stiffness = 99.0},
+                   {.length = 15.7, .bending_stiffness = 99.0, .rest_curvature = 0.1},
+                   {.length = 15.0, .bending_stiffness = 332.0},
+                   {.length = 31.4, .bending_stiffness = 332.0, .rest_curvature = -1.0 / 30.0},
+                   {.length = 579.9, .bending_stiffness = 332.0}}};
+  const Wire wire{
+      .name = "wire",
+      .radius = 0.4445,
+      .sections = {{.length = 30.0, .bending_stiffness = 5.0},
+                   {.length = 20.0, .bending_stiffness = 5.0, .proximal_bending_stiffness = 377.0},
+                   {.length = 1400.0, .bending_stiffness = 377.0}}};
+  ToolScene scene = tools_along_x({{cobra, 0.4955}, {wire, 0.0}}, {{10.0, 0.0}, {30.0, 0.0}});
+  scene.point = Vec3(0.0, 0.0, 3.0);
+  scene.direction = Vec3::UnitZ();
+  scene.vessel = &aorta();
+  scene.contact.friction = 0.1;
+  scene.residual_tolerance = 1e-6;
+  // Up over the wire, the wire back, up until the tip falls into the branch, the wire out.
+  scene.moves = {push_of({70.0, 70.0}), push_of({0.0, -96.0}), push_of({40.0, 0.0}),
+                 push_of({0.0, 110.0}), push_of({0.0, 18.0})};
+  ToolBench bench(scene);
+  ASSERT_TRUE(bench.settled());
+  std::vector<Vec3> catheter, tip;
+  for (const ToolMove& move : scene.moves) {
+    ASSERT_TRUE(bench.move(move)) << bench.record().residual;
+    catheter.push_back(bench.record().tools[0].tip);
+    tip.push_back(bench.record().tools[1].tip);
+    // Introducer and wall hold the tools.
+    Vec3 sum = bench.introducer_force();
+    for (const Touch& touch : bench.touches()) {
+      sum += touch.normal_force * touch.normal + touch.friction;
+      EXPECT_LT(touch.penetration, 0.3);
+    }
+    EXPECT_LT(sum.norm(), 1e-4);
+  }
+  // Over the wire it is nearly straight; its curve brings the tip down and to the wall.
+  EXPECT_GT(catheter[0].z() - catheter[1].z(), 2.0);
+  EXPECT_LT(catheter[1].y(), catheter[0].y() - 3.0);
+  EXPECT_GT(catheter[1].y(), -6.0);   // in the aorta
+  EXPECT_LT(catheter[2].y(), -10.0);  // in the branch
+  EXPECT_NEAR(tip[3].y(), catheter[3].y(), 8.0);
+  // The wire leaves it by 12 mm, and it holds.
+  EXPECT_LT(tip[4].y(), catheter[4].y() - 9.0);
+  EXPECT_LT((catheter[4] - catheter[2]).norm(), 1.5);
+}
+
+}  // namespace
+}  // namespace wireplan::simulate
