@@ -31,19 +31,21 @@ struct LoadedVessel {
 /// Refuses an entry outside the vessel. Returns a sentence where the wire touches the wall already
 /// as it enters, else nothing.
 std::vector<std::string> look_at_entry(const SceneFile& scene, const Surface& surface) {
-  if (!scene.insertion) return {};
-  const Vec3& entry = scene.insertion->introducer.point;
+  if (!scene.insertion && !scene.tools) return {};
+  const std::string key = scene.tools ? "introducer.point_mm" : "insertion.point_mm";
+  const Vec3& entry = scene.tools ? scene.tools->scene.point : scene.insertion->introducer.point;
   const preprocess::InsideAnswer answer = preprocess::locate_point(surface, entry);
-  const double radius = scene.insertion->wire.radius;
+  const double radius =
+      scene.tools ? scene.tools->scene.tools.front().wire.radius : scene.insertion->wire.radius;
   if (answer.inside && answer.distance >= radius) return {};
   if (answer.inside) {
     return {
-        format("insertion.point_mm lies %.2f mm from the wall, nearer than the wire's radius of "
+        format("%s lies %.2f mm from the wall, nearer than the wire's radius of "
                "%.2f mm: the introducer presses the wire into the wall",
-               answer.distance, radius)};
+               key.c_str(), answer.distance, radius)};
   }
   Problems problems(scene.file.string());
-  problems.add("insertion.point_mm", to_json(entry).dump(),
+  problems.add(key, to_json(entry).dump(),
                format("a point inside the vessel; it lies %.1f mm outside", answer.distance),
                "move it, or correct the surface's unit or frame");
   problems.throw_if_any();
@@ -230,12 +232,24 @@ std::string tell_start(const Json& start) {
                                              : std::string());
 }
 
-SceneAnswer run_tools(const SceneFile& file, const fs::path& folder) {
-  const simulate::ToolScene& scene = file.tools->scene;
+SceneAnswer run_tools(const SceneFile& file, const LoadedVessel* vessel, const fs::path& folder) {
+  simulate::ToolScene scene = file.tools->scene;
+  if (vessel) scene.vessel = vessel->model.get();
   const double start = plan::thread_cpu_seconds();
   const simulate::ToolSceneResult result = simulate::run_tool_scene(scene);
   const double seconds = plan::thread_cpu_seconds() - start;
-  write_json(result_json(result, scene, file.tools->roll_zero, seconds), folder / "result.json");
+  std::vector<simulate::WireContact> contacts;
+  if (vessel) {
+    double radius = 0.0;  // of the thickest tool, which contacts count from
+    for (const simulate::Tool& tool : scene.tools) radius = std::max(radius, tool.wire.radius);
+    for (const simulate::Touch& touch : result.contacts) {
+      contacts.push_back(
+          simulate::contact_of(touch, radius - touch.thinner, vessel->model->locator));
+    }
+    write_forces(*vessel, sum_by_triangle(contacts), folder);
+  }
+  write_result(result_json(result, scene, contacts, file.tools->roll_zero, seconds), file, vessel,
+               folder);
   std::vector<PictureWire> drawn;
   for (std::size_t i = 0; i < scene.tools.size(); ++i) {
     const simulate::Wire& tool = scene.tools[i].wire;
@@ -248,9 +262,11 @@ SceneAnswer run_tools(const SceneFile& file, const fs::path& folder) {
                      .radius = tool.radius,
                      .color = wire_color(static_cast<int>(i))});
   }
-  if (!drawn.empty()) {
+  if (!drawn.empty() || vessel) {
     const std::string outcome = outcome_name(result.outcome);
-    write_picture(Surface(), drawn, {.title = file.name + ": " + outcome}, folder / "wire.png");
+    write_picture(vessel ? vessel->surface : Surface(), drawn,
+                  {.title = file.name + ": " + outcome, .access = scene.point},
+                  folder / "wire.png");
   }
 
   std::string line = outcome_name(result.outcome);
@@ -353,7 +369,7 @@ SceneAnswer run_scene_file(const SceneFile& scene, const fs::path& folder) {
   std::optional<LoadedVessel> vessel;
   if (scene.vessel) vessel = load_vessel(scene);
   fs::create_directories(folder);
-  if (scene.tools) return run_tools(scene, folder);
+  if (scene.tools) return run_tools(scene, vessel ? &*vessel : nullptr, folder);
   if (scene.bench) return run_bench_scene(scene, vessel ? &*vessel : nullptr, folder);
   if (!scene.insertion->rolls.empty()) return run_rolls(scene, *vessel, folder);
   return run_insertion_scene(scene, *scene.insertion, *vessel, folder);

@@ -22,7 +22,7 @@ struct CatalogueWire : DeviceWire {
   std::vector<std::string> aliases;  // earlier names, which cases may still use
 };
 
-/// A tube: its sections are those of a wire, of which no trial makes use yet.
+/// A tube: its sections are those of a wire; a tool of scenes, of which no trial makes use yet.
 struct Catheter {
   simulate::Wire tube;      // of the outer radius
   plan::WireSpread spread;  // of the tube

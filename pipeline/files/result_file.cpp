@@ -95,6 +95,7 @@ Json tool_json(const simulate::ToolReport& tool, const std::string& name, double
   put(json, "hub_torque_n_mm", tool.hub_torque);
   put_points(json, "tip_mm", tool.tip);
   put(json, "twist_deg", tool.twist / kRadPerDeg);
+  put(json, "wall_force_n", tool.wall_force);
   return json;
 }
 
@@ -282,7 +283,8 @@ Json start_json(const simulate::TrialResult& result, const simulate::StartLine& 
 }
 
 Json result_json(const simulate::ToolSceneResult& result, const simulate::ToolScene& scene,
-                 double roll_zero, double cpu_time_s) {
+                 const std::vector<simulate::WireContact>& contacts, double roll_zero,
+                 double cpu_time_s) {
   Json json = {{"schema", kResultSchema}, {"outcome", simulate::outcome_name(result.outcome)}};
   if (!result.reason.empty()) json["reason"] = result.reason;
   json["terms"] = result.terms;
@@ -318,7 +320,7 @@ Json result_json(const simulate::ToolSceneResult& result, const simulate::ToolSc
   }
   put_points(json, "introducer_force_n", result.introducer_force);
   if (result.distal_force) put_points(json, "distal_force_n", *result.distal_force);
-  json["contacts"] = Json::array();
+  json["contacts"] = contacts_json(contacts);
   json["moves"] = Json::array();
   for (const simulate::ToolRecord& record : result.history) {
     Json row = Json::object();

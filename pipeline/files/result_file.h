@@ -5,7 +5,7 @@
 
 #include "pipeline/files/json_reader.h"
 #include "simulate/insertion/scene.h"
-#include "simulate/insertion/tool_bench.h"
+#include "simulate/insertion/tool_scene.h"
 #include "simulate/insertion/trial.h"
 
 namespace wireplan::pipeline {
@@ -23,9 +23,10 @@ Json result_json(const simulate::TrialResult& result, double every_mm, double cp
 Json start_json(const simulate::TrialResult& result, const simulate::StartLine& line,
                 const Vec3& entry, double roll_zero);
 
-/// Of several tools on the bench, by the names of the wires in the scene; `roll_zero` is that of
-/// ToolBenchScene.
+/// Of several tools, by the names of the wires in the scene; `contacts` are those with the vessel,
+/// `roll_zero` is that of ToolBenchScene.
 Json result_json(const simulate::ToolSceneResult& result, const simulate::ToolScene& scene,
-                 double roll_zero, double cpu_time_s);
+                 const std::vector<simulate::WireContact>& contacts, double roll_zero,
+                 double cpu_time_s);
 
 }  // namespace wireplan::pipeline

@@ -514,6 +514,12 @@ SceneFile read_scene(const std::filesystem::path& path) {
   root.text("schema", std::nullopt);
   if (root.has("tools")) {
     scene.tools = read_tool_bench(root);
+    if (root.has("vessel")) {
+      scene.vessel = read_vessel(root, path.parent_path());
+      simulate::ContactOptions& contact = scene.tools->scene.contact;
+      contact.friction = scene.vessel->friction;
+      contact.law = scene.vessel->contact_law;
+    }
     root.finish();
     problems.throw_if_any();
     return scene;

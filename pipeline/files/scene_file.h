@@ -46,7 +46,7 @@ struct SceneFile {
   std::string name;  // of the file without its ending, of the folder if it is scene.json
   std::optional<SceneVessel> vessel;
   std::optional<simulate::Scene> bench;  // its vessel is not set
-  std::optional<ToolBenchScene> tools;
+  std::optional<ToolBenchScene> tools;   // its vessel is not set
   std::optional<InsertionScene> insertion;
 };
 

@@ -99,6 +99,7 @@ void read_tool(JsonReader& reader, ToolBenchScene& into) {
     reader.problems().add(reader.path_of("device"), "a strip somewhere", "round all along",
                           "strips in other tools are not in this version");
   }
+  if (reader.has("friction")) tool.wire.friction = read_friction(reader, 0.0);
   reader.finish();
   into.scene.tools.push_back(std::move(tool));
   into.scene.places.push_back(place);
@@ -253,7 +254,6 @@ ToolBenchScene read_tool_bench(JsonReader& root) {
   scene.max_iterations = solver.integer("max_iterations", scene.max_iterations, 1, 10000000);
   solver.finish();
   refuse(root, "wire", "a wire beside \"tools\", of which the last one is the wire, is");
-  refuse(root, "vessel", "vessels round several tools are");
   refuse(root, "insertion", "insertions of several tools are");
   refuse(root, "target", "targets of several tools are");
   if (sound && problems.empty()) check_insertions(bench, problems);

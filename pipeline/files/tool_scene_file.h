@@ -3,7 +3,7 @@
 /// one wire and of several tools read alike.
 #include "pipeline/files/json_reader.h"
 #include "simulate/insertion/scene.h"
-#include "simulate/insertion/tool_bench.h"
+#include "simulate/insertion/tool_scene.h"
 
 namespace wireplan::pipeline {
 

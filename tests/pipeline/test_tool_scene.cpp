@@ -138,9 +138,9 @@ TEST_F(CaseFile, MistakesInToolsAreToldByKey) {
          json["supports"] =
              Json::array({{{"at", "proximal"}, {"kind", "clamped"}, {"point_mm", {0, 0, 0}}}});
        }},
-      {"vessel is given, expected no such key yet (vessels round several tools are not in this "
+      {"insertion is given, expected no such key yet (insertions of several tools are not in this "
        "version; delete the key)",
-       [](Json& json) { json["vessel"] = Json::object(); }},
+       [](Json& json) { json["insertion"] = Json::object(); }},
       {"loads.tip_torque_n_mm is 1.0, expected 0 (turn a hub in a move)",
        [](Json& json) {
          json["loads"] = {{"tip_torque_n_mm", 1}};
@@ -200,6 +200,52 @@ TEST_F(CaseFile, CatheterTakesItsCurveAsTheWireIsWithdrawn) {
   // The hands get back what bent the wire: k_c k_w / (2 (k_c + k_w)) kappa^2 over 30 mm.
   const double stored = 0.5 * 332.0 * 150.0 / 482.0 / 225.0 * 30.0;
   EXPECT_NEAR(result["hand_work_n_mm"].get<double>(), -stored, 0.01 * stored);
+}
+
+TEST_F(CaseFile, ToolsInAVesselTellWhatEachDoesToTheWall) {
+  write_stl(shapes::bend_tube(4.0, 30.0, 0.5 * kPi, 20.0, 40.0, 1.5), folder_ / "bend.stl");
+  Json json = wire_in_catheter();
+  json["tools"][0]["insertion_mm"] = 8;
+  json["tools"][1]["insertion_mm"] = 12;
+  json["tools"][1]["friction"] = 0.05;
+  json["vessel"] = {{"surface", {{"path", "bend.stl"}, {"unit", "mm"}, {"frame", "LPS"}}},
+                    {"friction", 0.1}};
+  json["moves"] = Json::array({{{"together", Json::array({{{"tool", "catheter"}, {"push_mm", 40}},
+                                                          {{"tool", "wire"}, {"push_mm", 55}}})}}});
+  const SceneFile file = read_scene(write("scene.json", json.dump()));
+  ASSERT_TRUE(file.tools && file.vessel);
+  EXPECT_EQ(file.tools->scene.contact.friction, 0.1);
+  EXPECT_FALSE(file.tools->scene.tools[0].wire.friction);
+  EXPECT_EQ(file.tools->scene.tools[1].wire.friction, 0.05);
+  EXPECT_EQ(check_scene_vessel(file).size(), 0u);
+  const SceneAnswer answer = run_scene_file(file, folder_ / "out");
+  EXPECT_TRUE(answer.solved) << answer.line;
+  std::ifstream stream(folder_ / "out" / "result.json");
+  const Json result = Json::parse(stream);
+  double on_tools = 0.0, at_contacts = 0.0;
+  for (const Json& tool : result["tools"]) {
+    on_tools += tool["wall_force_n"].get<double>();
+  }
+  for (const Json& contact : result["contacts"]) {
+    const Vec3 force = point_of(contact["normal_force_n"]);
+    at_contacts += force.norm();
+    EXPECT_GE(contact["triangle"].get<int>(), 0);
+  }
+  EXPECT_GT(on_tools, 0.01);
+  EXPECT_NEAR(on_tools, at_contacts, 1e-9 * on_tools);
+  EXPECT_EQ(result["vessel"]["friction"], 0.1);
+  EXPECT_TRUE(fs::exists(folder_ / "out" / "forces.vtu"));
+
+  // Outside the vessel it is refused by the key.
+  json["introducer"]["point_mm"] = {0, 50, 5};
+  const SceneFile outside = read_scene(write("scene.json", json.dump()));
+  try {
+    check_scene_vessel(outside);
+    FAIL() << "tools outside the vessel were taken";
+  } catch (const Error& error) {
+    EXPECT_NE(std::string(error.what()).find("introducer.point_mm is "), std::string::npos)
+        << error.what();
+  }
 }
 
 }  // namespace
