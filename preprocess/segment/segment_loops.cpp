@@ -3,116 +3,89 @@
 #include <algorithm>
 #include <array>
 #include <cstdlib>
+#include <functional>
 #include <limits>
-#include <queue>
-#include <utility>
 
 #include "preprocess/segment/segment_leak.h"
 
 namespace wireplan::preprocess {
 namespace {
 
-constexpr std::size_t kCubeVoxels = 27, kCubeMiddle = 13;
-using Cube = std::array<bool, kCubeVoxels>;  // a voxel's neighbours, x first; the middle is itself
+constexpr int kBits = 27, kMiddleBit = 13;
+constexpr std::uint32_t kAllRound = ((1U << kBits) - 1U) & ~(1U << kMiddleBit);
 
-std::size_t cube_index(const Voxel& step) {
-  return static_cast<std::size_t>(step[0] + 1 + 3 * (step[1] + 1) + 9 * (step[2] + 1));
-}
-
-/// Which voxels of a cube are neighbours, without the middle one.
-struct CubeNeighbours {
-  std::array<std::vector<std::size_t>, kCubeVoxels> by_faces, by_all;
-  std::array<int, kCubeVoxels>
-      steps{};  // from the middle: 1 by a face, 2 by an edge, 3 by a corner
+/// Which bits are neighbours: by faces, edges and corners; and by faces among those that share a
+/// face or an edge with the middle.
+struct BitsRound {
+  std::array<std::uint32_t, kBits> touching{}, by_face{};
+  std::uint32_t faces = 0, faces_and_edges = 0;
 };
 
-CubeNeighbours make_cube_neighbours() {
-  CubeNeighbours made;
-  const auto place = [](std::size_t k) {
-    const int n = static_cast<int>(k);
-    return Voxel{n % 3 - 1, n / 3 % 3 - 1, n / 9 - 1};
+BitsRound make_bits_round() {
+  BitsRound bits;
+  const auto apart = [](int a, int b) {
+    return std::array<int, 3>{std::abs(a % 3 - b % 3), std::abs(a / 3 % 3 - b / 3 % 3),
+                              std::abs(a / 9 - b / 9)};
   };
-  for (std::size_t a = 0; a < kCubeVoxels; ++a) {
-    const Voxel from = place(a);
-    made.steps[a] = std::abs(from[0]) + std::abs(from[1]) + std::abs(from[2]);
-    for (std::size_t b = 0; b < kCubeVoxels; ++b) {
-      if (b == a || b == kCubeMiddle) continue;
-      const Voxel to = place(b);
-      const Voxel away = {std::abs(to[0] - from[0]), std::abs(to[1] - from[1]),
-                          std::abs(to[2] - from[2])};
-      if (*std::max_element(away.begin(), away.end()) > 1) continue;
-      made.by_all[a].push_back(b);
-      if (away[0] + away[1] + away[2] == 1) made.by_faces[a].push_back(b);
+  for (int a = 0; a < kBits; ++a) {
+    const auto from_middle = apart(a, kMiddleBit);
+    const int steps = from_middle[0] + from_middle[1] + from_middle[2];
+    bits.faces |= steps == 1 ? 1U << a : 0U;
+    bits.faces_and_edges |= steps == 1 || steps == 2 ? 1U << a : 0U;
+  }
+  for (int a = 0; a < kBits; ++a) {
+    for (int b = 0; b < kBits; ++b) {
+      const auto d = apart(a, b);
+      if (a == b || a == kMiddleBit || b == kMiddleBit) continue;
+      if (std::max({d[0], d[1], d[2]}) == 1) bits.touching[a] |= 1U << b;
+      if (d[0] + d[1] + d[2] == 1) bits.by_face[a] |= 1U << b;
     }
+    bits.by_face[a] &= bits.faces_and_edges;
   }
-  return made;
+  return bits;
 }
 
-/// Takes the piece that `start` is in out of `left`.
-void take_piece(const std::array<std::vector<std::size_t>, kCubeVoxels>& neighbours,
-                std::size_t start, Cube& left) {
-  std::array<std::size_t, kCubeVoxels> queue{};
-  std::size_t count = 0;
-  queue[count++] = start;
-  left[start] = false;
-  for (std::size_t next = 0; next < count; ++next) {
-    for (const std::size_t beside : neighbours[queue[next]]) {
-      if (!left[beside]) continue;
-      left[beside] = false;
-      queue[count++] = beside;
-    }
-  }
-}
-
-/// Whether the middle can be added to what is `inside` without a change of topology.
-bool is_simple(const Cube& inside) {
-  static const CubeNeighbours kNeighbours = make_cube_neighbours();
-  Cube near = inside, outside{};
-  for (std::size_t k = 0; k < kCubeVoxels; ++k) {
-    if (kNeighbours.steps[k] > 2 || k == kCubeMiddle) near[k] = false;
-    outside[k] = !inside[k] && k != kCubeMiddle;
-  }
-  int pieces = 0;
-  for (std::size_t k = 0; k < kCubeVoxels; ++k) {
-    if (kNeighbours.steps[k] != 1 || !near[k]) continue;
-    take_piece(kNeighbours.by_faces, k, near);
-    ++pieces;
-  }
-  if (pieces != 1) return false;
-  const auto first = std::find(outside.begin(), outside.end(), true);
-  if (first == outside.end()) return false;
-  take_piece(kNeighbours.by_all, static_cast<std::size_t>(first - outside.begin()), outside);
-  return std::find(outside.begin(), outside.end(), true) == outside.end();
-}
-
-/// Step 1; the largest of `order` comes first.
-Labels grow_simple(const Grid& grid, const Labels& labels, const std::vector<float>& order,
-                   std::size_t seed) {
-  Labels grown(labels.size(), 0), waiting(labels.size(), 0);
-  std::priority_queue<std::pair<float, std::size_t>> queue;
-  const auto take = [&](std::size_t n) {
-    grown[n] = 1;
-    for_each_neighbour(grid, n, [&](std::size_t m, const Voxel&) {
-      if (labels[m] == 0 || grown[m] != 0 || waiting[m] != 0) return;
-      waiting[m] = 1;
-      queue.push({order[m], m});
-    });
-  };
-  take(seed);
-  while (!queue.empty()) {
-    const std::size_t n = queue.top().second;
-    queue.pop();
-    waiting[n] = 0;
-    Cube inside{};
-    for_each_neighbour(grid, n, [&](std::size_t m, const Voxel& step) {
-      inside[cube_index(step)] = grown[m] != 0;
-    });
-    if (is_simple(inside)) take(n);
+/// Of `all`, what hangs together with the lowest bit of `start`.
+std::uint32_t grow_bits(const std::array<std::uint32_t, kBits>& neighbours, std::uint32_t all,
+                        std::uint32_t start) {
+  std::uint32_t grown = start & (~start + 1U), front = grown;
+  while (front != 0) {
+    const int bit = __builtin_ctz(front);
+    front &= front - 1U;
+    const std::uint32_t fresh = neighbours[static_cast<std::size_t>(bit)] & all & ~grown;
+    grown |= fresh;
+    front |= fresh;
   }
   return grown;
 }
 
 }  // namespace
+
+int bit_of(const Voxel& step) { return kMiddleBit + step[0] + 3 * step[1] + 9 * step[2]; }
+
+bool is_simple_by_corners(std::uint32_t inside) {
+  static const BitsRound bits = make_bits_round();
+  const std::uint32_t outside = ~inside & bits.faces_and_edges;
+  if (inside == 0 || (outside & bits.faces) == 0) return false;
+  return grow_bits(bits.touching, inside, inside) == inside &&
+         ((outside & bits.faces) & ~grow_bits(bits.by_face, outside, outside & bits.faces)) == 0;
+}
+
+bool is_simple_by_faces(std::uint32_t inside) { return is_simple_by_corners(kAllRound & ~inside); }
+
+std::vector<std::size_t> collect_part(const Grid& grid, std::size_t start, const Labels& marked,
+                                      Labels& seen) {
+  std::vector<std::size_t> queue = {start};
+  seen[start] = 1;
+  for (std::size_t next = 0; next < queue.size(); ++next) {
+    for_each_neighbour(grid, queue[next], [&](std::size_t m, const Voxel&) {
+      if (marked[m] == 0 || seen[m] != 0) return;
+      seen[m] = 1;
+      queue.push_back(m);
+    });
+  }
+  return queue;
+}
 
 LoopSearch cut_loops(const Grid& grid, std::size_t seed, const std::vector<Vec3>& way, double thin,
                      Labels& labels) {
@@ -124,24 +97,20 @@ LoopSearch cut_loops(const Grid& grid, std::size_t seed, const std::vector<Vec3>
       order[n] = std::numeric_limits<float>::infinity();
     }
   }
-  const Labels grown = grow_simple(grid, labels, order, seed);
+  const Labels grown = grow_simple(grid, order, labels, seed, std::less<>(), is_simple_by_faces);
+  Labels left = labels;
+  for (std::size_t n = 0; n < left.size(); ++n) left[n] = grown[n] == 0 ? labels[n] : 0;
   LoopSearch found;
   Labels seen(labels.size(), 0);
   for (std::size_t n = 0; n < seen.size(); ++n) {
-    if (labels[n] == 0 || grown[n] != 0 || seen[n] != 0) continue;
-    std::vector<std::size_t> wall = {n};
-    seen[n] = 1;
+    if (left[n] == 0 || seen[n] != 0) continue;
+    const std::vector<std::size_t> wall = collect_part(grid, n, left, seen);
     std::size_t deepest = n;
     bool divides = false;  // else a piece of its own
-    for (std::size_t next = 0; next < wall.size(); ++next) {
-      if (depth[wall[next]] > depth[deepest]) deepest = wall[next];
-      for_each_face_neighbour(grid, wall[next],
-                              [&](std::size_t m) { divides = divides || grown[m] != 0; });
-      for_each_neighbour(grid, wall[next], [&](std::size_t m, const Voxel&) {
-        if (labels[m] == 0 || grown[m] != 0 || seen[m] != 0) return;
-        seen[m] = 1;
-        wall.push_back(m);
-      });
+    for (const std::size_t m : wall) {
+      if (depth[m] > depth[deepest]) deepest = m;
+      for_each_face_neighbour(grid, m,
+                              [&](std::size_t beside) { divides = divides || grown[beside] != 0; });
     }
     if (!divides) continue;
     const auto radius = static_cast<double>(depth[deepest]);

@@ -11,6 +11,7 @@
 #include <utility>
 
 #include "preprocess/segment/segment_leak.h"
+#include "preprocess/segment/segment_loops.h"
 
 namespace wireplan::preprocess {
 namespace {
@@ -22,68 +23,6 @@ constexpr double kKeptMm = 2.0;     // a given point so near says that it is ope
 constexpr double kLongestMm = 2.5;  // of a touch: between what is undimmed on both sides
 constexpr int kMostTouches = 20;    // on one way
 
-// ---- the 26 voxels round one, as bits -----------------------------------------------------------
-
-constexpr int kBits = 27, kMiddleBit = 13;
-
-/// Which bits are neighbours: by faces, edges and corners; and by faces among those that share a
-/// face or an edge with the middle.
-struct BitsRound {
-  std::array<std::uint32_t, kBits> touching{}, by_face{};
-  std::uint32_t faces = 0, faces_and_edges = 0;
-};
-
-BitsRound make_bits_round() {
-  BitsRound bits;
-  const auto apart = [](int a, int b) {
-    return std::array<int, 3>{std::abs(a % 3 - b % 3), std::abs(a / 3 % 3 - b / 3 % 3),
-                              std::abs(a / 9 - b / 9)};
-  };
-  for (int a = 0; a < kBits; ++a) {
-    const auto from_middle = apart(a, kMiddleBit);
-    const int steps = from_middle[0] + from_middle[1] + from_middle[2];
-    bits.faces |= steps == 1 ? 1U << a : 0U;
-    bits.faces_and_edges |= steps == 1 || steps == 2 ? 1U << a : 0U;
-  }
-  for (int a = 0; a < kBits; ++a) {
-    for (int b = 0; b < kBits; ++b) {
-      const auto d = apart(a, b);
-      if (a == b || a == kMiddleBit || b == kMiddleBit) continue;
-      if (std::max({d[0], d[1], d[2]}) == 1) bits.touching[a] |= 1U << b;
-      if (d[0] + d[1] + d[2] == 1) bits.by_face[a] |= 1U << b;
-    }
-    bits.by_face[a] &= bits.faces_and_edges;
-  }
-  return bits;
-}
-
-/// Of `all`, what hangs together with the lowest bit of `start`.
-std::uint32_t grow_bits(const std::array<std::uint32_t, kBits>& neighbours, std::uint32_t all,
-                        std::uint32_t start) {
-  std::uint32_t grown = start & (~start + 1U), front = grown;
-  while (front != 0) {
-    const int bit = __builtin_ctz(front);
-    front &= front - 1U;
-    const std::uint32_t fresh = neighbours[static_cast<std::size_t>(bit)] & all & ~grown;
-    grown |= fresh;
-    front |= fresh;
-  }
-  return grown;
-}
-
-/// Whether taking the voxel changes no loop, piece or cavity of what is inside (connected through
-/// corners too; the outside through faces): one part of the inside touches it, and one of the
-/// outside shares a face with it (Bertrand and Malandain 1994).
-bool closes_nothing(const BitsRound& bits, std::uint32_t inside) {
-  const std::uint32_t outside = ~inside & bits.faces_and_edges;
-  if (inside == 0 || (outside & bits.faces) == 0) return false;
-  return grow_bits(bits.touching, inside, inside) == inside &&
-         ((outside & bits.faces) & ~grow_bits(bits.by_face, outside, outside & bits.faces)) == 0;
-}
-
-/// The bit of a neighbour that lies so from the middle.
-int bit_of(const Voxel& step) { return kMiddleBit + step[0] + 3 * step[1] + 9 * step[2]; }
-
 // ---- sheets -------------------------------------------------------------------------------------
 
 /// What is left out of the mask so that it has no loops: by voxel the number of its sheet, from 1.
@@ -91,21 +30,6 @@ struct Sheets {
   std::vector<std::uint32_t> of;
   std::vector<std::vector<std::size_t>> voxels;  // of sheet 1, 2, ...
 };
-
-/// What is marked and hangs together with the voxel, through corners too.
-std::vector<std::size_t> collect_part(const Grid& grid, std::size_t start, const Labels& marked,
-                                      Labels& seen) {
-  std::vector<std::size_t> queue = {start};
-  seen[start] = 1;
-  for (std::size_t next = 0; next < queue.size(); ++next) {
-    for_each_neighbour(grid, queue[next], [&](std::size_t m, const Voxel&) {
-      if (marked[m] == 0 || seen[m] != 0) return;
-      seen[m] = 1;
-      queue.push_back(m);
-    });
-  }
-  return queue;
-}
 
 /// Whether a mask of one piece without cavities has a loop, contacts of corners and edges included:
 /// by the Euler number of the voxels as closed cubes, corners - edges + faces - cubes.
@@ -137,33 +61,10 @@ bool has_loops(const Grid& grid, const Labels& labels) {
 /// Fills the mask from the start, voxels of high value first, and takes none that closes a loop.
 Labels fill_without_loops(const Grid& grid, const std::vector<float>& values, const Labels& labels,
                           std::size_t start) {
-  static const BitsRound bits = make_bits_round();
-  using Entry = std::pair<float, std::size_t>;
-  const auto later = [](const Entry& a, const Entry& b) {
+  const auto later = [](const Ordered& a, const Ordered& b) {
     return a.first != b.first ? a.first < b.first : a.second > b.second;
   };
-  std::priority_queue<Entry, std::vector<Entry>, decltype(later)> queue(later);
-  Labels filled(labels.size(), 0), waiting(labels.size(), 0);
-  const auto take = [&](std::size_t n) {
-    filled[n] = 1;
-    for_each_neighbour(grid, n, [&](std::size_t m, const Voxel&) {
-      if (labels[m] == 0 || filled[m] != 0 || waiting[m] != 0) return;
-      waiting[m] = 1;
-      queue.push({values[m], m});
-    });
-  };
-  take(start);
-  while (!queue.empty()) {
-    const std::size_t n = queue.top().second;
-    queue.pop();
-    waiting[n] = 0;  // it comes again when more round it is taken
-    std::uint32_t inside = 0;
-    for_each_neighbour(grid, n, [&](std::size_t m, const Voxel& step) {
-      if (filled[m] != 0) inside |= 1U << bit_of(step);
-    });
-    if (closes_nothing(bits, inside)) take(n);
-  }
-  return filled;
+  return grow_simple(grid, values, labels, start, later, is_simple_by_corners);
 }
 
 Sheets find_sheets(const Grid& grid, const Labels& labels, const Labels& filled) {
