@@ -62,6 +62,31 @@ std::string table_text(const std::vector<Json>& rows) {
   return format_table(lines);
 }
 
+Json aim_entry(const char* what, double aim, bool at_least, const Json& found) {
+  const bool met =
+      !found.is_null() && (at_least ? found.get<double>() >= aim : found.get<double>() <= aim);
+  return {{"what", what},
+          {"aim", aim},
+          {"at_least", at_least},
+          {"found", found},
+          {"met", found.is_null() ? Json(nullptr) : Json(met)}};
+}
+
+std::string aims_text(const Json& aims) {
+  std::string text;
+  for (const Json& one : aims) {
+    const Json& found = one.at("found");
+    text += (found.is_null()             ? std::string("unknown  ")
+             : one.at("met").get<bool>() ? std::string("met      ")
+                                         : std::string("NOT MET  ")) +
+            one.at("what").get<std::string>() + ": " +
+            (found.is_null() ? std::string("-") : format("%.4g", found.get<double>())) +
+            (one.at("at_least").get<bool>() ? ", aim at least " : ", aim at most ") +
+            format("%g\n", one.at("aim").get<double>());
+  }
+  return text;
+}
+
 double thread_milliseconds() {
   timespec now{};
   clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);

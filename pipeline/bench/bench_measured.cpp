@@ -224,23 +224,16 @@ Json one_roll(const std::vector<MeasuredTrial>& trials) {
 Json aims_of(const std::vector<MeasuredTrial>& trials) {
   const Json push = summary_of(trials, "push", true), last = summary_of(trials, "last", true),
              on = summary_of(trials, "steered", true);
-  const auto aim = [](const char* what, double limit, bool at_least, const Json& found) {
-    const bool met = !found.is_null() &&
-                     (at_least ? found.get<double>() >= limit : found.get<double>() <= limit);
-    return Json{{"what", what},
-                {"aim", limit},
-                {"at_least", at_least},
-                {"found", found},
-                {"met", found.is_null() ? Json(nullptr) : Json(met)}};
-  };
   return Json::array(
-      {aim("one push, best of eight rolls: mean distance, mm", 3.5, false, push.at("mean_mm")),
-       aim("the same for the last 50 mm of wire alone, mm", 2.5, false, last.at("mean_mm")),
-       aim("one push, best of eight rolls: share of frames whose branch is right", 0.7, true,
-           push.at("branch_right_share")),
-       aim("from an earlier frame, best steering: mean distance, mm", 2.0, false, on.at("mean_mm")),
-       aim("from an earlier frame, best steering: share of tips within 5 mm", 0.8, true,
-           on.at("tip_within_5_mm_share"))});
+      {aim_entry("one push, best of eight rolls: mean distance, mm", 3.5, false,
+                 push.at("mean_mm")),
+       aim_entry("the same for the last 50 mm of wire alone, mm", 2.5, false, last.at("mean_mm")),
+       aim_entry("one push, best of eight rolls: share of frames whose branch is right", 0.7, true,
+                 push.at("branch_right_share")),
+       aim_entry("from an earlier frame, best steering: mean distance, mm", 2.0, false,
+                 on.at("mean_mm")),
+       aim_entry("from an earlier frame, best steering: share of tips within 5 mm", 0.8, true,
+                 on.at("tip_within_5_mm_share"))});
 }
 
 std::string measured_text(const Json& results, const std::vector<Json>& best_rows,
@@ -251,17 +244,7 @@ std::string measured_text(const Json& results, const std::vector<Json>& best_row
   std::vector<Json> summaries;
   for (const Json& one : results.at("summary")) summaries.push_back(one);
   text += table_text(summaries) + "\n";
-  for (const Json& one : results.at("aims")) {
-    const Json& found = one.at("found");
-    text += (found.is_null()             ? std::string("unknown  ")
-             : one.at("met").get<bool>() ? std::string("met      ")
-                                         : std::string("NOT MET  ")) +
-            one.at("what").get<std::string>() + ": " +
-            (found.is_null() ? std::string("-") : format("%.4g", found.get<double>())) +
-            (one.at("at_least").get<bool>() ? ", aim at least " : ", aim at most ") +
-            format("%g\n", one.at("aim").get<double>());
-  }
-  return text;
+  return text + aims_text(results.at("aims"));
 }
 
 /// The measured wire, the best push, and the best that started from an earlier frame.

@@ -47,6 +47,10 @@ BenchReport bench_truth(const BenchOptions& options);
 /// Rows as a table for people: columns aligned, numbers with 4 digits.
 std::string table_text(const std::vector<Json>& rows);
 
+/// An aim beside what was found (null: unknown), "met" or not; and a list of these as lines.
+Json aim_entry(const char* what, double aim, bool at_least, const Json& found);
+std::string aims_text(const Json& aims);
+
 /// CPU time of this thread [ms].
 double thread_milliseconds();
 

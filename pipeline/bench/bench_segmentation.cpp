@@ -174,15 +174,6 @@ Json criteria_of(const std::vector<PatientRow>& rows) {
   const auto share = [](int part, int whole) {
     return whole > 0 ? Json(static_cast<double>(part) / whole) : Json(nullptr);
   };
-  const auto entry = [](const char* what, double aim, bool at_least, const Json& found) {
-    const bool met =
-        !found.is_null() && (at_least ? found.get<double>() >= aim : found.get<double>() <= aim);
-    return Json{{"what", what},
-                {"aim", aim},
-                {"at_least", at_least},
-                {"found", found},
-                {"met", found.is_null() ? Json(nullptr) : Json(met)}};
-  };
   const std::vector<double> dice = sorted_values(rows, &PatientRow::dice_way);
   const std::vector<double> silent = sorted_values(rows, &PatientRow::outside_silent);
   std::vector<double> radius = sorted_values(rows, &PatientRow::radius_within);
@@ -199,16 +190,17 @@ Json criteria_of(const std::vector<PatientRow>& rows) {
     return enough(row) && row.outcome != PatientOutcome::kDone;
   });
   return Json::array(
-      {entry("median of dice_way", 0.96, true, quantile(dice, 0.5)),
-       entry("least 5 % of dice_way", 0.90, true, quantile(dice, 0.05)),
-       entry("share of ways that are right, of those not refused", 0.98, true,
-             share(count_rows(rows, [](const PatientRow& row) { return row.way_right == true; }),
-                   count_rows(rows, went_on))),
-       entry("share of places with the radius within 5 %, mean of patients", 0.95, true,
-             radius.empty() ? Json(nullptr) : Json(within)),
-       entry("largest outside_silent, share of the truth", 0.05, false, quantile(silent, 1.0)),
-       entry("share of false refusals with contrast over 120 HU", 0.01, false,
-             share(false_refusals, count_rows(rows, enough)))});
+      {aim_entry("median of dice_way", 0.96, true, quantile(dice, 0.5)),
+       aim_entry("least 5 % of dice_way", 0.90, true, quantile(dice, 0.05)),
+       aim_entry(
+           "share of ways that are right, of those not refused", 0.98, true,
+           share(count_rows(rows, [](const PatientRow& row) { return row.way_right == true; }),
+                 count_rows(rows, went_on))),
+       aim_entry("share of places with the radius within 5 %, mean of patients", 0.95, true,
+                 radius.empty() ? Json(nullptr) : Json(within)),
+       aim_entry("largest outside_silent, share of the truth", 0.05, false, quantile(silent, 1.0)),
+       aim_entry("share of false refusals with contrast over 120 HU", 0.01, false,
+                 share(false_refusals, count_rows(rows, enough)))});
 }
 
 std::string text_of(const Json& results, const std::vector<PatientRow>& all) {
@@ -221,16 +213,7 @@ std::string text_of(const Json& results, const std::vector<PatientRow>& all) {
             number("q05") + ", 5 % above " + number("q95") + ", from " + number("least") + " to " +
             number("most") + "\n";
   }
-  for (const Json& one : results.at("criteria")) {
-    const Json& found = one.at("found");
-    text += (found.is_null()             ? std::string("unknown  ")
-             : one.at("met").get<bool>() ? std::string("met      ")
-                                         : std::string("NOT MET  ")) +
-            one.at("what").get<std::string>() + ": " +
-            (found.is_null() ? std::string("-") : format("%.4g", found.get<double>())) +
-            (one.at("at_least").get<bool>() ? ", aim at least " : ", aim at most ") +
-            format("%g\n", one.at("aim").get<double>());
-  }
+  text += aims_text(results.at("criteria"));
   for (const PatientRow& row : all) {
     if (!row.message.empty()) {
       text += row.patient + " " + name_of(row.outcome) + ": " + row.message + "\n";
