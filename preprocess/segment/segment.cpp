@@ -145,7 +145,10 @@ Segmentation segment(const Image& image, const SegmentOptions& options) {
   require_no_bone(statistics);
   statistics.shape = measure_shape(region.grid, region.labels);
   MaskLimits limits = options.limits;
-  if (!options.lower_hu) limits.handles *= kThinLoops;
+  if (!options.lower_hu) {
+    constexpr int kMost = std::numeric_limits<int>::max() / kThinLoops;
+    limits.handles = kThinLoops * std::min(limits.handles, kMost);
+  }
   require_simple(statistics.shape, limits, /*by_labels=*/false);
   part_touches(region, region.seeds, options, statistics);
   if (!options.lower_hu) {

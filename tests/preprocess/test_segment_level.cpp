@@ -56,6 +56,10 @@ TEST(SegmentLevel, ContrastThatFallsAlongTheVesselIsFollowed) {
   EXPECT_GT(dice(found.mask, [](const Vec3& p) { return off_axis(p, 0) < 5.0; }), 0.96);
   EXPECT_TRUE(found.statistics.search.leaks.empty());
   EXPECT_EQ(found.statistics.shape.handles, 0U);
+  // As many handles as a case may allow.
+  const SegmentOptions any = {
+      .seeds = {kBottom}, .target = kTop, .limits = {.handles = 1'000'000'000}};
+  EXPECT_EQ(segment(image, any).mask.labels, found.mask.labels);
   // Every 10 mm of 80, and the ends. The average of 14 mm of the way is known to a few
   // HU, at the ends, where it is of one side, to 8 more.
   ASSERT_GE(found.statistics.along.size(), 9U);
