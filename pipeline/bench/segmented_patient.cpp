@@ -65,6 +65,7 @@ std::vector<Vec3> told_places(const SegmentStatistics& statistics) {
   std::vector<Vec3> places;
   for (const preprocess::Leak& leak : statistics.search.leaks) places.push_back(leak.place);
   for (const preprocess::Leak& part : statistics.doubtful) places.push_back(part.place);
+  for (const preprocess::Leak& branch : statistics.branches) places.push_back(branch.place);
   for (const preprocess::Touch& touch : statistics.touches) places.push_back(touch.place);
   return places;
 }
@@ -73,7 +74,8 @@ int count_warnings(const SegmentStatistics& statistics, int handles) {
   constexpr std::size_t kLeaksTold = 5;  // as the stage tells them
   return static_cast<int>(std::min(statistics.search.leaks.size(), kLeaksTold) +
                           statistics.doubtful.size() + statistics.touches.size()) +
-         (statistics.touches_border ? 1 : 0) + (handles > 0 ? 1 : 0);
+         (statistics.branches.empty() ? 0 : 1) + (statistics.touches_border ? 1 : 0) +
+         (handles > 0 ? 1 : 0);
 }
 
 /// What the mask holds that neither is nor is next to truth, corners included: all of it, and that

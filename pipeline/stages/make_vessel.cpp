@@ -58,6 +58,22 @@ std::string loops_warning(const std::vector<preprocess::Loop>& loops) {
          ": a ring of arteries, or vessels that touch; look at the outline there";
 }
 
+// Side branches that the levels alone would leave out.
+std::string branches_warning(const std::vector<preprocess::Leak>& branches) {
+  constexpr std::size_t kBranchesTold = 5;
+  std::string places;
+  for (std::size_t k = 0; k < std::min(branches.size(), kBranchesTold); ++k) {
+    const Vec3& at = branches[k].place;
+    places +=
+        (k == 0 ? "" : ", ") + format("(%.1f, %.1f, %.1f)", at.x(), at.y(), at.z()) +
+        format(" mm (%.1f mm in radius, %.0f HU)", branches[k].radius_mm, branches[k].mean_hu);
+  }
+  return "segment: side branches with less or other contrast than the way were kept, for they end "
+         "at it, from " +
+         places + (branches.size() > kBranchesTold ? " and in other places" : "") +
+         ": arteries that fill late or are thin, or veins that end there; look at the outline";
+}
+
 // Figures of the segment stage. What was chosen for the case is told as the report prints it.
 void add_segmentation(const preprocess::SegmentStatistics& statistics, bool chosen, Json& figures) {
   constexpr std::size_t kLeaksTold = 5;
@@ -111,6 +127,16 @@ void add_segmentation(const preprocess::SegmentStatistics& statistics, bool chos
   }
   if (!statistics.loops.left.empty()) {
     figures["warnings"].push_back(loops_warning(statistics.loops.left));
+  }
+  figures["side_branches"] = Json::array();
+  for (const preprocess::Leak& branch : statistics.branches) {
+    figures["side_branches"].push_back({{"place_mm", to_json(branch.place)},
+                                        {"radius_mm", branch.radius_mm},
+                                        {"volume_mm3", branch.volume_mm3},
+                                        {"mean_hu", branch.mean_hu}});
+  }
+  if (!statistics.branches.empty()) {
+    figures["warnings"].push_back(branches_warning(statistics.branches));
   }
   for (const preprocess::Leak& part : statistics.doubtful) {
     if (part.volume_mm3 < kDoubtfulPart * statistics.volume_mm3) continue;

@@ -207,7 +207,7 @@ std::vector<Stage> stages_to_surface(const Case& given) {
   }
   stages.push_back({.name = "volume", .version = 2, .reads_input = true, .make = make_volume});
   stages.push_back({.name = "segment",
-                    .version = 8,
+                    .version = 9,
                     .reads_input = true,
                     .parameters = {"/segmentation", "/mask"},
                     .make = make_segment});

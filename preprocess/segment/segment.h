@@ -50,6 +50,7 @@ struct SegmentStatistics {
   bool touches_border = false;          // of the volume: the vessel is cut there
   LeakSearch search;                    // the way from seed to target, and the leaks cut
   std::vector<Leak> doubtful;           // what was kept, though it may be a vein
+  std::vector<Leak> branches;           // side branches that were kept by their shape alone
   MaskShape shape;                      // where a band was given before touches are cut
   LoopSearch loops;                     // where none was given
   std::vector<Touch> touches;           // by their values, then by their shape [HU, mm]

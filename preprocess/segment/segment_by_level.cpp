@@ -245,6 +245,7 @@ Region find_by_level(const Image& image, const SegmentOptions& options,
   }
   region.edge = band.surroundings_hu + 0.5 * darkest;
   statistics.doubtful = std::move(lumen.doubtful);
+  statistics.branches = std::move(lumen.branches);
   statistics.search.leaks = std::move(lumen.leaks);
   statistics.search.route = route_along(region, ways);
   require_width(region.grid, statistics.search.route);

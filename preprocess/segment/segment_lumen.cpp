@@ -4,6 +4,7 @@
 #include <cmath>
 #include <utility>
 
+#include "preprocess/segment/side_branches.h"
 #include "preprocess/segment/vessel_parts.h"
 
 namespace wireplan::preprocess {
@@ -179,6 +180,15 @@ std::vector<Leak> find_doubtful(const LumenField& field, const VesselParts& part
   return doubtful;
 }
 
+/// Whether most of what was cut came back as a branch.
+bool is_branch(const Leak& leak, const std::vector<Leak>& branches) {
+  constexpr double kMost = 0.5, kBesideMm = 3.0;
+  return std::any_of(branches.begin(), branches.end(), [&](const Leak& branch) {
+    return branch.volume_mm3 >= kMost * leak.volume_mm3 &&
+           (branch.place - leak.place).norm() <= branch.radius_mm + kBesideMm;
+  });
+}
+
 }  // namespace
 
 LocalLumen find_local_lumen(const LumenField& field, const Candidates& candidates,
@@ -216,6 +226,8 @@ LocalLumen find_local_lumen(const LumenField& field, const Candidates& candidate
   }
   found.doubtful = find_doubtful(field, parts, depth, found.labels);
   add_rim(field, level, found.labels, other);
+  found.branches = add_side_branches(field, level, found.labels, other);
+  std::erase_if(found.leaks, [&](const Leak& leak) { return is_branch(leak, found.branches); });
   found.other = std::move(other);
   return found;
 }

@@ -14,6 +14,7 @@ struct LocalLumen {
   Labels other;                // 1 in what touches them
   std::vector<Leak> leaks;     // what touches them and was cut, largest first
   std::vector<Leak> doubtful;  // what was kept, though it may be a vein
+  std::vector<Leak> branches;  // thin or little filled, kept by their shape
 };
 
 /// The arteries that the ways run in, with their branches.
@@ -25,6 +26,7 @@ struct LocalLumen {
 ///   3. Two layers of voxels are added to either, down to 40 % of the contrast (smoothing makes
 ///      vessels thinner) to what lies there, one and two voxels on; between an artery and what was
 ///      cut a voxel goes to the nearer, or to the one whose level it is nearer to.
+///   4. Side branches that are too thin or too little filled for this are added (side_branches.h).
 /// `seeds` are voxels on the ways; contacts narrower than `neck` [mm] connect nothing. Throws
 /// `Error` where the core is more complicated than what a vessel may be (require_no_flood).
 LocalLumen find_local_lumen(const LumenField& field, const Candidates& candidates,

@@ -95,6 +95,44 @@ TEST(SegmentLevel, TheWayKeepsToItsVesselThoughAWiderOneOfItsLevelTouchesAndIsSh
   }
 }
 
+/// An artery of 5 mm and 300 HU, and beside it what has 57 % of its contrast.
+template <typename Beside>
+Segmentation beside_artery(Beside beside) {
+  const Image image = scanned(8.0, [&](const Vec3& p) {
+    return off_axis(p, 0) < 5.0 ? 300.0 : beside(p) ? 188.0 : kAround;
+  });
+  return segment(image, {.seeds = {kBottom}, .target = kTop});
+}
+
+TEST(SegmentLevel, ABranchThatFillsLessIsKeptAndTold) {
+  const auto branch = [](const Vec3& p) {
+    return p.x() > 0.0 && std::hypot(p.y(), p.z() - 45.0 - 0.3 * p.x()) < 2.0;
+  };
+  const Segmentation found = beside_artery(branch);
+  EXPECT_GT(dice(found.mask, [&](const Vec3& p) { return off_axis(p, 0) < 5.0 || branch(p); }),
+            0.96);
+  EXPECT_TRUE(contains(found.mask, Vec3(18, 0, 50.4)));
+  ASSERT_EQ(found.statistics.branches.size(), 1U);
+  const Leak& told = found.statistics.branches.front();
+  EXPECT_LT((told.place - Vec3(5.5, 0, 46.6)).norm(), 2.0) << told.place.transpose();
+  EXPECT_NEAR(told.radius_mm, 2.0, 0.4);
+  EXPECT_NEAR(told.mean_hu, 180.0, 15.0);
+}
+
+TEST(SegmentLevel, AVeinThatPassesByOrAnOrganIsNoBranch) {
+  const auto vein = [](const Vec3& p) { return std::hypot(p.x() - 6.5, p.z() - 45.0) < 2.0; };
+  const auto organ = [](const Vec3& p) { return (p - Vec3(14, 0, 45)).norm() < 10.0; };
+  const auto returning = [](const Vec3& p) {  // from the artery, and to it 24 mm further on
+    return p.x() > 0.0 && std::abs(p.y()) < 2.0 &&
+           std::abs(std::hypot(p.x() - 2.0, p.z() - 45.0) - 12.0) < 2.0;
+  };
+  for (const Segmentation& found :
+       {beside_artery(vein), beside_artery(organ), beside_artery(returning)}) {
+    EXPECT_TRUE(found.statistics.branches.empty());
+    EXPECT_GT(dice(found.mask, [](const Vec3& p) { return off_axis(p, 0) < 5.0; }), 0.95);
+  }
+}
+
 TEST(SegmentLevel, AVeinOfItsOwnLevelThatTouchesAllAlongIsLeftOut) {
   // The vein has 150 HU: as much as the artery at the top, and 60 % of it at the bottom. Their
   // walls touch from 20 to 60 mm; elsewhere 4 mm lie between.

@@ -1,0 +1,285 @@
+#include "preprocess/segment/side_branches.h"
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <limits>
+#include <numbers>
+#include <queue>
+#include <utility>
+
+namespace wireplan::preprocess {
+namespace {
+
+constexpr double kBranchPart = 0.45;   // of the artery's contrast
+constexpr double kNoises = 5.0;        // that a voxel of it stands out by
+constexpr double kMostBrighter = 0.2;  // of the artery's contrast
+constexpr double kLeastMm = 12.0, kLeastRadii = 6.0, kMostMm = 80.0;  // of its length
+constexpr double kLeastVoxels = 3.0;                                  // of its cross-section
+constexpr double kOnePiece = 0.85;                                    // of a section's voxels
+constexpr double kSteady = 2.2;    // by which sections may differ from those before
+constexpr double kOstium = 0.3;    // least contact with the artery, of the cross-section
+constexpr double kLeavesMm = 5.0;  // from the contact, behind which the artery is far
+constexpr double kOfArtery = 0.7, kAlwaysMm = 2.0;  // of the artery's radius; what always is
+constexpr double kSectionVoxels = 2.0;            // how long a section is, at least
+constexpr double kOwnPart = 0.5;                  // of its own contrast, where a branch ends
+
+/// Voxels of one distance from the contact.
+struct Section {
+  std::vector<std::size_t> voxels;
+  double sum = 0.0;      // of the volume's values                                         [HU]
+  bool returns = false;  // one lies at the artery again
+};
+
+/// Voxels beside the artery that may be where a branch begins.
+struct Contact {
+  std::vector<std::size_t> voxels;
+  double level = 0.0;   // of the artery there                                             [HU]
+  double radius = 0.0;  // of the artery there                                             [mm]
+};
+
+/// What a branch of an artery of this level has at least [HU].
+double least_value(const LumenField& field, double level) {
+  const double left =
+      field.smoothing_mm > 0.0 ? smoothed_noise(field.grid, field.smoothing_mm) : 1.0;
+  return field.surroundings +
+         std::max(kBranchPart * (level - field.surroundings), kNoises * field.noise * left);
+}
+
+/// Looks for a branch at one contact after the other.
+class BranchSearch {
+ public:
+  BranchSearch(const LumenField& field, const Labels& artery)
+      : field_(field),
+        artery_(artery),
+        voxel_(std::cbrt(field.grid.spacing.prod())),
+        section_mm_(std::max(kSectionVoxels * voxel_, field.grid.spacing.maxCoeff())),
+        distance_(artery.size(), std::numeric_limits<double>::infinity()),
+        open_(artery.size(), 0) {}
+
+  /// The sections of the branch at this contact; empty where there is none.
+  std::vector<Section> follow(const Contact& contact) {
+    std::vector<Section> sections = follow_steady(contact);
+    for (const std::size_t n : touched_) {
+      distance_[n] = std::numeric_limits<double>::infinity();
+      open_[n] = 0;
+    }
+    touched_.clear();
+    const auto count = static_cast<double>(sections.size());
+    const double across =
+        mean_voxels(sections) * voxel_ / section_mm_;  // voxels of a cross-section
+    const double radius = voxel_ * std::sqrt(across / std::numbers::pi);
+    if (across < kLeastVoxels || count * section_mm_ < std::max(kLeastMm, kLeastRadii * radius) ||
+        static_cast<double>(contact.voxels.size()) < kOstium * across ||
+        radius > std::max(kAlwaysMm, kOfArtery * contact.radius)) {
+      sections.clear();
+    }
+    return sections;
+  }
+
+ private:
+  using Visit = std::pair<double, std::size_t>;  // distance [mm], voxel
+
+  static double mean_voxels(const std::vector<Section>& sections) {
+    double sum = 0.0;
+    for (const Section& section : sections) sum += static_cast<double>(section.voxels.size());
+    return sum / std::max(1.0, static_cast<double>(sections.size()));
+  }
+
+  std::vector<Section> follow_steady(const Contact& contact) {
+    const double least = least_value(field_, contact.level);
+    std::priority_queue<Visit, std::vector<Visit>, std::greater<>> visits;
+    const auto reach = [&](std::size_t n, double distance) {
+      if (distance >= distance_[n]) return;
+      if (std::isinf(distance_[n])) touched_.push_back(n);
+      distance_[n] = distance;
+      visits.push({distance, n});
+    };
+    for (const std::size_t n : contact.voxels) reach(n, 0.0);
+    std::vector<Section> sections;
+    Section open;
+    while (!visits.empty()) {
+      const double distance = visits.top().first;
+      const std::size_t n = visits.top().second;
+      visits.pop();
+      if (distance > distance_[n]) continue;
+      if (!open.voxels.empty() &&
+          distance >= static_cast<double>(sections.size() + 1) * section_mm_) {
+        if (open.returns) return {};
+        if (!goes_on(open, contact.level, sections)) return sections;
+        sections.push_back(std::exchange(open, {}));
+        if (distance > kMostMm) return sections;
+      }
+      open_[n] = 1;
+      open.voxels.push_back(n);
+      open.sum += static_cast<double>(field_.raw[n]);
+      for_each_neighbour(field_.grid, n, [&](std::size_t m, const Voxel& step) {
+        if (artery_[m] != 0) {
+          open.returns = open.returns || distance > kLeavesMm;
+          return;
+        }
+        const auto value = static_cast<double>(field_.values[m]);
+        if (value < least || value > field_.upper) return;
+        reach(m,
+              distance + Vec3(step[0], step[1], step[2]).cwiseProduct(field_.grid.spacing).norm());
+      });
+    }
+    if (open.returns) return {};
+    if (!open.voxels.empty() && goes_on(open, contact.level, sections)) {
+      sections.push_back(std::move(open));
+    }
+    return sections;
+  }
+
+  /// Whether the section belongs to the branch that the sections before it are of.
+  bool goes_on(const Section& section, double level, const std::vector<Section>& before) {
+    const auto voxels = static_cast<double>(section.voxels.size());
+    const double most = level + kMostBrighter * (level - field_.surroundings);
+    if (section.sum > voxels * most) return false;
+    if (!before.empty() && (voxels > kSteady * mean_voxels(before) ||
+                            voxels * kSteady < kLeastVoxels * section_mm_ / voxel_)) {
+      return false;
+    }
+    return static_cast<double>(largest_piece(section)) >= kOnePiece * voxels;
+  }
+
+  /// Voxels of the largest piece of the open section.
+  std::size_t largest_piece(const Section& section) {
+    std::vector<std::size_t> queue;
+    std::size_t largest = 0;
+    for (const std::size_t start : section.voxels) {
+      if (open_[start] == 0) continue;
+      queue.assign(1, start);
+      open_[start] = 0;
+      for (std::size_t next = 0; next < queue.size(); ++next) {
+        for_each_neighbour(field_.grid, queue[next], [&](std::size_t m, const Voxel&) {
+          if (open_[m] == 0) return;
+          open_[m] = 0;
+          queue.push_back(m);
+        });
+      }
+      largest = std::max(largest, queue.size());
+    }
+    return largest;
+  }
+
+  const LumenField& field_;
+  const Labels& artery_;
+  double voxel_, section_mm_;     //                                                       [mm]
+  std::vector<double> distance_;  // in the branch, from the contact                       [mm]
+  Labels open_;                   // 1 in the section that is being visited
+  std::vector<std::size_t> touched_;
+};
+
+/// Inscribed radius of the artery [mm] in its middle beside voxel n, uphill from there.
+double radius_beside(const Grid& grid, const std::vector<float>& depth, std::size_t n) {
+  for (bool climbs = true; climbs;) {
+    std::size_t best = n;
+    for_each_neighbour(grid, n, [&](std::size_t m, const Voxel&) {
+      if (depth[m] > depth[best]) best = m;
+    });
+    climbs = best != n;
+    n = best;
+  }
+  return static_cast<double>(depth[n]);
+}
+
+/// All contacts, those of the lower voxels first.
+std::vector<Contact> find_contacts(const LumenField& field, const std::vector<float>& level,
+                                   const Labels& artery) {
+  const Grid& grid = field.grid;
+  std::vector<float> beside(artery.size(), 0.0F);  // level of the artery that a voxel touches
+  for (std::size_t n = 0; n < artery.size(); ++n) {
+    if (artery[n] == 0) continue;
+    for_each_face_neighbour(grid, n, [&](std::size_t m) {
+      if (artery[m] == 0) beside[m] = std::max(beside[m], level[n]);
+    });
+  }
+  for (std::size_t n = 0; n < artery.size(); ++n) {
+    if (beside[n] == 0.0F) continue;
+    const auto value = static_cast<double>(field.values[n]);
+    if (value < least_value(field, static_cast<double>(beside[n])) || value > field.upper) {
+      beside[n] = 0.0F;
+    }
+  }
+  const std::vector<float> depth = measure_depth(grid, artery);
+  std::vector<Contact> contacts;
+  for (std::size_t n = 0; n < artery.size(); ++n) {
+    if (beside[n] == 0.0F) continue;
+    Contact contact;
+    const auto take = [&](std::size_t m) {
+      contact.voxels.push_back(m);
+      contact.level += static_cast<double>(beside[m]);
+      contact.radius = std::max(contact.radius, radius_beside(grid, depth, m));
+      beside[m] = 0.0F;
+    };
+    take(n);
+    for (std::size_t next = 0; next < contact.voxels.size(); ++next) {
+      for_each_neighbour(grid, contact.voxels[next], [&](std::size_t m, const Voxel&) {
+        if (beside[m] != 0.0F) take(m);
+      });
+    }
+    contact.level /= static_cast<double>(contact.voxels.size());
+    contacts.push_back(std::move(contact));
+  }
+  return contacts;
+}
+
+/// Labels a branch as artery, and beside it what has half of its contrast.
+Leak add_branch(const LumenField& field, const Contact& contact,
+                const std::vector<Section>& sections, std::vector<float>& level, Labels& artery,
+                Labels& other) {
+  const Grid& grid = field.grid;
+  Leak added;
+  for (const std::size_t n : contact.voxels) added.place += center_of(grid, n);
+  added.place /= static_cast<double>(contact.voxels.size());
+  std::vector<std::size_t> voxels;
+  for (const Section& section : sections) {
+    added.mean_hu += section.sum;
+    voxels.insert(voxels.end(), section.voxels.begin(), section.voxels.end());
+  }
+  added.mean_hu /= static_cast<double>(voxels.size());
+  const double edge = field.surroundings + kOwnPart * (added.mean_hu - field.surroundings);
+  const auto take = [&](std::size_t n) {
+    artery[n] = 1;
+    other[n] = 0;
+    level[n] = static_cast<float>(added.mean_hu);
+  };
+  for (const std::size_t n : voxels) take(n);
+  const std::size_t inside = voxels.size();
+  for (std::size_t k = 0; k < inside; ++k) {
+    for_each_face_neighbour(grid, voxels[k], [&](std::size_t m) {
+      const auto value = static_cast<double>(field.values[m]);
+      if (artery[m] != 0 || value < edge || value > field.upper) return;
+      take(m);
+      voxels.push_back(m);
+    });
+  }
+  added.volume_mm3 = static_cast<double>(voxels.size()) * grid.spacing.prod();
+  const double section_mm =
+      std::max(kSectionVoxels * std::cbrt(grid.spacing.prod()), grid.spacing.maxCoeff());
+  added.radius_mm = std::sqrt(added.volume_mm3 / std::numbers::pi / section_mm /
+                              static_cast<double>(sections.size()));
+  return added;
+}
+
+}  // namespace
+
+std::vector<Leak> add_side_branches(const LumenField& field, std::vector<float>& level,
+                                    Labels& artery, Labels& other) {
+  std::vector<Leak> added;
+  BranchSearch search(field, artery);
+  for (const Contact& contact : find_contacts(field, level, artery)) {
+    const bool taken = std::any_of(contact.voxels.begin(), contact.voxels.end(),
+                                   [&](std::size_t n) { return artery[n] != 0; });
+    if (taken) continue;
+    const std::vector<Section> sections = search.follow(contact);
+    if (sections.empty()) continue;
+    added.push_back(add_branch(field, contact, sections, level, artery, other));
+  }
+  std::stable_sort(added.begin(), added.end(),
+                   [](const Leak& a, const Leak& b) { return a.volume_mm3 > b.volume_mm3; });
+  return added;
+}
+
+}  // namespace wireplan::preprocess
