@@ -133,5 +133,49 @@ TEST(EndOn, AStraightWireIsNotPushedAside) {
   }
 }
 
+// ---------------------------------------------------------------- V15: a rod that buckles in a
+// tube
+
+TEST(BuckledInATube, TouchesInOnePlaceThenAlongALineAsTheoryHasIt) {
+  // A pinned rod of length 2 l under a thrust P in a tube with clearance r, in a plane through the
+  // axis (the first contact of Dayan, Durban and Givli 2022, references-2 V15). Where it touches in
+  // one place, y = A sin kx - A k x cos kl with k^2 = P/EI has y(l) = r and y'(l) = 0: the wall
+  // pushes with F = -2 P r k cos kl/(sin kl - k l cos kl), from none at Euler's load, kl = pi/2,
+  // until the rod lies straight there, kl = pi, at four times that. Beyond, it lies along the wall
+  // but for pi/k at either end, and the wall pushes with 2 P r k/pi.
+  const double EI = 1000.0, length = 200.0, half = 0.5 * length, r = 1.0, radius = 0.25;
+  const double euler = EI * std::pow(kPi / length, 2);
+  const VesselModel vessel(long_tube(r + radius, length + 20.0, 64), {.grid_spacing = 0.4});
+  for (const double times : {1.2, 2.0, 3.0, 3.9, 6.0, 9.0}) {
+    SCOPED_TRACE(times);
+    const double thrust = times * euler, k = std::sqrt(thrust / EI);
+    const double c = std::cos(k * half), s = std::sin(k * half);
+    const double expected =
+        times < 4.0 ? -2.0 * thrust * r * k * c / (s - k * half * c) : 2.0 * thrust * r * k / kPi;
+    Bench bench(
+        round_wire(length, radius, EI), 100, vessel,
+        {.law = {LinearLaw{.stiffness = 20.0, .smoothing = 1e-4}}, .spacing = 2.0},
+        [&](double arc) { return Vec3(r * std::sin(kPi * arc / length), 0.0, 10.0 + arc); });
+    bench.problem.proximal = pinned();
+    bench.problem.distal = held_across(Vec3::UnitZ());
+    bench.problem.plane = Vec3::UnitY();
+    Eigen::Matrix3Xd load = Eigen::Matrix3Xd::Zero(3, bench.rod.nodes());
+    load(2, bench.rod.nodes() - 1) = -thrust;
+    bench.problem.load = &load;
+    const NewtonResult solve = bench.solve(1e-8);
+    ASSERT_TRUE(solve.converged) << solve.residual;
+    const std::vector<Touch> touches = bench.contact.touches();
+    const auto all = [](const Touch&) { return true; };
+    EXPECT_NEAR(normal_force(touches, all), expected, 0.02 * expected);
+    // Where it lies along the wall, that pushes at both ends of the line.
+    const double free = times < 4.0 ? half : kPi / k;
+    for (const Touch& touch : touches) {
+      if (touch.normal_force < 0.05 * expected) continue;
+      const double from_end = std::min(touch.tip_distance, length - touch.tip_distance);
+      EXPECT_NEAR(from_end, free, 6.0);
+    }
+  }
+}
+
 }  // namespace
 }  // namespace wireplan::simulate
