@@ -132,7 +132,8 @@ void read_segmentation(JsonReader& root, Case& input) {
   }
   const std::size_t problems_before = root.problems().count();
   JsonReader reader = root.object("segmentation", false);
-  const Range band{.min = -1100.0, .max = 65535.0}, length{.min = 0.0, .max = 5.0};
+  const Range band{.min = -1100.0, .max = 65535.0}, length{.min = 0.0, .max = 5.0},
+      reach{.min = 10.0, .max = 2000.0};
   const auto given = [&](const std::string& key, Range range) {
     return reader.has(key) ? std::optional<double>(reader.number(key, std::nullopt, range))
                            : std::nullopt;
@@ -152,6 +153,11 @@ void read_segmentation(JsonReader& root, Case& input) {
   segmentation.seeds = reader.points("seeds_mm", false);
   segmentation.smoothing_mm = given("smoothing_mm", length);
   segmentation.neck_opening_mm = given("neck_opening_mm", length);
+  if (segmentation.lower_hu && reader.has("reach_mm")) {
+    root.problems().add("segmentation.reach_mm", "given beside a band",
+                        "one of them: a band is followed through the whole volume");
+  }
+  segmentation.reach_mm = reader.number("reach_mm", segmentation.reach_mm, reach);
   reader.finish();
 }
 
@@ -321,6 +327,7 @@ Json input_json(const Case& input) {
                             {"seeds_mm", seeds},
                             {"smoothing_mm", value(segmentation.smoothing_mm)},
                             {"neck_opening_mm", value(segmentation.neck_opening_mm)}};
+    if (!segmentation.lower_hu) json["segmentation"]["reach_mm"] = segmentation.reach_mm;
   }
   if (!input.surface_input) json["mask"] = mask_limits_json(input.mask_limits);
   if (input.surface_input) {

@@ -124,7 +124,7 @@ Segmentation segment(const Image& image, const SegmentOptions& options) {
   expects(!options.lower_hu || *options.lower_hu < *options.upper_hu);
   expects(!options.seeds.empty());
   expects(options.smoothing_mm.value_or(0.0) >= 0.0 &&
-          options.neck_opening_mm.value_or(0.0) >= 0.0);
+          options.neck_opening_mm.value_or(0.0) >= 0.0 && options.reach_mm > 0.0);
   expects(image.values.size() == image.grid.voxels() && !image.values.empty());
   std::vector<Vec3> points = options.seeds;
   if (options.target) points.push_back(*options.target);

@@ -27,6 +27,8 @@ struct SegmentOptions {
   /// Contacts with other bright things are cut where they are thinner than twice this, and so are
   /// arteries. Without it: as smoothing_mm.                                                [mm]
   std::optional<double> neck_opening_mm = {};
+  /// Without a band: how far from the box round the points arteries are looked for.        [mm]
+  double reach_mm = 80.0;
   MaskLimits limits = {};  // of the mask, and of what the band connects (require_no_flood)
 };
 
@@ -67,7 +69,7 @@ struct Segmentation {
 ///   2. Keep what is connected to the seeds through voxel faces.
 ///   3. Cut thin necks (prototypes A).
 ///   4. Cut leaks (segment_leak.h).
-/// Without one, within 80 mm of the points:
+/// Without one, within reach of the points:
 ///   1. Measure the lumen's level and noise at the points (segment_band.h), and smooth.
 ///   2. Find the ways between them (segment_way.h).
 ///   3. Find the lumen round the ways by the levels there, and cut what touches it

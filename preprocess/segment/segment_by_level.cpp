@@ -13,7 +13,6 @@
 namespace wireplan::preprocess {
 namespace {
 
-constexpr double kFieldReachMm = 80.0;       // round the points, in which arteries are looked for
 constexpr double kNearMm = 2.5;              // how far a point may lie beside the lumen it means
 constexpr double kStrongContrastHu = 300.0;  // over veins too, most often
 constexpr double kCorePart = 0.65, kCorePartStrong = 0.75;  // of the contrast
@@ -25,14 +24,15 @@ constexpr double kToldMm = 10.0;  // along the way, between the levels that are 
 
 /// The part of the volume within reach of the points, smoothed.
 LumenField make_field(const Image& image, const std::vector<Vec3>& points,
-                      const SegmentStatistics& statistics, bool hounsfield, Box& box) {
+                      const SegmentStatistics& statistics, const SegmentOptions& options,
+                      Box& box) {
   const Voxel first = *nearest_voxel(image.grid, points.front());
   box = {first, first};
   for (const Vec3& point : points) {
     const Voxel v = *nearest_voxel(image.grid, point);
     box = united(box, {v, v});
   }
-  box = grown(box, kFieldReachMm, image.grid);
+  box = grown(box, options.reach_mm, image.grid);
   LumenField field;
   field.grid = cropped(image.grid, box);
   field.raw = crop_values(image.grid, box, image.values);
@@ -40,7 +40,7 @@ LumenField make_field(const Image& image, const std::vector<Vec3>& points,
   field.smoothing_mm = statistics.band.smoothing_mm;
   field.surroundings = statistics.band.surroundings_hu;
   field.upper = statistics.band.upper_hu;
-  field.core_part = !hounsfield                                       ? kCorePartElsewhere
+  field.core_part = !options.hounsfield                               ? kCorePartElsewhere
                     : statistics.band.contrast_hu > kStrongContrastHu ? kCorePartStrong
                                                                       : kCorePart;
   field.noise = std::numeric_limits<double>::infinity();
@@ -203,7 +203,7 @@ Region find_by_level(const Image& image, const SegmentOptions& options,
   least = std::max(least, kLeastOfBrightest * band.contrast_hu);
 
   Region region;
-  LumenField field = make_field(image, points, statistics, options.hounsfield, region.box);
+  LumenField field = make_field(image, points, statistics, options, region.box);
   std::vector<std::size_t> starts;
   for (const Vec3& point : points) {
     for (const std::size_t n : voxels_in_ball(field.grid, point, kNearMm)) {

@@ -175,6 +175,7 @@ inline Json own_wire() {
 inline Json full_case(Json json) {
   json["name"] = "full";
   if (json.contains("segmentation")) {
+    if (!json["segmentation"].contains("lower_hu")) json["segmentation"]["reach_mm"] = 120;
     json["volume"]["series"] = "4";
     json["segmentation"].update(Json{
         {"seeds_mm", Json::array({{1, 2, 3}})}, {"smoothing_mm", 0.8}, {"neck_opening_mm", 1.5}});

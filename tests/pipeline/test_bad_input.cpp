@@ -36,6 +36,9 @@ const std::vector<BadInput> kOfAVolume = {
      R"~(segmentation.seeds_mm[0] is [1,2], expected three numbers [x, y, z])~"},
     {R"~(segmentation.smoothing_mm=9)~",
      R"~(segmentation.smoothing_mm is 9, expected a number from 0 to 5)~"},
+    {R"~(segmentation.reach_mm=5)~",
+     "segmentation.reach_mm is given beside a band, expected one of them: a band is followed "
+     "through the whole volume\nsegmentation.reach_mm is 5, expected a number from 10 to 2000"},
     {R"~(segmentation.neck_opening_mm=-1)~",
      R"~(segmentation.neck_opening_mm is -1, expected a number from 0 to 5)~"},
     {R"~(surface.edge_length_mm=0.01)~",

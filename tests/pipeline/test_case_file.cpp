@@ -400,6 +400,12 @@ TEST_F(CaseFile, CodeAndSchemaAgreeOnKeysLimitsAndRequirements) {
   const Json schema = read_schema("case.schema.json");
   const auto told = [this](const Json& json) { return problem(json); };
   SchemaWalk of_volume(schema, full_case(volume_case()), told);
+  Json without_band = volume_case();
+  without_band["segmentation"] = Json::object();
+  SchemaWalk of_found(schema, full_case(without_band), told);
+  of_found.visit(schema, "", "");
+  without_band["segmentation"] = {{"lower_hu", 150}, {"upper_hu", 600}, {"reach_mm", 120}};
+  expect_mentions(problem(without_band), {"segmentation.reach_mm is given beside a band"});
   Json section = full_case(surface_case());
   section["target"].erase("radius_mm");
   section["target"]["beyond_mm"] = 10;
@@ -457,8 +463,8 @@ TEST_F(CaseFile, CodeAndSchemaAgreeOnKeysLimitsAndRequirements) {
   visited.merge(of_labels);
   visited.merge(of_forms);
   list_properties(schema, schema, "", known);
-  for (const SchemaWalk* walk : {&of_surface, &of_lists, &of_sections, &of_marked, &of_marked_lists,
-                                 &of_voxels, &of_voxel_lists}) {
+  for (const SchemaWalk* walk : {&of_found, &of_surface, &of_lists, &of_sections, &of_marked,
+                                 &of_marked_lists, &of_voxels, &of_voxel_lists}) {
     visited.insert(walk->visited.begin(), walk->visited.end());
   }
   if (!imaging) return;
