@@ -18,6 +18,13 @@ struct Rubbing {
   double energy, slope, curvature;  // of the potential per `limit`
 };
 
+/// What friction did to a point from one equilibrium to the next.
+struct RubbedPoint {
+  int point;
+  Vec3 force;   // its mean on the point                                                  [N]
+  double work;  // of the point against it                                             [N mm]
+};
+
 /// Each point is held to an anchor; the force grows smoothly to the coefficient times the normal
 /// force over the slip, then the anchor is to follow. That has no potential, since the normal force
 /// and the normal depend on the state; with those of a lag, a state of before, it has one.
@@ -63,6 +70,12 @@ class Friction {
   /// that does not touch, where it is. Returns the heat, the friction now times the way that the
   /// anchors went [N mm].
   double settle(const ContactPoints& points, ContactMemory& memory) const;
+
+  /// What friction did since the last settle(), as each point went straight from where it was and
+  /// its normal force changed evenly: the mean force on it, and what the point put into friction,
+  /// as heat and in its hold on the anchor [N mm]. Replaces what is in `rubbed`.
+  void find_rubbed(const ContactPoints& points, const ContactMemory& memory,
+                   std::vector<RubbedPoint>& rubbed) const;
 
   /// Adds gradient and Hessian of the potential to a sink of elements.h.
   template <class Sink>

@@ -53,6 +53,11 @@ class WallContact {
   /// After an equilibrium: where friction was overcome, points have slipped. Returns the work that
   /// turned into heat since the last call [N mm].
   double settle();
+  /// Before settle(): what friction did since the last one, see Friction.
+  void find_rubbed(std::vector<RubbedPoint>& rubbed) const {
+    friction_.find_rubbed(points_, memory_, rubbed);
+  }
+  const ContactPoint& point(int k) const { return points_[k]; }
   /// Points that touch in the latest sample, proximal to distal.
   const std::vector<Touch>& touches();
 

@@ -9,18 +9,19 @@
 namespace wireplan::simulate {
 namespace {
 
-/// All chosen, but for the step of differences.
+/// All chosen.
 struct BenchTuning {
   double longest_push = 2.0;                // of a part of a move                             [mm]
   double largest_turn = 5.0 * kPi / 180.0;  //                                            [rad]
-  double shortest = 1.0 / 16.0;             // of such a part, where it is cut
-  double unbalanced = 0.02;                 // of the work of a part: more, and it is cut
+  double of_element = 0.9;       // at most so much in a vessel: parts as long as elements meet the
+                                 // same place of the forces' ripple each time
+  double first_push = 0.1;       // of a move where walls rub: friction turns round within it  [mm]
+  double shortest = 1.0 / 16.0;  // of such a part, where it is cut
+  double unbalanced = 0.02;      // of the work of a part: more, and it is cut
   double unbalanced_in_vessel = 0.2;  // there friction and ridges of the wall are in the forces
   double jump = 0.5;  // of a node off its guess, in the shortest part in a vessel              [mm]
   double deepest = 1.0;      // past the wall                                  [mm]
   double least_work = 1e-7;  // that counts so                                [N mm]
-  double step = 1e-5;        // of differences by insertion: with 1e-3 the stretch of an edge, whose
-                       // energy is no parabola, makes an error of 1e-4 N                  [mm]
   double nudge = 1e-3;  // of the tip of each tool but the first curved one, in a guess       [rad]
   int most_solves = 4;  // of a part that runs out of iterations, from where it got
   int load_steps = 10;  // where the full loads have no equilibrium at once
@@ -87,8 +88,6 @@ void lean_aside(const Rod& rod, const Vec3& point, const std::optional<Vec3>& pl
   }
 }
 
-double edge_length_of(const Composite& composite) { return composite.rod.rest_length[0]; }
-
 }  // namespace
 
 double friction_with_wall(const ToolScene& scene, std::size_t tool) {
@@ -126,30 +125,39 @@ ToolBench::ToolBench(const ToolScene& scene)
     }
   }
   if (now_.contact != nullptr) now_.contact->settle();
+  find_energy(now_);
   const std::vector<double> none(scene.tools.size(), 0.0);
-  feel(now_, {none, none});
   report({none, none});
 }
 
 bool ToolBench::move(const ToolMove& by) {
   expects(settled_ && by.push.size() == scene_.tools.size() && by.turn.size() == by.push.size());
   record_.iterations = 0;
-  double parts = 1.0;
+  const bool in_vessel = scene_.vessel != nullptr;
+  const double longest_push =
+      in_vessel ? std::min(kBench.longest_push, kBench.of_element * scene_.element_length)
+                : kBench.longest_push;
+  double parts = 1.0, farthest = 0.0;
   for (std::size_t i = 0; i < by.push.size(); ++i) {
-    parts = std::max({parts, std::ceil(std::abs(by.push[i]) / kBench.longest_push - 1e-9),
+    farthest = std::max(farthest, std::abs(by.push[i]));
+    parts = std::max({parts, std::ceil(std::abs(by.push[i]) / longest_push - 1e-9),
                       std::ceil(std::abs(by.turn[i]) / kBench.largest_turn - 1e-9)});
   }
   const double longest = 1.0 / parts, shortest = kBench.shortest * longest;
-  feel(now_, by);  // where tips meet, the force hangs on which way they go
   const std::vector<ToolPlace> start = now_.places;
   double done = 0.0, size = longest;
+  if (in_vessel && scene_.contact.friction > 0.0 && farthest > 0.0) {
+    size = std::min(longest, kBench.first_push / farthest);
+  }
+  double slope = slope_along(now_, by.push, 1.0);
   while (done < 1.0 - 1e-12) {
     const double part = 1.0 - done < 1.01 * size ? 1.0 - done : size;
     const bool may_cut = part > 1.01 * shortest;
     State next;
     place(moved(start, by, done + part), next);
     next.state = follow(now_, next);
-    carry_contact(now_, next);
+    const Eigen::VectorXd slid = slides(now_, next);
+    carry_contact(now_, slid, next);
     const Eigen::Matrix3Xd guess = next.state.x;
     if (!solve(next)) {
       if (!may_cut) {
@@ -159,16 +167,18 @@ bool ToolBench::move(const ToolMove& by) {
       size = 0.5 * part;
       continue;
     }
-    const double rubbed = next.contact != nullptr ? next.contact->settle() : 0.0;
-    feel(next, by);
+    double against_wall = 0.0;
+    const double rubbed = rub(slid, next, against_wall);
+    find_energy(next);
 
     // The work of the hands against what the energy gained.
-    double work = 0.0, scale = 0.0;
-    for (std::size_t i = 0; i < by.push.size(); ++i) {
-      const double push = 0.5 * part * by.push[i] * (now_.force[i] + next.force[i]);
+    const double next_slope = slope_along(next, by.push, -1.0);
+    double work = 0.5 * part * (slope + next_slope) + against_wall;
+    double scale = part * std::max(std::abs(slope), std::abs(next_slope)) + std::abs(rubbed);
+    for (std::size_t i = 0; i < by.turn.size(); ++i) {
       const double turn = 0.5 * part * by.turn[i] * (now_.torque[i] + next.torque[i]);
-      work += push + turn;
-      scale += std::abs(push) + std::abs(turn);
+      work += turn;
+      scale += std::abs(turn);
     }
     const double gained = next.energy.total() - now_.energy.total();
     const double excess = work - gained - rubbed;
@@ -183,11 +193,13 @@ bool ToolBench::move(const ToolMove& by) {
     const bool ripples = next.contact != nullptr && off < kBench.jump;
     const double released = jumped && !ripples ? std::max(0.0, excess) : 0.0;
     now_ = std::move(next);
+    slope = slope_along(now_, by.push, 1.0);
     record_.released += released;
     record_.unbalanced += excess - released;
     record_.heat += rubbed;
     record_.work += gained + rubbed + released;
-    for (std::size_t i = 0; i + 1 < by.push.size(); ++i) {
+    if (scene_.friction > 0.0) feel(now_, by);
+    for (std::size_t i = 0; i + 1 < by.push.size() && scene_.friction > 0.0; ++i) {
       const ToolContact contact = find_contact(i, by);
       const double heat = part * (contact.friction_force * (by.push[i + 1] - by.push[i]) +
                                   contact.friction_torque * (by.turn[i + 1] - by.turn[i]));
@@ -235,41 +247,37 @@ void ToolBench::place(const std::vector<ToolPlace>& places, State& at) const {
   at.load.rightCols<1>() += scene_.loads.tip_force;
   if (scene_.vessel == nullptr) return;
   if (scene_.contact.friction > 0.0) {
-    const Eigen::Index n = at.load.cols();
-    at.composite.rod.rubs.resize(n);
-    for (Eigen::Index i = 0; i < n; ++i) {
-      const double arc = static_cast<double>(i) * edge_length_of(at.composite);
-      at.composite.rod.rubs[i] =
-          friction_with_wall(scene_, outermost(at, arc)) / scene_.contact.friction;
+    at.composite.rod.rubs.setZero(at.load.cols());
+    for (std::size_t i = 0; i < places.size(); ++i) {
+      at.composite.rod.rubs += friction_with_wall(scene_, i) / scene_.contact.friction *
+                               at.composite.outside.row(static_cast<Eigen::Index>(i)).transpose();
     }
   }
   at.contact = std::make_unique<WallContact>(at.composite.rod, *scene_.vessel, scene_.contact);
 }
 
-/// The outermost tool at an arc length; at the foremost tip the one that leads.
-std::size_t ToolBench::outermost(const State& at, double arc) const {
-  std::size_t foremost = 0;
-  for (std::size_t i = 0; i < at.places.size(); ++i) {
-    if (at.places[i].insertion >= arc) return i;
-    if (at.places[i].insertion > at.places[foremost].insertion) foremost = i;
+/// How far the outermost tool slides past each node, forward; where a tip covers a part of the
+/// node's share, a mean.
+Eigen::VectorXd ToolBench::slides(const State& from, const State& to) const {
+  const Eigen::Index n = from.state.x.cols();
+  const double longer = to.composite.edge_length() - from.composite.edge_length();
+  Eigen::VectorXd slide = Eigen::VectorXd::LinSpaced(n, 0.0, -longer * static_cast<double>(n - 1));
+  for (std::size_t i = 0; i < from.places.size(); ++i) {
+    slide += (to.places[i].insertion - from.places[i].insertion) *
+             from.composite.outside.row(static_cast<Eigen::Index>(i)).transpose();
   }
-  return foremost;
+  return slide;
 }
 
 /// What holds the nodes at the wall is held against the tool there, not against the node, which
 /// slides along it.
-void ToolBench::carry_contact(const State& from, State& to) const {
+void ToolBench::carry_contact(const State& from, const Eigen::VectorXd& slides, State& to) const {
   if (to.contact == nullptr) return;
   ContactMemory memory = from.contact->memory();
   const Eigen::Index n = from.state.x.cols();
   expects(memory.anchor.cols() == n);
-  const double h = edge_length_of(from.composite), h_new = edge_length_of(to.composite);
   for (Eigen::Index i = 0; i < n; ++i) {
-    const double arc = static_cast<double>(i) * h;
-    const std::size_t tool = outermost(from, arc);
-    const double slide = to.places[tool].insertion - from.places[tool].insertion -
-                         static_cast<double>(i) * (h_new - h);
-    const Vec3 along = slide * edge_tangent(from.state, std::min(i, n - 2));
+    const Vec3 along = slides[i] * edge_tangent(from.state, std::min(i, n - 2));
     memory.x.col(i) -= along;
     memory.anchor.col(i) -= along;
   }
@@ -305,7 +313,7 @@ RodState ToolBench::unloaded(const State& at) const {
 
 /// The centreline of before, as much longer or shorter as it now is, and the tools' angles on it.
 RodState ToolBench::follow(const State& from, const State& to) const {
-  const double h = edge_length_of(from.composite), h_new = edge_length_of(to.composite);
+  const double h = from.composite.edge_length(), h_new = to.composite.edge_length();
   const Eigen::Index edges = from.state.x.cols() - 1;
   RodState state = from.state;
   if (h != h_new) {
@@ -410,61 +418,7 @@ bool ToolBench::solve(State& at) {
   return !through_wall_;
 }
 
-// ---------------------------------------------------------------- what the hands feel
-
-double ToolBench::energy_at(const State& at, const std::vector<ToolPlace>& places) const {
-  State other;
-  place(places, other);
-  Eigen::Matrix3Xd unused(3, at.state.x.cols());
-  return Statics::evaluate(problem_of(other), at.state, unused).total();
-}
-
-/// By differences in both directions, or, where the energy has a kink or the tool an end, in one.
-double ToolBench::force_on(const State& at, std::size_t tool, double direction) const {
-  const double h = kBench.step, here = at.places[tool].insertion;
-  const auto energy = [&](double by) {
-    std::vector<ToolPlace> places = at.places;
-    places[tool].insertion += by;
-    return energy_at(at, places);
-  };
-  bool kink = false;
-  for (std::size_t k = 0; k < at.places.size(); ++k) {
-    kink = kink || (k != tool && std::abs(at.places[k].insertion - here) < 2.0 * h);
-  }
-  double side = kink ? std::copysign(1.0, direction) : 0.0;
-  if (here < 2.0 * h) side = 1.0;
-  if (here > scene_.tools[tool].wire.length() - 2.0 * h) side = -1.0;
-  if (side == 0.0) return (energy(h) - energy(-h)) / (2.0 * h);
-  return side * (4.0 * energy(side * h) - energy(2.0 * side * h) - 3.0 * energy(0.0)) / (2.0 * h);
-}
-
-void ToolBench::feel(State& at, const ToolMove& direction) const {
-  Eigen::Matrix3Xd unused(3, at.state.x.cols());
-  at.energy = Statics::evaluate(problem_of(at), at.state, unused);
-  const std::size_t count = scene_.tools.size();
-  at.force.assign(count, 0.0);
-  at.torque.assign(count, 0.0);
-  for (std::size_t i = 0; i < count; ++i) {
-    double relative = direction.push[i];  // against what its tip may meet
-    for (std::size_t k = 0; k < count && relative == 0.0; ++k) relative -= direction.push[k];
-    at.force[i] = force_on(at, i, relative);
-  }
-  const ToolTerms& terms = at.composite.terms;
-  const Eigen::Index edges = at.state.x.cols() - 1;
-  for (int t = 0; t < terms.twists(); ++t) {
-    at.torque[static_cast<std::size_t>(terms.tool[static_cast<std::size_t>(t)])] =
-        terms.lead[t] * (terms.roll[t] - at.state.theta[t * edges]);
-  }
-  if (at.contact == nullptr) return;
-  // A tool is pushed along the nodes, against the friction of the wall on it.
-  at.touches = at.contact->touches();
-  const double h = edge_length_of(at.composite);
-  for (const Touch& touch : at.touches) {
-    const std::size_t tool = outermost(at, (touch.edge + touch.part) * h);
-    const Eigen::Index edge = std::min<Eigen::Index>(touch.edge, edges - 1);
-    at.force[tool] -= touch.friction.dot(edge_tangent(at.state, edge));
-  }
-}
+// ---------------------------------------------------------------- what is told
 
 std::vector<Touch> ToolBench::touches() const { return now_.touches; }
 
@@ -473,6 +427,7 @@ double ToolBench::free_force(int tool) const {
 }
 
 void ToolBench::report(const ToolMove& by) {
+  feel(now_, by);
   const std::size_t count = scene_.tools.size();
   record_.energy = now_.energy;
   record_.tools.assign(count, {});
@@ -492,8 +447,9 @@ void ToolBench::report(const ToolMove& by) {
     }
   }
   for (const Touch& touch : now_.touches) {
-    const double arc = (touch.edge + touch.part) * edge_length_of(now_.composite);
-    record_.tools[outermost(now_, arc)].wall_force += touch.normal_force;
+    for (std::size_t i = 0; i < count; ++i) {
+      record_.tools[i].wall_force += outside_part(now_, i, touch) * touch.normal_force;
+    }
   }
   for (std::size_t i = 0; i + 1 < count; ++i) {
     const ToolContact contact = find_contact(i, by);

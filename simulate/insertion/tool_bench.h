@@ -16,7 +16,8 @@
 ///
 /// In a vessel the nodes touch the wall, as thick and as rough as the outermost tool there. What
 /// friction holds is the tool: before each solve anchors go back along the node's tangent by as
-/// much as the tool slides past the node, and on the hand acts the wall's friction along it.
+/// much as the tool slides past the node, and on the hand acts the wall's friction along it. Since
+/// nodes go with the foremost tip, that is less the nearer to it they are.
 #include <memory>
 #include <optional>
 #include <vector>
@@ -123,7 +124,8 @@ class ToolBench {
     RodState state;
     Energy energy;
     std::vector<Touch> touches;
-    std::vector<double> force, torque;  // without friction
+    std::vector<double> torque;  // of the hands ...
+    std::vector<double> force;   // ... without friction between tools, once felt
   };
 
   Problem problem_of(const State& at) const;
@@ -132,12 +134,17 @@ class ToolBench {
   RodState follow(const State& from, const State& to) const;
   void bend_to_support(const State& to, Eigen::Matrix3Xd& x) const;
   void set_frames(const std::vector<Eigen::VectorXd>& angles, RodState& state) const;
-  void carry_contact(const State& from, State& to) const;
-  std::size_t outermost(const State& at, double arc) const;
+  Eigen::VectorXd slides(const State& from, const State& to) const;
+  void carry_contact(const State& from, const Eigen::VectorXd& slides, State& to) const;
+  static double outside_part(const State& at, std::size_t tool, const Touch& touch);
   bool solve(State& at);
+  double rub(const Eigen::VectorXd& slides, State& at, double& by_hands);
+  void find_energy(State& at) const;
   void feel(State& at, const ToolMove& direction) const;
   double energy_at(const State& at, const std::vector<ToolPlace>& places) const;
-  double force_on(const State& at, std::size_t tool, double direction) const;
+  double slope_along(const State& at, const std::vector<double>& push, double side) const;
+  double side_of(const State& at, std::size_t tool, const ToolMove& direction) const;
+  double leads(const State& at, std::size_t tool, double side) const;
   static Vec3 edge_tangent(const RodState& state, Eigen::Index e);
   Eigen::Matrix3Xd moments(int tool) const;
   double bridged_length(std::size_t outer, const Eigen::Matrix3Xd& moment) const;
@@ -149,6 +156,7 @@ class ToolBench {
   State now_;
   ToolRecord record_;
   Statics statics_;
+  std::vector<RubbedPoint> rubbed_;  // scratch
   bool settled_ = false, through_wall_ = false;
 };
 

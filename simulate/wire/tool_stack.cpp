@@ -53,7 +53,8 @@ class Builder {
       if (!tools[i].wire.straight()) terms_.tool.push_back(static_cast<int>(i));
     }
     const int T = terms_.twists();
-    compliance_ = axial_ = mass_ = radius_ = Eigen::VectorXd::Zero(n_);
+    compliance_ = axial_ = mass_ = Eigen::VectorXd::Zero(n_);
+    outside_.setZero(static_cast<Eigen::Index>(tools.size()), n_);
     torsional_ = terms_.rest = terms_.twist = Eigen::MatrixXd::Zero(T, n_);
     terms_.mutual = Eigen::MatrixXd::Zero(T * (T - 1) / 2, n_);
     terms_.lead = terms_.roll = Eigen::VectorXd::Zero(T);
@@ -63,7 +64,8 @@ class Builder {
     for (int e = 0; e + 1 < n_; ++e) integrate_edge(e);
     add_leads();
     finish_twist();
-    return {make_rod(), terms_};
+    const Rod rod = make_rod();
+    return {rod, terms_, outside_ * rod.share.cwiseInverse().asDiagonal()};
   }
 
  private:
@@ -98,11 +100,12 @@ class Builder {
 
   void add_point(double s, double length, const std::array<Share, 2>& shares) {
     std::array<ToolSpot, kMostTools> local;
-    double K = 0.0, EA = 0.0, mass = 0.0, radius = 0.0;
+    double K = 0.0, EA = 0.0, mass = 0.0;
+    Eigen::Index outermost = 0;
     for (std::size_t i = 0; i < tools_.size(); ++i) {
       local[i] = look_at(tools_[i].wire, places_[i].insertion - s);
       if (!local[i].there) continue;
-      if (K == 0.0) radius = tools_[i].wire.radius;  // of the outermost
+      if (K == 0.0) outermost = static_cast<Eigen::Index>(i);
       K += local[i].EI;
       EA += local[i].EA;
       mass += local[i].mass;
@@ -112,7 +115,7 @@ class Builder {
       compliance_[share.node] += w / K;
       axial_[share.node] += w / EA;
       mass_[share.node] += w * mass;
-      radius_[share.node] += w * radius;
+      outside_(outermost, share.node) += w;
       for (int t = 0; t < terms_.twists(); ++t) add_curve(t, share.node, w, K, local);
     }
   }
@@ -172,7 +175,12 @@ class Builder {
     rod.share = Eigen::VectorXd::Constant(n_, h_);
     rod.share[0] = rod.share[n_ - 1] = 0.5 * h_;
     rod.mass = mass_;
-    rod.thinner = (rod.radius - (radius_.array() / rod.share.array())).max(0.0);
+    rod.thinner.setZero(n_);
+    for (std::size_t i = 0; i < tools_.size(); ++i) {
+      const double less = rod.radius - tools_[i].wire.radius;
+      rod.thinner +=
+          less * outside_.row(static_cast<Eigen::Index>(i)).transpose().cwiseQuotient(rod.share);
+    }
     // An edge stretches as the hats of its ends do: it must not jump either.
     rod.stretch.resize(n_ - 1);
     for (int e = 0; e + 1 < n_; ++e) {
@@ -187,7 +195,8 @@ class Builder {
   const int n_;  // nodes
   double length_ = 0.0, h_ = 0.0;
   Eigen::VectorXd compliance_, axial_;  // (n) integrals of w/K, w/EA
-  Eigen::VectorXd mass_, radius_;       // (n) of w times mass, and times radius
+  Eigen::VectorXd mass_;                // (n) of w times mass
+  Eigen::MatrixXd outside_;             // (tools, n) of w where a tool is the outermost
   Eigen::MatrixXd torsional_;           // (T, n) of w/GJ
   ToolTerms terms_;
 };

@@ -61,6 +61,9 @@ struct ToolTerms {
 struct Composite {
   Rod rod;
   ToolTerms terms;
+  Eigen::MatrixXd outside;  // (tools, n) the part of a node's share where a tool is the outermost
+
+  double edge_length() const { return rod.rest_length[0]; }  //                           [mm]
 };
 
 /// In `elements` equal edges along the longest of the insertions, so that energies have no kink

@@ -130,6 +130,112 @@ TEST(ToolVessel, EachToolRubsByItsOwnFriction) {
   EXPECT_GT(by_both, 1.1 * by_sheath);
 }
 
+// ---------------------------------------------------------------- energy, and walls that yield
+
+/// A curved catheter and a wire round the bend; then the wire back, the catheter turned and on, the
+/// wire out, the catheter back.
+ToolScene curved_round_the_bend(double friction) {
+  Tool catheter = uniform_tool(300.0, 332.0), wire = uniform_tool(300.0, 60.0);
+  catheter.wire.sections = {{.length = 30.0, .bending_stiffness = 99.0, .rest_curvature = 0.05},
+                            {.length = 270.0, .bending_stiffness = 332.0}};
+  wire.wire.radius = 0.4;
+  ToolScene scene = near_the_bend({catheter, wire}, {{5.0, 0.0}, {10.0, 0.0}});
+  scene.contact.friction = friction;
+  scene.residual_tolerance = 1e-6;
+  scene.moves = {push_of({60.0, 60.0}), push_of({0.0, -40.0}), turn_of({1.0, 0.0}),
+                 push_of({20.0, 0.0}),  push_of({0.0, 40.0}),  push_of({-20.0, 0.0})};
+  return scene;
+}
+
+VesselModel yielding_bend(double young_modulus) {
+  const Surface surface = shapes::bend_tube(4.0, 40.0, 0.5 * kPi, 40.0, 60.0, 1.5);
+  return {surface, shapes::extruded_wall(surface, 1.0, young_modulus),
+          LumenOptions{.grid_spacing = 0.6}};
+}
+
+/// Makes the scene's moves; each is to balance to within a part of what it stored, rubbed away and
+/// released.
+void expect_balance(const ToolScene& scene, double part) {
+  ToolBench bench(scene);
+  ASSERT_TRUE(bench.settled());
+  for (std::size_t k = 0; k < scene.moves.size(); ++k) {
+    SCOPED_TRACE(k);
+    const ToolRecord before = bench.record();
+    ASSERT_TRUE(bench.move(scene.moves[k])) << bench.record().residual;
+    const ToolRecord& after = bench.record();
+    const double gained = after.energy.total() - before.energy.total();
+    const double heat = after.heat - before.heat, released = after.released - before.released;
+    EXPECT_NEAR(after.work - before.work, gained + heat + released, 1e-9);
+    EXPECT_LT(std::abs(after.unbalanced - before.unbalanced),
+              part * (std::abs(gained) + heat + released));
+    EXPECT_EQ(heat > 1e-3, scene.contact.friction > 0.0);
+    // Introducer and wall hold the tools.
+    Vec3 sum = bench.introducer_force();
+    for (const Touch& touch : bench.touches()) {
+      sum += touch.normal_force * touch.normal + touch.friction;
+    }
+    EXPECT_LT(sum.norm(), 1e-5);
+  }
+}
+
+TEST(ToolVessel, WorkOfTheHandsIsWhatIsStoredAndRubbedAway) {
+  const VesselModel yielding = yielding_bend(0.4);
+  for (const double friction : {0.0, 0.15}) {
+    for (const VesselModel* vessel : {&tool_bend(), &yielding}) {
+      SCOPED_TRACE(friction + (vessel == &yielding));
+      ToolScene scene = curved_round_the_bend(friction);
+      scene.vessel = vessel;
+      const double part = vessel == &yielding ? 0.015 : 0.01;  // yielding has kinks
+      expect_balance(scene, part);
+      // Tools whose tips are level, pushed together and back.
+      const Tool half = uniform_tool(300.0, 30.0);
+      scene.tools = {half, half};
+      scene.places = {{5.0, 0.0}, {5.0, 0.0}};
+      scene.moves = {push_of({60.0, 60.0}), push_of({25.0, 25.0}), push_of({-20.0, -20.0}),
+                     push_of({20.0, 20.0})};
+      expect_balance(scene, part);
+    }
+  }
+}
+
+TEST(ToolVessel, StifferWallsLeadToTheRigidOne) {
+  const auto run = [](const VesselModel& vessel, double& work, double& yields) {
+    ToolScene scene = curved_round_the_bend(0.15);
+    scene.vessel = &vessel;
+    ToolBench bench(scene);
+    EXPECT_TRUE(bench.settled());
+    Eigen::Matrix3Xd tips(3, 0);
+    yields = 0.0;
+    for (const ToolMove& move : scene.moves) {
+      EXPECT_TRUE(bench.move(move));
+      for (const ToolReport& tool : bench.record().tools) {
+        tips.conservativeResize(3, tips.cols() + 1);
+        tips.rightCols<1>() = tool.tip;
+      }
+      for (const Touch& touch : bench.touches()) yields = std::max(yields, touch.wall_displacement);
+    }
+    work = bench.record().work;
+    return tips;
+  };
+  double work = 0.0, rigid_work = 0.0, yields = 0.0, none = 0.0;
+  const Eigen::Matrix3Xd rigid = run(tool_bend(), rigid_work, none);
+  EXPECT_EQ(none, 0.0);
+  const Eigen::Matrix3Xd stiffest = run(yielding_bend(400.0), work, yields);
+  // The field of a wall that yields reaches further: other samples.
+  EXPECT_LT((stiffest - rigid).colwise().norm().maxCoeff(), 0.05);
+  EXPECT_NEAR(work, rigid_work, 0.005);  // of 1.6 N mm turned into heat
+  double last = 0.25;                    // [mm]
+  for (const double young_modulus : {0.4, 4.0, 40.0}) {
+    SCOPED_TRACE(young_modulus);
+    const Eigen::Matrix3Xd tips = run(yielding_bend(young_modulus), work, yields);
+    EXPECT_NEAR(yields, 0.07 * 0.4 / young_modulus, 0.035 * 0.4 / young_modulus);
+    const double off = (tips - stiffest).colwise().norm().maxCoeff();
+    EXPECT_LT(off, 0.5 * last);
+    last = off;
+  }
+  EXPECT_GT(last, 1e-5);
+}
+
 /// Aorta of 12 mm along z, with a branch of 7 mm toward anterior at 100 mm, 15 degrees upward.
 const VesselModel& aorta() {
   static const VesselModel vessel(
