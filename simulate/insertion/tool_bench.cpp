@@ -24,7 +24,8 @@ struct BenchTuning {
   double least_work = 1e-7;  // that counts so                                [N mm]
   double nudge = 1e-3;  // of the tip of each tool but the first curved one, in a guess       [rad]
   int most_solves = 4;  // of a part that runs out of iterations, from where it got
-  int load_steps = 10;  // where the full loads have no equilibrium at once
+  double least_start = 1.0;  // of tools that are brought in [mm]
+  int load_steps = 10;       // where the full loads have no equilibrium at once
 };
 constexpr BenchTuning kBench;
 
@@ -112,6 +113,24 @@ ToolBench::ToolBench(const ToolScene& scene)
   expects(scene.places.size() == scene.tools.size() && scene.loads.tip_torque == 0.0);
   place(scene.places, now_);
   now_.state = unloaded(now_);
+  lies_free(now_) ? settle_at(scene.places) : bring_in();
+  const std::vector<double> none(scene.tools.size(), 0.0);
+  report({none, none});
+}
+
+bool ToolBench::lies_free(const State& at) const {
+  if (scene_.vessel == nullptr) return true;
+  double least = kBench.deepest;
+  for (const Vec3& x : at.state.x.colwise()) {
+    least = std::min(least, scene_.vessel->lumen.distance(x) - at.composite.rod.radius);
+  }
+  return least > -kBench.deepest;
+}
+
+/// Finds the equilibrium that is nearest to how the tools lie without loads.
+void ToolBench::settle_at(const std::vector<ToolPlace>& places) {
+  place(places, now_);
+  now_.state = unloaded(now_);
   if (now_.contact != nullptr) now_.contact->start_at(now_.state.x);
   const RodState start = now_.state;
   settled_ = solve(now_);
@@ -126,8 +145,30 @@ ToolBench::ToolBench(const ToolScene& scene)
   }
   if (now_.contact != nullptr) now_.contact->settle();
   find_energy(now_);
-  const std::vector<double> none(scene.tools.size(), 0.0);
-  report({none, none});
+}
+
+/// From places so far back that the tools lie free, all at once.
+void ToolBench::bring_in() {
+  const double longest = largest_insertion(scene_.places);
+  std::vector<ToolPlace> places;
+  for (double out = 0.5 * longest; out > kBench.least_start; out *= 0.5) {
+    places = scene_.places;
+    for (ToolPlace& one : places) one.insertion = std::max(0.0, one.insertion - (longest - out));
+    place(places, now_);
+    now_.state = unloaded(now_);
+    if (lies_free(now_)) break;
+  }
+  settle_at(places);
+  if (!settled_) return;
+  ToolMove all;
+  for (std::size_t i = 0; i < places.size(); ++i) {
+    all.push.push_back(scene_.places[i].insertion - places[i].insertion);
+    all.turn.push_back(0.0);
+  }
+  settled_ = move(all);
+  const int iterations = record_.iterations;
+  record_ = {};
+  record_.iterations = iterations;
 }
 
 bool ToolBench::move(const ToolMove& by) {

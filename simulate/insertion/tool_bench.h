@@ -85,6 +85,9 @@ struct ToolRecord {
 class ToolBench {
  public:
   /// Expects what ToolScene says; the tools are then at their places in equilibrium if settled().
+  /// Tools that would not lie free in the vessel as they are without loads, as long ones, are
+  /// brought in together by the introducer from where they do. That is no move: work counts from
+  /// then on.
   explicit ToolBench(const ToolScene& scene);
   bool settled() const { return settled_; }
 
@@ -131,6 +134,9 @@ class ToolBench {
   Problem problem_of(const State& at) const;
   void place(const std::vector<ToolPlace>& places, State& at) const;
   RodState unloaded(const State& at) const;
+  bool lies_free(const State& at) const;
+  void settle_at(const std::vector<ToolPlace>& places);
+  void bring_in();
   RodState follow(const State& from, const State& to) const;
   void bend_to_support(const State& to, Eigen::Matrix3Xd& x) const;
   void set_frames(const std::vector<Eigen::VectorXd>& angles, RodState& state) const;

@@ -13,6 +13,7 @@
 #include "tests/shapes.h"
 #include "tests/simulate/random_values.h"
 #include "tests/simulate/tool_bench.h"
+#include "tests/simulate/tool_vessels.h"
 
 namespace wireplan::simulate {
 namespace {
@@ -236,72 +237,98 @@ TEST(ToolVessel, StifferWallsLeadToTheRigidOne) {
   EXPECT_GT(last, 1e-5);
 }
 
-/// Aorta of 12 mm along z, with a branch of 7 mm toward anterior at 100 mm, 15 degrees upward.
-const VesselModel& aorta() {
-  static const VesselModel vessel(
-      shapes::level_set(
-          [](const Vec3& p) {
-            const double up = 15.0 * kPi / 180.0;
-            const Vec3 start(0.0, 0.0, 100.0), out(0.0, -std::cos(up), std::sin(up));
-            const double trunk = shapes::depth_in_tube(p, Vec3::Zero(), Vec3(0.0, 0.0, 170.0), 6.0);
-            const double branch = shapes::depth_in_tube(p, start, start + 45.0 * out, 3.5);
-            const auto soft = [](double depth) { return std::exp(depth / 0.5); };
-            return 0.5 * std::log(soft(trunk) + soft(branch));
-          },
-          Vec3(-8.0, -47.0, -2.0), Vec3(8.0, 8.0, 172.0), 1.1),
-      LumenOptions{.grid_spacing = 0.6});
-  return vessel;
-}
+// ---------------------------------------------------------------- catheters that take their curves
+
+/// Where the tips of catheter and wire are after each move; the tools are held by introducer and
+/// wall, and do not sink into it.
+struct TipsAfter {
+  std::vector<Vec3> catheter, wire;
+  double released = 0.0;
+
+  explicit TipsAfter(const ToolScene& scene) {
+    ToolBench bench(scene);
+    EXPECT_TRUE(bench.settled());
+    for (const ToolMove& move : scene.moves) {
+      if (!bench.settled() || !bench.move(move)) {
+        ADD_FAILURE() << "no equilibrium: " << bench.record().residual;
+        return;
+      }
+      catheter.push_back(bench.record().tools[0].tip);
+      wire.push_back(bench.record().tools[1].tip);
+      Vec3 sum = bench.introducer_force();
+      for (const Touch& touch : bench.touches()) {
+        sum += touch.normal_force * touch.normal + touch.friction;
+        EXPECT_LT(touch.penetration, 0.3);
+      }
+      EXPECT_LT(sum.norm(), 1e-4);
+    }
+    const ToolRecord& record = bench.record();
+    released = record.released;
+    EXPECT_LT(std::abs(record.unbalanced), 0.03 * (std::abs(record.work) + record.heat));
+  }
+};
 
 TEST(ToolVessel, CobraHooksABranchAndHoldsItWhileTheWireGoesOut) {
-  // A Cobra C2 of the catalogue over a Rosen shaft with a floppy, straight tip.
-  const Wire cobra{
-      .name = "cobra",
-      .radius = 0.8335,
-      .sections = {{.length = 8.0, .bending_stiffness = 99.0},
-                   {.length = 15.7, .bending_stiffness = 99.0, .rest_curvature = 0.1},
-                   {.length = 15.0, .bending_stiffness = 332.0},
-                   {.length = 31.4, .bending_stiffness = 332.0, .rest_curvature = -1.0 / 30.0},
-                   {.length = 579.9, .bending_stiffness = 332.0}}};
-  const Wire wire{
-      .name = "wire",
-      .radius = 0.4445,
-      .sections = {{.length = 30.0, .bending_stiffness = 5.0},
-                   {.length = 20.0, .bending_stiffness = 5.0, .proximal_bending_stiffness = 377.0},
-                   {.length = 1400.0, .bending_stiffness = 377.0}}};
-  ToolScene scene = tools_along_x({{cobra, 0.4955}, {wire, 0.0}}, {{10.0, 0.0}, {30.0, 0.0}});
+  const VesselModel vessel(aorta_with_a_branch(), {.grid_spacing = 0.8});
+  ToolScene scene = catheter_over_wire(cobra_tip(), vessel);
   scene.point = Vec3(0.0, 0.0, 3.0);
-  scene.direction = Vec3::UnitZ();
-  scene.vessel = &aorta();
-  scene.contact.friction = 0.1;
-  scene.residual_tolerance = 1e-6;
   // Up over the wire, the wire back, up until the tip falls into the branch, the wire out.
-  scene.moves = {push_of({70.0, 70.0}), push_of({0.0, -96.0}), push_of({40.0, 0.0}),
-                 push_of({0.0, 110.0}), push_of({0.0, 18.0})};
-  ToolBench bench(scene);
-  ASSERT_TRUE(bench.settled());
-  std::vector<Vec3> catheter, tip;
-  for (const ToolMove& move : scene.moves) {
-    ASSERT_TRUE(bench.move(move)) << bench.record().residual;
-    catheter.push_back(bench.record().tools[0].tip);
-    tip.push_back(bench.record().tools[1].tip);
-    // Introducer and wall hold the tools.
-    Vec3 sum = bench.introducer_force();
-    for (const Touch& touch : bench.touches()) {
-      sum += touch.normal_force * touch.normal + touch.friction;
-      EXPECT_LT(touch.penetration, 0.3);
-    }
-    EXPECT_LT(sum.norm(), 1e-4);
-  }
+  scene.moves = {push_of({70.0, 70.0}), push_of({0.0, -96.0}), push_of({35.0, 0.0}),
+                 push_of({0.0, 110.0}), push_of({0.0, 12.0})};
+  const TipsAfter tips(scene);
+  ASSERT_EQ(tips.wire.size(), 5u);
   // Over the wire it is nearly straight; its curve brings the tip down and to the wall.
-  EXPECT_GT(catheter[0].z() - catheter[1].z(), 2.0);
-  EXPECT_LT(catheter[1].y(), catheter[0].y() - 3.0);
-  EXPECT_GT(catheter[1].y(), -6.0);   // in the aorta
-  EXPECT_LT(catheter[2].y(), -10.0);  // in the branch
-  EXPECT_NEAR(tip[3].y(), catheter[3].y(), 8.0);
+  EXPECT_GT(tips.catheter[0].z() - tips.catheter[1].z(), 3.0);
+  EXPECT_LT(tips.catheter[1].y(), tips.catheter[0].y() - 4.0);
+  EXPECT_GT(tips.catheter[1].y(), -7.0);  // in the aorta
+  EXPECT_LT(tips.catheter[2].y(), -9.0);  // in the branch
+  EXPECT_NEAR(tips.wire[3].y(), tips.catheter[3].y(), 3.0);
   // The wire leaves it by 12 mm, and it holds.
-  EXPECT_LT(tip[4].y(), catheter[4].y() - 9.0);
-  EXPECT_LT((catheter[4] - catheter[2]).norm(), 1.5);
+  EXPECT_LT(tips.wire[4].y(), tips.catheter[4].y() - 9.0);
+  EXPECT_LT((tips.catheter[4] - tips.catheter[2]).norm(), 1.5);
+}
+
+TEST(ToolVessel, ToolsTooLongToLieFreeAreBroughtInTogether) {
+  const VesselModel vessel(aorta_with_a_branch(), {.grid_spacing = 0.8});
+  ToolScene scene = catheter_over_wire(cobra_tip(), vessel);
+  scene.point = Vec3(0.0, 0.0, 3.0);
+  scene.moves = {push_of({70.0, 70.0})};
+  ToolBench pushed(scene);
+  ASSERT_TRUE(pushed.settled() && pushed.move(scene.moves[0]));
+  scene.places = {{80.0, 0.0}, {100.0, 0.0}};
+  scene.moves.clear();
+  const ToolBench there(scene);
+  ASSERT_TRUE(there.settled());
+  EXPECT_EQ(there.record().work, 0.0);
+  EXPECT_EQ(there.record().heat, 0.0);
+  EXPECT_GT(there.record().tools[0].wall_force, 0.1);
+  for (const std::size_t i : {0, 1}) {
+    EXPECT_LT((there.record().tools[i].tip - pushed.record().tools[i].tip).norm(), 1.0);
+  }
+}
+
+TEST(ToolVessel, SimmonsIsFormedInTheArchAndPulledDownIntoABranch) {
+  const VesselModel vessel(arch_with_a_branch(), {.grid_spacing = 0.8});
+  ToolScene scene = catheter_over_wire(simmons_tip(), vessel);
+  scene.point = Vec3(32.0, 0.0, -145.0);
+  scene.element_length = 1.5;
+  // Over the wire into the arch, the wire back, down with it, the wire out.
+  scene.moves = {push_of({225.0, 225.0}), push_of({0.0, -200.0}), push_of({-115.0, 0.0}),
+                 push_of({-21.0, 0.0}),   push_of({0.0, 75.0}),   push_of({0.0, 10.0})};
+  const TipsAfter tips(scene);
+  ASSERT_EQ(tips.wire.size(), 6u);
+  EXPECT_LT(tips.catheter[0].x(), -20.0);  // beyond the arch's top
+  EXPECT_LT(tips.wire[1].z(), -80.0);
+  // The knee leads: the tip is nearer to the introducer than the 120 mm that the catheter is in;
+  // then it falls into the branch.
+  EXPECT_GT(tips.catheter[2].x(), 20.0);
+  EXPECT_LT(tips.catheter[2].z(), -145.0 + 120.0 - 10.0);
+  EXPECT_LT(tips.catheter[3].x(), 12.0);
+  EXPECT_LT(tips.catheter[3].z(), -60.0);
+  EXPECT_GT(tips.released, 2.0);
+  // The wire leaves it by 20 mm, and it holds.
+  EXPECT_LT(tips.wire[5].x(), tips.catheter[5].x() - 15.0);
+  EXPECT_LT((tips.catheter[5] - tips.catheter[3]).norm(), 4.0);
 }
 
 }  // namespace
