@@ -24,7 +24,9 @@ struct BenchTuning {
   double least_work = 1e-7;  // that counts so                                [N mm]
   double nudge = 1e-3;  // of the tip of each tool but the first curved one, in a guess       [rad]
   int most_solves = 4;  // of a part that runs out of iterations, from where it got
+  double snap = 1.0;    // off the way of before in a part: a jump, not to go on [mm]
   double least_start = 1.0;  // of tools that are brought in [mm]
+  int most_followed = 6;     // more solves of a jump in a vessel
   int load_steps = 10;       // where the full loads have no equilibrium at once
 };
 constexpr BenchTuning kBench;
@@ -87,6 +89,42 @@ void lean_aside(const Rod& rod, const Vec3& point, const std::optional<Vec3>& pl
         (rotation_by(most * std::sin(2.0 * kPi * so_far / total) * axis) * wire.edges.col(i))
             .eval();
   }
+}
+
+/// How a move is cut: the lengths of its parts, as parts of it, and its longest push.
+struct Parts {
+  double first, longest, shortest;  // to cut a part to
+  double farthest;                  //                                                   [mm]
+};
+
+Parts parts_of(const ToolScene& scene, const ToolMove& by) {
+  const bool in_vessel = scene.vessel != nullptr;
+  const double longest_push =
+      in_vessel ? std::min(kBench.longest_push, kBench.of_element * scene.element_length)
+                : kBench.longest_push;
+  double count = 1.0, farthest = 0.0;
+  for (std::size_t i = 0; i < by.push.size(); ++i) {
+    farthest = std::max(farthest, std::abs(by.push[i]));
+    count = std::max({count, std::ceil(std::abs(by.push[i]) / longest_push - 1e-9),
+                      std::ceil(std::abs(by.turn[i]) / kBench.largest_turn - 1e-9)});
+  }
+  double first = 1.0 / count;
+  if (in_vessel && scene.contact.friction > 0.0 && farthest > 0.0) {
+    first = std::min(first, kBench.first_push / farthest);
+  }
+  return {first, 1.0 / count, kBench.shortest / count, farthest};
+}
+
+/// On from where a solve got, taken for a jump: friction that is held to where the tools were may
+/// have no equilibrium there. So anchors follow, and friction opposes the rest. Adds its heat.
+template <class Solve>
+bool follow_jump(WallContact* contact, const Solve& solve, double& rubbed) {
+  for (int k = 0; k < kBench.most_followed && contact != nullptr; ++k) {
+    rubbed += contact->settle();
+    contact->predict(0.0);
+    if (solve()) return true;
+  }
+  return false;
 }
 
 }  // namespace
@@ -166,41 +204,39 @@ void ToolBench::bring_in() {
     all.turn.push_back(0.0);
   }
   settled_ = move(all);
-  const int iterations = record_.iterations;
-  record_ = {};
-  record_.iterations = iterations;
+  record_.work = record_.heat = record_.released = record_.unbalanced = 0.0;
 }
 
 bool ToolBench::move(const ToolMove& by) {
   expects(settled_ && by.push.size() == scene_.tools.size() && by.turn.size() == by.push.size());
   record_.iterations = 0;
-  const bool in_vessel = scene_.vessel != nullptr;
-  const double longest_push =
-      in_vessel ? std::min(kBench.longest_push, kBench.of_element * scene_.element_length)
-                : kBench.longest_push;
-  double parts = 1.0, farthest = 0.0;
-  for (std::size_t i = 0; i < by.push.size(); ++i) {
-    farthest = std::max(farthest, std::abs(by.push[i]));
-    parts = std::max({parts, std::ceil(std::abs(by.push[i]) / longest_push - 1e-9),
-                      std::ceil(std::abs(by.turn[i]) / kBench.largest_turn - 1e-9)});
-  }
-  const double longest = 1.0 / parts, shortest = kBench.shortest * longest;
+  record_.worst_energy_rise = 0.0;
+  const Parts parts = parts_of(scene_, by);
   const std::vector<ToolPlace> start = now_.places;
-  double done = 0.0, size = longest;
-  if (in_vessel && scene_.contact.friction > 0.0 && farthest > 0.0) {
-    size = std::min(longest, kBench.first_push / farthest);
-  }
+  double done = 0.0, size = parts.first;
+  Shape drift;  // of the last part
   double slope = slope_along(now_, by.push, 1.0);
   while (done < 1.0 - 1e-12) {
     const double part = 1.0 - done < 1.01 * size ? 1.0 - done : size;
-    const bool may_cut = part > 1.01 * shortest;
+    const bool may_cut = part > 1.01 * parts.shortest;
     State next;
     place(moved(start, by, done + part), next);
-    next.state = follow(now_, next);
+    const Shape followed = follow(next);
+    next.state = guess(followed, drift, part);
     const Eigen::VectorXd slid = slides(now_, next);
     carry_contact(now_, slid, next);
-    const Eigen::Matrix3Xd guess = next.state.x;
-    if (!solve(next)) {
+    const Eigen::Matrix3Xd guessed = next.state.x;
+    bool solved = solve(next);
+    if (!solved && drift.x.cols() > 0) {  // then from where it was
+      drift = {};
+      continue;
+    }
+    double rubbed = 0.0;
+    if (!solved && !may_cut && !through_wall_) {
+      solved = follow_jump(
+          next.contact.get(), [&] { return solve(next); }, rubbed);
+    }
+    if (!solved) {
       if (!may_cut) {
         report(by);
         return false;
@@ -209,7 +245,7 @@ bool ToolBench::move(const ToolMove& by) {
       continue;
     }
     double against_wall = 0.0;
-    const double rubbed = rub(slid, next, against_wall);
+    rubbed += rub(slid, next, against_wall);
     find_energy(next);
 
     // The work of the hands against what the energy gained.
@@ -225,16 +261,21 @@ bool ToolBench::move(const ToolMove& by) {
     const double excess = work - gained - rubbed;
     const double allowed =
         next.contact != nullptr ? kBench.unbalanced_in_vessel : kBench.unbalanced;
-    const bool jumped = std::abs(excess) > allowed * scale + kBench.least_work;
+    const double unknown = scene_.residual_tolerance * part * parts.farthest;
+    const bool jumped = std::abs(excess) > allowed * scale + kBench.least_work + unknown;
     if (jumped && may_cut) {
       size = 0.5 * part;
       continue;
     }
-    const double off = std::sqrt((next.state.x - guess).colwise().squaredNorm().maxCoeff());
+    const double off = std::sqrt((next.state.x - guessed).colwise().squaredNorm().maxCoeff());
     const bool ripples = next.contact != nullptr && off < kBench.jump;
     const double released = jumped && !ripples ? std::max(0.0, excess) : 0.0;
     now_ = std::move(next);
-    slope = slope_along(now_, by.push, 1.0);
+    drift = shape();
+    drift.x = (drift.x - followed.x) / part;
+    drift.angles = (drift.angles - followed.angles) / part;
+    if (part * std::sqrt(drift.x.colwise().squaredNorm().maxCoeff()) > kBench.snap) drift = {};
+    slope = is_smooth(now_, by.push) ? next_slope : slope_along(now_, by.push, 1.0);
     record_.released += released;
     record_.unbalanced += excess - released;
     record_.heat += rubbed;
@@ -248,7 +289,7 @@ bool ToolBench::move(const ToolMove& by) {
       record_.work += heat;
     }
     done += part;
-    size = std::min(longest, 2.0 * part);
+    size = std::min(parts.longest, 2.0 * part);
   }
   report(by);
   return true;
@@ -344,41 +385,60 @@ RodState ToolBench::unloaded(const State& at) const {
     state.x.col(i + 1) = state.x.col(i) + rod.rest_length[i] * t;
   }
   bend_to_support(at, state.x);
-  std::vector<Eigen::VectorXd> angles;
-  for (int k = 0; k < terms.twists(); ++k) {
-    angles.push_back(Eigen::VectorXd::Constant(rod.nodes() - 1, terms.roll[k]));
-  }
+  Eigen::MatrixXd angles(rod.nodes() - 1, terms.twists());
+  for (int k = 0; k < terms.twists(); ++k) angles.col(k).setConstant(terms.roll[k]);
   set_frames(angles, state);
   return state;
 }
 
-/// The centreline of before, as much longer or shorter as it now is, and the tools' angles on it.
-RodState ToolBench::follow(const State& from, const State& to) const {
-  const double h = from.composite.edge_length(), h_new = to.composite.edge_length();
-  const Eigen::Index edges = from.state.x.cols() - 1;
-  RodState state = from.state;
-  if (h != h_new) {
-    for (Eigen::Index e = 0; e < edges; ++e) {
-      const Vec3 t = between_middles((static_cast<double>(e) + 0.5) * h_new, h, edges,
-                                     [&](Eigen::Index k) { return edge_tangent(from.state, k); });
-      state.x.col(e + 1) = state.x.col(e) + h_new * t.normalized();
-    }
-    bend_to_support(to, state.x);
+ToolBench::Shape ToolBench::shape() const {
+  const std::vector<int>& twisted = now_.composite.terms.tool;
+  Shape shape{now_.state.x, Eigen::MatrixXd(now_.state.x.cols() - 1, twisted.size())};
+  for (std::size_t k = 0; k < twisted.size(); ++k) {
+    shape.angles.col(static_cast<Eigen::Index>(k)) = angles(twisted[k]);
   }
-  std::vector<Eigen::VectorXd> angles_now;
-  for (const int tool : from.composite.terms.tool) {
-    const Eigen::VectorXd old = angles(tool);
-    Eigen::VectorXd moved_angles(edges);
-    for (Eigen::Index e = 0; e < edges; ++e) {
-      moved_angles[e] = between_middles((static_cast<double>(e) + 0.5) * h_new, h, edges,
-                                        [&](Eigen::Index k) { return old[k]; });
+  return shape;
+}
+
+/// The centreline of now, as much longer or shorter as it is to be, and the tools' angles on it.
+ToolBench::Shape ToolBench::follow(const State& to) const {
+  const double h = now_.composite.edge_length(), h_new = to.composite.edge_length();
+  const Eigen::Index edges = now_.state.x.cols() - 1;
+  const Shape from = shape();
+  Shape next = from;
+  for (Eigen::Index e = 0; e < edges; ++e) {
+    const double middle = (static_cast<double>(e) + 0.5) * h_new;
+    if (h != h_new) {
+      const Vec3 t = between_middles(middle, h, edges,
+                                     [&](Eigen::Index k) { return edge_tangent(now_.state, k); });
+      next.x.col(e + 1) = next.x.col(e) + h_new * t.normalized();
+    }
+    for (Eigen::Index k = 0; k < from.angles.cols(); ++k) {
       // Tools that lie in one plane, curved to opposite sides, would stay so when that is a saddle.
-      moved_angles[e] += kBench.nudge * static_cast<double>(angles_now.size()) *
-                         static_cast<double>(e) / static_cast<double>(edges);
+      next.angles(e, k) =
+          between_middles(middle, h, edges, [&](Eigen::Index i) { return from.angles(i, k); }) +
+          kBench.nudge * static_cast<double>(k * e) / static_cast<double>(edges);
     }
-    angles_now.push_back(moved_angles);
   }
-  set_frames(angles_now, state);
+  if (h != h_new) bend_to_support(to, next.x);
+  return next;
+}
+
+/// The shape that was followed, and what the tools came off such shapes before, `drift` per part.
+RodState ToolBench::guess(const Shape& followed, const Shape& drift, double part) const {
+  RodState state;
+  state.x = followed.x;
+  Eigen::MatrixXd turned = followed.angles;
+  if (drift.x.cols() > 0) {
+    const Eigen::Matrix3Xd x = followed.x + part * drift.x;
+    for (Eigen::Index e = 0; e + 1 < x.cols(); ++e) {  // no edge gets longer by that
+      const Vec3 edge = x.col(e + 1) - x.col(e);
+      const double length = (followed.x.col(e + 1) - followed.x.col(e)).norm();
+      state.x.col(e + 1) = state.x.col(e) + (length / edge.norm()) * edge;
+    }
+    turned += part * drift.angles;
+  }
+  set_frames(turned, state);
   return state;
 }
 
@@ -401,7 +461,7 @@ void ToolBench::bend_to_support(const State& to, Eigen::Matrix3Xd& x) const {
 }
 
 /// Reference directors carried along from the introducer without twist, and the tools' angles.
-void ToolBench::set_frames(const std::vector<Eigen::VectorXd>& angles, RodState& state) const {
+void ToolBench::set_frames(const Eigen::MatrixXd& angles, RodState& state) const {
   const Eigen::Index edges = state.x.cols() - 1;
   state.director.resize(3, edges);
   state.reference_twist = Eigen::VectorXd::Zero(edges + 1);
@@ -413,10 +473,7 @@ void ToolBench::set_frames(const std::vector<Eigen::VectorXd>& angles, RodState&
     state.director.col(e) = d;
     t = next;
   }
-  state.theta.resize(edges * static_cast<Eigen::Index>(angles.size()));
-  for (std::size_t k = 0; k < angles.size(); ++k) {
-    state.theta.segment(static_cast<Eigen::Index>(k) * edges, edges) = angles[k];
-  }
+  state.theta = angles.reshaped();
 }
 
 Vec3 ToolBench::edge_tangent(const RodState& state, Eigen::Index e) {
@@ -448,6 +505,7 @@ bool ToolBench::solve(State& at) {
         problem_of(at), at.state,
         {.residual_tolerance = scene_.residual_tolerance, .max_iterations = scene_.max_iterations});
     record_.iterations += found.iterations;
+    record_.worst_energy_rise = std::max(record_.worst_energy_rise, found.worst_energy_rise);
     if (found.iterations < scene_.max_iterations) break;
   }
   record_.residual = found.residual;

@@ -80,6 +80,9 @@ struct ToolRecord {
   double unbalanced = 0.0;  //                                                        [N mm]
   double residual = 0.0;    //                                                             [N]
   int iterations = 0;       // of this move
+  /// Largest of the energy over the accepted steps of this move's solves, with the lag that they
+  /// were made with; 0 unless rounding [N mm].
+  double worst_energy_rise = 0.0;
 };
 
 class ToolBench {
@@ -131,15 +134,23 @@ class ToolBench {
     std::vector<double> force;   // ... without friction between tools, once felt
   };
 
+  /// The centreline, and the angles of the twisted tools, one column each.
+  struct Shape {
+    Eigen::Matrix3Xd x;
+    Eigen::MatrixXd angles;
+  };
+
   Problem problem_of(const State& at) const;
   void place(const std::vector<ToolPlace>& places, State& at) const;
   RodState unloaded(const State& at) const;
   bool lies_free(const State& at) const;
   void settle_at(const std::vector<ToolPlace>& places);
   void bring_in();
-  RodState follow(const State& from, const State& to) const;
+  Shape follow(const State& to) const;
+  Shape shape() const;
+  RodState guess(const Shape& followed, const Shape& drift, double part) const;
   void bend_to_support(const State& to, Eigen::Matrix3Xd& x) const;
-  void set_frames(const std::vector<Eigen::VectorXd>& angles, RodState& state) const;
+  void set_frames(const Eigen::MatrixXd& angles, RodState& state) const;
   Eigen::VectorXd slides(const State& from, const State& to) const;
   void carry_contact(const State& from, const Eigen::VectorXd& slides, State& to) const;
   static double outside_part(const State& at, std::size_t tool, const Touch& touch);
@@ -148,6 +159,7 @@ class ToolBench {
   void find_energy(State& at) const;
   void feel(State& at, const ToolMove& direction) const;
   double energy_at(const State& at, const std::vector<ToolPlace>& places) const;
+  bool is_smooth(const State& at, const std::vector<double>& push) const;
   double slope_along(const State& at, const std::vector<double>& push, double side) const;
   double side_of(const State& at, std::size_t tool, const ToolMove& direction) const;
   double leads(const State& at, std::size_t tool, double side) const;

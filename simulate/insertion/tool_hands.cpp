@@ -26,8 +26,22 @@ double ToolBench::energy_at(const State& at, const std::vector<ToolPlace>& place
   return Statics::evaluate(problem_of(other), at.state, unused).total();
 }
 
+/// Whether the energy has one slope along a push: no tip passes one that is level with it, and no
+/// tool is at an end.
+bool ToolBench::is_smooth(const State& at, const std::vector<double>& push) const {
+  for (std::size_t i = 0; i < push.size(); ++i) {
+    if (push[i] == 0.0) continue;
+    const double here = at.places[i].insertion, length = scene_.tools[i].wire.length();
+    if (here < 2.0 * kInsertionStep || here > length - 2.0 * kInsertionStep) return false;
+    for (std::size_t k = 0; k < push.size(); ++k) {
+      if (push[k] != push[i] && level(at.places[i], at.places[k])) return false;
+    }
+  }
+  return true;
+}
+
 /// What the energy gains, all nodes held, per part of a push of all tools: by differences in both
-/// directions, or in that of `side` where two tips meet or a tool ends.
+/// directions, or, where it is not smooth, in that of `side`.
 double ToolBench::slope_along(const State& at, const std::vector<double>& push, double side) const {
   double most = 0.0;
   for (const double one : push) most = std::max(most, std::abs(one));
@@ -38,16 +52,7 @@ double ToolBench::slope_along(const State& at, const std::vector<double>& push, 
     for (std::size_t i = 0; i < places.size(); ++i) places[i].insertion += by * push[i];
     return energy_at(at, places);
   };
-  bool both = true;
-  for (std::size_t i = 0; i < push.size(); ++i) {
-    if (push[i] == 0.0) continue;
-    const double here = at.places[i].insertion, length = scene_.tools[i].wire.length();
-    both = both && here > 2.0 * kInsertionStep && here < length - 2.0 * kInsertionStep;
-    for (std::size_t k = 0; k < push.size(); ++k) {
-      both = both && (push[k] == push[i] || !level(at.places[i], at.places[k]));
-    }
-  }
-  if (both) return (energy(h) - energy(-h)) / (2.0 * h);
+  if (is_smooth(at, push)) return (energy(h) - energy(-h)) / (2.0 * h);
   return side * (4.0 * energy(side * h) - energy(2.0 * side * h) - 3.0 * energy(0.0)) / (2.0 * h);
 }
 
