@@ -29,6 +29,10 @@ constexpr double kInto = 0.25;
 /// the smooth field is not quite 1.
 constexpr double kLipschitz = 1.2;
 
+/// How much further its place at rest may move than the point and the sections together: G^-1 of
+/// sections that slide past each other by 1 mm per mm has a norm of 1.6.
+constexpr double kSheared = 2.0;
+
 std::vector<ContactPoint> build_points(const Rod& rod, double most_apart) {
   std::vector<ContactPoint> points;
   const int edges = rod.nodes() - 1;
@@ -60,7 +64,12 @@ bool in_band(const ContactPoint& p, const ContactPoint& q) {
 double WireMotion::longest() const {
   double longest = 0.0;
   for (int i = first; i < last; ++i) longest = std::max(longest, of_node(i).squaredNorm());
-  return std::sqrt(longest);
+  if (!has_sections()) return std::sqrt(longest);
+  double furthest = 0.0;
+  for (Eigen::Index k = sections_from(); k < values.size(); k += 3) {
+    furthest = std::max(furthest, values.segment<3>(k).squaredNorm());
+  }
+  return std::sqrt(longest) + std::sqrt(furthest);
 }
 
 void WireMotion::scatter(const ContactPoint& point, const Vec3& force,
@@ -73,9 +82,10 @@ void WireMotion::scatter(const ContactPoint& point, const Vec3& force,
   add_to(point.edge + 1, point.part);
 }
 
-ContactPoints::ContactPoints(const Rod& rod, const Lumen& lumen, double spacing, double reach)
-    : lumen_(lumen), reach_(reach) {
-  expects(spacing > 0.0 && lumen.band() > reach);
+ContactPoints::ContactPoints(const Rod& rod, const VesselModel& vessel, double spacing,
+                             double reach)
+    : lumen_(vessel.lumen), chain_(vessel.sections.get()), reach_(reach) {
+  expects(spacing > 0.0 && lumen_.band() > reach);
   points_ = build_points(rod, spacing);
   if (rod.thinner.size() > 0) {
     thinner_.resize(size());
@@ -87,6 +97,50 @@ ContactPoints::ContactPoints(const Rod& rod, const Lumen& lumen, double spacing,
   known_distance_.setZero(size());
   known_.resize(points_.size());
   touched_.assign(points_.size(), 0);
+  if (chain_ == nullptr) return;
+  u_.setZero(3, chain_->nodes());
+  frames_.resize(points_.size());
+  framed_in_.assign(points_.size(), -1);
+}
+
+/// In the present state, found when first asked for.
+const MovingFrame& ContactPoints::frame(int k) const {
+  const auto at = static_cast<std::size_t>(k);
+  if (framed_in_[at] != state_) {
+    framed_in_[at] = state_;
+    frames_[at].find(*chain_, u_, place(k));
+  }
+  return frames_[at];
+}
+
+Vec3 ContactPoints::position_in(int k, const Eigen::Matrix3Xd& x,
+                                const Eigen::Matrix3Xd& sections) const {
+  const Vec3 p = (*this)[k].at(x);
+  if (chain_ == nullptr) return p;
+  MovingFrame frame;
+  frame.find(*chain_, sections, p);
+  return frame.rest;
+}
+
+Vec3 ContactPoints::motion_of(int k, const WireMotion& motion) const {
+  const Vec3 moved = motion.of((*this)[k]);
+  if (chain_ == nullptr) return moved;
+  const MovingFrame& here = frame(k);
+  Vec3 apart = moved;
+  for (const SectionChain::Weight& weight : here.weights) {
+    apart -= weight.value * motion.of_section(weight.node);
+  }
+  return here.inverse * apart;
+}
+
+void ContactPoints::scatter(int k, const WireMotion& motion, const Vec3& force,
+                            Eigen::VectorXd& target) const {
+  const Vec3 on_point = on_wire(k, force);
+  motion.scatter((*this)[k], on_point, target);
+  if (chain_ == nullptr) return;
+  for (const SectionChain::Weight& weight : frame(k).weights) {
+    target.segment<3>(motion.sections_from() + 3 * weight.node) -= weight.value * on_point;
+  }
 }
 
 void ContactPoints::free_from(double tip_distance) {
@@ -116,11 +170,18 @@ void ContactPoints::carry_back(const Eigen::VectorXd& from, double distance, Eig
   }
 }
 
-void ContactPoints::find_active(const Eigen::Matrix3Xd& x, const Eigen::VectorXd& expected,
-                                ContactSample& sample) {
+void ContactPoints::find_active(const Eigen::Matrix3Xd& x, const Eigen::Matrix3Xd& sections,
+                                const Eigen::VectorXd& expected, ContactSample& sample) {
   const Eigen::Index moving = x.cols() - (*this)[first_free_].edge;
-  travelled_ += std::sqrt((x - x_).rightCols(moving).colwise().squaredNorm().maxCoeff());
+  double travelled = std::sqrt((x - x_).rightCols(moving).colwise().squaredNorm().maxCoeff());
   x_ = x;
+  if (chain_ != nullptr) {
+    travelled += std::sqrt((sections - u_).colwise().squaredNorm().maxCoeff());
+    travelled *= kSheared;
+    u_ = sections;
+    ++state_;
+  }
+  travelled_ += travelled;
   sample.lost = false;
   sample.active.clear();
   // One that was far enough for its motion since is not looked at.
@@ -176,12 +237,12 @@ WallSample ContactPoints::look_at(int k, const Vec3& position, double near) {
 }
 
 double ContactPoints::largest_safe_part(const WireMotion& motion, int looks) const {
-  const double longest = motion.longest();
+  const double longest = (chain_ != nullptr ? kSheared : 1.0) * motion.longest();
   double cap = std::numeric_limits<double>::infinity();
   if (longest <= kInto) return cap;
   for (int k = first_free_; k < size(); ++k) {
     if (asleep_until_[k] >= travelled_ && longest <= kInto + reach_) continue;
-    const Vec3 move = motion.of((*this)[k]), from = position(k);
+    const Vec3 move = motion_of(k, motion), from = position(k);
     const double distance = least_distance(k, from);
     const double room = kInto + std::max(0.0, distance), length = move.norm();
     if (length > room && room < cap * length) {

@@ -7,7 +7,9 @@
 #include <vector>
 
 #include "simulate/contact/contact_sample.h"
+#include "simulate/contact/moving_frame.h"
 #include "simulate/wall/lumen.h"
+#include "simulate/wall/vessel_model.h"
 #include "simulate/wire/rod.h"
 
 namespace wireplan::simulate {
@@ -34,7 +36,8 @@ inline double at_point(const Eigen::VectorXd& nodes, const ContactPoint& point) 
 }
 
 /// A motion of the wire, node by node with `stride` numbers each, of which the first three are the
-/// node's; nodes from `first` to before `last`, the others are at rest.
+/// node's; nodes from `first` to before `last`, the others are at rest. Where cross-sections move,
+/// theirs follow, three numbers each.
 struct WireMotion {
   int first, last, stride;
   const Eigen::VectorXd& values;
@@ -47,7 +50,10 @@ struct WireMotion {
     if (point.part == 0.0) return of_node(point.edge);
     return (1.0 - point.part) * of_node(point.edge) + point.part * of_node(point.edge + 1);
   }
-  double longest() const;  // of a node                                                    [mm]
+  bool has_sections() const { return values.size() > sections_from(); }
+  Eigen::Index sections_from() const { return stride * (last - first); }
+  Vec3 of_section(int j) const { return values.segment<3>(sections_from() + 3 * j); }
+  double longest() const;  // of a node, and a section's with it                           [mm]
   /// Adds a force at a point to its nodes, in the same layout.
   void scatter(const ContactPoint& point, const Vec3& force, Eigen::VectorXd& target) const;
 };
@@ -55,11 +61,15 @@ struct WireMotion {
 /// Points lie on the nodes and evenly between them, so that long elements feel a short ridge. They
 /// follow the wire from state to state: one that is far from the wall sleeps until it may have come
 /// near, and one that hardly moved knows the wall where it is.
+///
+/// Where the vessel's cross-sections move, a point's `position` is its place in the vessel at rest
+/// (moving_frame.h), of which all else is a function; what is added to a sink or a vector goes to
+/// the sections too.
 class ContactPoints {
  public:
   /// At most `spacing` apart, half of it near the tip; contact reaches to `reach` from the wire's
-  /// axis [mm]. Keeps a reference to the lumen.
-  ContactPoints(const Rod& rod, const Lumen& lumen, double spacing, double reach);
+  /// axis [mm]. Keeps a reference to the vessel.
+  ContactPoints(const Rod& rod, const VesselModel& vessel, double spacing, double reach);
 
   int size() const { return static_cast<int>(points_.size()); }
   const ContactPoint& operator[](int k) const { return points_[static_cast<std::size_t>(k)]; }
@@ -75,12 +85,38 @@ class ContactPoints {
 
   /// Finds the points near the wall in the state x, and whether one is lost. Where a point is
   /// `expected` to have a force, it stays in sight further off. Forces are left to be found.
-  void find_active(const Eigen::Matrix3Xd& x, const Eigen::VectorXd& expected,
-                   ContactSample& sample);
+  void find_active(const Eigen::Matrix3Xd& x, const Eigen::Matrix3Xd& sections,
+                   const Eigen::VectorXd& expected, ContactSample& sample);
 
   /// The state in which they were looked for last.
   const Eigen::Matrix3Xd& nodes() const { return x_; }
-  Vec3 position(int k) const { return (*this)[k].at(x_); }
+  const Eigen::Matrix3Xd& sections() const { return u_; }
+  Vec3 position(int k) const { return chain_ == nullptr ? (*this)[k].at(x_) : frame(k).rest; }
+  /// The same in another state.
+  Vec3 position_in(int k, const Eigen::Matrix3Xd& x, const Eigen::Matrix3Xd& sections) const;
+  /// On the wire.
+  Vec3 place(int k) const { return (*this)[k].at(x_); }
+  /// A force over a point's position, on the wire.
+  Vec3 on_wire(int k, const Vec3& force) const {
+    return chain_ == nullptr ? force : Vec3(frame(k).inverse.transpose() * force);
+  }
+  const SectionChain* chain() const { return chain_; }
+  /// Of a point's position, in a motion of wire and sections.
+  Vec3 motion_of(int k, const WireMotion& motion) const;
+  /// Adds a force over a point's position to its nodes and sections, in the motion's layout.
+  void scatter(int k, const WireMotion& motion, const Vec3& force, Eigen::VectorXd& target) const;
+
+  // ---- into a sink of elements.h; all of the state in which they were looked for last
+
+  /// Adds the gradient over a point's position.
+  template <class Sink>
+  void add_gradient(Sink& sink, int k, const Vec3& g) const;
+  /// And the Hessian, of entries entry(r, c), for a function whose gradient is `g`.
+  template <class Sink, class Entry>
+  void add_hessian(Sink& sink, int k, const Vec3& g, const Entry& entry) const;
+  /// And the block between two points, n over k by m over j.
+  template <class Sink>
+  void add_hessian_between(Sink& sink, int k, const Vec3& n, int j, const Vec3& m) const;
   /// By how much the wire is thinner there than its radius: distances from the wall, as samples
   /// have them, are by so much larger [mm].
   double thinner(int k) const { return thinner_.size() > 0 ? thinner_[k] : 0.0; }
@@ -89,12 +125,14 @@ class ContactPoints {
   double largest_safe_part(const WireMotion& motion, int looks) const;
 
  private:
+  const MovingFrame& frame(int k) const;
   WallSample look_at(int k, const Vec3& position, double near);
   double least_distance(int k, const Vec3& position) const;
   double way_inside(int k, const Vec3& from, const Vec3& toward, double length, double distance,
                     int looks) const;
 
   const Lumen& lumen_;
+  const SectionChain* const chain_;
   double reach_;
   std::vector<ContactPoint> points_;  // proximal to distal
   Eigen::VectorXd thinner_;           // per point, see Rod; distances from the wall have it in them
@@ -103,6 +141,7 @@ class ContactPoints {
   // How far any node went at most, from state to state. Until that comes to a point's
   // `asleep_until_`, the point is too far from the wall to matter.
   Eigen::Matrix3Xd x_;            // (3, n)                                                 [mm]
+  Eigen::Matrix3Xd u_;            // of the sections                                        [mm]
   double travelled_ = 0.0;        // [mm]
   Eigen::VectorXd asleep_until_;  // [mm]
 
@@ -111,6 +150,13 @@ class ContactPoints {
   Eigen::VectorXd known_distance_;   // [mm]
   std::vector<WallSample> known_;    // there, of the points that touched
   std::vector<char> touched_;        // when the wall was last looked at
+
+  // Where cross-sections move: per point, and of which state; found when asked for.
+  mutable std::vector<MovingFrame> frames_;
+  mutable std::vector<long long> framed_in_;
+  long long state_ = 0;
+  mutable std::vector<Vec3> turned_slopes_;  // scratch, as is
+  mutable std::vector<SectionChain::Weight> bent_weights_;
 };
 
 // ---------------------------------------------------------------- into a sink of elements.h
@@ -122,40 +168,81 @@ void for_each_node(const ContactPoint& point, const Visit& visit) {
   if (point.part > 0.0) visit(point.edge + 1, point.part);
 }
 
-/// Adds the gradient over a point's position.
 template <class Sink>
-void add_gradient(Sink& sink, const ContactPoint& point, const Vec3& g) {
-  for_each_node(point, [&](int i, double w) { sink.gradient(i, w * g); });
+void ContactPoints::add_gradient(Sink& sink, int k, const Vec3& g) const {
+  const Vec3 on_point = on_wire(k, g);
+  for_each_node((*this)[k], [&](int i, double w) { sink.gradient(i, w * on_point); });
+  if (chain_ == nullptr) return;
+  for (const SectionChain::Weight& weight : frame(k).weights) {
+    sink.section_gradient(weight.node, -weight.value * on_point);
+  }
 }
 
-/// And the Hessian, of entries entry(r, c): as Eigen's outer products they are function calls.
+// Entry by entry: as Eigen's outer products they are function calls.
 template <class Sink, class Entry>
-void add_hessian(Sink& sink, const ContactPoint& point, const Entry& entry) {
+void ContactPoints::add_hessian(Sink& sink, int k, const Vec3& g, const Entry& entry) const {
   Mat3 H;
   for (int c = 0; c < 3; ++c) {
     for (int r = 0; r < 3; ++r) H(r, c) = entry(r, c);
   }
-  for_each_node(point, [&](int i, double w_i) {
-    for_each_node(point, [&](int j, double w_j) {
-      if (j <= i) sink.hessian_scaled(i, j, w_i * w_j, H);
+  const ContactPoint& point = (*this)[k];
+  const auto add_to_wire = [&] {
+    for_each_node(point, [&](int i, double w_i) {
+      for_each_node(point, [&](int j, double w_j) {
+        if (j <= i) sink.hessian_scaled(i, j, w_i * w_j, H);
+      });
     });
-  });
+  };
+  if (chain_ == nullptr) return add_to_wire();
+  const MovingFrame& moved = frame(k);
+  const Vec3 on_point = moved.inverse.transpose() * g;
+  Mat3 B;
+  moved.find_bend(*chain_, u_, on_point, B, turned_slopes_, bent_weights_);
+  H = (moved.inverse.transpose() * (H - B) * moved.inverse).eval();
+  add_to_wire();
+  const std::vector<SectionChain::Weight>& weights = moved.weights;
+  for (std::size_t a = 0; a < weights.size(); ++a) {
+    const double N_a = weights[a].value;
+    const Mat3 turn_a = turned_slopes_[a] * on_point.transpose();
+    const Mat3 cross = -(N_a * H + turn_a);
+    for_each_node(point,
+                  [&](int i, double w) { sink.section_cross(i, weights[a].node, w, cross); });
+    for (std::size_t b = 0; b <= a; ++b) {
+      const double N_b = weights[b].value;
+      const Mat3 turn_b = turned_slopes_[b] * on_point.transpose();
+      sink.section_hessian(weights[a].node, weights[b].node,
+                           N_a * N_b * H + N_b * turn_a.transpose() + N_a * turn_b);
+    }
+  }
 }
 
-/// And the block between two points, n over p by m over q.
 template <class Sink>
-void add_hessian_between(Sink& sink, const ContactPoint& p, const Vec3& n, const ContactPoint& q,
-                         const Vec3& m) {
+void ContactPoints::add_hessian_between(Sink& sink, int k, const Vec3& n_rest, int j,
+                                        const Vec3& m_rest) const {
+  const ContactPoint &p = (*this)[k], &q = (*this)[j];
+  const Vec3 n = on_wire(k, n_rest), m = on_wire(j, m_rest);
   const Mat3 H = n * m.transpose(), H_transposed = m * n.transpose();
   for_each_node(p, [&](int i, double w_i) {
-    for_each_node(q, [&](int j, double w_j) {
-      if (i == j) {
-        sink.hessian_scaled(i, j, w_i * w_j, H + H_transposed);
+    for_each_node(q, [&](int l, double w_l) {
+      if (i == l) {
+        sink.hessian_scaled(i, l, w_i * w_l, H + H_transposed);
       } else {
-        sink.hessian_scaled(std::max(i, j), std::min(i, j), w_i * w_j, i > j ? H : H_transposed);
+        sink.hessian_scaled(std::max(i, l), std::min(i, l), w_i * w_l, i > l ? H : H_transposed);
       }
     });
   });
+  if (chain_ == nullptr) return;
+  const MovingFrame &at_p = frame(k), &at_q = frame(j);
+  for (const SectionChain::Weight& b : at_q.weights) {
+    for_each_node(p, [&](int i, double w) { sink.section_cross(i, b.node, -w * b.value, H); });
+    for (const SectionChain::Weight& a : at_p.weights) {
+      sink.section_pair(a.node, b.node, a.value * b.value, H);
+    }
+  }
+  for (const SectionChain::Weight& a : at_p.weights) {
+    for_each_node(
+        q, [&](int l, double w) { sink.section_cross(l, a.node, -w * a.value, H_transposed); });
+  }
 }
 
 }  // namespace wireplan::simulate

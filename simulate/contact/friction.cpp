@@ -22,7 +22,7 @@ Rub rub(double u, double slip) {
 /// Where friction holds a point, or where it was in the last equilibrium.
 Vec3 anchor_of(int k, const ContactPoints& points, const ContactMemory& memory) {
   if (memory.normal_force[k] > 0.0) return memory.anchor.col(k);
-  return points[k].at(memory.x);
+  return points.position_in(k, memory.x, memory.sections);
 }
 
 }  // namespace
@@ -149,6 +149,7 @@ double Friction::settle(const ContactPoints& points, ContactMemory& memory) cons
   memory.normal_force.setZero();
   for (const int k : lag_.points) memory.normal_force[k] = lag_.force[k];
   memory.x = points.nodes();
+  memory.sections = points.sections();
   return work;
 }
 

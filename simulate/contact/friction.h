@@ -104,11 +104,12 @@ void Friction::add(const ContactPoints& points, Sink& sink) const {
   for (const int k : lag_.points) {
     const Rubbing& r = rubbing(k);
     const Vec3& t = r.toward;  // 0 at the anchor, where friction is as stiff to all sides
-    add_gradient(sink, points[k], (r.limit * r.slope) * t);
+    const Vec3 force = (r.limit * r.slope) * t;
+    points.add_gradient(sink, k, force);
     if constexpr (Sink::kHessian) {
       const Vec3 normal = lag_.normal.col(k);
       const double across = r.length > 0.0 ? r.slope / r.length : r.curvature;
-      add_hessian(sink, points[k], [&](int row, int column) {
+      points.add_hessian(sink, k, force, [&](int row, int column) {
         const double along = t[row] * t[column], off = normal[row] * normal[column],
                      own = row == column ? 1.0 : 0.0;
         return r.limit * (r.curvature * along + across * (own - along - off));

@@ -159,7 +159,7 @@ void NormalForces::find_fall(const ContactPoints& points, const ContactSample& s
   motion_.resize(3, m);
   for (Eigen::Index k = 0; k < m; ++k) {
     const ActivePoint& active = sample.active[static_cast<std::size_t>(k)];
-    motion_.col(k) = motion.of(points[active.point]);
+    motion_.col(k) = points.motion_of(active.point, motion);
     approach_[k] = active.wall.gradient.dot(motion_.col(k));
   }
   fall_ = approach_;

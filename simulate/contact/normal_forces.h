@@ -105,13 +105,13 @@ void NormalForces::add(const ContactPoints& points, const ContactSample& sample,
     const ActivePoint& active = sample.active[static_cast<std::size_t>(k)];
     const ContactPoint& point = points[active.point];
     const Vec3& n = active.wall.gradient;
-    add_gradient(sink, point, -active.force * n);
+    points.add_gradient(sink, active.point, -active.force * n);
     if constexpr (Sink::kHessian) {
       const double stiffness =
           yielding_ ? coupling_.stiffness(k, k) + folded_[k] : law_stiffness_[k];
       const double expected = expected_[active.point];
       const double force = expected >= 0.0 ? expected : active.force;
-      add_hessian(sink, point, [&](int r, int c) {
+      points.add_hessian(sink, active.point, -force * n, [&](int r, int c) {
         return stiffness * n[r] * n[c] - force * active.wall.hessian(r, c);
       });
       for (int j = yielding_ ? coupling_.first_coupled(k) : k; j < k; ++j) {
@@ -119,7 +119,7 @@ void NormalForces::add(const ContactPoints& points, const ContactSample& sample,
         const ContactPoint& other_point = points[other.point];
         if (!in_band(point, other_point)) continue;
         const Vec3 m = coupling_.stiffness(k, j) * other.wall.gradient;
-        add_hessian_between(sink, point, n, other_point, m);
+        points.add_hessian_between(sink, active.point, n, other.point, m);
       }
     }
   }

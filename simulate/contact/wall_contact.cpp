@@ -21,11 +21,12 @@ WallContact::WallContact(const Rod& rod, const VesselModel& vessel, const Contac
     : lumen_(vessel.lumen),
       radius_(rod.radius),
       felt_from_(rod.radius + options.law.reach()),
-      points_(rod, vessel.lumen, options.spacing, reach(rod, vessel, options.law)),
+      points_(rod, vessel, options.spacing, reach(rod, vessel, options.law)),
       forces_(options.law, vessel, rod.radius, points_.size()),
       friction_(options.friction, options.slip, points_.size()) {
   const int m = points_.size();
   memory_.x.setZero(3, rod.nodes());
+  if (chain() != nullptr) memory_.sections.setZero(3, chain()->nodes());
   memory_.anchor.setZero(3, m);
   memory_.normal_force.setZero(m);
   if (forces_.yielding()) memory_.triangle.assign(static_cast<std::size_t>(m), -1);
@@ -41,8 +42,9 @@ WallContact::WallContact(const Rod& rod, const VesselModel& vessel, const Contac
 
 // ---------------------------------------------------------------- the trial's part
 
-void WallContact::start_at(const Eigen::Matrix3Xd& x) {
-  memory_.x = x;
+void WallContact::start_at(const RodState& state) {
+  memory_.x = state.x;
+  memory_.sections = state.sections;
   memory_.normal_force.setZero();
   friction_.predict_nothing();
   forces_.expect_nothing();
@@ -65,36 +67,49 @@ const std::vector<Touch>& WallContact::touches() {
     if (active.force <= 0.0) continue;
     const ContactPoint& point = points_[active.point];
     const double slope = active.wall.gradient.norm();
-    touches_.push_back({.point = active.point,
-                        .edge = point.edge,
-                        .part = point.part,
-                        .position = active.position,
-                        .normal = active.wall.gradient / slope,
-                        .normal_force = active.force * slope,
-                        .friction = friction_.acts() ? friction_.force(active.point) : Vec3::Zero(),
-                        .penetration = std::max(0.0, radius_ - active.wall.distance - active.yield),
-                        .wall_displacement = active.yield,
-                        .tip_distance = point.tip_distance,
-                        .share = point.share,
-                        .thinner = points_.thinner(active.point)});
+    const Vec3 normal = points_.on_wire(active.point, active.wall.gradient);
+    const double length = normal.norm();
+    touches_.push_back(
+        {.point = active.point,
+         .edge = point.edge,
+         .part = point.part,
+         .position = points_.place(active.point),
+         .rest = active.position,
+         .rest_normal = active.wall.gradient / slope,
+         .normal = normal / length,
+         .normal_force = active.force * length,
+         .friction = friction_.acts() ? points_.on_wire(active.point, friction_.force(active.point))
+                                      : Vec3::Zero(),
+         .penetration = std::max(0.0, radius_ - active.wall.distance - active.yield),
+         .wall_displacement = active.yield,
+         .tip_distance = point.tip_distance,
+         .share = point.share,
+         .thinner = points_.thinner(active.point)});
   }
   return touches_;
 }
 
 // ---------------------------------------------------------------- samples
 
-const ContactSample& WallContact::begin(const Eigen::Matrix3Xd& x) {
+const ContactSample& WallContact::begin(const RodState& state) {
   forces_.begin();
-  points_.find_active(x, forces_.expected(), latest_);
-  latest_.own_lag = false;
+  find(state);
   friction_.begin(points_, latest_, lumen_, felt_from_);
   forces_.find(points_, memory_.triangle, latest_);
   return rub();
 }
 
-const ContactSample& WallContact::sample(const Eigen::Matrix3Xd& x) {
-  points_.find_active(x, forces_.expected(), latest_);
+/// Which points touch, and what holds the sections.
+void WallContact::find(const RodState& state) {
+  points_.find_active(state.x, state.sections, forces_.expected(), latest_);
   latest_.own_lag = false;
+  if (chain() == nullptr) return;
+  support_.setZero(3, chain()->nodes());
+  support_energy_ = chain()->energy(state.sections, support_);
+}
+
+const ContactSample& WallContact::sample(const RodState& state) {
+  find(state);
   forces_.find(points_, memory_.triangle, latest_);
   return rub();
 }
@@ -112,6 +127,7 @@ const ContactSample& WallContact::refresh(bool fully) {
 const ContactSample& WallContact::rub() {
   friction_.find_rubbing(points_, memory_);
   latest_.energy.friction = friction_.energy();
+  latest_.energy.support = support_energy_;
   return latest_;
 }
 
@@ -139,7 +155,7 @@ void WallContact::add_remainder(const Motion& motion, Eigen::VectorXd& product) 
           (friction_.per_normal_force(active.point) * change[k] * active.wall.gradient.norm()) *
           friction_.rubbing(active.point).toward;
     }
-    motion.scatter(points_[active.point], out_of_balance, product);
+    points_.scatter(active.point, motion, out_of_balance, product);
   }
 }
 

@@ -46,8 +46,10 @@ class WallContact {
   /// Only points nearer to the tip than this touch; those behind it are still in the introducer
   /// [mm]. At the start: all.
   void free_from(double tip_distance) { points_.free_from(tip_distance); }
+  /// The vessel's sections, null where they do not move.
+  const SectionChain* chain() const { return points_.chain(); }
   /// Takes the state as one in which nothing has slipped yet.
-  void start_at(const Eigen::Matrix3Xd& x);
+  void start_at(const RodState& state);
   /// Before a push by `distance`: each point will feel what the wire ahead of it felt.
   void predict(double distance);
   /// After an equilibrium: where friction was overcome, points have slipped. Returns the work that
@@ -69,10 +71,10 @@ class WallContact {
   const ContactSample& latest() const { return latest_; }
   ContactEnergy energy() const { return latest_.energy; }
 
-  /// First sampling of a solve: finds which points touch at x, with the lag of the prediction.
-  const ContactSample& begin(const Eigen::Matrix3Xd& x);
-  /// Finds which points touch at x and their forces, with the lag as it is.
-  const ContactSample& sample(const Eigen::Matrix3Xd& x);
+  /// First sampling of a solve: finds which points touch in it, with the lag of the prediction.
+  const ContactSample& begin(const RodState& state);
+  /// Finds which points touch in the state and their forces, with the lag as it is.
+  const ContactSample& sample(const RodState& state);
   /// Takes the lag from the latest sample; `fully`: and nothing of the one before. Finds the sample
   /// with that lag.
   const ContactSample& refresh(bool fully);
@@ -109,6 +111,7 @@ class WallContact {
   void add(Sink& sink) {
     forces_.add(points_, latest_, sink);
     friction_.add(points_, sink);
+    if (points_.chain() != nullptr) add_support(sink);
   }
   /// Adds to `product` what the Hessian of add() leaves out, times the motion: far pairs,
   /// friction's dependence on normal forces, and how the wall yields less or more where the wire
@@ -129,7 +132,19 @@ class WallContact {
   }
 
  private:
+  template <class Sink>
+  void add_support(Sink& sink) const {
+    for (Eigen::Index j = 0; j < support_.cols(); ++j) {
+      sink.section_gradient(static_cast<int>(j), support_.col(j));
+    }
+    if constexpr (Sink::kHessian) {
+      for (const SectionChain::Block& block : points_.chain()->stiffness()) {
+        sink.section_hessian(block.i, block.j, block.value);
+      }
+    }
+  }
   bool has_lag() const { return forces_.yielding() || friction_.acts(); }
+  void find(const RodState& state);
   const ContactSample& rub();
 
   const Lumen& lumen_;
@@ -140,8 +155,10 @@ class WallContact {
   Friction friction_;
   ContactMemory memory_;
   ContactSample latest_;
-  std::vector<Touch> touches_;  // scratch, as is
-  Eigen::VectorXd predicted_;   // per point                                                [N]
+  Eigen::Matrix3Xd support_;     // derivatives of the energy of the sections' support        [N]
+  double support_energy_ = 0.0;  //                                                       [N mm]
+  std::vector<Touch> touches_;   // scratch, as is
+  Eigen::VectorXd predicted_;    // per point                                                [N]
 };
 
 }  // namespace wireplan::simulate

@@ -88,6 +88,15 @@ void hold(const Mat3& P, bool hold_theta, int k, BlockBand<D>& H) {
   if (k + 2 < H.size()) H.two(k + 2) = (H.two(k + 2) * Q).eval();
 }
 
+/// The same out of what couples nodes with sections.
+inline void hold_sections(const Problem& problem, SectionBlocks& blocks) {
+  const int n = problem.rod->nodes();
+  if (problem.first == 0) blocks.project(0, free_directions(problem.proximal));
+  if (problem.last == n) {
+    blocks.project(n - 1 - problem.first, free_directions(problem.distal));
+  }
+}
+
 /// Takes what the supports hold out of a vector of the free nodes.
 template <int D>
 void project(const Problem& problem, Eigen::VectorXd& v) {

@@ -45,10 +45,12 @@ class Newton {
         out_of_introducer_(problem.first > 0 && problem.last == problem.rod->nodes()),
         polynomial_(problem.contact == nullptr && D == 3 && !problem.tip_moment && !problem.plane &&
                     problem.springs == nullptr),
-        banded_(D == 3 && out_of_introducer_ && !problem.distal.hold_along &&
+        sections_(contact_ != nullptr && contact_->chain() != nullptr ? contact_->chain()->nodes()
+                                                                      : 0),
+        banded_(D == 3 && sections_ == 0 && out_of_introducer_ && !problem.distal.hold_along &&
                 !problem.distal.hold_across && contact_ != nullptr &&
                 contact_->remainder_is_banded()),
-        chain_(D == 4 && problem.tools == nullptr && out_of_introducer_
+        chain_(D == 4 && problem.tools == nullptr && out_of_introducer_ && sections_ == 0
                    ? find_chain(rod_, problem.first)
                    : TwistChain{}),
         extent_(state.x.cwiseAbs().maxCoeff()),
@@ -87,12 +89,13 @@ class Newton {
   // ---- the iterate
 
   void start() {
-    gradient_.resize(D * count_);
-    step_.resize(D * count_);
+    expects(state_.sections.cols() == sections_);
+    gradient_.resize(D * count_ + 3 * sections_);
+    step_.resize(D * count_ + 3 * sections_);
     gather_chain(chain_, state_);
     result_.rounding_floor = find_rounding_floor(problem_, extent_);
     trial_ = state_;
-    if (contact_ != nullptr) contact_->begin(state_.x);
+    if (contact_ != nullptr) contact_->begin(state_);
     wire_energy_ = differentiate(state_);
   }
 
@@ -116,6 +119,7 @@ class Newton {
     result_.energy = wire_energy_;
     if (contact_ != nullptr) {
       result_.wall_energy = contact_->energy().wall;
+      result_.wall_energy += contact_->energy().support;
       result_.energy += contact_->energy().contact + result_.wall_energy;
     }
     return result_;
@@ -127,6 +131,10 @@ class Newton {
     double residual = 0.0;
     for (int k = 0; k < count_; ++k) {
       residual = std::max(residual, gradient_.template segment<3>(D * k).squaredNorm());
+    }
+    for (int j = 0; j < sections_; ++j) {
+      residual =
+          std::max(residual, gradient_.template segment<3>(D * count_ + 3 * j).squaredNorm());
     }
     residual = std::sqrt(residual);
     if constexpr (D > 3) {  // a torque out of balance counts as a force at the wire's radius
@@ -174,10 +182,12 @@ class Newton {
     } else {
       hessian_.reset(count_, chain_.edges());
     }
-    BandSink<D> both{gradient, hessian_};
+    if (sections_ > 0) memory_.sections.reset(count_, sections_);
+    BandSink<D> both{gradient, hessian_, memory_.sections};
     const double sum = add_wire(where, both);
     add_contact(both);
     apply_supports<D>(problem_, hessian_);
+    if (sections_ > 0) hold_sections(problem_, memory_.sections);
     return sum;
   }
 
@@ -218,7 +228,7 @@ class Newton {
     if (unsymmetric_) {
       memory_.unsymmetric.solve(step_);
     } else {
-      memory_.coupled.solve(factored_, step_);
+      solve_again(step_);
     }
     refine_and_bound();
     return slope_ < 0.0 && cap_ >= 1.0;
@@ -239,8 +249,22 @@ class Newton {
       }
     }
     step_ = -gradient_;
+    if (sections_ > 0) {
+      if (!memory_.moving.factor(hessian_, memory_.sections, shift_)) return false;
+      memory_.moving.solve(step_);
+      return true;
+    }
     return factored_.factor(hessian_, shift_) &&
            memory_.coupled.solve_first(chain_, factored_, chain_.last - problem_.first, step_);
+  }
+
+  /// With the factors of the symmetric matrix.
+  void solve_again(Eigen::VectorXd& v) {
+    if (sections_ > 0) {
+      memory_.moving.solve(v);
+    } else {
+      memory_.coupled.solve(factored_, v);
+    }
   }
 
   /// The slope of the energy along the step, and the largest part of the step that is safe.
@@ -291,7 +315,15 @@ class Newton {
 
   double go(double part) {
     turn_edges<D>(problem_, state_, step_, part, trial_);
+    move_sections(part);
     return try_trial(part);
+  }
+
+  void move_sections(double part) {
+    for (int j = 0; j < sections_; ++j) {
+      trial_.sections.col(j) =
+          state_.sections.col(j) + part * step_.template segment<3>(D * count_ + 3 * j);
+    }
   }
 
   bool may_go_as_far_again(double part) {
@@ -325,7 +357,7 @@ class Newton {
         trial_wire_energy_ =
             assemble(problem_, trial_, sink, chain_).total() + chain_.energy(trial_);
       }
-      trial_energy = trial_wire_energy_ + contact_->sample(trial_.x).energy.total();
+      trial_energy = trial_wire_energy_ + contact_->sample(trial_).energy.total();
     }
     accepted_ = trial_energy <= energy_ + kTuning.armijo * length * slope_ + rounding_;
     if (accepted_) {
@@ -375,6 +407,7 @@ class Newton {
         trial_.x.col(problem_.first + k) =
             state_.x.col(problem_.first + k) + length_ * step_.template segment<3>(D * k);
       }
+      move_sections(length_);
       const double trial_energy = try_trial(length_);
       if (accepted_) return;
       // Lowest point of the parabola through both energies and the slope, within a safe bracket.
@@ -423,6 +456,7 @@ class Newton {
   const int count_;               // free nodes
   const bool out_of_introducer_;  // the free nodes are those at the tip
   const bool polynomial_;         // the energy along a step is a quartic
+  const int sections_;            // of the vessel, that move
   const bool banded_;             // what contact leaves out fits into an unsymmetric band: no GMRES
   const TwistChain chain_;
   const double extent_;  // largest coordinate at the start                        [mm]
@@ -474,7 +508,7 @@ double Newton<D>::refine_step() {
   memory_.first_step = step_;
   find_rest(step_);
   if (refined.norm() <= kTuning.not_worth * gradient_.norm()) return slope_;
-  memory_.coupled.solve(factored_, refined);
+  solve_again(refined);
   const double start = refined.norm();
   if (start <= kTuning.enough * step_.norm()) {
     step_ -= refined;
@@ -506,7 +540,7 @@ void Newton<D>::add_krylov(double start) {
     const int k = count++;
     direction = krylov.col(k);
     find_rest(direction);
-    memory_.coupled.solve(factored_, refined);
+    solve_again(refined);
     refined += direction;
     for (int i = 0; i <= k; ++i) {
       upper(i, k) = krylov.col(i).dot(refined);

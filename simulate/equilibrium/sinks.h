@@ -4,6 +4,7 @@
 
 #include "simulate/equilibrium/problem.h"
 #include "simulate/wire/block_band.h"
+#include "simulate/wire/moving_band.h"
 #include "simulate/wire/rod.h"
 #include "simulate/wire/wire_pass.h"
 
@@ -14,6 +15,7 @@ struct EnergySink {
   static constexpr bool kHessian = false;
   void gradient(int, const Vec3&) {}
   void gradient_theta(int, double, int = 0) {}
+  void section_gradient(int, const Vec3&) {}
 };
 
 /// Sum of the gradient over the nodes and edges before `first`.
@@ -27,22 +29,40 @@ struct HeldSink {
   void gradient_theta(int e, double g, int = 0) {
     if (e < first) sum.torque += g;
   }
+  void section_gradient(int, const Vec3&) {}
 };
 
-/// Gradient with respect to every node; no Hessian.
+/// Gradient with respect to every node of the wire; no Hessian.
 struct GradientSink {
   static constexpr bool kHessian = false;
   Eigen::Ref<Eigen::Matrix3Xd> target;
   void gradient(int i, const Vec3& g) { target.col(i) += g; }
   void gradient_theta(int, double, int = 0) {}
+  void section_gradient(int, const Vec3&) {}
 };
 
-/// Gradient and dense Hessian over all x, then all theta, tool by tool.
+/// Gradient and dense Hessian over all x, then all theta, tool by tool, then the sections.
 struct DenseSink {
   static constexpr bool kHessian = true;
   int n;
   Eigen::VectorXd& g;
   Eigen::MatrixXd& H;
+  int sections_from;
+
+  int section(int j) const { return sections_from + 3 * j; }
+  void section_gradient(int j, const Vec3& v) { g.segment<3>(section(j)) += v; }
+  void section_cross(int i, int j, double scale, const Mat3& block) {
+    H.block<3, 3>(3 * i, section(j)) += scale * block;
+    H.block<3, 3>(section(j), 3 * i) += scale * block.transpose();
+  }
+  void section_hessian(int i, int j, const Mat3& block) {
+    H.block<3, 3>(section(i), section(j)) += block;
+    if (i != j) H.block<3, 3>(section(j), section(i)) += block.transpose();
+  }
+  void section_pair(int i, int j, double scale, const Mat3& block) {
+    H.block<3, 3>(section(i), section(j)) += scale * block;
+    H.block<3, 3>(section(j), section(i)) += scale * block.transpose();
+  }
 
   void gradient(int i, const Vec3& v) { g.segment<3>(3 * i) += v; }
   int theta(int e, int tool) const { return 3 * n + tool * (n - 1) + e; }
@@ -72,7 +92,7 @@ struct DenseSink {
 };
 
 /// Gradient of the free nodes: block k holds x of node first + k and, for D > 3, theta of its edge,
-/// one for each of D - 3 tools.
+/// one for each of D - 3 tools. Sections follow, 3 each.
 template <int D>
 struct FreeSink {
   static constexpr bool kHessian = false;
@@ -88,18 +108,37 @@ struct FreeSink {
   void gradient_theta(int e, double v, int tool = 0) {
     if (D > 3 && is_free(e)) g[D * (e - first) + 3 + tool] += v;
   }
+  void section_gradient(int j, const Vec3& v) {
+    g.template segment<3>(D * (last - first) + 3 * j) += v;
+  }
   WirePass::Energy add_wire(const Rod& rod, const RodState& state) {
     return pass.add_gradient<D>(rod, first, last, state.x, g);
   }
 };
 
-/// And their banded Hessian.
+/// And their banded Hessian, with what couples with sections.
 template <int D>
 struct BandSink : FreeSink<D> {
   static constexpr bool kHessian = true;
   using FreeSink<D>::first;
   using FreeSink<D>::is_free;
   BlockBand<D>& H;
+  SectionBlocks& sections;
+
+  void section_cross(int i, int j, double scale, const Mat3& v) {
+    if (is_free(i)) sections.cross(i - first, j) += scale * v;
+  }
+  void section_hessian(int i, int j, const Mat3& v) { sections.pair(i, j) += v; }
+  /// Of two points that both move sections: i's rows of one, j's of the other.
+  void section_pair(int i, int j, double scale, const Mat3& v) {
+    if (i == j) {
+      sections.pair(i, i) += scale * (v + v.transpose());
+    } else if (i > j) {
+      sections.pair(i, j) += scale * v;
+    } else {
+      sections.pair(j, i) += scale * v.transpose();
+    }
+  }
 
   WirePass::Energy add_wire(const Rod& rod, const RodState& state) {
     const WirePass::Energy energy = FreeSink<D>::add_wire(rod, state);

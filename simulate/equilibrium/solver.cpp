@@ -12,11 +12,11 @@ Energy assemble_with_contact(const Problem& problem, const RodState& state, Sink
   Energy energy = assemble(problem, state, sink);
   if (problem.contact == nullptr) return energy;
   problem.contact->expect_nothing();
-  problem.contact->begin(state.x);
+  problem.contact->begin(state);
   const ContactEnergy contact = problem.contact->refresh(true).energy;
   problem.contact->add(sink);
   energy.contact += contact.contact;
-  energy.wall += contact.wall;
+  energy.wall += contact.wall + contact.support;
   return energy;
 }
 
@@ -100,10 +100,11 @@ double Statics::bend_per_length(const Rod& rod, const RodState& state, int i, do
 void Statics::derivatives(const Problem& problem, const RodState& state, Eigen::VectorXd& gradient,
                           Eigen::MatrixXd& hessian) {
   const int n = problem.rod->nodes();
-  const int size = 3 * n + std::max(1, problem.twists()) * (n - 1);
+  const int wire = 3 * n + std::max(1, problem.twists()) * (n - 1);
+  const int size = wire + static_cast<int>(state.sections.size());
   gradient.setZero(size);
   hessian.setZero(size, size);
-  DenseSink sink{n, gradient, hessian};
+  DenseSink sink{n, gradient, hessian, wire};
   assemble_with_contact(problem, state, sink);
 }
 

@@ -24,7 +24,7 @@ class Statics {
   /// under a moment M [N].
   static double bend_per_length(const Rod& rod, const RodState& state, int i, double length);
   /// For tests: gradient and dense Hessian over all x, then all theta (4n-1; with
-  /// tools tool by tool), supports ignored.
+  /// tools tool by tool), then the sections' displacements, supports ignored.
   static void derivatives(const Problem& problem, const RodState& state, Eigen::VectorXd& gradient,
                           Eigen::MatrixXd& hessian);
 

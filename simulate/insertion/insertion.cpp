@@ -13,7 +13,7 @@ WireContact contact_of(const Touch& touch, double wire_radius, const TriangleLoc
   const Vec3 point = touch.position - wire_radius * touch.normal;
   return {.node = touch.edge + (at_next ? 1 : 0),
           .part = at_next ? 0.0 : touch.part,
-          .triangle = locator.nearest(point).triangle,
+          .triangle = locator.nearest(touch.rest - wire_radius * touch.rest_normal).triangle,
           .point = point,
           .normal_force = touch.normal_force * touch.normal,
           .friction_force = touch.friction,
@@ -111,7 +111,8 @@ Insertion::Insertion(const Wire& wire, const Introducer& introducer, const Vesse
   }
   newton_ = {.residual_tolerance = options.residual_tolerance,
              .max_iterations = options.max_iterations};
-  contact_.start_at(state_.x);
+  if (vessel.sections) state_.sections.setZero(3, vessel.sections->nodes());
+  contact_.start_at(state_);
   forces_ = Eigen::Matrix3Xd::Zero(3, n);
   guess_ahead_.resize(3, n);
   path_.resize(3, n);
@@ -215,8 +216,9 @@ NewtonResult Insertion::advance(double distance) {
       path_.col(i) = ahead_of(i, distance);
       const Vec3 way = drift * drift_.col(i);
       guess_ahead_.col(i) = path_.col(i) + way;
-      through = through || (way.norm() > kDriftInto &&
-                            vessel_.lumen.distance(guess_ahead_.col(i)) < -kDriftInto - deepest_);
+      through = through ||
+                (way.norm() > kDriftInto &&
+                 vessel_.lumen.distance(at_rest(guess_ahead_.col(i))) < -kDriftInto - deepest_);
     }
   }
   if (through) guess_ahead_ = path_;
@@ -255,7 +257,7 @@ void Insertion::bend_off_wall(int tip) {
     double deep = 0.0, reach = 0.0;  // past the wall, of the deepest node; its tip distance
     Vec3 inward = Vec3::Zero();
     for (int i = std::max(tip, problem_.first); i < n; ++i) {
-      const WallSample wall = vessel_.lumen.sample(guess_.x.col(i));
+      const WallSample wall = vessel_.lumen.sample(at_rest(guess_.x.col(i)));
       const double here = rod_.radius - wall.distance - deepest_;
       if (here <= deep) continue;
       deep = here;
@@ -397,6 +399,19 @@ double Insertion::length_outside(int i) const {
   return std::max(kSmallestPart * rod_.share[i], out);
 }
 
+Vec3 Insertion::at_rest(const Vec3& place) const {
+  if (vessel_.sections == nullptr) return place;
+  MovingFrame frame;
+  frame.find(*vessel_.sections, state_.sections, place);
+  return frame.rest;
+}
+
+Eigen::Matrix3Xd Insertion::free_nodes_at_rest() const {
+  Eigen::Matrix3Xd nodes = free_nodes();
+  for (Eigen::Index i = 0; i < nodes.cols(); ++i) nodes.col(i) = at_rest(nodes.col(i));
+  return nodes;
+}
+
 /// Point of the present shape `distance` further along the wire than node i, which is that far from
 /// the tip at least. Called for rising i.
 Vec3 Insertion::ahead_of(int i, double distance) {
@@ -507,7 +522,8 @@ void Insertion::measure(Push& record) {
     if (!options_.map_forces) continue;
     std::int32_t& triangle = mapped_[static_cast<std::size_t>(touch.point)];
     triangle =
-        vessel_.locator.pierced(touch.position - rod_.radius * touch.normal, touch.normal, triangle)
+        vessel_.locator
+            .pierced(touch.rest - rod_.radius * touch.rest_normal, touch.rest_normal, triangle)
             .triangle;
     if (triangle >= 0) triangle_forces_.emplace_back(triangle, touch.normal_force);
   }

@@ -124,6 +124,12 @@ class Insertion {
     return state_.x.rightCols(rod_.nodes() - problem_.first);
   }
   Eigen::Matrix3Xd free_nodes() const { return state_.x.rightCols(rod_.nodes() - problem_.first); }
+  /// Where a place is in the vessel at rest: elsewhere where cross-sections have moved. And the
+  /// free nodes there.
+  Vec3 at_rest(const Vec3& place) const;
+  Eigen::Matrix3Xd free_nodes_at_rest() const;
+  /// (3, s) how far the vessel's cross-sections have moved; empty where they do not [mm].
+  const Eigen::Matrix3Xd& sections() const { return state_.sections; }
   /// (3, n) of the wall on the nodes, after the last move [N].
   const Eigen::Matrix3Xd& forces() const { return forces_; }
   PushTerms terms() const;  // of the present shape

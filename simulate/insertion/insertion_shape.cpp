@@ -35,8 +35,7 @@ std::optional<Vec3> Insertion::find_fold() const {
 }
 
 std::optional<int> Insertion::left_through() const {
-  return preprocess::left_through(vessel_.lumen.openings(),
-                                  state_.x.rightCols(rod_.nodes() - problem_.first));
+  return preprocess::left_through(vessel_.lumen.openings(), free_nodes_at_rest());
 }
 
 Vec3 Insertion::most_bent() const {

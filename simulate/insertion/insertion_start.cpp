@@ -79,7 +79,7 @@ std::optional<Push> Insertion::start(const StartLine& start) {
   if (rod_.twisted) state_.theta.setConstant(introducer_.roll);
   bend_at_the_exit();
   contact_.free_from(depth_);
-  contact_.start_at(state_.x);
+  contact_.start_at(state_);
 
   Push record;
   const Eigen::VectorXd share = springs.stiffness;

@@ -157,7 +157,7 @@ std::vector<std::string> terms_of(const Scene& scene, const Rod& rod) {
 /// Contact with the vessel, from the state in which the wire is.
 void add_vessel(const Scene& scene, Setup& s) {
   s.contact.emplace(s.rod, *scene.vessel, scene.contact);
-  s.contact->start_at(s.state.x);
+  s.contact->start_at(s.state);
   s.problem.contact = &*s.contact;
 }
 

@@ -169,7 +169,7 @@ bool ToolBench::lies_free(const State& at) const {
 void ToolBench::settle_at(const std::vector<ToolPlace>& places) {
   place(places, now_);
   now_.state = unloaded(now_);
-  if (now_.contact != nullptr) now_.contact->start_at(now_.state.x);
+  if (now_.contact != nullptr) now_.contact->start_at(now_.state);
   const RodState start = now_.state;
   settled_ = solve(now_);
   if (!settled_) {

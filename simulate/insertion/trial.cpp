@@ -98,7 +98,7 @@ bool Trial::start(const StartLine& line) {
   record_.shapes.push_back(*record_.start);
   pushing_since_ = 1;
   for (std::size_t k = 0; k < goals_.size(); ++k) {
-    pursuits_[k].best_distance = (push->tip - goals_[k].point).norm();
+    pursuits_[k].best_distance = (tip_at_rest() - goals_[k].point).norm();
     check_place(k);
   }
   return !ended();
@@ -146,7 +146,7 @@ bool Trial::step(const Move& move) {
                                                " of insertion, tip at " +
                                                place_text(insertion_.tip()) + " mm");
   }
-  if (end_in_sphere(*push)) return false;
+  if (end_in_sphere()) return false;
   record_.pushes.push_back(*push);
   if (options_.record_terms) record_.push_terms.push_back(insertion_.terms());
   if (distance <= 0.0) pushing_since_ = record_.pushes.size();
@@ -177,10 +177,10 @@ bool Trial::ends_by_crossing() {
 }
 
 /// Measures the distances; inside a sphere the wire goes on until the tip is nearest to its centre.
-bool Trial::end_in_sphere(const Push& push) {
+bool Trial::end_in_sphere() {
   for (std::size_t k = 0; k < goals_.size(); ++k) {
     double& best = pursuits_[k].best_distance;
-    const double to_goal = (push.tip - goals_[k].point).norm();
+    const double to_goal = (tip_at_rest() - goals_[k].point).norm();
     if (!goals_[k].at_section && best <= goals_[k].radius && to_goal >= best) {
       insertion_.take_back();
       end(k, Outcome::kReached, reached_reason(k));
@@ -205,8 +205,8 @@ void Trial::check_place(std::size_t goal) {
                millimetres(push.max_penetration) + " through the wall" + after + ", tip at " +
                    place_text(push.tip) + " mm");
   }
-  if (own.at_section && own.way->may_have_arrived(push.tip)) {
-    const Eigen::Matrix3Xd wire = insertion_.free_nodes();
+  if (own.at_section && own.way->may_have_arrived(tip_at_rest())) {
+    const Eigen::Matrix3Xd wire = insertion_.free_nodes_at_rest();
     if (own.way->find_arrival(wire, vessel_.lumen)) {
       const std::optional<std::string> detour = own.way->find_detour(wire);
       if (!detour) return end(goal, Outcome::kReached, reached_reason(goal));
@@ -221,7 +221,7 @@ void Trial::check_place(std::size_t goal) {
         "the wire left the imaged vessel through its end at " + place_of(*opening) + after);
   }
   const std::optional<int> image_end =
-      own.way ? own.way->find_image_end(push.tip, vessel_.lumen) : std::nullopt;
+      own.way ? own.way->find_image_end(tip_at_rest(), vessel_.lumen) : std::nullopt;
   if (image_end) {
     end_where_it_is(goal, Outcome::kLeftImage,
                     "the tip came to the end of the imaged vessel, " +
@@ -237,7 +237,7 @@ void Trial::check_advance(std::size_t goal, double distance) {
   Pursuit& pursuit = pursuits_[goal];
   const Push& push = record_.pushes.back();
   const Centerline& path = own.way->path();
-  const double progress = preprocess::find_progress(push.tip, path);
+  const double progress = preprocess::find_progress(tip_at_rest(), path);
   if (distance <= 0.0 || progress > pursuit.furthest) {
     pursuit.furthest = progress;
     pursuit.since_furthest = 0.0;
@@ -286,7 +286,7 @@ void Trial::check_motion(std::size_t goal) {
   if (fold) {
     const std::shared_ptr<const Way>& way = goals_[goal].way;
     const std::optional<std::string> detour =
-        way ? way->find_detour(insertion_.free_nodes()) : std::nullopt;
+        way ? way->find_detour(insertion_.free_nodes_at_rest()) : std::nullopt;
     return end_where_it_is(goal, Outcome::kProlapsed,
                            "the wire folds back at " + place_text(*fold) + " mm after " +
                                millimetres(push.insertion) +
@@ -306,6 +306,7 @@ Shape Trial::shape_here() const {
   return {.insertion = insertion_.depth(),
           .hub_angle = insertion_.hub_angle(),
           .nodes = insertion_.free_nodes(),
+          .sections = insertion_.sections(),
           .contact_force = insertion_.forces()
                                .rightCols(insertion_.rod().nodes() - first)
                                .colwise()
@@ -316,7 +317,7 @@ Shape Trial::shape_here() const {
 /// As `outcome`, unless the tip is in another vessel: then that is the outcome.
 void Trial::end_where_it_is(std::size_t goal, Outcome outcome, const std::string& reason) {
   const std::shared_ptr<const Way>& way = goals_[goal].way;
-  const std::optional<Astray> astray = way ? way->find_astray(insertion_.tip()) : std::nullopt;
+  const std::optional<Astray> astray = way ? way->find_astray(tip_at_rest()) : std::nullopt;
   if (!astray) return end(goal, outcome, reason);
   end(goal, astray->passed_by ? Outcome::kPassedBy : Outcome::kWrongBranch,
       "the tip is not on the way: " + astray->text + "; " + reason);
@@ -346,6 +347,7 @@ void Trial::end(std::size_t goal, Outcome outcome, const std::string& reason) {
   ended.reason = reason + balance_text();
   ended.crossing = record_.crossing;
   ended.nodes = insertion_.free_nodes();
+  ended.sections = insertion_.sections();
   ended.contacts = insertion_.contacts();
   ended.peak_forces = insertion_.peak_forces();
   const bool recorded = !record_.shapes.empty() &&
@@ -369,7 +371,7 @@ std::string Trial::balance_text() const {
 std::string Trial::reached_reason(std::size_t goal) const {
   if (goals_[goal].at_section) {
     const double from_axis =
-        preprocess::find_place(insertion_.tip(), goals_[goal].way->path()).from_axis;
+        preprocess::find_place(tip_at_rest(), goals_[goal].way->path()).from_axis;
     return "tip past the target's cross-section, " + millimetres(from_axis) +
            " from the vessel's axis, after " + millimetres(insertion_.depth()) + " of insertion";
   }

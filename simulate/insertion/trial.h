@@ -41,10 +41,12 @@ const char* outcome_name(Outcome outcome);  // "reached", "missed", "stuck", ...
 
 /// A shape on the way, for pictures and time series.
 struct Shape {
-  double insertion = 0.0;         //                                                  [mm]
-  double hub_angle = 0.0;         //                                                 [rad]
-  Eigen::Matrix3Xd nodes;         // (3, k) beyond the introducer, proximal to distal [mm]
-  Eigen::VectorXd contact_force;  // (k) norm per node                                [N]
+  double insertion = 0.0;          //                                                  [mm]
+  double hub_angle = 0.0;          //                                                 [rad]
+  Eigen::Matrix3Xd nodes;          // (3, k) beyond the introducer, proximal to distal [mm]
+  Eigen::Matrix3Xd sections = {};  // (3, s) how far the vessel's cross-sections have moved; empty
+                                   // where they do not                                [mm]
+  Eigen::VectorXd contact_force;   // (k) norm per node                                [N]
 };
 
 struct TrialResult {
@@ -57,7 +59,8 @@ struct TrialResult {
   std::vector<std::pair<double, double>> stuck;
   /// Where the wire ran through itself first. The trial ends by that, unless it is pushed on.
   std::optional<SelfCrossing> crossing;
-  Eigen::Matrix3Xd nodes;  // (3, k) final shape beyond the introducer, proximal to distal
+  Eigen::Matrix3Xd nodes;          // (3, k) final shape beyond the introducer, proximal to distal
+  Eigen::Matrix3Xd sections = {};  // of the final shape, as Shape has them
   std::vector<WireContact> contacts;       // of the final shape
   std::vector<TriangleForce> peak_forces;  // over all pushes, ascending triangles; if mapped
   std::vector<Shape> shapes;       // every `record_every` of the hand's way, and the final one
@@ -138,7 +141,9 @@ class Trial {
   void end(std::size_t goal, Outcome outcome, const std::string& reason);
   void end_where_it_is(std::size_t goal, Outcome outcome, const std::string& reason);
   bool end_all(Outcome outcome, const std::string& reason);
-  bool end_in_sphere(const Push& push);
+  bool end_in_sphere();
+  /// Where the tip is in the vessel at rest, in which ways and goals are.
+  Vec3 tip_at_rest() const { return insertion_.at_rest(insertion_.tip()); }
   void check_place(std::size_t goal);
   void check_advance(std::size_t goal, double distance);
   void check_motion(std::size_t goal);

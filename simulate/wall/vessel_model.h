@@ -7,6 +7,7 @@
 #include "simulate/wall/compliance.h"
 #include "simulate/wall/locator.h"
 #include "simulate/wall/lumen.h"
+#include "simulate/wall/section_chain.h"
 
 namespace wireplan::simulate {
 
@@ -28,6 +29,7 @@ struct VesselModel {
   Lumen lumen;
   TriangleLocator locator;
   std::unique_ptr<const WallCompliance> compliance;  // null: the wall is rigid
+  std::unique_ptr<const SectionChain> sections;      // null: cross-sections do not move as wholes
 };
 
 }  // namespace wireplan::simulate

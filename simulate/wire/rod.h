@@ -109,6 +109,9 @@ struct RodState {
   Eigen::Matrix3Xd director;        // (3, n-1) reference director, normal to the edge    [-]
   Eigen::VectorXd reference_twist;  // (n)     of the reference directors, at nodes       [rad]
   double tip_angle = 0.0;  // of the last edge about a moment's axis, all turns counted [rad]
+  Eigen::Matrix3Xd sections =
+      {};  // (3, m)  how far the vessel's cross-sections have moved; empty where
+           //         they do not (section_chain.h)                   [mm]
 };
 
 /// The wire straight from `point` along the unit `direction`, its material director turned by

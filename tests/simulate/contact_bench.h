@@ -40,7 +40,7 @@ struct Bench {
     for (int i = 0; i < rod.nodes(); ++i) {
       state.x.col(i) = point_at(rod.tip_distance[0] - rod.tip_distance[i]);
     }
-    contact.start_at(state.x);
+    contact.start_at(state);
     problem.rod = &rod;
     problem.last = rod.nodes();
     problem.contact = &contact;

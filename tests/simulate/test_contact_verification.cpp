@@ -416,7 +416,7 @@ TEST(Friction, ChangesWithTheNormalForceInTheUnsymmetricBandAsElsewhere) {
   Bench bench(round_wire(20.0, 1.0, 50.0), 10, vessel, options, along_the_bend(0.0));
   const Bench further(round_wire(20.0, 1.0, 50.0), 10, vessel, options, along_the_bend(0.01));
   const int n = bench.rod.nodes();
-  bench.contact.begin(further.state.x);
+  bench.contact.begin(further.state);
   bench.contact.refresh(true);
 
   const Eigen::VectorXd motion = Eigen::VectorXd::LinSpaced(3 * n, -1.0, 2.0);
@@ -455,17 +455,17 @@ TEST(WallContact, FindsWhatTouchesAfterManyMotions) {
     const double stride = strides[static_cast<std::size_t>(round) % strides.size()];
     const Vec3 by(stride * side(random), stride * side(random), 0.0);
     bench.contact.free_from(out);
-    bench.contact.begin(bench.state.x);
+    bench.contact.begin(bench.state);
     for (int i = 0; i < bench.rod.nodes(); ++i) {
       Vec3 p = bench.state.x.col(i) + by * (0.5 + 0.5 * std::sin(i + shift));
       p.head<2>() *= std::min(1.0, 2.7 / p.head<2>().norm());
       bench.state.x.col(i) = p;
     }
-    const double found = bench.contact.sample(bench.state.x).energy.contact;
+    const double found = bench.contact.sample(bench.state).energy.contact;
     WallContact fresh(bench.rod, vessel, options);
-    fresh.start_at(bench.state.x);
+    fresh.start_at(bench.state);
     fresh.free_from(out);
-    fresh.begin(bench.state.x);
+    fresh.begin(bench.state);
     // Of a point that hardly moved the field is that of where it was, to second order: 2 N of force
     // times 1e-10 mm.
     SCOPED_TRACE(round);
@@ -556,7 +556,7 @@ TEST(SafeStep, SlidesAlongTheWallButNotThroughIt) {
   const VesselModel vessel(shapes::straight_tube(kRadius, 100.0, 1.0));
   Bench bench(round_wire(10.0, 0.5, 50.0), 10, vessel, {},
               [&](double s) { return Vec3(kOff, 0.0, 40.0 + s); });
-  bench.contact.begin(bench.state.x);
+  bench.contact.begin(bench.state);
   const double distance = vessel.lumen.distance(Vec3(kOff, 0.0, 45.0));
   constexpr double kInto = 0.25;  // a point may go so far past the wall                     [mm]
   // Largest way of the whole wire in one direction, of 20 mm.

@@ -266,10 +266,10 @@ TEST(YieldingWall, HeldFeetAreRefreshedOnlyWhereTheyAreFarOff) {
       };
     };
     Bench bench(round_wire(27.0, 1.0, 50.0), 27, vessel, {}, wire_at(0.0, 0.0));
-    bench.contact.begin(bench.state.x);
+    bench.contact.begin(bench.state);
     if (held) bench.contact.hold_feet();
     const Bench moved(round_wire(27.0, 1.0, 50.0), 27, vessel, {}, wire_at(along, round / off));
-    const double before = bench.contact.sample(moved.state.x).energy.total();
+    const double before = bench.contact.sample(moved.state).energy.total();
     return bench.contact.refresh(true).energy.total() - before;
   };
   EXPECT_NEAR(change(0.2, 0.0, true), 0.0, 1e-12);

@@ -1,0 +1,28 @@
+#pragma once
+/// Where a point of the wire is in a vessel whose cross-sections have moved: the place at rest that
+/// was carried to it, X + u(X) = p, u(X) = sum N_j(X) u_j (section_chain.h). All that contact knows
+/// of a wall is of places at rest. A motion of the point and of the sections moves the place by
+///   dX = G^-1 (dp - sum N_j du_j),  G = I + sum u_j N_j',
+/// so a force g over dX is G^-T g on the wire and -N_j G^-T g on node j: no force is lost.
+#include <vector>
+
+#include "simulate/wall/section_chain.h"
+
+namespace wireplan::simulate {
+
+struct MovingFrame {
+  Vec3 rest = Vec3::Zero();         // X                                                     [mm]
+  Mat3 inverse = Mat3::Identity();  // G^-1
+  std::vector<SectionChain::Weight> weights = {};  // at X; empty: not found yet
+
+  /// Finds the place for a point, by Newton's method from where it was.
+  void find(const SectionChain& chain, const Eigen::Matrix3Xd& u, const Vec3& point);
+
+  /// Second derivatives of a function of X with the gradient `force` over p (G^-T g), beyond those
+  /// of dX: the quadratic form -dX' B dX - 2 sum_j (force . du_j)(N_j' . dX). Finds B, of which a
+  /// Hessian over X is to be less, and for each weight r_j = G^-T N_j'.
+  void find_bend(const SectionChain& chain, const Eigen::Matrix3Xd& u, const Vec3& force, Mat3& B,
+                 std::vector<Vec3>& r, std::vector<SectionChain::Weight>& scratch) const;
+};
+
+}  // namespace wireplan::simulate
