@@ -80,7 +80,8 @@ struct Predictor {
 std::vector<Predictor> list_predictors(const std::vector<Disturbance>& disturbances,
                                        const Study& study, int wire) {
   std::vector<Predictor> predictors = {{"friction", {}}, {"stiffness", {}}, {"wall", {}},
-                                       {"angle", {}},    {"entry", {}},     {"lumen", {}}};
+                                       {"angle", {}},    {"entry", {}},     {"lumen", {}},
+                                       {"support", {}}};
   const auto add = [&](std::size_t k, auto value) {
     std::vector<double> column;
     for (const Disturbance& d : disturbances) column.push_back(value(d));
@@ -104,6 +105,7 @@ std::vector<Predictor> list_predictors(const std::vector<Disturbance>& disturban
     add(4, [axis](const Disturbance& d) { return d.shift[axis]; });
   }
   add(5, [](const Disturbance& d) { return d.inward; });
+  add(6, [](const Disturbance& d) { return d.support_factor; });
   const auto still = [](const Predictor& p) { return p.columns.empty(); };
   predictors.erase(std::remove_if(predictors.begin(), predictors.end(), still), predictors.end());
   return predictors;
@@ -139,6 +141,7 @@ std::vector<Disturbance> draw_disturbances(const RobustnessOptions& options,
   expects(options.repeats >= 0);
   const Unknowns& unknowns = options.unknowns;
   expects(unknowns.wall_low > 0.0 && unknowns.wall_low <= unknowns.wall_high);
+  expects(unknowns.support_low > 0.0 && unknowns.support_low <= unknowns.support_high);
   expects(unknowns.angle >= 0.0 && unknowns.entry >= 0.0 && unknowns.lumen >= 0.0);
 
   // One column per unknown, each with an order of its own.
@@ -152,12 +155,22 @@ std::vector<Disturbance> draw_disturbances(const RobustnessOptions& options,
     of_wires.push_back(draw_stratified(options.repeats, own));
   }
 
+  // The support's own draws, so that the others are the same with it and without.
+  std::vector<double> support;
+  if (unknowns.support_low < unknowns.support_high) {
+    std::mt19937_64 own(seed_of(options.seed, "support"));
+    support = draw_stratified(options.repeats, own);
+  }
+
   std::vector<Disturbance> disturbances;
   for (std::size_t k = 0; k < static_cast<std::size_t>(options.repeats); ++k) {
     Disturbance& drawn = disturbances.emplace_back();
     drawn.friction = u[0][k];
     for (const std::vector<double>& own : of_wires) drawn.stiffness.push_back(own[k]);
     drawn.wall_factor = between_logarithms(unknowns.wall_low, unknowns.wall_high, u[1][k]);
+    drawn.support_factor = support.empty() ? unknowns.support_low
+                                           : between_logarithms(unknowns.support_low,
+                                                                unknowns.support_high, support[k]);
     drawn.tilt = on_disc(unknowns.angle, u[2][k], u[3][k]);
     drawn.shift = on_disc(unknowns.entry, u[4][k], u[5][k]);
     drawn.inward = unknowns.lumen * (2.0 * u[6][k] - 1.0);
@@ -191,6 +204,7 @@ simulate::TrialResult run_disturbed(const Study& study, const Candidate& candida
   wire.radius += disturbance.inward;
   simulate::InsertionOptions insertion = study.insertion;
   insertion.residual_tolerance *= kRepeatTolerance / factor;
+  insertion.support_factor *= disturbance.support_factor / factor;
   insertion.record_every = insertion.length;
   insertion.map_forces = false;
 

@@ -18,6 +18,9 @@ namespace wireplan::plan {
 struct Unknowns {
   /// The femoral artery stiffens 2.4 times from under 35 to over 60 years (references B1).
   double wall_low = 0.5, wall_high = 2.0;
+  /// A factor too, of what holds a vessel whose cross-sections move: not measured on the patient.
+  /// Published values reach from 0.01 to 10 kPa/mm (references-2 M).
+  double support_low = 1.0, support_high = 1.0;
   double angle = 5.0 * kRadPerDeg;  // of the introducer, in any direction; assumed        [rad]
   double entry = 1.0;               // of the introducer's point; assumed                  [mm]
   double lumen = 0.25;              // of the wall, in or out; assumed                     [mm]
@@ -42,6 +45,7 @@ struct Disturbance {
   double friction = 0.5;               // where every wire's lies in its spread, 0 to 1
   std::vector<double> stiffness = {};  // the same of each wire's EI; empty: as it is given
   double wall_factor = 1.0;
+  double support_factor = 1.0;
   Eigen::Vector2d tilt = Eigen::Vector2d::Zero();   //                                     [rad]
   Eigen::Vector2d shift = Eigen::Vector2d::Zero();  //                                     [mm]
   double inward = 0.0;                              //                                     [mm]
@@ -68,9 +72,9 @@ simulate::Wire disturbed_wire(const Study& study, int wire, const Disturbance& d
 ///
 /// The vessel model serves all disturbances as it is. A wall that is f times as stiff: equilibrium
 /// depends on the ratio of wire and wall alone, so EI, EA, GJ and the tolerance are divided by f
-/// instead, and all forces and works are multiplied by f afterwards. This is exact but for the
-/// contact law, which is then f times as stiff too. A lumen that is narrower by d: the wire's
-/// contact radius is larger by d instead.
+/// instead, and so is the support of sections that move, and all forces and works are multiplied by
+/// f afterwards. This is exact but for the contact law, which is then f times as stiff too. A lumen
+/// that is narrower by d: the wire's contact radius is larger by d instead.
 simulate::TrialResult run_disturbed(const Study& study, const Candidate& candidate,
                                     const simulate::VesselModel& vessel,
                                     const Disturbance& disturbance);
@@ -95,7 +99,8 @@ std::vector<int> choose_plans_to_repeat(const Ranking& ranking,
 /// Which unknown moves the ranking most.
 struct Sensitivity {
   struct Share {
-    std::string unknown;  // "friction", "stiffness", "wall", "angle", "entry", "lumen"
+    std::string unknown;  // "friction", "stiffness", "wall", "angle", "entry", "lumen",
+                          // "support"
     double of_all = 0.0;  // of what all unknowns together explain; sum 1
   };
   std::vector<Share> shares;        // largest first; an unknown that does not act is not listed

@@ -23,7 +23,8 @@ WallContact::WallContact(const Rod& rod, const VesselModel& vessel, const Contac
       felt_from_(rod.radius + options.law.reach()),
       points_(rod, vessel, options.spacing, reach(rod, vessel, options.law)),
       forces_(options.law, vessel, rod.radius, points_.size()),
-      friction_(options.friction, options.slip, points_.size()) {
+      friction_(options.friction, options.slip, points_.size()),
+      support_factor_(options.support_factor) {
   const int m = points_.size();
   memory_.x.setZero(3, rod.nodes());
   if (chain() != nullptr) memory_.sections.setZero(3, chain()->nodes());
@@ -105,7 +106,8 @@ void WallContact::find(const RodState& state) {
   latest_.own_lag = false;
   if (chain() == nullptr) return;
   support_.setZero(3, chain()->nodes());
-  support_energy_ = chain()->energy(state.sections, support_);
+  support_energy_ = support_factor_ * chain()->energy(state.sections, support_);
+  support_ *= support_factor_;
 }
 
 const ContactSample& WallContact::sample(const RodState& state) {

@@ -17,9 +17,10 @@ namespace wireplan::simulate {
 
 struct ContactOptions {
   ContactLaw law;
-  double spacing = 1.0;   // most between two contact points; half of it near the tip     [mm]
-  double friction = 0.0;  // Coulomb's coefficient
-  double slip = 0.02;     // displacement along the wall that develops friction fully     [mm]
+  double spacing = 1.0;         // most between two contact points; half of it near the tip     [mm]
+  double friction = 0.0;        // Coulomb's coefficient
+  double slip = 0.02;           // displacement along the wall that develops friction fully     [mm]
+  double support_factor = 1.0;  // on the energy of the vessel's sections, where they move
 };
 
 /// Contact of one wire with one vessel: its points, their normal forces and their friction. Holds
@@ -139,7 +140,7 @@ class WallContact {
     }
     if constexpr (Sink::kHessian) {
       for (const SectionChain::Block& block : points_.chain()->stiffness()) {
-        sink.section_hessian(block.i, block.j, block.value);
+        sink.section_hessian(block.i, block.j, support_factor_ * block.value);
       }
     }
   }
@@ -155,6 +156,7 @@ class WallContact {
   Friction friction_;
   ContactMemory memory_;
   ContactSample latest_;
+  const double support_factor_;
   Eigen::Matrix3Xd support_;     // derivatives of the energy of the sections' support        [N]
   double support_energy_ = 0.0;  //                                                       [N mm]
   std::vector<Touch> touches_;   // scratch, as is

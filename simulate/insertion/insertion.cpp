@@ -71,6 +71,7 @@ ContactOptions contact_options(const Wire& wire, const InsertionOptions& options
   contact.law = options.contact_law;
   contact.spacing = options.contact_spacing;
   contact.friction = friction_of(wire, options);
+  contact.support_factor = options.support_factor;
   return contact;
 }
 
@@ -408,7 +409,12 @@ Vec3 Insertion::at_rest(const Vec3& place) const {
 
 Eigen::Matrix3Xd Insertion::free_nodes_at_rest() const {
   Eigen::Matrix3Xd nodes = free_nodes();
-  for (Eigen::Index i = 0; i < nodes.cols(); ++i) nodes.col(i) = at_rest(nodes.col(i));
+  if (vessel_.sections == nullptr) return nodes;
+  MovingFrame frame;  // each from where the one before was
+  for (Eigen::Index i = 0; i < nodes.cols(); ++i) {
+    frame.find(*vessel_.sections, state_.sections, nodes.col(i));
+    nodes.col(i) = frame.rest;
+  }
   return nodes;
 }
 

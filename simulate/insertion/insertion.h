@@ -26,6 +26,7 @@ struct InsertionOptions {
   double contact_spacing = 1.0;      // see ContactOptions::spacing                      [mm]
   double friction = 0.0;             // Coulomb's coefficient of wires that have none of their own
   double friction_factor = 1.0;      // on the friction of every wire
+  double support_factor = 1.0;       // on what holds the vessel's cross-sections, where they move
   ContactLaw contact_law = {};       // the default; see contact_law.h
   double residual_tolerance = 1e-6;  // largest nodal force out of balance               [N]
   int max_iterations = 50;           // Newton iterations per solve; see Insertion::push()

@@ -18,7 +18,9 @@ constexpr double kDropped = 1e-3, kWhole = 8e-3;
 
 /// What a node may add to the sum of the bell curves at most where it is not looked at: jumps of
 /// the weights of this size are far below what a solve resolves.
-constexpr double kUnseen = 1e-13;
+constexpr double kUnseen = 1e-10;
+
+constexpr double kLeastPower = -23.0;  // its logarithm
 
 constexpr double kCell = 8.0;          // side of a cell                                      [mm]
 constexpr double kChainMargin = 24.0;  // of the grid round the nodes                         [mm]
@@ -188,7 +190,9 @@ void SectionChain::find_weights(const Vec3& rest, bool with_bend,
   Mat3 spread = Mat3::Zero();
   for (const int k : nodes) {
     const Vec3 away = places_.col(k) - rest;
-    const double e = std::exp(0.5 * per_square * (nearest - away.squaredNorm()));
+    const double power = 0.5 * per_square * (nearest - away.squaredNorm());
+    if (power < kLeastPower) continue;
+    const double e = std::exp(power);
     const Vec3 a = per_square * away;
     sum += e;
     mean += e * a;

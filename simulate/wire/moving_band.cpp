@@ -249,6 +249,39 @@ bool MovingBand::factor(BlockBand<D>& wire, const SectionBlocks& blocks, double 
   return true;
 }
 
+namespace {
+
+/// Both halves of a solve with the rows of one block row, P numbers per column of which those
+/// beyond `rows` are 0.
+template <int P>
+void solve_row_forward(const double* l, int rows, int before, const double* known, double* own) {
+  double sum[P] = {};
+  for (int k = 0; k < before; ++k, l += P) {
+    for (int r = 0; r < P; ++r) sum[r] += l[r] * known[k];
+  }
+  for (int r = 0; r < rows; ++r) {
+    own[r] -= sum[r];
+    for (int c = 0; c < r; ++c) own[r] -= l[c * P + r] * own[c];
+  }
+}
+
+template <int P>
+void solve_row_back(const double* l, int rows, int before, double* known, double* own) {
+  const double* diagonal = l + static_cast<std::ptrdiff_t>(before) * P;
+  double found[P] = {};
+  for (int r = rows - 1; r >= 0; --r) {
+    found[r] = own[r];
+    for (int c = 0; c < r; ++c) own[c] -= diagonal[c * P + r] * own[r];
+  }
+  for (int k = 0; k < before; ++k, l += P) {
+    double sum = 0.0;
+    for (int r = 0; r < P; ++r) sum += l[r] * found[r];
+    known[k] -= sum;
+  }
+}
+
+}  // namespace
+
 void MovingBand::solve(Eigen::VectorXd& v) {
   for (const Row& row : rows_) {
     for (int r = 0; r < row.rows; ++r) {
@@ -258,27 +291,22 @@ void MovingBand::solve(Eigen::VectorXd& v) {
   double* const x = ordered_.data();
   for (const Row& row : rows_) {
     const double* l = values_.data() + row.offset;
-    double sum[8] = {};
-    for (int k = row.first; k < row.start; ++k, l += width_) {
-      for (int r = 0; r < row.rows; ++r) sum[r] += l[r] * x[k];
-    }
-    for (int r = 0; r < row.rows; ++r) {
-      x[row.start + r] -= sum[r];
-      for (int c = 0; c < r; ++c) x[row.start + r] -= l[c * width_ + r] * x[row.start + c];
+    const int before = row.start - row.first;
+    if (width_ == 4) {
+      solve_row_forward<4>(l, row.rows, before, x + row.first, x + row.start);
+    } else {
+      solve_row_forward<8>(l, row.rows, before, x + row.first, x + row.start);
     }
   }
   for (std::size_t k = 0; k < inverse_.size(); ++k) x[k] *= inverse_[k];
   for (std::size_t at = rows_.size(); at-- > 0;) {
     const Row& row = rows_[at];
-    double* l = values_.data() + row.offset;
-    const double* diagonal = l + static_cast<std::ptrdiff_t>(row.start - row.first) * width_;
-    for (int r = row.rows - 1; r >= 0; --r) {
-      for (int c = 0; c < r; ++c) x[row.start + c] -= diagonal[c * width_ + r] * x[row.start + r];
-    }
-    for (int k = row.first; k < row.start; ++k, l += width_) {
-      double sum = 0.0;
-      for (int r = 0; r < row.rows; ++r) sum += l[r] * x[row.start + r];
-      x[k] -= sum;
+    const double* l = values_.data() + row.offset;
+    const int before = row.start - row.first;
+    if (width_ == 4) {
+      solve_row_back<4>(l, row.rows, before, x + row.first, x + row.start);
+    } else {
+      solve_row_back<8>(l, row.rows, before, x + row.first, x + row.start);
     }
   }
   for (const Row& row : rows_) {

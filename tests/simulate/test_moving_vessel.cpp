@@ -304,11 +304,11 @@ double straighten_by_differences(double EI, double K, double clearance, const Li
 }
 
 /// References M, V18: a wire without clearance moves the vessel by A r / (1 + r), r = EI q^4 / K.
-struct Row {
+struct TableRow {
   double support, EI, closed_form;
 };
-std::vector<Row> table_rows() {
-  std::vector<Row> rows;
+std::vector<TableRow> table_rows() {
+  std::vector<TableRow> rows;
   for (const double support : {1e-4, 1e-3, 1e-2, 2.5e-2}) {
     for (const double EI : {291.0, 377.0, 1849.0, 4857.0}) {
       const double q = kDrawnOut * kWaveNumber;
@@ -321,7 +321,7 @@ std::vector<Row> table_rows() {
 
 TEST(Straightening, ByDifferencesIsTheClosedFormWhereThereIsNoClearance) {
   const LinearLaw hard{.stiffness = 1e4, .smoothing = 1e-6};
-  for (const Row& row : table_rows()) {
+  for (const TableRow& row : table_rows()) {
     const double found =
         straighten_by_differences(kStiffer * row.EI, kPi * kTableRadius * row.support, 0.0, hard);
     EXPECT_NEAR(found, row.closed_form, 1e-3 * row.closed_form);  // of cells of 2 mm
@@ -331,7 +331,7 @@ TEST(Straightening, ByDifferencesIsTheClosedFormWhereThereIsNoClearance) {
 TEST(Straightening, IsThatOfDifferencesInAllRowsOfTheTable) {
   Wavy scene;
   constexpr double kClearance = 0.5;  // mm: the field is rounded within a cell of the axis
-  for (const Row& row : table_rows()) {
+  for (const TableRow& row : table_rows()) {
     SCOPED_TRACE(row.support);
     SCOPED_TRACE(row.EI);
     const double expected =
