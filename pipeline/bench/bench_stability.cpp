@@ -364,6 +364,74 @@ Json row_of(const ContactScene& scene, const std::string& name, const Finding& f
   return row;
 }
 
+// ---------------------------------------------------------------- tools in one another
+
+/// All moves of a scene, each held against the laws that it must keep.
+Finding run_coaxial(const CoaxialScene& given, const simulate::VesselModel& tube) {
+  simulate::ToolScene scene = tool_scene_of(given);
+  if (given.in_tube) scene.vessel = &tube;
+  simulate::ToolBench bench(scene);
+  Finding finding;
+  finding.outcome = "converged";
+  finding.worst_energy_rise = finding.residual = 0.0;
+  const auto check = [&](const std::string& when) {
+    const simulate::ToolRecord& record = bench.record();
+    finding.iterations += record.iterations;
+    finding.residual = std::max(*finding.residual, record.residual);
+    finding.worst_energy_rise = std::max(*finding.worst_energy_rise, record.worst_energy_rise);
+    finding.energy = record.energy.total();
+    if (!bench.state().x.allFinite() || !std::isfinite(*finding.energy)) {
+      fail(finding, "a number is not finite " + when);
+    }
+    const double size = record.energy.bend + record.energy.stretch;
+    if (record.worst_energy_rise > energy_slack(size, *finding.energy)) {
+      fail(finding, "the energy rose " + when);
+    }
+    // What holds the tools balances, whatever the solver says.
+    Vec3 sum = bench.introducer_force();
+    for (const simulate::Touch& touch : bench.touches()) {
+      sum += touch.normal_force * touch.normal + touch.friction;
+    }
+    const double allowed =
+        static_cast<double>(bench.state().x.cols()) * scene.residual_tolerance + 1e-9 * size;
+    if (sum.norm() > allowed) fail(finding, format("%.3g N are not held ", sum.norm()) + when);
+  };
+  bool good = bench.settled();
+  std::string when = "at the start";
+  if (good) check(when);
+  for (std::size_t k = 0; k < scene.moves.size() && good; ++k) {
+    when = "in move " + std::to_string(k);
+    good = bench.move(scene.moves[k]);
+    if (good) check(when);
+  }
+  if (good) return finding;
+  finding.outcome = bench.through_wall() ? "left_lumen" : "not_converged";
+  finding.residual = bench.record().residual;
+  if (finding.verdict == "ok") finding.verdict = "limit";
+  finding.note += (finding.note.empty() ? "" : "; ") + when;
+  return finding;
+}
+
+Json row_of(const CoaxialScene& given, const Finding& finding) {
+  const simulate::ToolScene scene = tool_scene_of(given);
+  const double EI = scene.tools[0].wire.sections[0].bending_stiffness;
+  Json row = finding_row(given.name, "newton", finding);
+  row["time_step_s"] = nullptr;
+  row["critical_time_step_s"] = nullptr;
+  row["bend_coefficient_n_per_m"] = clean(EI / kNPerMmFromNPerM);  // at 1 mm elements
+  row["stretch_coefficient_n_per_m3"] =
+      clean(2.0 * EI / std::pow(scene.tools[0].wire.radius, 2) / kNPerMm3FromNPerM3);
+  row["stiffness_ratio"] = given.ratio;
+  row["element_length_mm"] = scene.element_length;
+  row["nodes"] = given.nodes();
+  row["gravity_m_per_s2"] = 0.0;
+  row["tip_force_n"] = 0.0;
+  row["squeeze"] = 0.0;
+  row["bending_stiffness_n_mm2"] = clean(EI);
+  row["note"] = finding.note;
+  return row;
+}
+
 // ---------------------------------------------------------------- all of them
 
 /// An exception is a finding too.
@@ -419,6 +487,14 @@ void run_contact_scenes(int stride, std::vector<Json>& rows) {
   }
 }
 
+void run_coaxial_scenes(int stride, std::vector<Json>& rows) {
+  const simulate::VesselModel tube(make_s_tube().surface);
+  const std::vector<CoaxialScene> scenes = coaxial_scenes();
+  for (std::size_t k = 0; k < scenes.size(); k += static_cast<std::size_t>(stride)) {
+    rows.push_back(row_of(scenes[k], guarded([&] { return run_coaxial(scenes[k], tube); })));
+  }
+}
+
 }  // namespace
 
 BenchReport bench_stability(const BenchOptions& options) {
@@ -426,6 +502,7 @@ BenchReport bench_stability(const BenchOptions& options) {
   const int stride = options.quick ? 7 : 1;
   run_static_scenes(stride, report.rows);
   run_contact_scenes(stride, report.rows);
+  run_coaxial_scenes(stride, report.rows);
   report.description = describe_stability();
   const std::vector<Json> summary = summarize_stability(report.rows);
   const std::vector<std::string> lower = find_lower_energies(report.rows);

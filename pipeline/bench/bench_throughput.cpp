@@ -6,6 +6,7 @@
 
 #include "pipeline/bench/bench_report.h"
 #include "pipeline/bench/bench_walls.h"
+#include "pipeline/bench/coaxial_manoeuvres.h"
 #include "pipeline/bench/throughput_results.h"
 #include "pipeline/bench/timed_batch.h"
 #include "pipeline/stages/stages.h"
@@ -29,8 +30,9 @@ struct Size {
   double finest;                 // elements that the error of the tip counts from      [mm]
   std::vector<double> s_pushes;  // in the S-tube                                       [mm]
   std::vector<double> s_EI;
-  int copies;   // of each insertion in a batch, for the threads to share
-  int repeats;  // of each batch
+  int copies;      // of each insertion in a batch, for the threads to share
+  int repeats;     // of each batch
+  double coaxial;  // push of a catheter and of a wire                                  [mm]
 };
 
 const double kQuarter = 0.5 * kPi;
@@ -43,7 +45,8 @@ const Size kFull = {.tree_edge = 1.6,
                     .s_pushes = {0.2, 1.0, 5.0},
                     .s_EI = {50.0, 521.0},
                     .copies = 4,
-                    .repeats = 7};
+                    .repeats = 7,
+                    .coaxial = 600.0};
 const Size kQuick = {.tree_edge = 4.0,
                      .length = 60.0,
                      .EI = {50.0, 521.0},
@@ -53,7 +56,8 @@ const Size kQuick = {.tree_edge = 4.0,
                      .s_pushes = {1.0, 5.0},
                      .s_EI = {521.0},
                      .copies = 1,
-                     .repeats = 1};
+                     .repeats = 1,
+                     .coaxial = 40.0};
 
 /// The vessel of a case, made by its own stages and kept in the store.
 Vessel vessel_of_case(const Case& given, const std::filesystem::path& cache) {
@@ -331,14 +335,19 @@ BenchReport bench_throughput(const BenchOptions& options) {
 
   report.description = describe_throughput(surface, size.length, size.finest);
   // The quick size is too short to hold against them.
-  const std::vector<Json> aims =
-      options.quick ? std::vector<Json>{} : list_throughput_aims(results);
-  report.results = {
-      {"aims", Json::array()}, {"s_tube", results.s_tube}, {"same_on_two_threads", results.same}};
+  std::vector<Json> aims = options.quick ? std::vector<Json>{} : list_throughput_aims(results);
+  const std::vector<Json> coaxial = time_coaxial_manoeuvres(size.coaxial);
+  if (!options.quick) {
+    for (const Json& aim : list_coaxial_aims(coaxial)) aims.push_back(aim);
+  }
+  report.results = {{"aims", Json::array()},
+                    {"s_tube", results.s_tube},
+                    {"coaxial", coaxial},
+                    {"same_on_two_threads", results.same}};
   for (const Json& aim : aims) report.results["aims"].push_back(aim);
   report.rows = std::move(results.rows);
   report.text = table_text(shorten_throughput(report.rows)) + "\n" + table_text(results.s_tube) +
-                "\n" + table_text(aims) + "On one thread and on two " +
+                "\n" + table_text(coaxial) + "\n" + table_text(aims) + "On one thread and on two " +
                 (results.same ? "the same to the last bit\n" : "NOT THE SAME\n");
   report.plot = plot_throughput(report.rows, surface);
   return report;

@@ -219,15 +219,23 @@ Vessel make_arterial_tree(double edge_length) {
   return vessel;
 }
 
-Vessel make_s_tube() {
+namespace {
+
+Vessel two_bends(double before, double behind, double radius, int rings) {
   const double quarter = 0.5 * kPi * 60.0;
-  return tube_along({{.length = 40.0},
+  return tube_along({{.length = before},
                      {.length = quarter, .bend_radius = 60.0, .toward = Vec3::UnitX()},
                      {.length = 20.0},
                      {.length = quarter, .bend_radius = 60.0, .toward = Vec3::UnitY()},
-                     {.length = 80.0}},
-                    5.0, 84, 24);
+                     {.length = behind}},
+                    radius, rings, 24);
 }
+
+}  // namespace
+
+Vessel make_s_tube() { return two_bends(40.0, 80.0, 5.0, 84); }
+
+Vessel make_long_s_tube() { return two_bends(200.0, 260.0, 6.0, 170); }
 
 Vessel make_paper_tube() {
   const double quarter = 0.5 * kPi * 30.0;

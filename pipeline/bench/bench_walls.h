@@ -24,6 +24,9 @@ Vessel make_arterial_tree(double edge_length);
 /// of the first. Starts at the origin along +z.
 Vessel make_s_tube();
 
+/// The same, of radius 6 mm and straight for 200, 20 and 260 mm: 668 mm long.
+Vessel make_long_s_tube();
+
 /// A tube of 1160 triangles, as many as that of the paper's Fig. 5, whose measures the paper does
 /// not tell: radius 3 mm, 65 mm long, a bend of 90 degrees of radius 30 mm. Its wall has 1 MPa: one
 /// of 25 kPa/mm would give way to so stiff a wire altogether. Starts at the origin along +z.

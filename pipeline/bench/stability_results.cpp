@@ -115,6 +115,11 @@ Json describe_stability() {
         {"device_size", "the same with EI 620 N mm^2 and EA 49600 N"},
         {"ratio", "stiffness that falls by 1 to 1e4 in one third of the wire"},
         {"squeezed", "clamped at both ends, these nearer by 2 or 30 % of the length"},
+        {"coaxial",
+         "a curved catheter over a curved wire, EI 1e-3 to 1e3 of each other's, overlapping by 0.1 "
+         "to "
+         "40 mm at the start, pushed by turns in steps of 0.2 to 10 mm and each turned all round; "
+         "every second one in the S-tube of the throughput with friction 0.2"},
         {"all_at_once", "ratio 1e4, k_b 1e7, k_s 1e14, 5000 nodes, elements of 0.05 mm"}}},
       {"walls", walls},
       {"wall_entries", "along the axis, 0.1 mm beside the wall, 80 degrees into it; EI 1 to 1e5"},

@@ -1,5 +1,9 @@
 #include "pipeline/bench/stability_scenes.h"
 
+#include <algorithm>
+
+#include "pipeline/files/text.h"
+
 namespace wireplan::pipeline {
 
 std::vector<StaticScene> static_scenes() {
@@ -68,6 +72,61 @@ std::vector<StaticScene> static_scenes() {
         "all_at_once");
   }
   return scenes;
+}
+
+std::vector<CoaxialScene> coaxial_scenes() {
+  std::vector<CoaxialScene> scenes;
+  for (const double ratio : {1e-3, 1e-1, 1.0, 1e1, 1e3}) {
+    for (const double overlap : {0.1, 1.0, 10.0, 40.0}) {
+      for (const double step : {0.2, 2.0, 10.0}) {
+        scenes.push_back({.name = format("coaxial-%g-%g-%g", ratio, overlap, step),
+                          .ratio = ratio,
+                          .overlap = overlap,
+                          .step = step,
+                          .in_tube = scenes.size() % 2 == 1});
+      }
+    }
+  }
+  return scenes;
+}
+
+constexpr int kCoaxialPushes = 4;      // of each tool
+constexpr double kCoaxialWire = 45.0;  // in at the start                                [mm]
+
+int CoaxialScene::nodes() const {
+  const double longest = std::max(kCoaxialWire + step, overlap + kCoaxialPushes * step);
+  return 1 + static_cast<int>(std::ceil(longest - 1e-9));  // elements of 1 mm
+}
+
+simulate::ToolScene tool_scene_of(const CoaxialScene& given) {
+  constexpr double kProduct = 100.0 * 100.0;  // of both EI                        [N^2 mm^4]
+  const auto tool = [](const char* name, double radius, double inner, double EI, double curvature) {
+    return simulate::Tool{.wire = {.name = name,
+                                   .radius = radius,
+                                   .sections = {{.length = 20.0,
+                                                 .bending_stiffness = EI,
+                                                 .rest_curvature = curvature},
+                                                {.length = 280.0, .bending_stiffness = EI}}},
+                          .inner_radius = inner};
+  };
+  const double wire_EI = std::sqrt(kProduct / given.ratio);
+  simulate::ToolScene scene;
+  scene.tools = {tool("catheter", 0.8335, 0.4955, given.ratio * wire_EI, 1.0 / 20.0),
+                 tool("wire", 0.4445, 0.0, wire_EI, 1.0 / 12.0)};
+  scene.places = {{given.overlap, 0.0}, {kCoaxialWire, 0.5 * kPi}};
+  scene.point = Vec3(0.0, 0.0, 5.0);
+  scene.direction = Vec3::UnitZ();
+  scene.friction = 0.1;
+  scene.contact.friction = 0.2;
+  scene.residual_tolerance = 1e-6;
+  for (int k = 0; k < kCoaxialPushes; ++k) {
+    scene.moves.push_back(
+        {.push = {0.0, k % 2 == 0 ? given.step : -given.step}, .turn = {0.0, 0.0}});
+    scene.moves.push_back({.push = {given.step, 0.0}, .turn = {0.0, 0.0}});
+  }
+  scene.moves.push_back({.push = {0.0, 0.0}, .turn = {0.0, 2.0 * kPi}});
+  scene.moves.push_back({.push = {0.0, 0.0}, .turn = {-2.0 * kPi, 0.0}});
+  return scene;
 }
 
 }  // namespace wireplan::pipeline

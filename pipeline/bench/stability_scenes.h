@@ -1,10 +1,12 @@
 #pragma once
-/// Wires that `bench stability` bends without a wall. For use in this folder.
+/// Wires that `bench stability` bends without a wall, and tools in one another. For use in this
+/// folder.
 #include <cmath>
 #include <string>
 #include <vector>
 
 #include "preprocess/base.h"
+#include "simulate/insertion/tool_bench.h"
 
 namespace wireplan::pipeline {
 
@@ -39,5 +41,20 @@ struct StaticScene {
 };
 
 std::vector<StaticScene> static_scenes();
+
+/// A curved catheter over a curved wire out of an introducer: pushed on in turns, then each turned
+/// all round.
+struct CoaxialScene {
+  std::string name{};
+  double ratio = 1.0;    // EI of the catheter to that of the wire, whose product is given
+  double overlap = 0.1;  // of the two at the start                                      [mm]
+  double step = 2.0;     // of a push                                                    [mm]
+  bool in_tube = false;  // the S-tube of `bench throughput`, with friction 0.2; else no wall
+
+  int nodes() const;  // where the tools are furthest in
+};
+
+std::vector<CoaxialScene> coaxial_scenes();
+simulate::ToolScene tool_scene_of(const CoaxialScene& scene);
 
 }  // namespace wireplan::pipeline

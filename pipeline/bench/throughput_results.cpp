@@ -142,6 +142,11 @@ Json describe_throughput(const std::string& surface, double length, double fines
         {kPaperArtery,
          "as the paper's Fig. 6, with --case only: the vessel of the case, decimated to 5472 "
          "triangles or as near as can be; 200 mm of wire, no friction"}}},
+      {"coaxial",
+       "a wire of 0.889 mm pushed by pushed_mm into a tube of 6 mm radius with the bends of the "
+       "S-tube, then a Cobra C2 over it, to 1e-6 N; friction 0.1 to the wall and 0.05 between "
+       "them; "
+       "CPU time of one run, the vessel's model not counted"},
       {"real_time",
        "a time step of the paper is 1 ms and one iteration toward equilibrium; here a push of 1 mm "
        "is taken to equilibrium, and is faster than real time if that takes below 1 ms, in which "
