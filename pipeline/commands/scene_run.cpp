@@ -10,6 +10,7 @@
 #include "pipeline/report/picture.h"
 #include "pipeline/report/report.h"
 #include "plan/batch.h"
+#include "preprocess/centerline/centerline.h"
 #include "preprocess/files/vessel_io.h"
 #include "preprocess/surface/surface.h"
 #include "preprocess/surface/surface_repair.h"
@@ -105,9 +106,19 @@ LoadedVessel load_vessel(const SceneFile& scene) {
   vessel.told.insert(vessel.told.end(), read.entry.begin(), read.entry.end());
   vessel.wall = preprocess::extrude_wall(vessel.surface, given.wall.extrusion).wall;
   const simulate::LumenOptions options = simulate::follow(vessel.surface);
-  vessel.model = given.wall.elastic
-                     ? std::make_unique<simulate::VesselModel>(vessel.surface, vessel.wall, options)
-                     : std::make_unique<simulate::VesselModel>(vessel.surface, options);
+  auto model = given.wall.elastic
+                   ? std::make_unique<simulate::VesselModel>(vessel.surface, vessel.wall, options)
+                   : std::make_unique<simulate::VesselModel>(vessel.surface, options);
+  if (given.wall.support) {
+    const Vec3& entry = scene.insertion->introducer.point;
+    model->sections = std::make_unique<simulate::SectionChain>(
+        preprocess::find_tree(vessel.surface, entry),
+        simulate::SectionChainOptions{.support = *given.wall.support,
+                                      .young_modulus = vessel.wall.young_modulus,
+                                      .thickness = given.wall.extrusion.thickness_mm,
+                                      .pins = {simulate::Pin{.place = entry}}});
+  }
+  vessel.model = std::move(model);
   return vessel;
 }
 
@@ -141,6 +152,7 @@ Json warnings_json(const SceneVessel& given, const LoadedVessel& vessel) {
     warnings.push_back("frictionless (friction is 0): push forces are lower bounds");
   }
   if (!given.wall.elastic) warnings.push_back("rigid wall: contact forces are upper bounds");
+  if (given.wall.support) warnings.push_back(support_warning(*given.wall.support));
   return warnings;
 }
 

@@ -39,7 +39,12 @@ struct SurfaceInput {
 struct WallInput {
   bool elastic = true;
   preprocess::WallOptions extrusion;  // young_modulus 0: chosen by the wall stage
+  std::optional<double> support;      // of cross-sections that move as wholes; empty: they do
+                                      // not                                          [N/mm^3]
 };
+
+/// What a report tells of a vessel whose cross-sections move.
+std::string support_warning(double support);
 
 using plan::Manoeuvring;
 
@@ -115,8 +120,8 @@ SurfaceInput read_surface_input(JsonReader& reader, const std::filesystem::path&
 /// Adds a problem where the key is given: a part of the design that this version does not have.
 void refuse(JsonReader& reader, const std::string& key, const std::string& what);
 
-/// Reads {"model", "thickness_mm", "young_modulus_kpa", "poisson_ratio"} of the wall; `model` is
-/// "elastic" or "rigid" and stands where the file gives none.
+/// Reads {"model", "thickness_mm", "young_modulus_kpa", "poisson_ratio", "support_kpa_per_mm"} of
+/// the wall; `model` is "elastic" or "rigid" and stands where the file gives none.
 WallInput read_wall(JsonReader& reader, const std::string& model);
 
 /// Reads a coefficient of friction between wire and wall.

@@ -144,18 +144,26 @@ plan::Refinement refinement_of(const Json& json) {
 // In internal units: these are not for reading, and come back bit for bit.
 Json robustness_to_json(const plan::RobustnessOptions& options) {
   const plan::Unknowns& unknowns = options.unknowns;
-  return {{"repeats", options.repeats},  {"plans", options.plans},
-          {"seed", options.seed},        {"wall_factor", {unknowns.wall_low, unknowns.wall_high}},
-          {"angle_rad", unknowns.angle}, {"entry_mm", unknowns.entry},
-          {"lumen_mm", unknowns.lumen}};
+  Json json = {
+      {"repeats", options.repeats},  {"plans", options.plans},
+      {"seed", options.seed},        {"wall_factor", {unknowns.wall_low, unknowns.wall_high}},
+      {"angle_rad", unknowns.angle}, {"entry_mm", unknowns.entry},
+      {"lumen_mm", unknowns.lumen}};
+  if (unknowns.support_low != 1.0 || unknowns.support_high != 1.0) {
+    json["support_factor"] = {unknowns.support_low, unknowns.support_high};
+  }
+  return json;
 }
 
 plan::RobustnessOptions robustness_of(const Json& json) {
+  const Json support = json.value("support_factor", Json({1.0, 1.0}));
   return {.repeats = json.at("repeats"),
           .plans = json.at("plans"),
           .seed = json.at("seed"),
           .unknowns = {.wall_low = json.at("wall_factor").at(0),
                        .wall_high = json.at("wall_factor").at(1),
+                       .support_low = support.at(0),
+                       .support_high = support.at(1),
                        .angle = json.at("angle_rad"),
                        .entry = json.at("entry_mm"),
                        .lumen = json.at("lumen_mm")}};

@@ -503,6 +503,18 @@ double bending_stiffness_from_paper(double bend_coefficient, double edge_length)
   return bend_coefficient * h * h * h * kMmPerM * kMmPerM;  // N m^2 -> N mm^2
 }
 
+namespace {
+
+/// Of a scene in which no wire is pushed in.
+void refuse_support(const SceneVessel& vessel, Problems& problems) {
+  if (!vessel.wall.support) return;
+  problems.add("vessel.wall.support_kpa_per_mm", number_text(*vessel.wall.support / kMpaPerKpa),
+               "null, where no wire is pushed in",
+               "cross-sections move under a wire with \"insertion\"; delete the key, or give one");
+}
+
+}  // namespace
+
 SceneFile read_scene(const std::filesystem::path& path) {
   SceneFile scene;
   scene.file = path;
@@ -519,6 +531,7 @@ SceneFile read_scene(const std::filesystem::path& path) {
       simulate::ContactOptions& contact = scene.tools->scene.contact;
       contact.friction = scene.vessel->friction;
       contact.law = scene.vessel->contact_law;
+      refuse_support(*scene.vessel, problems);
     }
     root.finish();
     problems.throw_if_any();
@@ -544,6 +557,7 @@ SceneFile read_scene(const std::filesystem::path& path) {
     scene.insertion = read_insertion_scene(root, wire, *scene.vessel);
     scene.insertion->options.record_every = every;
   } else {
+    if (scene.vessel) refuse_support(*scene.vessel, problems);
     scene.bench = read_bench(root, wire, scene.vessel);
   }
   root.finish();

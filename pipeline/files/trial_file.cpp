@@ -203,6 +203,7 @@ std::string trial_text(const plan::Study& study, const plan::Candidate& candidat
   file["terms"] = trial.terms;
   file["pushes"] = pushes_to_json(trial.pushes);
   file["nodes_mm"] = to_json(trial.nodes);
+  if (trial.sections.size() > 0) file["sections_mm"] = to_json(trial.sections);
   file["contacts"] = contacts_to_json(trial.contacts);
   file["peak_forces"] = peaks_to_json(trial.peak_forces);
   return to_lines(file);
@@ -239,6 +240,7 @@ std::optional<TrialResult> find_trial(const std::filesystem::path& path) {
   trial.terms = file.at("terms").get<std::vector<std::string>>();
   trial.pushes = pushes_from_json(file.at("pushes"));
   trial.nodes = points_of(file.at("nodes_mm"));
+  if (file.contains("sections_mm")) trial.sections = points_of(file.at("sections_mm"));
   trial.contacts = contacts_from_json(file.at("contacts"));
   trial.peak_forces = peaks_from_json(file.at("peak_forces"));
   return trial;

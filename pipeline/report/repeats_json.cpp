@@ -53,6 +53,7 @@ Json disturbances_json(const std::vector<plan::Disturbance>& disturbances) {
                     {"tilt_deg", {d.tilt[0] / kRadPerDeg, d.tilt[1] / kRadPerDeg}},
                     {"shift_mm", {d.shift[0], d.shift[1]}},
                     {"lumen_inward_mm", d.inward}});
+    if (d.support_factor != 1.0) list.back()["support_factor"] = d.support_factor;
   }
   return list;
 }
@@ -119,6 +120,9 @@ Json repeats_json(const plan::Study& study, const plan::Plan& plan,
                                {"angle_deg", clean(unknowns.angle / kRadPerDeg)},
                                {"entry_mm", unknowns.entry},
                                {"lumen_mm", unknowns.lumen}});
+  if (unknowns.support_low < unknowns.support_high) {
+    json["unknowns"]["support_factor"] = {unknowns.support_low, unknowns.support_high};
+  }
   json["plans"] = std::move(plans);
   json["sensitivity"] = sensitivity_json(study, plan, judged);
   json["disturbances"] = disturbances_json(plan.disturbances);

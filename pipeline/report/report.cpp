@@ -456,6 +456,7 @@ Json build_report(const ReportInput& input) {
   if (input.figures.contains("anatomy")) {
     report["anatomy"] = anatomy_json(input.figures.at("anatomy"), input.study.wires);
   }
+  if (!input.motion.is_null()) report["vessel_motion"] = input.motion;
   report["ranking"] = std::move(ranking);
   report["excluded"] = std::move(excluded);
   report["wires"] = std::move(wires);

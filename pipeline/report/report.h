@@ -34,7 +34,9 @@ struct ReportInput {
   plan::Verdict verdict;              // for who decides
   std::vector<std::string> warnings;  // besides those in the figures
   Json robustness;                    // of repeats_json.h
-  Json timing;                        // all that differs between equal runs
+  Json motion;  // of motion_json.h, of the best trial of each wire; null where
+                // the vessel's cross-sections do not move
+  Json timing;  // all that differs between equal runs
 };
 
 Json build_report(const ReportInput& input);

@@ -122,6 +122,9 @@ void make_trials(Workspace& work, const fs::path& folder) {
   if (!work.given().wall.elastic) {
     figures["warnings"].push_back("trials: rigid wall: contact forces are upper bounds");
   }
+  if (const std::optional<double>& support = work.given().wall.support) {
+    figures["warnings"].push_back("trials: " + support_warning(*support));
+  }
   const double lumen_radius = study.goal.way->section().radius;
   if (!study.goal.at_section && study.goal.radius < lumen_radius) {
     figures["warnings"].push_back(small_sphere_warning(study.goal.radius, lumen_radius));

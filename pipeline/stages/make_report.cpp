@@ -12,6 +12,7 @@
 #include "pipeline/files/trial_file.h"
 #include "pipeline/files/viewer_files.h"
 #include "pipeline/report/anatomy_json.h"
+#include "pipeline/report/motion_json.h"
 #include "pipeline/report/page.h"
 #include "pipeline/report/picture.h"
 #include "pipeline/report/places.h"
@@ -78,6 +79,37 @@ plan::Verdict decide(const Workspace& work, const ReportInput& report) {
   return plan::find_verdict(known);
 }
 
+/// How far a trial has moved the vessel's cross-sections in the end.
+Eigen::Matrix3Xd moved_by(const Workspace& work, const ReportInput& report, int trial) {
+  // Attempts ran in full for their shapes; what they are judged by may be a probe without sections.
+  if (const std::optional<simulate::TrialResult> played = find_played(work, trial)) {
+    return played->sections;
+  }
+  return read_trial(work, report.plan.levels[static_cast<std::size_t>(trial)], trial).sections;
+}
+
+/// What the best plan of each wire, or its closest attempt where it has none, does to the vessel;
+/// null where its cross-sections do not move.
+Json find_motion(Workspace& work, const ReportInput& report) {
+  const std::unique_ptr<const simulate::SectionChain> chain = work.section_chain();
+  if (!chain) return nullptr;
+  Json trials = Json::array();
+  for (const int id :
+       plan::best_of_each_wire(report.study, report.plan, report.judgement.ranking)) {
+    const auto k = static_cast<std::size_t>(id);
+    const Eigen::Matrix3Xd u = moved_by(work, report, id);
+    if (u.cols() != chain->nodes()) continue;  // of a coarse trial without them
+    const auto wire = static_cast<std::size_t>(report.plan.candidates[k].wire);
+    trials.push_back({{"trial", id},
+                      {"wire", report.study.wires[wire].name},
+                      {"outcome", outcome_name(report.plan.trials[k].outcome)}});
+    trials.back().update(motion_json(*report.study.goal.way, *chain, u));
+  }
+  return {{"support_kpa_per_mm", clean(*work.given().wall.support / kMpaPerKpa)},
+          {"support_source", "given, not measured on the patient; published: 0.01 to 10"},
+          {"trials", std::move(trials)}};
+}
+
 // All of the report that the stages before it tell.
 ReportInput describe_run(Workspace& work) {
   const Case& given = work.given();
@@ -102,6 +134,7 @@ ReportInput describe_run(Workspace& work) {
   const Json of_plans = work.figures("plans");
   for (const Json& told : of_plans.at("warnings")) report.warnings.push_back(told);
 
+  report.motion = find_motion(work, report);
   report.verdict = decide(work, report);
 
   // The values that stages chose where the case left them open.
@@ -187,7 +220,18 @@ std::string draw_overview(Workspace& work, const ReportInput& report, const Page
                     .color = wire_color(static_cast<int>(wires.size()))});
     key.push_back({"wire", Json({wire.name, wire.radius, hash_text(bytes_of(wire.nodes))}).dump()});
   }
-  return work.piece(key, [&] { return encode_png(draw_picture(work.surface(), wires, marks)); });
+  // As the best plan moves it.
+  Surface vessel = work.surface();
+  if (const std::unique_ptr<const simulate::SectionChain> chain = work.section_chain();
+      chain && !report.judgement.ranking.plans.empty()) {
+    const int best = report.judgement.ranking.plans.front().trial;
+    const Eigen::Matrix3Xd u = moved_by(work, report, best);
+    for (Eigen::Index k = 0; k < vessel.vertices.cols(); ++k) {
+      vessel.vertices.col(k) += chain->displacement(vessel.vertices.col(k), u);
+    }
+    key.push_back({"moved", hash_text(bytes_of(u))});
+  }
+  return work.piece(key, [&] { return encode_png(draw_picture(vessel, wires, marks)); });
 }
 
 /// What the page shows of the vessel and of where to; trials and insertions are added by the

@@ -255,7 +255,10 @@ std::vector<Stage> stages_of(const Case& given) {
                .parameters = {"/access", "/target", "/wires", "/tip_roll_deg", "/friction",
                               "/friction_factor", "/wall/model", "/insertion"},
                .make = make_trials};
-  if (given.wall.elastic) trials.after.push_back("wall");  // a rigid one does not act
+  const bool sections_move = given.wall.support.has_value();
+  // A rigid wall does not act but in how the vessel moves as a whole.
+  if (given.wall.elastic || sections_move) trials.after.push_back("wall");
+  if (sections_move) read_too(trials, {"/wall/support_kpa_per_mm"});
   if (const std::vector<std::size_t> served = targets_served(given); served.size() > 1) {
     for (const std::size_t k : served) trials.after.push_back(centerline_toward(k));
   }
@@ -272,6 +275,7 @@ std::vector<Stage> stages_of(const Case& given) {
     read_too(manoeuvres, {"/robustness/seed", "/robustness/friction_factor",
                           "/robustness/stiffness_factor", "/robustness/wall_factor",
                           "/robustness/angle_deg", "/robustness/entry_mm", "/robustness/lumen_mm"});
+    if (sections_move) read_too(manoeuvres, {"/robustness/support_factor"});
   }
   manoeuvres.make = make_manoeuvres;
   stages.push_back(manoeuvres);

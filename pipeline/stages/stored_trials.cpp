@@ -94,6 +94,7 @@ std::string StoredTrials::key_of(const plan::Run& run, const std::string& shared
     lines.push_back(
         {"disturbance",
          Json({d.wall_factor, d.tilt.x(), d.tilt.y(), d.shift.x(), d.shift.y(), d.inward}).dump()});
+    if (d.support_factor != 1.0) lines.push_back({"support", Json(d.support_factor).dump()});
   }
   return shared_key + key_text(lines);
 }

@@ -161,12 +161,16 @@ const simulate::VesselModel& Workspace::rigid_model() {
     stock.model = std::make_unique<simulate::VesselModel>(surface(), options);
   }
   if (stock.model->compliance) stock.compliance_aside = std::move(stock.model->compliance);
+  if (stock.model->sections) stock.sections_aside = std::move(stock.model->sections);
   return *stock.model;
 }
 
 const simulate::VesselModel& Workspace::model() {
   ModelStock& stock = models();
-  if (stock.model && stock.model->compliance) return *stock.model;
+  if (stock.model && stock.model->compliance) {
+    let_sections_move(stock);
+    return *stock.model;
+  }
   rigid_model();
   if (given_.wall.elastic) {
     if (!stock.compliance_aside) {
@@ -174,7 +178,32 @@ const simulate::VesselModel& Workspace::model() {
     }
     stock.model->compliance = std::move(stock.compliance_aside);
   }
+  let_sections_move(stock);
   return *stock.model;
+}
+
+/// Cross-sections of the tree on the case's support, held where the wire goes in.
+std::unique_ptr<const simulate::SectionChain> Workspace::section_chain() {
+  if (!given_.wall.support) return nullptr;
+  return std::make_unique<simulate::SectionChain>(
+      read_tree(*this),
+      simulate::SectionChainOptions{.support = *given_.wall.support,
+                                    .young_modulus = wall().young_modulus,
+                                    .thickness = given_.wall.extrusion.thickness_mm,
+                                    .pins = {simulate::Pin{.place = given_.study.access}}});
+}
+
+void Workspace::let_sections_move(ModelStock& stock) {
+  if (!given_.wall.support) return;
+  const Vec3& access = given_.study.access;
+  std::string made_from = artifact("centerline").contents() + artifact("wall").contents() +
+                          Json({*given_.wall.support, access[0], access[1], access[2]}).dump();
+  if (stock.sections_made_from != made_from) {
+    stock.sections_aside = section_chain();
+    stock.sections_made_from = std::move(made_from);
+    stock.model->sections = nullptr;
+  }
+  if (!stock.model->sections) stock.model->sections = std::move(stock.sections_aside);
 }
 
 std::string Workspace::piece(std::vector<KeyLine> key,

@@ -26,6 +26,8 @@ struct ModelStock {
   std::string made_from;  // key of surface and wall
   std::unique_ptr<simulate::VesselModel> model = nullptr;
   std::unique_ptr<const simulate::WallCompliance> compliance_aside = nullptr;  // while it is rigid
+  std::string sections_made_from = {};  // how its cross-sections move
+  std::unique_ptr<const simulate::SectionChain> sections_aside = nullptr;  // while it is rigid
 };
 
 /// How a stage speaks to whom started it; each may be empty.
@@ -66,8 +68,10 @@ class Workspace {
   const Wall& wall();
   /// The vessel as the trials feel it: with the wall only where it yields.
   const simulate::VesselModel& model();
-  /// The same with a wall that does not yield. Both are one object: the use of either ends before
-  /// the other is asked for.
+  /// How its cross-sections move; null where they do not.
+  std::unique_ptr<const simulate::SectionChain> section_chain();
+  /// The same with a wall that does not yield or move. Both are one object: the use of either ends
+  /// before the other is asked for.
   const simulate::VesselModel& rigid_model();
   /// Makes the field of the vessel a piece in the store, unless another process did: for shards, so
   /// that one of them computes it. rigid_model() takes it from there.
@@ -103,7 +107,8 @@ class Workspace {
 
   std::string field_key_text() const;
   ModelStock& models();  // of this surface and wall
-  bool find_field();     // whether the store has it; the stock's model then
+  void let_sections_move(ModelStock& stock);
+  bool find_field();  // whether the store has it; the stock's model then
 };
 
 /// The start of a stage's figures.json, and its end.

@@ -184,8 +184,11 @@ inline Json full_case(Json json) {
   if (!json["surface"].contains("path")) {
     json["mask"] = {{"most_handles", 20}, {"most_faces", 100000}};
   }
-  json["wall"] = {
-      {"model", "rigid"}, {"thickness_mm", 2}, {"young_modulus_kpa", 56}, {"poisson_ratio", 0.4}};
+  json["wall"] = {{"model", "rigid"},
+                  {"thickness_mm", 2},
+                  {"young_modulus_kpa", 56},
+                  {"poisson_ratio", 0.4},
+                  {"support_kpa_per_mm", 2}};
   json["access"].update(Json{{"inclination_deg", {0, 15}}, {"azimuth_deg", {0, 90}}});
   json["target"]["radius_mm"] = 5;
   json["wires"] = {own_wire(), "amplatz"};
@@ -216,6 +219,7 @@ inline Json full_case(Json json) {
                         {"friction_factor", {0.25, 4}},
                         {"stiffness_factor", {0.9, 1.2}},
                         {"wall_factor", {1, 1}},
+                        {"support_factor", {0.5, 4}},
                         {"angle_deg", 3},
                         {"entry_mm", 0.5},
                         {"lumen_mm", 0.1}};

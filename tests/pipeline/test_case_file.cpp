@@ -44,6 +44,7 @@ TEST_F(CaseFile, GivesEveryMissingKeyItsDefault) {
 TEST_F(CaseFile, ConvertsToInternalUnits) {
   const Case input = read(full_case(volume_case()));
   EXPECT_DOUBLE_EQ(input.wall.extrusion.young_modulus, 0.056);  // MPa
+  EXPECT_DOUBLE_EQ(input.wall.support.value(), 2e-3);           // N/mm^3
   EXPECT_DOUBLE_EQ(input.study.inclinations[1], kPi / 12.0);    // rad
   EXPECT_DOUBLE_EQ(input.study.azimuths[1], kPi / 2.0);
   EXPECT_DOUBLE_EQ(input.study.rolls[1], kPi);
@@ -51,6 +52,25 @@ TEST_F(CaseFile, ConvertsToInternalUnits) {
   EXPECT_DOUBLE_EQ(wire.radius, 0.4445);                     // mm
   EXPECT_DOUBLE_EQ(wire.sections[0].mass_per_length, 5e-9);  // t/mm
   EXPECT_DOUBLE_EQ(wire.sections[0].rest_curvature, 1.0 / 12.0);
+}
+
+TEST_F(CaseFile, CrossSectionsMoveWhereASupportIsGivenAlone) {
+  Json json = volume_case();
+  EXPECT_FALSE(read(json).wall.support);
+  EXPECT_FALSE(case_parameters(read(json))["wall"].contains("support_kpa_per_mm"));
+  json["robustness"]["support_factor"] = {0.5, 2};
+  EXPECT_EQ(read(json).robustness.unknowns.support_high, 1.0) << "there is none to be disturbed";
+  json["wall"]["support_kpa_per_mm"] = nullptr;
+  EXPECT_FALSE(read(json).wall.support);
+  json["wall"]["support_kpa_per_mm"] = 1;
+  EXPECT_DOUBLE_EQ(read(json).wall.support.value(), 1e-3);
+  EXPECT_EQ(read(json).robustness.unknowns.support_high, 2.0);
+  json["robustness"].erase("support_factor");
+  EXPECT_EQ(read(json).robustness.unknowns.support_low, 0.1);
+  EXPECT_EQ(read(json).robustness.unknowns.support_high, 10.0);
+  json["wall"]["support_kpa_per_mm"] = 0;
+  expect_mentions(problem(json), {"wall.support_kpa_per_mm is 0, expected a number from 0.001",
+                                  "1e6 Pa/m are 1 kPa/mm"});
 }
 
 TEST_F(CaseFile, ReadsAFolderThroughItsCaseJson) {

@@ -266,6 +266,7 @@ std::map<std::string, std::vector<std::string>> common_table() {
                                         {"/wall/thickness_mm", wall},
                                         {"/wall/young_modulus_kpa", wall},
                                         {"/wall/poisson_ratio", wall},
+                                        {"/wall/support_kpa_per_mm", trials},
                                         {"/target/radius_mm", trials},
                                         {"/access/inclination_deg/0", trials},
                                         {"/access/azimuth_deg/0", trials},
@@ -307,9 +308,10 @@ std::map<std::string, std::vector<std::string>> common_table() {
     table[std::string("/") + key] = report;
   }
   const Names tried = {"manoeuvres", "plans", "report"};  // under disturbances
-  for (const char* key : {"seed", "friction_factor/0", "friction_factor/1", "stiffness_factor/0",
-                          "stiffness_factor/1", "wall_factor/0", "wall_factor/1", "angle_deg",
-                          "entry_mm", "lumen_mm"}) {
+  for (const char* key :
+       {"seed", "friction_factor/0", "friction_factor/1", "stiffness_factor/0",
+        "stiffness_factor/1", "wall_factor/0", "wall_factor/1", "support_factor/0",
+        "support_factor/1", "angle_deg", "entry_mm", "lumen_mm"}) {
     table[std::string("/robustness/") + key] = tried;
   }
   table["/robustness/repeats"] = table["/robustness/plans"] = {"plans", "report"};
@@ -340,6 +342,7 @@ Json case_with_every_list_of_one(const fs::path& folder) {
   file["tip_roll_deg"] = {0};
   file["robustness"]["friction_factor"] = {0.5, 2};
   file["robustness"]["stiffness_factor"] = {0.8, 1.5};
+  file["wall"]["support_kpa_per_mm"] = 1;
   // A wire with every kind of value.
   Json& wire = file["wires"][0];
   wire["coating"] = "ptfe";
