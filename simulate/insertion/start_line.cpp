@@ -86,6 +86,21 @@ Vec3 point_at_arc(const Eigen::Matrix3Xd& line, double arc) {
   return line.col(line.cols() - 1);
 }
 
+Eigen::Matrix3Xd line_up_to(const Eigen::Matrix3Xd& line, double arc) {
+  Eigen::Index count = 1;
+  double length = 0.0;
+  while (count < line.cols()) {
+    length += (line.col(count) - line.col(count - 1)).norm();
+    if (length >= arc) break;
+    ++count;
+  }
+  if (count >= line.cols()) return line;
+  Eigen::Matrix3Xd part(3, count + 1);
+  part.leftCols(count) = line.leftCols(count);
+  part.col(count) = point_at_arc(line, std::max(0.0, arc));
+  return part;
+}
+
 void bring_into_lumen(const Lumen& lumen, double radius, int first, Eigen::Matrix3Xd& points) {
   const int n = static_cast<int>(points.cols());
   std::vector<bool> known(static_cast<std::size_t>(n), false);

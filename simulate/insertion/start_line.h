@@ -24,6 +24,9 @@ Eigen::Matrix3Xd line_from_entry(const Eigen::Matrix3Xd& line, const Vec3& entry
 /// Point of the line at an arc length; on its last edge's extension beyond its end.
 Vec3 point_at_arc(const Eigen::Matrix3Xd& line, double arc);
 
+/// The line from its start to the point at an arc length, at least its first edge's start and end.
+Eigen::Matrix3Xd line_up_to(const Eigen::Matrix3Xd& line, double arc);
+
 /// Moves points from `first` on that are nearer to the wall than the radius, or through it, to that
 /// distance from it. Those beyond the field of the lumen first come to it, straight toward the last
 /// point that is not, or the next one.

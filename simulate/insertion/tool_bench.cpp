@@ -53,7 +53,7 @@ int count_elements(const ToolScene& scene) {
     places = moved(places, move, 1.0);
     longest = std::max(longest, largest_insertion(places));
   }
-  return std::max(4, static_cast<int>(std::ceil(longest / scene.element_length - 1e-9)));
+  return elements_over(longest, scene.element_length);
 }
 
 /// A list of values at the middles of edges of length h, at s; beyond the ends that of the ends.
@@ -115,19 +115,11 @@ Parts parts_of(const ToolScene& scene, const ToolMove& by) {
   return {first, 1.0 / count, kBench.shortest / count, farthest};
 }
 
-/// On from where a solve got, taken for a jump: friction that is held to where the tools were may
-/// have no equilibrium there. So anchors follow, and friction opposes the rest. Adds its heat.
-template <class Solve>
-bool follow_jump(WallContact* contact, const Solve& solve, double& rubbed) {
-  for (int k = 0; k < kBench.most_followed && contact != nullptr; ++k) {
-    rubbed += contact->settle();
-    contact->predict(0.0);
-    if (solve()) return true;
-  }
-  return false;
-}
-
 }  // namespace
+
+int elements_over(double length, double element_length) {
+  return std::max(4, static_cast<int>(std::ceil(length / element_length - 1e-9)));
+}
 
 double friction_with_wall(const ToolScene& scene, std::size_t tool) {
   return scene.tools[tool].wire.friction.value_or(scene.contact.friction);
@@ -233,8 +225,7 @@ bool ToolBench::move(const ToolMove& by) {
     }
     double rubbed = 0.0;
     if (!solved && !may_cut && !through_wall_) {
-      solved = follow_jump(
-          next.contact.get(), [&] { return solve(next); }, rubbed);
+      solved = follow_jump(next, rubbed);
     }
     if (!solved) {
       if (!may_cut) {
@@ -357,7 +348,7 @@ void ToolBench::carry_contact(const State& from, const Eigen::VectorXd& slides, 
   if (to.contact == nullptr) return;
   ContactMemory memory = from.contact->memory();
   const Eigen::Index n = from.state.x.cols();
-  expects(memory.anchor.cols() == n);
+  expects(memory.anchor.cols() == n && to.contact->memory().anchor.cols() == n);
   for (Eigen::Index i = 0; i < n; ++i) {
     const Vec3 along = slides[i] * edge_tangent(from.state, std::min(i, n - 2));
     memory.x.col(i) -= along;
@@ -403,24 +394,27 @@ ToolBench::Shape ToolBench::shape() const {
 /// The centreline of now, as much longer or shorter as it is to be, and the tools' angles on it.
 ToolBench::Shape ToolBench::follow(const State& to) const {
   const double h = now_.composite.edge_length(), h_new = to.composite.edge_length();
-  const Eigen::Index edges = now_.state.x.cols() - 1;
+  const Eigen::Index before = now_.state.x.cols() - 1, edges = to.composite.rod.nodes() - 1;
+  const bool divided_anew = h != h_new || before != edges;
   const Shape from = shape();
-  Shape next = from;
+  Shape next{from.x, Eigen::MatrixXd(edges, from.angles.cols())};
+  if (divided_anew) next.x.resize(3, edges + 1);
+  next.x.col(0) = from.x.col(0);
   for (Eigen::Index e = 0; e < edges; ++e) {
     const double middle = (static_cast<double>(e) + 0.5) * h_new;
-    if (h != h_new) {
-      const Vec3 t = between_middles(middle, h, edges,
+    if (divided_anew) {
+      const Vec3 t = between_middles(middle, h, before,
                                      [&](Eigen::Index k) { return edge_tangent(now_.state, k); });
       next.x.col(e + 1) = next.x.col(e) + h_new * t.normalized();
     }
     for (Eigen::Index k = 0; k < from.angles.cols(); ++k) {
       // Tools that lie in one plane, curved to opposite sides, would stay so when that is a saddle.
       next.angles(e, k) =
-          between_middles(middle, h, edges, [&](Eigen::Index i) { return from.angles(i, k); }) +
+          between_middles(middle, h, before, [&](Eigen::Index i) { return from.angles(i, k); }) +
           kBench.nudge * static_cast<double>(k * e) / static_cast<double>(edges);
     }
   }
-  if (h != h_new) bend_to_support(to, next.x);
+  if (divided_anew) bend_to_support(to, next.x);
   return next;
 }
 
@@ -515,6 +509,17 @@ bool ToolBench::solve(State& at) {
     through_wall_ = through_wall_ || touch.penetration > kBench.deepest;
   }
   return !through_wall_;
+}
+
+/// On from where a solve got, taken for a jump: friction that is held to where the tools were may
+/// have no equilibrium there. So anchors follow, and friction opposes the rest. Adds its heat.
+bool ToolBench::follow_jump(State& at, double& rubbed) {
+  for (int k = 0; k < kBench.most_followed && at.contact != nullptr; ++k) {
+    rubbed += at.contact->settle();
+    at.contact->predict(0.0);
+    if (solve(at)) return true;
+  }
+  return false;
 }
 
 // ---------------------------------------------------------------- what is told

@@ -85,6 +85,9 @@ struct ToolRecord {
   double worst_energy_rise = 0.0;
 };
 
+/// So many elements divide a centreline of that length, none longer than asked for [mm].
+int elements_over(double length, double element_length);
+
 class ToolBench {
  public:
   /// Expects what ToolScene says; the tools are then at their places in equilibrium if settled().
@@ -99,10 +102,27 @@ class ToolBench {
   /// stay within 0 and their lengths, one of them beyond 0.
   bool move(const ToolMove& by);
 
+  /// Divides the centreline anew, into edges no longer than the scene asks for once the foremost
+  /// tip is `longest` in, and finds the equilibrium again. False, and all as before, where there is
+  /// none. Tools whose moves are not in the scene need it before an edge is 1.5 times as long.
+  bool divide(double longest);
+
+  /// save() marks where the tools are, restore() takes them back there.
+  struct Mark {
+    int elements = 0;
+    std::vector<ToolPlace> places;
+    RodState state;
+    ContactMemory memory;  // with the vessel
+    ToolRecord record;
+  };
+  Mark save() const;
+  void restore(const Mark& mark);
+
   const ToolRecord& record() const { return record_; }
   const RodState& state() const { return now_.state; }
   const Composite& composite() const { return now_.composite; }
   const std::vector<ToolPlace>& places() const { return now_.places; }
+  const std::vector<Tool>& tools() const { return scene_.tools; }
   /// Angle of a tool's director along the edges, counted as its hub's roll and carried along the
   /// centreline without twist; empty of a straight tool [rad].
   Eigen::VectorXd angles(int tool) const;
@@ -149,12 +169,14 @@ class ToolBench {
   Shape follow(const State& to) const;
   Shape shape() const;
   RodState guess(const Shape& followed, const Shape& drift, double part) const;
+  ContactMemory spread_contact(const State& from, const State& to) const;
   void bend_to_support(const State& to, Eigen::Matrix3Xd& x) const;
   void set_frames(const Eigen::MatrixXd& angles, RodState& state) const;
   Eigen::VectorXd slides(const State& from, const State& to) const;
   void carry_contact(const State& from, const Eigen::VectorXd& slides, State& to) const;
   static double outside_part(const State& at, std::size_t tool, const Touch& touch);
   bool solve(State& at);
+  bool follow_jump(State& at, double& rubbed);
   double rub(const Eigen::VectorXd& slides, State& at, double& by_hands);
   void find_energy(State& at) const;
   void feel(State& at, const ToolMove& direction) const;

@@ -47,6 +47,20 @@ struct Shape {
   Eigen::Matrix3Xd sections = {};  // (3, s) how far the vessel's cross-sections have moved; empty
                                    // where they do not                                [mm]
   Eigen::VectorXd contact_force;   // (k) norm per node                                [N]
+  /// Of several tools: how far each is in along these nodes, from the outside in; empty of one
+  /// wire.
+  std::vector<double> tools = {};  //                                                 [mm]
+};
+
+/// What one of several tools did and felt, an entry per push of the trial.
+struct ToolTrack {
+  std::string name;
+  std::vector<double> insertion;   //                                                 [mm]
+  std::vector<double> roll;        // of its hub since the start                     [rad]
+  std::vector<double> push_force;  // of the hand on it, into the body                 [N]
+  std::vector<double> hub_torque;  // of the hand on it                             [N mm]
+  std::vector<double> tip_force;   // of the wall on its last 2 mm; 0 inside another   [N]
+  std::vector<double> wall_force;  // sum of the wall's normal forces on it            [N]
 };
 
 struct TrialResult {
@@ -63,7 +77,9 @@ struct TrialResult {
   Eigen::Matrix3Xd sections = {};  // of the final shape, as Shape has them
   std::vector<WireContact> contacts;       // of the final shape
   std::vector<TriangleForce> peak_forces;  // over all pushes, ascending triangles; if mapped
-  std::vector<Shape> shapes;       // every `record_every` of the hand's way, and the final one
+  std::vector<ToolTrack> tools;            // of several tools, from the outside in; else empty
+  std::vector<int> steps;     // of several tools: the step of the script that each push belongs to
+  std::vector<Shape> shapes;  // every `record_every` of the hand's way, and the final one
   std::vector<std::string> terms;  // energy terms that the scene built: "stretch", "bend", ...
   std::optional<Shape> start;      // the equilibrium that it started from, if from a line
   double roll = 0.0;               // of the hub before the first move                    [rad]

@@ -1,0 +1,84 @@
+// Places of ToolBench that are gone back to, and its centreline divided anew.
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "simulate/insertion/tool_bench.h"
+
+namespace wireplan::simulate {
+
+bool ToolBench::divide(double longest) {
+  const int before = elements_;
+  elements_ = elements_over(longest, scene_.element_length);
+  if (elements_ == before) return true;
+  State next;
+  place(now_.places, next);
+  next.state = guess(follow(next), {}, 0.0);
+  if (next.contact != nullptr) {
+    next.contact->restore(spread_contact(now_, next));
+    next.contact->predict(0.0);
+  }
+  double rubbed = 0.0;
+  if (!solve(next) && !follow_jump(next, rubbed)) {
+    elements_ = before;
+    return false;
+  }
+  if (next.contact != nullptr) next.contact->settle();
+  const std::vector<double> none(scene_.tools.size(), 0.0);
+  find_energy(next);
+  feel(next, {none, none});
+  now_ = std::move(next);
+  return true;
+}
+
+ToolBench::Mark ToolBench::save() const {
+  return {.elements = elements_,
+          .places = now_.places,
+          .state = now_.state,
+          .memory = now_.contact != nullptr ? now_.contact->memory() : ContactMemory{},
+          .record = record_};
+}
+
+void ToolBench::restore(const Mark& mark) {
+  elements_ = mark.elements;
+  State at;
+  place(mark.places, at);
+  at.state = mark.state;
+  if (at.contact != nullptr) {
+    at.contact->restore(mark.memory);
+    at.contact->predict(0.0);
+  }
+  const std::vector<double> none(scene_.tools.size(), 0.0);
+  find_energy(at);
+  feel(at, {none, none});
+  now_ = std::move(at);
+  record_ = mark.record;
+  settled_ = true;
+  through_wall_ = false;
+}
+
+/// What the nodes remember, at the nodes of another division of the same centreline: of the nearest
+/// node, for their share of length.
+ContactMemory ToolBench::spread_contact(const State& from, const State& to) const {
+  const ContactMemory& known = from.contact->memory();
+  const double h = from.composite.rod.rest_length[0], h_new = to.composite.rod.rest_length[0];
+  const Eigen::Index last = from.state.x.cols() - 1, n = to.state.x.cols();
+  ContactMemory memory{.x = to.state.x,
+                       .normal_force = Eigen::VectorXd::Zero(n),
+                       .anchor = to.state.x,
+                       .triangle = {},
+                       .sections = known.sections};
+  if (!known.triangle.empty()) memory.triangle.assign(static_cast<std::size_t>(n), -1);
+  for (Eigen::Index i = 0; i < n; ++i) {
+    const Eigen::Index nearest =
+        std::min(last, static_cast<Eigen::Index>(std::lround(static_cast<double>(i) * h_new / h)));
+    memory.normal_force[i] = known.normal_force[nearest] * h_new / h;
+    memory.anchor.col(i) += known.anchor.col(nearest) - known.x.col(nearest);
+    if (known.triangle.empty()) continue;
+    memory.triangle[static_cast<std::size_t>(i)] =
+        known.triangle[static_cast<std::size_t>(nearest)];
+  }
+  return memory;
+}
+
+}  // namespace wireplan::simulate

@@ -1,0 +1,398 @@
+#include "simulate/insertion/tool_trial.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <map>
+#include <utility>
+
+#include "preprocess/centerline/path_place.h"
+#include "simulate/contact/contact_force.h"
+
+namespace wireplan::simulate {
+namespace {
+
+constexpr double kToolStart = 4.0;                   // of the innermost in the vessel         [mm]
+constexpr double kToolTip = 2.0;                     // that counts as a tip for its force     [mm]
+constexpr double kToolOutside = 1.0;                 // penetration that contact does not explain
+constexpr double kToolPatience = 25.0;               // of the last push, without progress     [mm]
+constexpr double kToolTurnStep = 15.0 * kRadPerDeg;  // of a hub between two records
+constexpr double kStepsPerPart = 2.0;    // of the options: a bench cuts a push at 2 mm itself
+constexpr double kDivideLonger = 1.25;   // edges than asked for, ...
+constexpr double kLongestEdge = 1.45;    // ... of it: ToolBench::divide()
+constexpr double kDivideShorter = 0.67;  // ... or shorter: the centreline is divided anew
+
+std::string in_mm(double value) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%.1f mm", value);
+  return text;
+}
+
+bool moves(const ToolStep& step, std::size_t tool) {
+  return step.tool == kBothTools || step.tool == static_cast<int>(tool);
+}
+
+ToolScene scene_of(const std::vector<Tool>& tools, const Introducer& introducer,
+                   const VesselModel& vessel, const ToolTrialOptions& options) {
+  ToolScene scene;
+  scene.tools = tools;
+  for (Tool& tool : scene.tools) tool.wire.friction = friction_of(tool.wire, options.insertion);
+  scene.places.assign(tools.size(), {.insertion = 0.0, .roll = introducer.roll});
+  scene.places.back().insertion = kToolStart;
+  scene.point = introducer.point;
+  scene.direction = introducer.direction;
+  scene.vessel = &vessel;
+  scene.contact.law = options.insertion.contact_law;
+  scene.contact.friction = options.insertion.friction;
+  scene.friction = options.friction_between;
+  scene.element_length = options.insertion.element_length;
+  scene.loads.gravity = options.insertion.gravity;
+  scene.residual_tolerance = options.insertion.residual_tolerance;
+  scene.max_iterations = options.insertion.max_iterations;
+  return scene;
+}
+
+}  // namespace
+
+ToolTrial::ToolTrial(const std::vector<Tool>& tools, const Introducer& introducer, const Goal& goal,
+                     const VesselModel& vessel, const ToolTrialOptions& options)
+    : goal_(goal),
+      vessel_(vessel),
+      options_(options),
+      bench_(std::make_unique<ToolBench>(scene_of(tools, introducer, vessel, options))),
+      start_roll_(introducer.roll) {
+  expects(!goal.at_section || goal.way);
+  start_energy_ = bench_->record().energy.total();
+  record_.roll = introducer.roll;
+  record_.terms = name_terms(bench_->composite().rod, {"tools"}, &vessel,
+                             friction_of(tools.back().wire, options.insertion));
+  for (const Tool& tool : tools) record_.tools.emplace_back().name = tool.wire.name;
+  best_distance_ = (tip(static_cast<int>(tools.size()) - 1) - goal.point).norm();
+  if (!bench_->settled()) {
+    end(Outcome::kNotConverged, "no equilibrium of the tools at the introducer");
+  }
+}
+
+double ToolTrial::insertion(int tool) const {
+  return bench_->places()[static_cast<std::size_t>(tool)].insertion;
+}
+
+double ToolTrial::foremost() const {
+  double most = 0.0;
+  for (const ToolPlace& place : bench_->places()) most = std::max(most, place.insertion);
+  return most;
+}
+
+double ToolTrial::foremost_of(int tool) const {
+  return tool == kBothTools ? foremost() : insertion(tool);
+}
+
+Vec3 ToolTrial::tip(int tool) const { return bench_->nodes_of(tool).rightCols<1>(); }
+
+Vec3 ToolTrial::tip_direction(int tool) const {
+  const Eigen::Matrix3Xd nodes = bench_->nodes_of(tool);
+  const Eigen::Index last = nodes.cols() - 1;
+  if (last < 1) return bench_->state().x.col(1) - bench_->state().x.col(0);
+  return (nodes.col(last) - nodes.col(std::max<Eigen::Index>(0, last - 2))).normalized();
+}
+
+bool ToolTrial::make(const ToolStep& step, bool last) {
+  expects(step.tool >= kBothTools && step.tool < static_cast<int>(record_.tools.size()));
+  const double whole = std::abs(step.push) + std::abs(step.turn) / kToolTurnStep;
+  const double most = step.turn == 0.0 ? kStepsPerPart * options_.insertion.step : 1.0;
+  furthest_ = since_furthest_ = 0.0;
+  ++step_;
+  for (double done = 0.0; whole - done > 1e-9 && !ended();) {
+    double by = std::min(most, whole - done);
+    if (last && step.push > 0.0) {
+      by = std::min(by, options_.insertion.length - foremost_of(step.tool));
+      if (by < 1e-9) break;
+    }
+    if (!part({step.tool, by / whole * step.push, by / whole * step.turn})) break;
+    done += by;
+    if (last && step.push > 0.0 && !check_advance(by)) break;
+  }
+  return !ended();
+}
+
+/// A part of a step, which is recorded; false where it ends the trial or the tool has no length
+/// left for it.
+bool ToolTrial::part(const ToolStep& step) {
+  const std::size_t count = record_.tools.size();
+  ToolMove move{std::vector<double>(count, 0.0), std::vector<double>(count, 0.0)};
+  // Some of the tools stays in the body, and the hubs outside.
+  double pushed = 0.0;
+  for (std::size_t k = 0; k < count; ++k) {
+    if (!moves(step, k)) continue;
+    double others = 0.0;
+    for (std::size_t i = 0; i < count; ++i) {
+      if (!moves(step, i)) others = std::max(others, bench_->places()[i].insertion);
+    }
+    const double here = bench_->places()[k].insertion;
+    const double least = others >= kToolStart ? 0.0 : kToolStart;
+    const double to =
+        std::clamp(here + step.push, std::min(least, here), bench_->tools()[k].wire.length());
+    move.push[k] = to - here;
+    move.turn[k] = step.turn;
+    pushed = std::max(pushed, std::abs(move.push[k]));
+  }
+  if (step.turn == 0.0 && pushed < 1e-9) return false;
+  if (!divide_for(move)) {
+    end(Outcome::kNotConverged, "no equilibrium of the tools with shorter elements after " +
+                                    in_mm(foremost()) + " of insertion");
+    return false;
+  }
+  if (!bench_->move(move)) {
+    if (bench_->through_wall()) {
+      end(Outcome::kLeftLumen, "a tool goes through the wall after " + in_mm(foremost()) +
+                                   " of insertion, near " +
+                                   place_text(bench_->state().x.rightCols<1>()) + " mm");
+    } else {
+      end(Outcome::kNotConverged, "no equilibrium after " + in_mm(foremost()) +
+                                      " of insertion, tip at " +
+                                      place_text(bench_->state().x.rightCols<1>()) + " mm");
+    }
+    return false;
+  }
+  note(step);
+  check_place();
+  return !ended();
+}
+
+/// Divides the centreline where the move would make its edges too long, or they are much shorter
+/// than asked for. False where edges would be so long that contact has no place.
+bool ToolTrial::divide_for(const ToolMove& move) {
+  double next = foremost();
+  for (std::size_t i = 0; i < move.push.size(); ++i) {
+    next = std::max(next, bench_->places()[i].insertion + move.push[i]);
+  }
+  const double asked = options_.insertion.element_length;
+  const double elements = static_cast<double>(bench_->composite().rod.rest_length.size());
+  const bool longer = next > kDivideLonger * asked * elements;
+  const bool shorter = foremost() < kDivideShorter * asked * elements && foremost() > 4.0 * asked;
+  if (!longer && !shorter) return true;
+  return bench_->divide(next) || next < kLongestEdge * asked * elements;
+}
+
+/// Forces and shape of the present equilibrium.
+void ToolTrial::note(const ToolStep& step) {
+  const ToolRecord& now = bench_->record();
+  const std::vector<Touch> touches = bench_->touches();
+  Push push;
+  push.insertion = foremost();
+  push.tip = bench_->state().x.rightCols<1>();
+  push.hub_angle = now.tools.front().place.roll - start_roll_;
+  for (std::size_t i = 0; i < now.tools.size(); ++i) {
+    if (moves(step, i)) push.push_force += now.tools[i].push_force;
+  }
+  push.hub_torque = now.tools.front().hub_torque;
+  std::vector<Vec3> sums;
+  push.peak_contact_force = peak_force_on_length(touches, kContactLength, sums);
+  for (const Touch& touch : touches) {
+    push.total_contact_force += touch.normal_force;
+    push.friction_force += touch.friction.norm();
+    push.max_penetration = std::max(push.max_penetration, touch.penetration);
+  }
+  for (std::size_t i = 0; i < record_.tools.size(); ++i) {
+    // Of the wall on its last 2 mm, as far as it is the outermost there.
+    const double behind = push.insertion - now.tools[i].place.insertion;
+    Vec3 at_tip = Vec3::Zero();
+    bool inside = false;
+    for (std::size_t k = 0; k < i; ++k) {
+      inside = inside || now.tools[k].place.insertion >= now.tools[i].place.insertion;
+    }
+    for (const Touch& touch : touches) {
+      const double share = part_within(touch, behind + kToolTip) - part_within(touch, behind);
+      if (!inside) at_tip += share * force_on_wire(touch);
+    }
+    ToolTrack& track = record_.tools[i];
+    track.insertion.push_back(now.tools[i].place.insertion);
+    track.roll.push_back(now.tools[i].place.roll - start_roll_);
+    track.push_force.push_back(now.tools[i].push_force);
+    track.hub_torque.push_back(now.tools[i].hub_torque);
+    track.tip_force.push_back(at_tip.norm());
+    track.wall_force.push_back(now.tools[i].wall_force);
+    push.tip_force = std::max(push.tip_force, at_tip.norm());
+  }
+  const RodState& state = bench_->state();
+  const double h = bench_->composite().rod.rest_length[0];
+  for (Eigen::Index i = 1; i + 1 < state.x.cols(); ++i) {
+    const Vec3 before = (state.x.col(i) - state.x.col(i - 1)).normalized(),
+               after = (state.x.col(i + 1) - state.x.col(i)).normalized();
+    push.peak_curvature = std::max(push.peak_curvature, (after - before).norm() / h);
+  }
+  push.push_work = now.work;
+  push.stored_energy = now.energy.total() - start_energy_;
+  push.friction_work = now.heat;
+  push.unbalanced = now.unbalanced;
+  push.residual = now.residual;
+  push.iterations = now.iterations;
+  record_.pushes.push_back(push);
+  record_.steps.push_back(step_);
+  if (options_.insertion.map_forces) {
+    std::map<int, double> forces;
+    for (const Touch& touch : touches) {
+      const WireContact contact =
+          contact_of(touch, bench_->composite().rod.radius - touch.thinner, vessel_.locator);
+      if (contact.triangle >= 0) forces[contact.triangle] += touch.normal_force;
+    }
+    for (const auto& [triangle, force] : forces) {
+      const auto slot = static_cast<std::size_t>(triangle);
+      if (peak_.size() <= slot) peak_.resize(slot + 1, 0.0);
+      peak_[slot] = std::max(peak_[slot], force);
+    }
+  }
+  since_shape_ += std::abs(step.push) +
+                  std::abs(step.turn) / (2.0 * kToolTurnStep) * options_.insertion.record_every;
+  if (since_shape_ >= options_.insertion.record_every - 1e-9) {
+    since_shape_ = 0.0;
+    record_.shapes.push_back(shape_here());
+  }
+}
+
+Shape ToolTrial::shape_here() const {
+  const RodState& state = bench_->state();
+  Shape shape{.insertion = foremost(),
+              .hub_angle = bench_->places().front().roll - start_roll_,
+              .nodes = state.x,
+              .contact_force = Eigen::VectorXd::Zero(state.x.cols())};
+  for (const Touch& touch : bench_->touches()) {
+    const double force = force_on_wire(touch).norm();
+    shape.contact_force[touch.edge] += (1.0 - touch.part) * force;
+    if (touch.part > 0.0) shape.contact_force[touch.edge + 1] += touch.part * force;
+  }
+  for (const ToolPlace& place : bench_->places()) shape.tools.push_back(place.insertion);
+  return shape;
+}
+
+/// Ends the trial where the last step brought the tip to the goal, or out of the vessel.
+void ToolTrial::check_place() {
+  const Push& push = record_.pushes.back();
+  const std::string after = " after " + in_mm(push.insertion) + " of insertion";
+  if (push.max_penetration > kToolOutside) {
+    return end(Outcome::kLeftLumen, in_mm(push.max_penetration) + " through the wall" + after +
+                                        ", tip at " + place_text(push.tip) + " mm");
+  }
+  const Eigen::Matrix3Xd& nodes = bench_->state().x;
+  const double to_goal = (push.tip - goal_.point).norm();
+  if (!goal_.at_section && best_distance_ <= goal_.radius && to_goal >= best_distance_) {
+    return end(Outcome::kReached, "tip " + in_mm(best_distance_) + " from the target" + after);
+  }
+  best_distance_ = to_goal;
+  if (goal_.at_section && goal_.way->may_have_arrived(push.tip) &&
+      goal_.way->find_arrival(nodes, vessel_.lumen)) {
+    const std::optional<std::string> detour = goal_.way->find_detour(nodes);
+    if (detour) {
+      return end(Outcome::kProlapsed, "the tip passes the target" + after +
+                                          ", but the tools did not come along the way: " + *detour);
+    }
+    const double from_axis = preprocess::find_place(push.tip, goal_.way->path()).from_axis;
+    return end(Outcome::kReached, "tip past the target's cross-section, " + in_mm(from_axis) +
+                                      " from the vessel's axis," + after);
+  }
+  if (const std::optional<int> opening =
+          preprocess::left_through(vessel_.lumen.openings(), nodes)) {
+    const Vec3& center = vessel_.lumen.openings()[static_cast<std::size_t>(*opening)].center;
+    return end_where_it_is(
+        Outcome::kLeftImage,
+        "a tool left the imaged vessel through its end at " + place_text(center) + " mm" + after);
+  }
+}
+
+/// Whether the last step of a script goes on: its push brings the tip further along the way.
+bool ToolTrial::check_advance(double pushed) {
+  if (!goal_.way || ended()) return !ended();
+  const Push& push = record_.pushes.back();
+  const double progress = preprocess::find_progress(push.tip, goal_.way->path());
+  if (progress > furthest_) {
+    furthest_ = progress;
+    since_furthest_ = 0.0;
+    return true;
+  }
+  since_furthest_ += pushed;
+  if (since_furthest_ <= kToolPatience) return true;
+  end_where_it_is(progress > 0.0 ? Outcome::kStuck : Outcome::kMissed,
+                  "the tip came no further than " + in_mm(furthest_) + " along the way while " +
+                      in_mm(since_furthest_) + " more went in, and is at " + place_text(push.tip) +
+                      " mm");
+  return false;
+}
+
+/// As `outcome`, unless the tip is in another vessel: then that is the outcome.
+void ToolTrial::end_where_it_is(Outcome outcome, const std::string& reason) {
+  const std::optional<Astray> astray =
+      goal_.way ? goal_.way->find_astray(record_.pushes.back().tip) : std::nullopt;
+  if (!astray) return end(outcome, reason);
+  end(astray->passed_by ? Outcome::kPassedBy : Outcome::kWrongBranch,
+      "the tip is not on the way: " + astray->text + "; " + reason);
+}
+
+void ToolTrial::end(Outcome outcome, const std::string& reason) {
+  outcome_ = record_.outcome = outcome;
+  record_.reason = reason;
+}
+
+TrialResult ToolTrial::finish() {
+  if (!ended() && !goal_.at_section && best_distance_ <= goal_.radius) {
+    end(Outcome::kReached, "tip " + in_mm(best_distance_) + " from the target after " +
+                               in_mm(foremost()) + " of insertion");
+  }
+  if (!ended()) {
+    const Vec3 tip_here = bench_->state().x.rightCols<1>();
+    const std::string reason = "the script ends with the tip at " + place_text(tip_here) + " mm, " +
+                               in_mm((tip_here - goal_.point).norm()) + " from the target";
+    record_.pushes.empty() ? end(Outcome::kMissed, reason)
+                           : end_where_it_is(Outcome::kMissed, reason);
+  }
+  record_.nodes = bench_->state().x;
+  for (const Touch& touch : bench_->touches()) {
+    record_.contacts.push_back(
+        contact_of(touch, bench_->composite().rod.radius - touch.thinner, vessel_.locator));
+  }
+  for (std::size_t k = 0; k < peak_.size(); ++k) {
+    if (peak_[k] > 0.0) record_.peak_forces.push_back({static_cast<int>(k), peak_[k]});
+  }
+  record_.shapes.push_back(shape_here());
+  return record_;
+}
+
+ToolTrial::Mark ToolTrial::save() const {
+  expects(!ended());
+  return {.bench = bench_->save(),
+          .pushes = record_.pushes.size(),
+          .shapes = record_.shapes.size(),
+          .step = step_,
+          .since_shape = since_shape_,
+          .best_distance = best_distance_};
+}
+
+void ToolTrial::restore(const Mark& mark) {
+  bench_->restore(mark.bench);
+  record_.pushes.resize(mark.pushes);
+  record_.steps.resize(mark.pushes);
+  step_ = mark.step;
+  record_.shapes.resize(mark.shapes);
+  for (ToolTrack& track : record_.tools) {
+    for (auto* column : {&track.insertion, &track.roll, &track.push_force, &track.hub_torque,
+                         &track.tip_force, &track.wall_force}) {
+      column->resize(mark.pushes);
+    }
+  }
+  since_shape_ = mark.since_shape;
+  best_distance_ = mark.best_distance;
+  outcome_.reset();
+  record_.outcome = Outcome::kFailed;
+  record_.reason.clear();
+}
+
+TrialResult run_tool_trial(const std::vector<Tool>& tools, const Introducer& introducer,
+                           const Goal& goal, const VesselModel& vessel,
+                           const ToolTrialOptions& options, const std::vector<ToolStep>& steps) {
+  ToolTrial trial(tools, introducer, goal, vessel, options);
+  for (std::size_t k = 0; k < steps.size() && !trial.ended(); ++k) {
+    trial.make(steps[k], k + 1 == steps.size());
+  }
+  return trial.finish();
+}
+
+}  // namespace wireplan::simulate

@@ -1,0 +1,101 @@
+#pragma once
+/// A wire in a catheter, brought into a vessel step by step, as Trial does with a wire alone, to an
+/// outcome by the same rules: the target is reached where the foremost tip passes its cross-section
+/// (or comes into its sphere), the tools having come along the way.
+///
+/// What a push records is of all tools together: `insertion` is that of the foremost tip, hub angle
+/// and torque are the catheter's, the hand's force is that on what it moves, work and energy
+/// are those of both. What each tool feels is in ToolTrack. The wall is taken for rigid.
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "simulate/insertion/tool_bench.h"
+#include "simulate/insertion/trial.h"
+
+namespace wireplan::simulate {
+
+inline constexpr int kBothTools = -1;
+
+/// One step of the hand on one tool, or on all together, which is pushed (pulled where negative) or
+/// turned.
+struct ToolStep {
+  int tool = 0;       // from the outside in: 0 the catheter, 1 the wire; or kBothTools
+  double push = 0.0;  //                                                                  [mm]
+  double turn = 0.0;  // of its hub, right-handed about the introducer's direction       [rad]
+};
+
+/// What is fixed of a trial of tools.
+struct ToolTrialOptions {
+  double friction_between = 0.05;  // Coulomb's coefficient of one tool in the other
+  /// Elements, steps, tolerance, friction of the wall. `length` bounds the foremost tip in the last
+  /// step of a script alone, since a wire may be further in before.
+  InsertionOptions insertion;
+};
+
+class ToolTrial {
+ public:
+  /// Keeps a reference to the vessel. Expects tools from the outside in that fit in one another,
+  /// and a goal as Trial does. The innermost starts with its tip just beyond the introducer.
+  ToolTrial(const std::vector<Tool>& tools, const Introducer& introducer, const Goal& goal,
+            const VesselModel& vessel, const ToolTrialOptions& options);
+
+  /// Makes a step, in parts of two of the options' steps or 15 degrees, as far as the tool has
+  /// length and the trial has not ended. The `last` one ends too where the tip comes no further.
+  /// False where the trial has ended.
+  bool make(const ToolStep& step, bool last = false);
+
+  bool ended() const { return outcome_.has_value(); }
+  bool reached() const { return outcome_ == Outcome::kReached; }
+  const std::string& reason() const { return record_.reason; }  // why it has ended
+  const ToolBench& bench() const { return *bench_; }
+  double insertion(int tool) const;
+  Vec3 tip(int tool) const;
+  Vec3 tip_direction(int tool) const;  // unit, onward
+  const std::vector<Push>& pushes() const { return record_.pushes; }
+
+  /// Ends the trial, unless it has ended: as reached if the tip is in the goal, else as missed.
+  TrialResult finish();
+
+  /// save() marks where an unfinished trial is, restore() takes it back there; peak forces stay.
+  struct Mark {
+    ToolBench::Mark bench;
+    std::size_t pushes = 0, shapes = 0;
+    int step = -1;
+    double since_shape = 0.0, best_distance = 0.0;
+  };
+  Mark save() const;
+  void restore(const Mark& mark);
+
+ private:
+  bool part(const ToolStep& step);
+  bool divide_for(const ToolMove& move);
+  void note(const ToolStep& step);
+  void check_place();
+  bool check_advance(double pushed);
+  void end(Outcome outcome, const std::string& reason);
+  void end_where_it_is(Outcome outcome, const std::string& reason);
+  Shape shape_here() const;
+  double foremost() const;
+  double foremost_of(int tool) const;
+
+  const Goal goal_;
+  const VesselModel& vessel_;
+  const ToolTrialOptions options_;
+  std::unique_ptr<ToolBench> bench_;
+  double start_energy_ = 0.0, start_roll_ = 0.0;  //                          [N mm, rad]
+  TrialResult record_;
+  std::optional<Outcome> outcome_;
+  int step_ = -1;  // of the script, under way
+  double since_shape_ = 0.0, best_distance_ = 0.0;
+  double furthest_ = 0.0, since_furthest_ = 0.0;  // of the last step
+  std::vector<double> peak_;                      // per triangle of the wall, largest force  [N]
+};
+
+/// Makes all steps, the last one until the goal is reached or the tip comes no further.
+TrialResult run_tool_trial(const std::vector<Tool>& tools, const Introducer& introducer,
+                           const Goal& goal, const VesselModel& vessel,
+                           const ToolTrialOptions& options, const std::vector<ToolStep>& steps);
+
+}  // namespace wireplan::simulate

@@ -1,0 +1,203 @@
+// A wire in a catheter brought into a vessel: against the wire alone, mirrored, gone back to.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <memory>
+#include <vector>
+
+#include "simulate/insertion/tool_trial.h"
+#include "tests/shapes.h"
+
+namespace wireplan::simulate {
+namespace {
+
+// An aorta of 9 mm radius along z from 0 to 170 mm, with branches of 3 mm radius toward +x and -x
+// at 110 mm; all ends are flat and closed.
+constexpr double kOstium = 110.0, kAorta = 9.0, kRenal = 3.0;
+
+const VesselModel& aorta() {
+  static const VesselModel vessel(
+      shapes::level_set(
+          [](const Vec3& p) {
+            const auto renal = [&](double x) {
+              return shapes::depth_in_tube(p, Vec3(0.0, 0.0, kOstium), Vec3(x, 0.0, kOstium),
+                                           kRenal);
+            };
+            const double trunk =
+                shapes::depth_in_tube(p, Vec3(0.0, 0.0, 0.0), Vec3(0.0, 0.0, 170.0), kAorta);
+            const auto soft = [](double depth) { return std::exp(depth / 0.5); };
+            return 0.5 * std::log(soft(trunk) + soft(renal(40.0)) + soft(renal(-40.0)));
+          },
+          Vec3(-41.0, -10.0, -1.5), Vec3(41.0, 10.0, 171.5), 1.0),
+      LumenOptions{.grid_spacing = 0.6});
+  return vessel;
+}
+
+Tool hooked_catheter() {
+  Tool tool;
+  tool.wire = {.name = "hook",
+               .radius = 0.83,
+               .sections = {{.length = 18.0, .bending_stiffness = 99.0, .rest_curvature = 0.08},
+                            {.length = 900.0, .bending_stiffness = 332.0}},
+               .friction = 0.1};
+  tool.inner_radius = 0.5;
+  return tool;
+}
+
+Tool straight_wire(double EI) {
+  Tool tool;
+  tool.wire = {.name = "wire",
+               .radius = 0.44,
+               .sections = {{.length = 1400.0, .bending_stiffness = EI}},
+               .friction = 0.04};
+  return tool;
+}
+
+ToolTrialOptions coarse() {
+  ToolTrialOptions options;
+  options.insertion.element_length = 3.0;
+  options.insertion.friction = 0.04;
+  options.insertion.length = 400.0;
+  return options;
+}
+
+const Introducer kUpward{.point = Vec3(0.0, 0.0, 5.0), .direction = Vec3::UnitZ()};
+const Goal kNowhere{.point = Vec3(0.0, 0.0, 500.0), .radius = 1.0};
+
+ToolTrial hooked_trial() {
+  return {{hooked_catheter(), straight_wire(20.0)}, kUpward, kNowhere, aorta(), coarse()};
+}
+
+TEST(ToolTrial, TheWireOfACatheterThatStaysOutsideGoesAsTheWireAlone) {
+  const VesselModel bend(shapes::bend_tube(4.0, 40.0, 0.5 * kPi, 40.0, 60.0, 1.5),
+                         {.grid_spacing = 0.6});
+  Centerline path;
+  path.points = shapes::bend_axis(40.0, 0.5 * kPi, 40.0, 60.0, 0.5);
+  const Eigen::Index n = path.points.cols();
+  path.radius = Eigen::VectorXd::Constant(n, 4.0);
+  path.arc_length = Eigen::VectorXd::Zero(n);
+  for (Eigen::Index i = 1; i < n; ++i) {
+    path.arc_length[i] =
+        path.arc_length[i - 1] + (path.points.col(i) - path.points.col(i - 1)).norm();
+  }
+  Eigen::Index last = 0;
+  while (path.arc_length[last] < 140.0) ++last;
+  path.points = path.points.leftCols(last).eval();
+  path.radius = path.radius.head(last).eval();
+  path.arc_length = path.arc_length.head(last).eval();
+  const auto way = std::make_shared<Way>(path);
+  const Goal goal{.point = way->section().center, .radius = 4.0, .at_section = true, .way = way};
+  ToolTrialOptions options = coarse();
+  options.insertion.element_length = 1.0;
+  options.insertion.length = 200.0;
+  const Introducer introducer{.point = Vec3(0.0, 0.0, 20.0), .direction = Vec3::UnitZ()};
+  const Tool wire = straight_wire(60.0);
+  const TrialResult alone = run_trial(wire.wire, introducer, goal, bend, options.insertion);
+  const TrialResult both = run_tool_trial({hooked_catheter(), wire}, introducer, goal, bend,
+                                          options, {{.tool = 1, .push = 196.0}});
+  ASSERT_EQ(alone.outcome, Outcome::kReached) << alone.reason;
+  ASSERT_EQ(both.outcome, Outcome::kReached) << both.reason;
+  EXPECT_NEAR(both.pushes.back().insertion, alone.pushes.back().insertion, 2.1) << "steps of 2 mm";
+  ASSERT_GT(both.shapes.size(), 4U);
+  // At the last recorded shape of the same insertion the lines agree.
+  double compared = 0.0;
+  for (const Shape& shape : both.shapes) {
+    for (const Shape& other : alone.shapes) {
+      if (std::abs(shape.insertion - other.insertion) > 1e-6) continue;
+      EXPECT_LT((shape.nodes.rightCols<1>() - other.nodes.rightCols<1>()).norm(), 0.3);
+      ++compared;
+    }
+  }
+  const double force = both.pushes.back().total_contact_force;
+  EXPECT_NEAR(force, alone.pushes.back().total_contact_force, 0.15 * force);
+  EXPECT_GT(force, 0.03);
+  EXPECT_EQ(both.tools.size(), 2U);
+  EXPECT_EQ(both.tools[1].insertion.back(), both.pushes.back().insertion);
+}
+
+TEST(ToolTrial, TurnsTheOtherWayEndOnTheOtherSide) {
+  // Rolls count from the reference direction, y: x and -x are mirror images.
+  std::vector<Vec3> tips;
+  for (const double side : {1.0, -1.0}) {
+    ToolTrial trial = hooked_trial();
+    ASSERT_TRUE(trial.make({.tool = 1, .push = 110.0}));
+    ASSERT_TRUE(trial.make({.tool = 0, .push = 95.0}));
+    ASSERT_TRUE(trial.make({.tool = 1, .push = -50.0}));
+    ASSERT_TRUE(trial.make({.tool = 0, .turn = side * 0.5 * kPi}));
+    tips.push_back(trial.tip(0));
+  }
+  EXPECT_GT(std::abs(tips[0].x()), 4.0) << "the hook lies sideways";
+  EXPECT_NEAR(tips[0].x(), -tips[1].x(), 0.6) << "the triangles are no mirror images";
+  EXPECT_NEAR(tips[0].y(), tips[1].y(), 0.6);
+  EXPECT_NEAR(tips[0].z(), tips[1].z(), 0.6);
+}
+
+TEST(ToolTrial, GoesOnFromAMarkAsItDidBefore) {
+  ToolTrial trial = hooked_trial();
+  ASSERT_TRUE(trial.make({.tool = 1, .push = 80.0}));
+  ASSERT_TRUE(trial.make({.tool = 0, .push = 60.0}));
+  const ToolTrial::Mark mark = trial.save();
+  ASSERT_TRUE(trial.make({.tool = 1, .push = -40.0}));
+  ASSERT_TRUE(trial.make({.tool = 0, .turn = 1.0}));
+  trial.restore(mark);
+  const ToolStep next{.tool = 0, .push = 10.0};
+  ASSERT_TRUE(trial.make(next));
+  const Vec3 once = trial.tip(0);
+  const std::size_t pushes = trial.pushes().size();
+  trial.restore(mark);
+  ASSERT_TRUE(trial.make(next));
+  EXPECT_EQ(trial.tip(0), once) << "bit for bit";
+  EXPECT_EQ(trial.pushes().size(), pushes);
+  EXPECT_NEAR(trial.insertion(0), 70.0, 1e-9);
+}
+
+TEST(ToolTrial, ANewDivisionOfTheCentrelineKeepsTheShape) {
+  for (const double h : {2.0, 3.5}) {
+    SCOPED_TRACE(h);
+    ToolScene scene;
+    scene.tools = {hooked_catheter(), straight_wire(20.0)};
+    scene.places = {{.insertion = 0.0}, {.insertion = 4.0}};
+    scene.point = kUpward.point;
+    scene.direction = kUpward.direction;
+    scene.vessel = &aorta();
+    scene.element_length = h;
+    scene.max_iterations = 50;
+    scene.moves = {
+        {{0.0, 76.0}, {0.0, 0.0}}, {{60.0, 0.0}, {0.0, 0.0}}, {{0.0, -50.0}, {0.0, 0.0}}};
+    ToolBench bench(scene);
+    for (const ToolMove& move : scene.moves) ASSERT_TRUE(bench.move(move));
+    const Vec3 before = bench.nodes_of(0).rightCols<1>();
+    const Eigen::Index nodes = bench.state().x.cols();
+    ASSERT_TRUE(bench.divide(60.0));
+    EXPECT_LT(bench.state().x.cols(), nodes) << "the catheter leads, 60 mm in";
+    EXPECT_LT((bench.nodes_of(0).rightCols<1>() - before).norm(), 0.5);
+    EXPECT_LE(bench.state().x.cols() - 1, std::ceil(60.0 / h));
+  }
+}
+
+TEST(ToolTrial, RecordsWhatEachToolFeels) {
+  ToolTrial trial = hooked_trial();
+  ASSERT_TRUE(trial.make({.tool = 1, .push = 100.0}));
+  ASSERT_TRUE(trial.make({.tool = 0, .push = 80.0}));
+  ASSERT_TRUE(trial.make({.tool = 1, .push = -60.0}));
+  const TrialResult result = trial.finish();
+  EXPECT_EQ(result.outcome, Outcome::kMissed);
+  ASSERT_EQ(result.tools.size(), 2U);
+  for (const ToolTrack& track : result.tools) {
+    for (const auto* column : {&track.insertion, &track.roll, &track.push_force, &track.hub_torque,
+                               &track.tip_force, &track.wall_force}) {
+      EXPECT_EQ(column->size(), result.pushes.size());
+    }
+  }
+  EXPECT_NEAR(result.tools[0].insertion.back(), 80.0, 1e-9);
+  EXPECT_NEAR(result.tools[1].insertion.back(), 44.0, 1e-9);
+  EXPECT_EQ(result.tools[1].tip_force.back(), 0.0) << "it is inside the catheter";
+  const simulate::Push& last = result.pushes.back();
+  EXPECT_NEAR(result.tools[0].wall_force.back() + result.tools[1].wall_force.back(),
+              last.total_contact_force, 1e-9);
+  EXPECT_GT(last.total_contact_force, 0.003) << "the hook is wider than it is straight";
+  EXPECT_EQ(result.shapes.back().tools, (std::vector<double>{80.0, 44.0}));
+}
+
+}  // namespace
+}  // namespace wireplan::simulate
