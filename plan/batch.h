@@ -37,7 +37,7 @@ BatchResult run_batch(const Study& study, const std::vector<Candidate>& candidat
 /// One trial: what it throws, or a number that is not finite, becomes Outcome::kFailed.
 simulate::TrialResult run_guarded(const std::function<simulate::TrialResult()>& run);
 
-/// One trial of the batch, guarded.
+/// One trial of the batch, guarded; a script of catheter and wire where the candidate has one.
 simulate::TrialResult run_candidate(const Study& study, const Candidate& candidate,
                                     const simulate::VesselModel& vessel);
 

@@ -72,11 +72,31 @@ simulate::Introducer make_introducer(const Study& study, const Candidate& candid
       .roll = candidate.roll};
 }
 
+std::vector<simulate::Tool> tools_of(const Study& study, const Candidate& candidate) {
+  return {study.catheters.at(static_cast<std::size_t>(candidate.catheter)).tool,
+          {.wire = study.wires.at(static_cast<std::size_t>(candidate.wire))}};
+}
+
+simulate::ToolTrialOptions tool_options(const Study& study) {
+  simulate::ToolTrialOptions options{.friction_between = study.tool_rules.friction,
+                                     .insertion = study.insertion};
+  options.insertion.element_length *= kToolElements;
+  return options;
+}
+
+double element_length_of(const Study& study, const Candidate& candidate) {
+  return study.insertion.element_length * (candidate.catheter >= 0 ? kToolElements : 1.0);
+}
+
 std::string describe(const Study& study, const Candidate& candidate) {
   expects(candidate.wire >= 0 && candidate.wire < std::ssize(study.wires));
-  return study.wires[candidate.wire].name + ", inclination " + degrees(candidate.inclination) +
-         " deg, azimuth " + degrees(candidate.azimuth) + " deg, roll " + degrees(candidate.roll) +
-         " deg";
+  const std::string through =
+      candidate.catheter < 0
+          ? ""
+          : " in " + study.catheters[static_cast<std::size_t>(candidate.catheter)].tool.wire.name;
+  return study.wires[candidate.wire].name + through + ", inclination " +
+         degrees(candidate.inclination) + " deg, azimuth " + degrees(candidate.azimuth) +
+         " deg, roll " + degrees(candidate.roll) + " deg";
 }
 
 }  // namespace wireplan::plan

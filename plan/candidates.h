@@ -3,7 +3,7 @@
 #include <string>
 #include <vector>
 
-#include "plan/wire_spread.h"
+#include "plan/catheters.h"
 #include "simulate/insertion/trial.h"
 
 namespace wireplan::plan {
@@ -20,12 +20,16 @@ struct Study {
   std::vector<simulate::Goal> others = {};
   simulate::InsertionOptions insertion;
   std::vector<WireSpread> spreads = {};  // of each wire; empty: its values are taken for known
+  std::vector<Catheter> catheters = {};  // that wires may be pushed through, see tool_search.h
+  ToolRules tool_rules = {};
 };
 
 struct Candidate {
   int wire = 0;                                         // index into Study::wires
   double inclination = 0.0, azimuth = 0.0, roll = 0.0;  //                          [rad]
   std::vector<simulate::Move> moves = {};               // before the last push
+  int catheter = -1;  // index into Study::catheters, round the wire; -1: none
+  std::vector<simulate::ToolStep> steps = {};  // of a script of catheter and wire
 };
 
 /// All combinations, wires outermost, roll innermost. What cannot differ is listed once: at
@@ -41,6 +45,15 @@ Vec3 introducer_direction(const Vec3& tangent, double inclination, double azimut
 
 /// Where and how the candidate enters the vessel.
 simulate::Introducer make_introducer(const Study& study, const Candidate& candidate);
+
+/// The catheter and the wire of a candidate that has one, from the outside in.
+std::vector<simulate::Tool> tools_of(const Study& study, const Candidate& candidate);
+
+/// Elements of scripts of catheter and wire are so many times the study's: the two together are
+/// stiffer than a wire alone, and halving them moved tips by half a millimetre (MEASUREMENTS.md).
+inline constexpr double kToolElements = 2.0;
+simulate::ToolTrialOptions tool_options(const Study& study);
+double element_length_of(const Study& study, const Candidate& candidate);  //             [mm]
 
 /// "amplatz-stiff, inclination 15 deg, azimuth 90 deg, roll 0 deg"
 std::string describe(const Study& study, const Candidate& candidate);

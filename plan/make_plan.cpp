@@ -46,7 +46,7 @@ Refinement estimate_error_of(const Study& study, int id, const std::vector<Run>&
     if (setting) {
       others.push_back({*setting, trials[k]});
     } else {
-      rows.push_back({factor * study.insertion.element_length, trials[k]});
+      rows.push_back({factor * element_length_of(study, runs[k].candidate), trials[k]});
     }
   }
   return estimate_error(id, insertion, rows, others);
@@ -94,6 +94,7 @@ class Planner {
       plan_.scripts = std::move(*known);
     } else {
       search_scripts(find_starts());
+      search_tools();
       log_.keep_scripts(plan_.scripts);
     }
     std::vector<Run> runs;
@@ -123,9 +124,57 @@ class Planner {
     return starts;
   }
 
+  // Scripts of catheter and wire, searched for by scouts and run in full. What does not reach in
+  // full is shown where nothing of its pair does.
+  void search_tools() {
+    const bool when_needed = options_.manoeuvres == Manoeuvring::kWhenNeeded;
+    if (study_.catheters.empty()) return;
+    if (options_.manoeuvres == Manoeuvring::kNever || (when_needed && has_steady_plan())) {
+      for (const ToolPair& pair : pairs_of(study_)) {
+        plan_.scripts.pairs.emplace_back().pair = pair;
+      }
+      return;
+    }
+    ToolScripts search = find_tool_scripts(study_, vessel_.rigid_model(), options_.batch);
+    if (options_.batch.cancelled && options_.batch.cancelled()) throw Interrupted();
+    plan_.scripts.branches += search.branches;
+    std::vector<Run> runs;
+    for (const Candidate& found : search.found) runs.push_back({.candidate = found});
+    const std::vector<Measured> trials =
+        find_or_run(study_, vessel_, runs, log_, options_.batch, plan_.full);
+    for (PairFindings& pair : search.pairs) {
+      std::vector<std::size_t> own, reached;
+      for (std::size_t k = 0; k < runs.size(); ++k) {
+        if (runs[k].candidate.catheter != pair.pair.catheter ||
+            runs[k].candidate.wire != pair.pair.wire) {
+          continue;
+        }
+        own.push_back(k);
+        if (trials[k].outcome == simulate::Outcome::kReached) reached.push_back(k);
+      }
+      if (reached.empty() && !own.empty()) {
+        const auto further = [&](std::size_t a, std::size_t b) {
+          return trials[a].progress < trials[b].progress;
+        };
+        reached = {*std::max_element(own.begin(), own.end(), further)};
+        if (pair.stopped.empty()) pair.stopped = trials[reached.front()].reason;
+      }
+      for (const std::size_t k : reached) {
+        plan_.scripts.found.push_back(runs[k].candidate);
+        plan_.scripts.starts.push_back(-1);
+      }
+    }
+    plan_.scripts.pairs = std::move(search.pairs);
+  }
+
   // Whether one of the best straight plans works in at least half of a few tries under
   // disturbances.
   bool has_steady_plan() {
+    if (!steady_) steady_ = find_steady_plan();
+    return *steady_;
+  }
+
+  bool find_steady_plan() {
     const Yardstick by;
     std::vector<std::pair<double, int>> plans;  // score and trial
     for (int id = 0; id < std::ssize(plan_.trials); ++id) {
@@ -303,7 +352,8 @@ class Planner {
   const PlanVessel& vessel_;
   const PlanOptions& options_;
   TrialLog& log_;
-  BatchOptions silent_;  // for what is too short to show
+  BatchOptions silent_;         // for what is too short to show
+  std::optional<bool> steady_;  // see has_steady_plan()
   Plan plan_;
 };
 

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "preprocess/centerline/path_place.h"
+#include "simulate/insertion/start_line.h"
 
 namespace wireplan::plan {
 namespace {
@@ -89,6 +90,30 @@ double find_progress(const simulate::TrialResult& trial, const Centerline& path)
   return progress;
 }
 
+std::vector<ToolMetrics> compute_tool_metrics(const simulate::TrialResult& trial,
+                                              const Centerline& path) {
+  std::vector<ToolMetrics> all;
+  for (const simulate::ToolTrack& track : trial.tools) {
+    ToolMetrics& tool = all.emplace_back();
+    tool.name = track.name;
+    const std::size_t count = track.insertion.size();
+    if (count == 0) continue;
+    for (std::size_t k = 0; k < count; ++k) {
+      tool.peak_tip_force = std::max(tool.peak_tip_force, track.tip_force[k]);
+      tool.mean_tip_force += track.tip_force[k] / static_cast<double>(count);
+      tool.peak_wall_force = std::max(tool.peak_wall_force, track.wall_force[k]);
+      tool.peak_push_force = std::max(tool.peak_push_force, std::abs(track.push_force[k]));
+      tool.peak_hub_torque = std::max(tool.peak_hub_torque, std::abs(track.hub_torque[k]));
+    }
+    tool.insertion = track.insertion.back();
+    if (trial.nodes.cols() > 1) {
+      tool.progress =
+          preprocess::find_progress(simulate::point_at_arc(trial.nodes, tool.insertion), path);
+    }
+  }
+  return all;
+}
+
 Measured measure(const simulate::TrialResult& trial, const Study& study, const Centerline& path) {
   return {.outcome = trial.outcome,
           .reason = trial.reason,
@@ -96,7 +121,8 @@ Measured measure(const simulate::TrialResult& trial, const Study& study, const C
           .metrics = compute_metrics(trial, study, path),
           .progress = find_progress(trial, path),
           .last_tip = trial.pushes.empty() ? study.access : trial.pushes.back().tip,
-          .nodes = trial.nodes};
+          .nodes = trial.nodes,
+          .tools = compute_tool_metrics(trial, path)};
 }
 
 }  // namespace wireplan::plan

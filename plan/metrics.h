@@ -85,6 +85,37 @@ Metrics compute_metrics(const simulate::TrialResult& trial, const Study& study,
 /// insertion 0. The mean force is the impulse divided by that way.
 Metrics compute_push_metrics(const std::vector<simulate::Push>& pushes);
 
+/// What one tool of a script did and felt.
+struct ToolMetrics {
+  std::string name;
+  double insertion = 0.0;        // at the end                                             [mm]
+  double progress = 0.0;         // of its tip along the path at the end, 0 off it         [mm]
+  double peak_tip_force = 0.0;   // of the wall on it                                      [N]
+  double mean_tip_force = 0.0;   // over the trial's pushes                                [N]
+  double peak_wall_force = 0.0;  // sum of the wall's normal forces on it                  [N]
+  double peak_push_force = 0.0;  // of the hand, pushed or held back                       [N]
+  double peak_hub_torque = 0.0;  //                                                     [N mm]
+};
+
+/// The numbers of ToolMetrics with their names in files.
+struct ToolMetricField {
+  const char* name;
+  double ToolMetrics::*value;
+};
+inline constexpr std::array kToolMetricFields = {
+    ToolMetricField{"insertion_mm", &ToolMetrics::insertion},
+    ToolMetricField{"progress_mm", &ToolMetrics::progress},
+    ToolMetricField{"peak_tip_force_n", &ToolMetrics::peak_tip_force},
+    ToolMetricField{"mean_tip_force_n", &ToolMetrics::mean_tip_force},
+    ToolMetricField{"peak_wall_force_n", &ToolMetrics::peak_wall_force},
+    ToolMetricField{"peak_push_force_n", &ToolMetrics::peak_push_force},
+    ToolMetricField{"peak_hub_torque_n_mm", &ToolMetrics::peak_hub_torque},
+};
+
+/// Of each tool of a trial that has several; else empty.
+std::vector<ToolMetrics> compute_tool_metrics(const simulate::TrialResult& trial,
+                                              const Centerline& path);
+
 /// What planning and judging keep of a trial.
 struct Measured {
   simulate::Outcome outcome = simulate::Outcome::kFailed;
@@ -95,6 +126,7 @@ struct Measured {
   Vec3 last_tip = Vec3::Zero();  // after the last push; the access without one              [mm]
   Eigen::Matrix3Xd nodes = {};   // (3, k) final shape                                       [mm]
   double cpu_seconds = 0.0;      // that it took; timing, so never twice the same            [s]
+  std::vector<ToolMetrics> tools = {};  // of catheter and wire; else empty
 };
 
 /// How far along the path the tip came in any push while it was in the path's lumen [mm].

@@ -174,19 +174,19 @@ std::vector<Disturbance> draw_disturbances(const RobustnessOptions& options,
     drawn.tilt = on_disc(unknowns.angle, u[2][k], u[3][k]);
     drawn.shift = on_disc(unknowns.entry, u[4][k], u[5][k]);
     drawn.inward = unknowns.lumen * (2.0 * u[6][k] - 1.0);
+    drawn.tube = u[1][k];  // the wall's factor does not act on catheters
   }
   return disturbances;
 }
 
-simulate::Wire disturbed_wire(const Study& study, int wire, const Disturbance& disturbance) {
-  const auto k = static_cast<std::size_t>(wire);
-  expects(wire >= 0 && k < study.wires.size());
-  const simulate::Wire& given = study.wires[k];
-  if (study.spreads.empty()) return given;
-  expects(study.spreads.size() == study.wires.size());
-  const WireSpread& spread = study.spreads[k];
-  simulate::Wire other = given;
-  if (!disturbance.stiffness.empty()) other = at_part(given, spread, disturbance.stiffness.at(k));
+namespace {
+
+WireSpread friction_alone(const WireSpread& spread) { return {.friction = spread.friction}; }
+
+/// A wire or tube of that spread, whose EI lies at `part` of it.
+simulate::Wire disturbed(const simulate::Wire& given, const WireSpread& spread, double part,
+                         const Study& study, const Disturbance& disturbance) {
+  simulate::Wire other = at_part(given, spread, part);
   if (!spread.friction.known()) {
     other.friction = spread.friction.at(disturbance.friction) *
                      given.friction.value_or(study.insertion.friction);
@@ -194,11 +194,31 @@ simulate::Wire disturbed_wire(const Study& study, int wire, const Disturbance& d
   return other;
 }
 
+}  // namespace
+
+simulate::Wire disturbed_wire(const Study& study, int wire, const Disturbance& disturbance) {
+  const auto k = static_cast<std::size_t>(wire);
+  expects(wire >= 0 && k < study.wires.size());
+  const simulate::Wire& given = study.wires[k];
+  if (study.spreads.empty()) return given;
+  expects(study.spreads.size() == study.wires.size());
+  const double part = disturbance.stiffness.empty() ? 0.5 : disturbance.stiffness.at(k);
+  return disturbed(
+      given, disturbance.stiffness.empty() ? friction_alone(study.spreads[k]) : study.spreads[k],
+      part, study, disturbance);
+}
+
+simulate::Wire disturbed_tube(const Study& study, int catheter, const Disturbance& disturbance) {
+  const Catheter& given = study.catheters.at(static_cast<std::size_t>(catheter));
+  return disturbed(given.tool.wire, given.spread, disturbance.tube, study, disturbance);
+}
+
 simulate::TrialResult run_disturbed(const Study& study, const Candidate& candidate,
                                     const simulate::VesselModel& vessel,
                                     const Disturbance& disturbance) {
   // The wire, its friction and its contact radius.
-  const double factor = vessel.compliance ? disturbance.wall_factor : 1.0;
+  const bool tools = candidate.catheter >= 0;
+  const double factor = vessel.compliance && !tools ? disturbance.wall_factor : 1.0;
   simulate::Wire wire = softened(disturbed_wire(study, candidate.wire, disturbance), factor,
                                  /*fix_axial=*/disturbance.inward != 0.0);
   wire.radius += disturbance.inward;
@@ -221,6 +241,16 @@ simulate::TrialResult run_disturbed(const Study& study, const Candidate& candida
   }
 
   simulate::TrialResult trial = run_guarded([&] {
+    if (tools) {
+      Study own = study;
+      own.insertion = insertion;
+      std::vector<simulate::Tool> both = tools_of(study, candidate);
+      both[0].wire = disturbed_tube(study, candidate.catheter, disturbance);
+      both[0].wire.radius += disturbance.inward;
+      both[1].wire = wire;
+      return simulate::run_tool_trial(both, introducer, study.goal, vessel, tool_options(own),
+                                      candidate.steps);
+    }
     return simulate::run_trial(wire, introducer, study.goal, vessel, insertion, candidate.moves);
   });
   multiply_forces(trial, factor);

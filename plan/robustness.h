@@ -49,6 +49,8 @@ struct Disturbance {
   Eigen::Vector2d tilt = Eigen::Vector2d::Zero();   //                                     [rad]
   Eigen::Vector2d shift = Eigen::Vector2d::Zero();  //                                     [mm]
   double inward = 0.0;                              //                                     [mm]
+  double tube = 0.5;  // where every catheter's EI lies in its spread; of the draw of the wall's
+                      // factor, which does not act on them
 };
 
 /// A Latin hypercube: every unknown takes each of `repeats` equal parts of its range once, in an
@@ -66,6 +68,7 @@ inline constexpr double kRepeatTolerance = 10.0;
 
 /// The study's wire with EI and friction as the disturbance has them.
 simulate::Wire disturbed_wire(const Study& study, int wire, const Disturbance& disturbance);
+simulate::Wire disturbed_tube(const Study& study, int catheter, const Disturbance& disturbance);
 
 /// The trial of a candidate under a disturbance; no shapes on the way, no forces per triangle.
 /// Never throws, as run_candidate does not.

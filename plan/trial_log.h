@@ -9,6 +9,7 @@
 #include "plan/batch.h"
 #include "plan/robustness.h"
 #include "plan/settings.h"
+#include "plan/tool_search.h"
 
 namespace wireplan::plan {
 
@@ -47,6 +48,9 @@ struct Scripts {
   std::vector<int> starts = {};  // of each, the straight candidate that it went on from
   int starts_tried = 0;
   long branches = 0;  // pushes that were tried
+  /// Of catheter and wire: their scripts stand in `found` too, with the start -1, and those of a
+  /// pair without one that reaches as what came closest.
+  std::vector<PairFindings> pairs = {};
 };
 
 /// keep() and keep_other() are called from many threads at once, everything else from one at a

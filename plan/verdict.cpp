@@ -69,6 +69,12 @@ class Weighing {
     const Candidate& candidate = known_.plan.candidates[static_cast<std::size_t>(id)];
     return known_.study.wires[static_cast<std::size_t>(candidate.wire)];
   }
+  std::string round_it(int id) const {
+    const int catheter = known_.plan.candidates[static_cast<std::size_t>(id)].catheter;
+    if (catheter < 0) return {};
+    return " in the catheter " +
+           known_.study.catheters[static_cast<std::size_t>(catheter)].tool.wire.name;
+  }
   const RepeatedPlan* repeats_of(int id) const {
     return find_repeated(known_.judgement.repeated, id);
   }
@@ -147,7 +153,7 @@ class Weighing {
   void weigh_plan(const RankedPlan& first) {
     const RepeatedPlan* repeats = repeats_of(first.trial);
     const Metrics& m = trial(first.trial).metrics;
-    headline_ = "The wire " + wire_of(first.trial).name +
+    headline_ = "The wire " + wire_of(first.trial).name + round_it(first.trial) +
                 " reaches the target within all limits, " +
                 (repeats == nullptr ? "not tried under disturbances"
                                     : "safe in " + safe_of(*repeats) + " disturbed repeats") +

@@ -490,6 +490,16 @@ Case read_case(const std::filesystem::path& path, const std::vector<std::string>
   input.told = std::move(wires.told);
   input.devices = std::move(wires.devices);
   for (const DeviceWire& device : input.devices) input.study.wires.push_back(device.wire);
+  input.catheters = read_case_catheters(root, input.devices);
+  if (input.catheters.empty()) {
+    if (root.has("tool_rules")) {
+      root.raw("tool_rules");
+      problems.add("tool_rules", "given", "only beside \"catheters\"",
+                   "delete the key, or list catheters");
+    }
+  } else {
+    input.study.tool_rules = read_tool_rules(root);
+  }
   read_insertion(root, input.study);
   input.access_limits = read_access_limits(root);
   read_limits(root, input.limits);
@@ -500,6 +510,8 @@ Case read_case(const std::filesystem::path& path, const std::vector<std::string>
       root.number("friction_factor", 1.0, {.min = 0.0, .max = 100.0}, "0: frictionless");
   read_robustness(root, input);
   input.study.spreads = spreads_of(input.devices, input.friction_spread, input.stiffness_spread);
+  input.study.catheters =
+      catheters_of(input.catheters, input.friction_spread, input.stiffness_spread);
   JsonReader search = root.object("search", false);
   input.exhaustive = search.boolean("exhaustive", false);
   search.finish();
@@ -568,6 +580,13 @@ Json case_parameters(const Case& input) {
   put("target", "targets", input.targets, target_json);
   json["wires"] = Json::array();
   for (const DeviceWire& device : input.devices) json["wires"].push_back(device.json);
+  if (!input.catheters.empty()) {
+    json["catheters"] = Json::array();
+    for (const Catheter& catheter : input.catheters) {
+      json["catheters"].push_back(catheter.json);
+    }
+    json["tool_rules"] = tool_rules_json(study.tool_rules);
+  }
   json["tip_roll_deg"] = degrees_json(study.rolls);
   json["manoeuvres"] = manoeuvring_name(input.manoeuvres);
   json["friction"] = study.insertion.friction;

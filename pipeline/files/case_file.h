@@ -65,6 +65,7 @@ struct Case {
   /// 0 the trials stage takes 1.25 times the path's length and 20 mm more.
   plan::Study study;
   std::vector<DeviceWire> devices;  // of the study's wires, in their order
+  std::vector<Catheter> catheters;  // of the study's, in their order
   /// Of every wire, where the case gives them in the place of the wires' own.
   std::optional<plan::FactorSpread> friction_spread, stiffness_spread;
   Manoeuvring manoeuvres = Manoeuvring::kWhenNeeded;

@@ -9,6 +9,8 @@
 namespace wireplan::pipeline {
 namespace {
 
+constexpr plan::FactorSpread kAnyFriction{.low = 0.5, .high = 2.0};  // assumed
+
 /// The wire under a name of the catalogue; a wire without sections where there is none.
 DeviceWire named_wire(const std::string& name, const std::string& key, const Catalogue& known,
                       Problems& problems, std::vector<std::string>& told) {
@@ -64,10 +66,97 @@ CaseWires read_wires(JsonReader& root) {
   return read;
 }
 
+std::vector<Catheter> read_case_catheters(JsonReader& root, const std::vector<DeviceWire>& wires) {
+  Problems& problems = root.problems();
+  std::vector<Catheter> read;
+  if (!root.has("catheters")) return read;
+  const Json& list = root.raw("catheters");
+  if (!list.is_array() || list.empty()) {
+    problems.add("catheters", list.dump(), "a list of catalogue names and catheters, at least one",
+                 "`wireplan devices` lists the catalogue; without the key wires go in alone");
+    return read;
+  }
+  const Catalogue known = catalogue();
+  std::vector<std::string> names;
+  for (const Catheter& entry : known.catheters) names.push_back(entry.tube.name);
+  std::set<std::string> used;
+  for (const DeviceWire& wire : wires) used.insert(wire.wire.name);
+  for (std::size_t i = 0; i < list.size(); ++i) {
+    const std::string key = "catheters[" + std::to_string(i) + "]";
+    if (list[i].is_string()) {
+      const std::string name = list[i].get<std::string>();
+      const auto found = std::find(names.begin(), names.end(), name);
+      if (found == names.end()) {
+        const std::string nearest = nearest_name(name, names);
+        problems.add(key, "\"" + name + "\"", "a catheter of the catalogue",
+                     nearest.empty()
+                         ? "`wireplan devices` lists them; one of your own is an object "
+                           "{\"name\", \"diameter_mm\", \"inner_diameter_mm\", "
+                           "\"sections\"}"
+                         : "did you mean \"" + nearest + "\"?");
+        continue;
+      }
+      const auto place = static_cast<std::size_t>(found - names.begin());
+      read.push_back(known.catheters[place]);
+      read.back().json = known.file.at("catheters").at(place);
+      for (const char* told : {"title", "shape"}) read.back().json.erase(told);
+    } else {
+      JsonReader reader(list[i], key, problems);
+      read.push_back(read_catheter(reader, known.coatings, /*own=*/true));
+      read.back().json = list[i];
+    }
+    const std::string& name = read.back().tube.name;
+    if (!name.empty() && !used.insert(name).second) {
+      problems.add(key, "\"" + name + "\" again", "a name of its own",
+                   "the report tells wires and catheters by name");
+    }
+  }
+  return read;
+}
+
+std::vector<plan::Catheter> catheters_of(const std::vector<Catheter>& catheters,
+                                         const std::optional<plan::FactorSpread>& friction,
+                                         const std::optional<plan::FactorSpread>& stiffness) {
+  std::vector<plan::Catheter> all;
+  for (const Catheter& catheter : catheters) {
+    plan::Catheter& own = all.emplace_back();
+    own.tool = {.wire = catheter.tube, .inner_radius = 0.5 * catheter.inner_diameter};
+    own.spread = catheter.spread;
+    if (own.spread.friction.known()) own.spread.friction = kAnyFriction;
+    if (friction) own.spread.friction = *friction;
+    if (stiffness) {
+      own.spread.stiffness.assign(catheter.tube.sections.size(), {*stiffness, *stiffness});
+    }
+  }
+  return all;
+}
+
+plan::ToolRules read_tool_rules(JsonReader& root) {
+  plan::ToolRules rules;
+  JsonReader reader = root.object("tool_rules", false);
+  constexpr Range kLength{.min = 0.0, .max = 5000.0};
+  rules.soft_tip = reader.number("soft_tip_n_mm2", rules.soft_tip, {.min = 0.0, .max = 1e5});
+  rules.hold = reader.number("hold_mm", rules.hold, kLength, "given in m?");
+  rules.outside = reader.number("outside_mm", rules.outside, kLength, "given in m?");
+  rules.most_turn =
+      reader.number("most_turn_deg", rules.most_turn / kRadPerDeg, {.min = 0.0, .max = 360.0}) *
+      kRadPerDeg;
+  rules.friction = reader.number("friction_between_tools", rules.friction, kFrictionRange);
+  reader.finish();
+  return rules;
+}
+
+Json tool_rules_json(const plan::ToolRules& rules) {
+  return {{"soft_tip_n_mm2", rules.soft_tip},
+          {"hold_mm", rules.hold},
+          {"outside_mm", rules.outside},
+          {"most_turn_deg", clean(rules.most_turn / kRadPerDeg)},
+          {"friction_between_tools", rules.friction}};
+}
+
 std::vector<plan::WireSpread> spreads_of(const std::vector<DeviceWire>& devices,
                                          const std::optional<plan::FactorSpread>& friction,
                                          const std::optional<plan::FactorSpread>& stiffness) {
-  constexpr plan::FactorSpread kAnyFriction{.low = 0.5, .high = 2.0};  // assumed
   std::vector<plan::WireSpread> spreads;
   for (const DeviceWire& device : devices) {
     plan::WireSpread& spread = spreads.emplace_back(device.spread);

@@ -4,8 +4,10 @@
 #include <string>
 #include <vector>
 
+#include "pipeline/files/catalogue.h"
 #include "pipeline/files/json_reader.h"
 #include "pipeline/files/wire_file.h"
+#include "plan/catheters.h"
 #include "simulate/insertion/insertion.h"
 
 namespace wireplan::pipeline {
@@ -20,6 +22,20 @@ struct CaseWires {
 
 /// Reads "wires". A wire without sections where a name is not known.
 CaseWires read_wires(JsonReader& root);
+
+/// Reads "catheters", beside the wires, which the names must differ from; none where the case has
+/// no such key.
+std::vector<Catheter> read_case_catheters(JsonReader& root, const std::vector<DeviceWire>& wires);
+
+/// As trials take them, their values as far off as the case says of all wires, or as their own
+/// tell.
+std::vector<plan::Catheter> catheters_of(const std::vector<Catheter>& catheters,
+                                         const std::optional<plan::FactorSpread>& friction,
+                                         const std::optional<plan::FactorSpread>& stiffness);
+
+/// Reads "tool_rules", what scripts of catheter and wire keep to.
+plan::ToolRules read_tool_rules(JsonReader& root);
+Json tool_rules_json(const plan::ToolRules& rules);
 
 /// How far the values of each wire may be off: as the case says of all, else as the wire's own
 /// values tell; of a friction that no source tells the spread of, half to twice.

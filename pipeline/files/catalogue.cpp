@@ -68,25 +68,8 @@ void check_tube(JsonReader& reader, double inner, double outer) {
 
 std::vector<Catheter> read_catheters(JsonReader& root, const std::vector<Coating>& coatings) {
   std::vector<Catheter> catheters;
-  std::vector<std::string> coats;
-  for (const Coating& coating : coatings) coats.push_back(coating.name);
   for (JsonReader& reader : root.objects("catheters", true)) {
-    Catheter& catheter = catheters.emplace_back();
-    catheter.tube.name = reader.text("name", std::nullopt);
-    catheter.title = reader.text("title", std::nullopt);
-    catheter.shape = reader.text("shape", std::nullopt);
-    const double outer = noted(catheter.values, reader, "diameter_mm", kTubeDiameter);
-    catheter.tube.radius = 0.5 * outer;
-    catheter.inner_diameter = noted(catheter.values, reader, "inner_diameter_mm", kTubeDiameter);
-    check_tube(reader, catheter.inner_diameter, outer);
-    const DeviceValue coating =
-        note_value(catheter.values, "coating", read_word(reader, "coating", coats), "");
-    for (const Coating& known : coatings) {
-      if (known.name == coating.word) catheter.tube.friction = known.friction.number();
-    }
-    read_sections(reader, outer, /*signed_radii=*/true, catheter.tube, catheter.spread,
-                  catheter.values);
-    reader.finish();
+    catheters.push_back(read_catheter(reader, coatings, /*own=*/false));
   }
   return catheters;
 }
@@ -179,6 +162,34 @@ Catalogue read_catalogue(const Json& file) {
   for (const Sheath& sheath : read.sheaths) check.device(sheath.name, sheath.values);
   problems.throw_if_any();
   return read;
+}
+
+Catheter read_catheter(JsonReader& reader, const std::vector<Coating>& coatings, bool own) {
+  using Fallback = std::optional<std::string>;
+  Catheter catheter;
+  std::vector<std::string> coats;
+  for (const Coating& coating : coatings) coats.push_back(coating.name);
+  catheter.tube.name = reader.text("name", std::nullopt);
+  catheter.title = reader.text("title", own ? Fallback(catheter.tube.name) : std::nullopt);
+  catheter.shape = reader.text("shape", own ? Fallback("") : std::nullopt);
+  const double outer = noted(catheter.values, reader, "diameter_mm", kTubeDiameter);
+  catheter.tube.radius = 0.5 * outer;
+  catheter.inner_diameter = noted(catheter.values, reader, "inner_diameter_mm", kTubeDiameter);
+  check_tube(reader, catheter.inner_diameter, outer);
+  if (!own || reader.has("coating")) {
+    const DeviceValue coating =
+        note_value(catheter.values, "coating", read_word(reader, "coating", coats), "");
+    for (const Coating& known : coatings) {
+      if (known.name == coating.word) catheter.tube.friction = known.friction.number();
+    }
+  }
+  if (own && reader.has("friction")) {
+    catheter.tube.friction = reader.number("friction", std::nullopt, kFrictionRange, kFrictionHint);
+  }
+  read_sections(reader, outer, /*signed_radii=*/true, catheter.tube, catheter.spread,
+                catheter.values);
+  reader.finish();
+  return catheter;
 }
 
 Catalogue catalogue() {

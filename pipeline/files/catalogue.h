@@ -22,13 +22,14 @@ struct CatalogueWire : DeviceWire {
   std::vector<std::string> aliases;  // earlier names, which cases may still use
 };
 
-/// A tube: its sections are those of a wire; a tool of scenes, of which no trial makes use yet.
+/// A tube: its sections are those of a wire; a tool of scenes, and of scripts that plans may have.
 struct Catheter {
   simulate::Wire tube;      // of the outer radius
   plan::WireSpread spread;  // of the tube
   std::string title, shape;
   double inner_diameter = 0.0;  //                                                        [mm]
   std::vector<NamedValue> values;
+  Json json;  // as a case takes it
 };
 
 struct Sheath {
@@ -48,6 +49,10 @@ struct Catalogue {
 
 /// The built-in catalogue.
 Catalogue catalogue();
+
+/// Reads a catheter: of the catalogue, or a case's `own`, which needs neither title, shape nor
+/// coating and may have a "friction".
+Catheter read_catheter(JsonReader& reader, const std::vector<Coating>& coatings, bool own);
 
 /// Reads such a file. Throws Error with all problems at once: a value without spread, source or
 /// confidence, a source that is not listed, a confidence that it does not bear.

@@ -58,22 +58,50 @@ plan::Metrics metrics_of(const Json& json) {
   return metrics;
 }
 
+Json tools_to_json(const std::vector<plan::ToolMetrics>& tools) {
+  Json list = Json::array();
+  for (const plan::ToolMetrics& tool : tools) {
+    Json own = {{"name", tool.name}};
+    for (const plan::ToolMetricField& field : plan::kToolMetricFields) {
+      own[field.name] = number_or_null(tool.*field.value);
+    }
+    list.push_back(std::move(own));
+  }
+  return list;
+}
+
+std::vector<plan::ToolMetrics> tools_of_json(const Json& list) {
+  std::vector<plan::ToolMetrics> tools;
+  for (const Json& own : list) {
+    plan::ToolMetrics& tool = tools.emplace_back();
+    tool.name = own.at("name");
+    for (const plan::ToolMetricField& field : plan::kToolMetricFields) {
+      tool.*field.value = number_of(own.at(field.name));
+    }
+  }
+  return tools;
+}
+
 Json measured_to_json(const plan::Measured& measured) {
-  return {{"outcome", simulate::outcome_name(measured.outcome)},
-          {"reason", measured.reason},
-          {"terms", measured.terms},
-          {"metrics", metrics_to_json(measured.metrics)},
-          {"progress_mm", number_or_null(measured.progress)},
-          {"last_tip_mm", point(measured.last_tip)}};
+  Json json = {{"outcome", simulate::outcome_name(measured.outcome)},
+               {"reason", measured.reason},
+               {"terms", measured.terms},
+               {"metrics", metrics_to_json(measured.metrics)},
+               {"progress_mm", number_or_null(measured.progress)},
+               {"last_tip_mm", point(measured.last_tip)}};
+  if (!measured.tools.empty()) json["tools"] = tools_to_json(measured.tools);
+  return json;
 }
 
 plan::Measured measured_of(const Json& json) {
-  return {.outcome = outcome_of(json.at("outcome")),
-          .reason = json.at("reason"),
-          .terms = json.at("terms").get<std::vector<std::string>>(),
-          .metrics = metrics_of(json.at("metrics")),
-          .progress = number_of(json.at("progress_mm")),
-          .last_tip = point_of(json.at("last_tip_mm"))};
+  plan::Measured measured = {.outcome = outcome_of(json.at("outcome")),
+                             .reason = json.at("reason"),
+                             .terms = json.at("terms").get<std::vector<std::string>>(),
+                             .metrics = metrics_of(json.at("metrics")),
+                             .progress = number_of(json.at("progress_mm")),
+                             .last_tip = point_of(json.at("last_tip_mm"))};
+  if (json.contains("tools")) measured.tools = tools_of_json(json.at("tools"));
+  return measured;
 }
 
 plan::Setting setting_of(const std::string& name) {

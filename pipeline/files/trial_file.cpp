@@ -1,5 +1,6 @@
 #include "pipeline/files/trial_file.h"
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <cstring>
@@ -12,6 +13,7 @@
 #include "pipeline/files/json_reader.h"
 #include "pipeline/files/text.h"
 #include "preprocess/files/vessel_io.h"
+#include "simulate/insertion/start_line.h"
 
 namespace wireplan::pipeline {
 namespace {
@@ -23,7 +25,8 @@ using simulate::TriangleForce;
 using simulate::WireContact;
 
 constexpr const char* kSchema = "wireplan.trial/3";
-constexpr std::string_view kShapesMagic = "wireplan.shapes/1\n";
+constexpr std::string_view kShapesMagic = "wireplan.shapes/1\n",
+                           kToolShapesMagic = "wireplan.shapes/2\n";  // and the tools' insertions
 
 constexpr std::array kOutcomes = {
     Outcome::kReached,       Outcome::kMissed,       Outcome::kPassedBy,  Outcome::kWrongBranch,
@@ -115,6 +118,45 @@ std::vector<TriangleForce> peaks_from_json(const Json& columns) {
   return peaks;
 }
 
+struct TrackField {
+  const char* name;
+  std::vector<double> simulate::ToolTrack::*column;
+};
+constexpr std::array kTrackFields = {
+    TrackField{"insertion_mm", &simulate::ToolTrack::insertion},
+    TrackField{"roll_rad", &simulate::ToolTrack::roll},
+    TrackField{"push_force_n", &simulate::ToolTrack::push_force},
+    TrackField{"hub_torque_n_mm", &simulate::ToolTrack::hub_torque},
+    TrackField{"tip_force_n", &simulate::ToolTrack::tip_force},
+    TrackField{"wall_force_n", &simulate::ToolTrack::wall_force}};
+
+// What each tool did, a column for each of its numbers.
+Json tracks_to_json(const std::vector<simulate::ToolTrack>& tools) {
+  Json list = Json::array();
+  for (const simulate::ToolTrack& track : tools) {
+    Json own = {{"name", track.name}};
+    for (const TrackField& field : kTrackFields) own[field.name] = track.*field.column;
+    list.push_back(std::move(own));
+  }
+  return list;
+}
+
+std::vector<simulate::ToolTrack> tracks_from_json(const Json& list) {
+  std::vector<simulate::ToolTrack> tools;
+  for (const Json& own : list) {
+    simulate::ToolTrack& track = tools.emplace_back();
+    track.name = own.at("name");
+    for (const TrackField& field : kTrackFields) {
+      for (const Json& value : own.at(field.name)) {
+        (track.*field.column).push_back(number_of(value));
+      }
+    }
+  }
+  return tools;
+}
+
+constexpr std::array kToolNames = {"both", "catheter", "wire"};  // of ToolStep::tool, from -1
+
 // One key of the root per line: compact, and still to be read and compared by eye.
 std::string to_lines(const Json& object) {
   std::ostringstream stream;
@@ -137,7 +179,8 @@ simulate::Outcome outcome_of(const std::string& name) {
 }
 
 std::string shapes_to_bytes(const std::vector<simulate::Shape>& shapes) {
-  std::string bytes(kShapesMagic);
+  const bool tools = !shapes.empty() && !shapes.front().tools.empty();
+  std::string bytes(tools ? kToolShapesMagic : kShapesMagic);
   const auto add = [&](const void* data, std::size_t count) {
     bytes.append(static_cast<const char*>(data), count);
   };
@@ -155,11 +198,18 @@ std::string shapes_to_bytes(const std::vector<simulate::Shape>& shapes) {
     add(shape.contact_force.data(),
         sizeof(double) * static_cast<std::size_t>(shape.contact_force.size()));
   }
+  if (!tools) return bytes;
+  add_count(std::ssize(shapes.front().tools));
+  for (const simulate::Shape& shape : shapes) {
+    expects(shape.tools.size() == shapes.front().tools.size());
+    add(shape.tools.data(), sizeof(double) * shape.tools.size());
+  }
   return bytes;
 }
 
 std::optional<std::vector<simulate::Shape>> shapes_from_bytes(const std::string& bytes) {
-  if (!bytes.starts_with(kShapesMagic)) return {};
+  const bool tools = bytes.starts_with(kToolShapesMagic);
+  if (!tools && !bytes.starts_with(kShapesMagic)) return {};
   std::size_t at = kShapesMagic.size();
   const auto take = [&](void* data, std::size_t count) {
     if (bytes.size() - at < count) return false;
@@ -183,6 +233,12 @@ std::optional<std::vector<simulate::Shape>> shapes_from_bytes(const std::string&
     if (!whole) return {};
     shapes.push_back(std::move(shape));
   }
+  std::uint64_t each = 0;
+  if (tools && (!take(&each, sizeof each) || each > simulate::kMostTools)) return {};
+  for (simulate::Shape& shape : shapes) {
+    shape.tools.resize(each);
+    if (!take(shape.tools.data(), each * sizeof(double))) return {};
+  }
   if (at != bytes.size()) return {};
   return shapes;
 }
@@ -198,6 +254,12 @@ std::string trial_text(const plan::Study& study, const plan::Candidate& candidat
   file["azimuth_deg"] = clean(candidate.azimuth / kRadPerDeg);
   file["roll_deg"] = clean(candidate.roll / kRadPerDeg);
   if (!candidate.moves.empty()) file["moves"] = moves_json(candidate.moves);
+  if (candidate.catheter >= 0) {
+    file["catheter"] = study.catheters[static_cast<std::size_t>(candidate.catheter)].tool.wire.name;
+    file["steps"] = steps_json(candidate.steps);
+    file["tools"] = tracks_to_json(trial.tools);
+    file["step"] = trial.steps;
+  }
   file["outcome"] = simulate::outcome_name(trial.outcome);
   file["reason"] = trial.reason;
   file["terms"] = trial.terms;
@@ -230,6 +292,33 @@ std::vector<simulate::Move> moves_of(const Json& list) {
   return moves;
 }
 
+Json steps_json(const std::vector<simulate::ToolStep>& steps) {
+  Json list = Json::array();
+  for (const simulate::ToolStep& step : steps) {
+    Json row = {{"tool", kToolNames.at(static_cast<std::size_t>(step.tool + 1))}};
+    if (step.turn != 0.0) {
+      row["turn_deg"] = clean(step.turn / kRadPerDeg);
+    } else {
+      row["push_mm"] = clean(step.push);
+    }
+    list.push_back(std::move(row));
+  }
+  return list;
+}
+
+std::vector<simulate::ToolStep> steps_of(const Json& list) {
+  std::vector<simulate::ToolStep> steps;
+  for (const Json& row : list) {
+    const std::string name = row.at("tool");
+    const auto found = std::find(kToolNames.begin(), kToolNames.end(), name);
+    expects(found != kToolNames.end());
+    steps.push_back({.tool = static_cast<int>(found - kToolNames.begin()) - 1,
+                     .push = row.value("push_mm", 0.0),
+                     .turn = row.value("turn_deg", 0.0) * kRadPerDeg});
+  }
+  return steps;
+}
+
 std::optional<TrialResult> find_trial(const std::filesystem::path& path) {
   std::ifstream stream(path, std::ios::binary);
   const Json file = Json::parse(stream, nullptr, /*allow_exceptions=*/false);
@@ -243,6 +332,10 @@ std::optional<TrialResult> find_trial(const std::filesystem::path& path) {
   if (file.contains("sections_mm")) trial.sections = points_of(file.at("sections_mm"));
   trial.contacts = contacts_from_json(file.at("contacts"));
   trial.peak_forces = peaks_from_json(file.at("peak_forces"));
+  if (file.contains("tools")) {
+    trial.tools = tracks_from_json(file.at("tools"));
+    trial.steps = file.at("step").get<std::vector<int>>();
+  }
   return trial;
 }
 
@@ -252,15 +345,43 @@ TrialResult read_trial_file(const std::filesystem::path& path) {
   return std::move(*trial);
 }
 
+namespace {
+
+/// The catheter of each shape as FOLDER/NAME-catheter/K.vtp, and NAME-catheter.pvd.
+void write_catheter(const TrialResult& trial, const std::string& name,
+                    const std::filesystem::path& folder) {
+  const std::string own = name + "-catheter";
+  std::filesystem::create_directories(folder / own);
+  std::vector<std::filesystem::path> files;
+  std::vector<double> times;
+  for (const simulate::Shape& shape : trial.shapes) {
+    files.push_back(folder / own / (std::to_string(files.size()) + ".vtp"));
+    times.push_back(static_cast<double>(times.size()));
+    const Eigen::Matrix3Xd nodes = simulate::line_up_to(shape.nodes, shape.tools.front());
+    preprocess::write_polyline(nodes, {}, files.back());
+  }
+  preprocess::write_time_series(files, times, folder / (own + ".pvd"));
+}
+
+}  // namespace
+
 void write_shapes(const TrialResult& trial, const std::string& name,
                   const std::filesystem::path& folder) {
+  const bool tools = !trial.shapes.empty() && !trial.shapes.front().tools.empty();
+  if (tools) write_catheter(trial, name, folder);
   std::filesystem::create_directories(folder / name);
   std::vector<std::filesystem::path> files;
   std::vector<double> insertions;
   for (const simulate::Shape& shape : trial.shapes) {
     const std::vector<double> force(shape.contact_force.begin(), shape.contact_force.end());
     files.push_back(folder / name / (std::to_string(files.size()) + ".vtp"));
-    insertions.push_back(shape.insertion);
+    // Tools go in and out by turns: their time is the number of the shape.
+    insertions.push_back(tools ? static_cast<double>(insertions.size()) : shape.insertion);
+    if (tools) {
+      preprocess::write_polyline(simulate::line_up_to(shape.nodes, shape.tools.back()), {},
+                                 files.back());
+      continue;
+    }
     preprocess::write_polyline(shape.nodes, {{"contact_force_n", force}}, files.back());
   }
   preprocess::write_time_series(files, insertions, folder / (name + ".pvd"));

@@ -36,8 +36,15 @@ std::optional<std::vector<simulate::Shape>> shapes_from_bytes(const std::string&
 Json moves_json(const std::vector<simulate::Move>& moves);
 std::vector<simulate::Move> moves_of(const Json& list);
 
+/// [{"tool": "catheter", "push_mm": 40.0}, {"tool": "both", "push_mm": -8.0}, {"tool": "catheter",
+/// "turn_deg": 90.0}]; and back.
+Json steps_json(const std::vector<simulate::ToolStep>& steps);
+std::vector<simulate::ToolStep> steps_of(const Json& list);
+
 /// The shapes on the way as FOLDER/NAME/K.vtp, with the contact force at each node, and
-/// FOLDER/NAME.pvd, a time series over the insertion [mm] that ParaView plays.
+/// FOLDER/NAME.pvd, a time series over the insertion [mm] that ParaView plays. Of catheter and wire
+/// the wire is told so, without forces and over the number of the shape, and the catheter beside it
+/// as NAME-catheter.
 void write_shapes(const simulate::TrialResult& trial, const std::string& name,
                   const std::filesystem::path& folder);
 

@@ -90,6 +90,9 @@ Json trials_json(const PageInput& input, const Quantiser& box) {
     trials.push_back({{"direction", to_json(trial.direction)},
                       {"nodes", box.encode_points(trial.nodes)},
                       {"push", encode_floats(trial.push.reshaped())}});
+    if (trial.tools.cols() > 0) {
+      trials.back()["tools"] = encode_floats(trial.tools.reshaped());
+    }
   }
   return trials;
 }
@@ -100,6 +103,7 @@ Json insertion_json(const PageInsertion& insertion, const Quantiser& box) {
     shapes.push_back({{"insertion_mm", shape.insertion},
                       {"nodes", box.encode_points(shape.nodes)},
                       {"force_n", encode_floats(shape.contact_force)}});
+    if (!shape.tools.empty()) shapes.back()["tools_mm"] = shape.tools;
   }
   std::vector<std::uint32_t> triangles;
   std::vector<float> forces;
@@ -162,6 +166,17 @@ PageTrial page_trial(const simulate::TrialResult& trial) {
     kept.push.col(static_cast<Eigen::Index>(k)) << static_cast<float>(push.insertion),
         static_cast<float>(push.push_force), static_cast<float>(push.tip_force),
         static_cast<float>(push.peak_contact_force), static_cast<float>(push.total_contact_force);
+  }
+  if (trial.tools.size() != 2) return kept;
+  kept.tools.resize(7, static_cast<Eigen::Index>(trial.pushes.size()));
+  for (std::size_t k = 0; k < trial.pushes.size(); ++k) {
+    const auto column = static_cast<Eigen::Index>(k);
+    kept.tools(0, column) = static_cast<float>(trial.steps[k]);
+    for (Eigen::Index i = 0; i < 2; ++i) {
+      const simulate::ToolTrack& track = trial.tools[static_cast<std::size_t>(i)];
+      kept.tools.col(column).segment<3>(1 + 3 * i) << static_cast<float>(track.insertion[k]),
+          static_cast<float>(track.push_force[k]), static_cast<float>(track.tip_force[k]);
+    }
   }
   return kept;
 }

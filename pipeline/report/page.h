@@ -20,6 +20,9 @@ struct PageTrial {
   Eigen::Matrix3Xf nodes;            // final shape                                         [mm]
   Eigen::Matrix<float, 5, -1> push;  // insertion [mm]; push, tip, largest contact and total contact
                                      // force [N], after each push
+  /// Of a script of catheter and wire, after each push: the step under way; then of each tool how
+  /// far it is in [mm], the hand's force and the tip's [N]. No rows of one wire.
+  Eigen::Matrix<float, 7, -1> tools = {};
 };
 PageTrial page_trial(const simulate::TrialResult& trial);  // all but the direction
 

@@ -8,6 +8,7 @@
 #include "pipeline/files/trial_file.h"
 #include "pipeline/report/anatomy_json.h"
 #include "pipeline/report/page.h"
+#include "pipeline/report/tools_json.h"
 #include "pipeline/report/verdict_json.h"
 #include "pipeline/store/hash.h"
 #include "plan/manoeuvre.h"
@@ -81,8 +82,15 @@ void put_candidate(Row& row, const ReportInput& input, std::size_t trial) {
   row.put("azimuth_deg", clean(candidate.azimuth / kRadPerDeg));
   row.put("roll_deg", clean(candidate.roll / kRadPerDeg));
   row.put("moves", moves_json(candidate.moves));
-  row.put("script",
-          plan::describe_moves(candidate.moves, input.plan.trials[trial].metrics.insertion));
+  if (candidate.catheter < 0) {
+    row.put("script",
+            plan::describe_moves(candidate.moves, input.plan.trials[trial].metrics.insertion));
+    return;
+  }
+  row.put("script", describe_tool_script(candidate, input.plan.trials[trial]));
+  row.put("catheter",
+          input.study.catheters[static_cast<std::size_t>(candidate.catheter)].tool.wire.name);
+  row.put("steps", told_steps_json(candidate, input.plan.trials[trial]));
 }
 
 const plan::Refinement* find_refinement(const ReportInput& input, int trial) {
@@ -248,6 +256,7 @@ Json trial_json(const ReportInput& input, std::size_t k) {
                      refined->reason);
   }
   row.put("iterations", m.iterations);
+  if (!trial.tools.empty()) row.put("tools", tools_json(input.study, trial));
   return row.finish();
 }
 
@@ -408,6 +417,9 @@ Json artifacts_json(const ReportInput& input) {
   for (std::size_t k = 1; k <= std::min(kPlansShown, input.judgement.ranking.plans.size()); ++k) {
     add("trials/plan-" + std::to_string(k) + ".pvd",
         "insertion of a plan, by rank, as a time series");
+    const auto id = static_cast<std::size_t>(input.judgement.ranking.plans[k - 1].trial);
+    if (input.plan.candidates[id].catheter < 0) continue;
+    add("trials/plan-" + std::to_string(k) + "-catheter.pvd", "its catheter, as a time series");
   }
   for (std::size_t k = 1; k <= input.judgement.ranking.plans.size(); ++k) {
     add("trials/plan-" + std::to_string(k) + ".mrk.json",
@@ -460,6 +472,7 @@ Json build_report(const ReportInput& input) {
   report["ranking"] = std::move(ranking);
   report["excluded"] = std::move(excluded);
   report["wires"] = std::move(wires);
+  if (!input.study.catheters.empty()) report["catheters"] = catheters_json(input.study, input.plan);
   report["pareto"] = input.judgement.ranking.pareto;
   report["robustness"] = input.robustness;
   report["numerics"] = numerics_json(input);
@@ -524,9 +537,10 @@ std::string describe_best(const Json& report) {
   return "best of " + std::to_string(ranking.size()) +
          (ranking.size() == 1 ? " safe plan" : " safe plans") + " (reach, no limit broken); " +
          std::to_string(reached) + " of " + std::to_string(trials.size()) +
-         " tried reach: " + best.at("wire").get<std::string>() + ", inclination " +
-         best.at("inclination_deg").dump() + " deg, azimuth " + best.at("azimuth_deg").dump() +
-         " deg, roll " + best.at("roll_deg").dump() + " deg, " +
+         " tried reach: " + best.at("wire").get<std::string>() +
+         (best.contains("catheter") ? " in " + best.at("catheter").get<std::string>() : "") +
+         ", inclination " + best.at("inclination_deg").dump() + " deg, azimuth " +
+         best.at("azimuth_deg").dump() + " deg, roll " + best.at("roll_deg").dump() + " deg, " +
          (script.empty() ? "" : script + ", ") + best.at("sentence").get<std::string>();
 }
 

@@ -56,7 +56,21 @@ void add_plans(Table& table, const Json& report) {
     table.row("inclination", plan.at("inclination_deg"), "deg");
     table.row("azimuth", plan.at("azimuth_deg"), "deg");
     table.row("roll of the tip", plan.at("roll_deg"), "deg");
-    if (!plan.at("script").get<std::string>().empty()) table.row("moves", plan.at("script"));
+    if (plan.contains("catheter")) {
+      table.row("catheter", plan.at("catheter"));
+      int number = 0;
+      for (const Json& step : plan.at("steps")) {
+        table.row("step " + std::to_string(++number), step.at("text"));
+      }
+      for (const Json& tool : trial.at("tools").at("each")) {
+        const std::string name = tool.at("name");
+        table.row(name + ": tip force", tool.at("peak_tip_force_n"), "N");
+        table.row(name + ": hand", tool.at("peak_push_force_n"), "N");
+        table.row(name + ": torque of the hub", tool.at("peak_hub_torque_n_mm"), "N mm");
+      }
+    } else if (!plan.at("script").get<std::string>().empty()) {
+      table.row("moves", plan.at("script"));
+    }
     table.row("wire in the vessel", trial.at("insertion_mm"), "mm");
     table.row("tip force", trial.at("peak_tip_force_n"), "N", limits.at("tip_force_warn_n"));
     table.row("largest force on 5 mm of wire", trial.at("peak_contact_force_n"), "N");

@@ -147,10 +147,11 @@ void make_manoeuvres(Workspace& work, const fs::path& folder) {
   Json figures = figures_of("manoeuvres");
   figures["starts"] = scripts.starts_tried;
   figures["branches"] = scripts.branches;
-  figures["scripts"] = Json::array();
-  for (std::size_t k = 0; k < scripts.found.size(); ++k) {
-    figures["scripts"].push_back(
-        {{"start", scripts.starts[k]}, {"moves", moves_json(scripts.found[k].moves)}});
+  figures["scripts"] = scripts_json(scripts);
+  if (!work.given().catheters.empty()) {
+    figures["pairs"] = pairs_json(scripts);
+    figures["warnings"].push_back(
+        "manoeuvres: catheters meet a rigid wall, so their contact forces are upper bounds");
   }
   write_figures(figures, folder);
 }

@@ -297,7 +297,7 @@ std::string to_bytes(const ShownTrials& shown) {
       forces.push_back(force);
     }
     rows.push_back({binary(shown.trials[k].nodes), binary(shown.trials[k].push), binary(triangles),
-                    binary(forces)});
+                    binary(forces), binary(shown.trials[k].tools)});
   }
   const std::vector<std::uint8_t> bytes = Json::to_cbor(rows);
   return {bytes.begin(), bytes.end()};
@@ -324,6 +324,8 @@ ShownTrials from_bytes(const std::string& bytes) {
     fill(row.at(1), trial.push);
     fill(row.at(2), triangles);
     fill(row.at(3), forces);
+    trial.tools.resize(7, columns(4, 7 * sizeof(float)));
+    fill(row.at(4), trial.tools);
     std::vector<simulate::TriangleForce>& peaks = shown.peaks.emplace_back();
     for (std::size_t k = 0; k < forces.size(); ++k) peaks.push_back({triangles[k], forces[k]});
   }

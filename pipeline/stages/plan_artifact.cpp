@@ -36,12 +36,57 @@ void write_plan(const plan::Plan& plan, const std::filesystem::path& folder) {
              folder / kTimingFile);
 }
 
-plan::Scripts read_scripts(const Json& figures, const std::vector<plan::Candidate>& straight) {
+Json scripts_json(const plan::Scripts& scripts) {
+  Json list = Json::array();
+  for (std::size_t k = 0; k < scripts.found.size(); ++k) {
+    const plan::Candidate& found = scripts.found[k];
+    if (found.catheter < 0) {
+      list.push_back({{"start", scripts.starts[k]}, {"moves", moves_json(found.moves)}});
+    } else {
+      list.push_back(
+          {{"wire", found.wire}, {"catheter", found.catheter}, {"steps", steps_json(found.steps)}});
+    }
+  }
+  return list;
+}
+
+Json pairs_json(const plan::Scripts& scripts) {
+  Json list = Json::array();
+  for (const plan::PairFindings& pair : scripts.pairs) {
+    list.push_back({{"wire", pair.pair.wire},
+                    {"catheter", pair.pair.catheter},
+                    {"unfit", pair.pair.unfit},
+                    {"found", pair.found},
+                    {"nearest_hook_mm", clean(pair.nearest_hook)},
+                    {"furthest_mm", clean(pair.furthest)},
+                    {"stopped", pair.stopped}});
+  }
+  return list;
+}
+
+plan::Scripts read_scripts(const Json& figures, const plan::Study& study) {
+  const std::vector<plan::Candidate> straight = plan::list_candidates(study);
   plan::Scripts scripts{.starts_tried = figures.at("starts"), .branches = figures.at("branches")};
   for (const Json& script : figures.at("scripts")) {
-    scripts.starts.push_back(script.at("start"));
-    scripts.found.push_back(straight.at(static_cast<std::size_t>(scripts.starts.back())));
-    scripts.found.back().moves = moves_of(script.at("moves"));
+    scripts.starts.push_back(script.value("start", -1));
+    if (scripts.starts.back() >= 0) {
+      scripts.found.push_back(straight.at(static_cast<std::size_t>(scripts.starts.back())));
+      scripts.found.back().moves = moves_of(script.at("moves"));
+      continue;
+    }
+    scripts.found.push_back(plan::first_candidate(
+        study, {.catheter = script.at("catheter"), .wire = script.at("wire"), .unfit = {}}));
+    scripts.found.back().steps = steps_of(script.at("steps"));
+  }
+  if (!figures.contains("pairs")) return scripts;
+  for (const Json& pair : figures.at("pairs")) {
+    scripts.pairs.push_back({.pair = {.catheter = pair.at("catheter"),
+                                      .wire = pair.at("wire"),
+                                      .unfit = pair.at("unfit")},
+                             .found = pair.at("found"),
+                             .nearest_hook = pair.at("nearest_hook_mm"),
+                             .furthest = pair.at("furthest_mm"),
+                             .stopped = pair.at("stopped")});
   }
   return scripts;
 }
@@ -49,7 +94,7 @@ plan::Scripts read_scripts(const Json& figures, const std::vector<plan::Candidat
 plan::Plan read_plan(Workspace& work) {
   plan::Plan plan;
   plan.candidates = plan::list_candidates(work.study());
-  plan.scripts = read_scripts(work.figures("manoeuvres"), plan.candidates);
+  plan.scripts = read_scripts(work.figures("manoeuvres"), work.study());
   plan.candidates.insert(plan.candidates.end(), plan.scripts.found.begin(),
                          plan.scripts.found.end());
   plan_from_json(read_json(plan_file(work.artifact("plans").folder), kSchema), work.study(), plan);

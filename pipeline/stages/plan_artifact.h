@@ -14,7 +14,9 @@ void write_plan(const plan::Plan& plan, const std::filesystem::path& folder);
 /// Expects the stages up to `plans` to be done. Without shapes, and what was spent.
 plan::Plan read_plan(Workspace& work);
 
-/// Scripts as the artifact `manoeuvres` tells them, of these straight candidates.
-plan::Scripts read_scripts(const Json& figures, const std::vector<plan::Candidate>& straight);
+/// Scripts, and pairs of catheter and wire, as the artifact `manoeuvres` tells them; and back.
+Json scripts_json(const plan::Scripts& scripts);
+Json pairs_json(const plan::Scripts& scripts);
+plan::Scripts read_scripts(const Json& figures, const plan::Study& study);
 
 }  // namespace wireplan::pipeline

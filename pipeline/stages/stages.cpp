@@ -269,6 +269,8 @@ std::vector<Stage> stages_of(const Case& given) {
   manoeuvres.version = 21;
   manoeuvres.after.push_back("trials");
   read_too(manoeuvres, {"/manoeuvres"});
+  const bool tools = !given.catheters.empty();
+  if (tools) read_too(manoeuvres, {"/catheters", "/tool_rules"});
   if (given.manoeuvres == Manoeuvring::kWhenNeeded) {
     // Plans are tried under disturbances.
     if (voxels != nullptr) manoeuvres.after.emplace_back(voxels);
@@ -285,6 +287,7 @@ std::vector<Stage> stages_of(const Case& given) {
   plans.after.insert(plans.after.end(), {"trials", "manoeuvres"});
   if (voxels != nullptr) plans.after.emplace_back(voxels);
   read_too(plans, {"/manoeuvres", "/robustness"});
+  if (tools) read_too(plans, {"/catheters", "/tool_rules"});
   plans.make = make_plans;
   stages.push_back(plans);
   Stage report{.name = "report",

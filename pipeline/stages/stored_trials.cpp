@@ -70,7 +70,7 @@ const plan::Study& StoredTrials::study_of(Level level) const {
 // All that one run reads: what the stage of the trials reads, but of the lists only its own entry.
 // The elements of a scout follow from all wires of the study.
 std::string StoredTrials::key_of(const plan::Run& run, const std::string& shared_key) const {
-  const auto& [wire, inclination, azimuth, roll, moves] = run.candidate;
+  const auto& [wire, inclination, azimuth, roll, moves, catheter, steps] = run.candidate;
   const plan::Study& study = study_of(run.level);
   Json script = Json::array();
   for (const auto& [push, turn] : moves) script.push_back({push, turn});
@@ -84,6 +84,16 @@ std::string StoredTrials::key_of(const plan::Run& run, const std::string& shared
                                 {"length", Json(study.insertion.length).dump()},
                                 {"level", plan::level_name(run.level)},
                                 {"element", Json(study.insertion.element_length).dump()}};
+  if (catheter >= 0) {
+    const plan::Catheter& known = study.catheters[static_cast<std::size_t>(catheter)];
+    const simulate::Wire tube =
+        run.disturbance ? plan::disturbed_tube(study, catheter, *run.disturbance) : known.tool.wire;
+    lines.push_back({"catheter", wire_json(tube).dump()});
+    lines.push_back(
+        {"lumen",
+         Json({known.tool.inner_radius, study.tool_rules.friction, plan::kToolElements}).dump()});
+    lines.push_back({"steps", steps_json(steps).dump()});
+  }
   if (run.elements) {
     const auto& [factor, insertion, setting] = *run.elements;
     lines.push_back({"elements", Json({factor, insertion}).dump()});
@@ -171,7 +181,7 @@ void StoredTrials::keep_other(std::size_t other, const plan::Run& run,
 
 std::optional<plan::Scripts> StoredTrials::find_scripts() {
   if (!work_.has("manoeuvres")) return {};
-  return read_scripts(work_.figures("manoeuvres"), plan::list_candidates(work_.study()));
+  return read_scripts(work_.figures("manoeuvres"), work_.study());
 }
 
 void StoredTrials::place(Level level, int first_id, const fs::path& folder) const {

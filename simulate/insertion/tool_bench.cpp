@@ -181,7 +181,9 @@ void ToolBench::settle_at(const std::vector<ToolPlace>& places) {
 void ToolBench::bring_in() {
   const double longest = largest_insertion(scene_.places);
   std::vector<ToolPlace> places;
-  for (double out = 0.5 * longest; out > kBench.least_start; out *= 0.5) {
+  double out = longest;
+  while (out > 2.0 * kBench.least_start) {
+    out *= 0.5;
     places = scene_.places;
     for (ToolPlace& one : places) one.insertion = std::max(0.0, one.insertion - (longest - out));
     place(places, now_);

@@ -64,10 +64,10 @@ ContactMemory ToolBench::spread_contact(const State& from, const State& to) cons
   const double h = from.composite.rod.rest_length[0], h_new = to.composite.rod.rest_length[0];
   const Eigen::Index last = from.state.x.cols() - 1, n = to.state.x.cols();
   ContactMemory memory{.x = to.state.x,
+                       .sections = known.sections,
                        .normal_force = Eigen::VectorXd::Zero(n),
                        .anchor = to.state.x,
-                       .triangle = {},
-                       .sections = known.sections};
+                       .triangle = {}};
   if (!known.triangle.empty()) memory.triangle.assign(static_cast<std::size_t>(n), -1);
   for (Eigen::Index i = 0; i < n; ++i) {
     const Eigen::Index nearest =

@@ -192,6 +192,16 @@ inline Json full_case(Json json) {
   json["access"].update(Json{{"inclination_deg", {0, 15}}, {"azimuth_deg", {0, 90}}});
   json["target"]["radius_mm"] = 5;
   json["wires"] = {own_wire(), "amplatz"};
+  json["catheters"][0] = {{"name", "own hook"}, {"title", "A hook"},        {"shape", "hook"},
+                          {"diameter_mm", 1.6}, {"inner_diameter_mm", 1.0}, {"coating", "ptfe"},
+                          {"friction", 0.1}};
+  json["catheters"][0]["sections"][0] = {{"length_mm", 600}, {"bending_stiffness_n_mm2", 99}};
+  json["catheters"][1] = "cobra-c2";
+  json["tool_rules"] = {{"soft_tip_n_mm2", 90},
+                        {"hold_mm", 80},
+                        {"outside_mm", 40},
+                        {"most_turn_deg", 170},
+                        {"friction_between_tools", 0.1}};
   json["tip_roll_deg"] = {0, 180};
   json["friction"] = 0.12;
   json["friction_factor"] = 0.9;

@@ -360,10 +360,23 @@ TEST_F(RerunMatrix, OfACaseThatStartsFromASurface) {
   auto table = common_table();
   table["/surface/path"] = {"report"};  // its contents count, not where it lies
   table["/surface/unit"] = table["/surface/frame"] = {"surface", "report"};
-  // A cross-section is where the centerline ends.
-  file["target"].erase("radius_mm");
+  file["target"].erase("radius_mm");  // a cross-section is where the centerline ends
   table.erase("/target/radius_mm");
   table["/target/beyond_mm"] = {"centerline", "trials", "manoeuvres", "plans", "report"};
+  file["catheters"][0] = {{"name", "hook"},
+                          {"diameter_mm", 1.6},
+                          {"inner_diameter_mm", 1.0},
+                          {"friction", 0.1},
+                          {"sections", Json::array()}};
+  file["catheters"][0]["sections"][0] = {{"length_mm", 300}, {"bending_stiffness_n_mm2", 90}};
+  for (const char* key :
+       {"catheters/0/name", "catheters/0/diameter_mm", "catheters/0/inner_diameter_mm",
+        "catheters/0/friction", "catheters/0/sections/0/length_mm",
+        "catheters/0/sections/0/bending_stiffness_n_mm2", "tool_rules/soft_tip_n_mm2",
+        "tool_rules/hold_mm", "tool_rules/outside_mm", "tool_rules/most_turn_deg",
+        "tool_rules/friction_between_tools"}) {
+    table[std::string("/") + key] = {"manoeuvres", "plans", "report"};
+  }
   Json changes = common_changes();
   changes["/surface/path"] = "other.stl";
   changes["/surface/unit"] = "cm";

@@ -24,6 +24,11 @@ inline std::string text_of(const Run& run) {
     add(move.push);
     add(move.turn);
   }
+  for (const simulate::ToolStep& step : c.steps) {
+    text += " tool " + std::to_string(step.tool);
+    add(step.push);
+    add(step.turn);
+  }
   if (run.elements) {
     text += " elements";
     add(run.elements->factor);

@@ -11,11 +11,12 @@ const bytes = (text) => {
 
 export const floats = (text) => new Float32Array(bytes(text));
 
-/** With the way that the hand has gone so far, in and back, which never falls. */
-const alongWay = (steps) => {
+/** With the way that the hand has gone so far, in and back, which never falls; of several tools, which
+    move by turns, so much for `each`. */
+const alongWay = (steps, each = 0) => {
   let way = 0, last = 0;
   for (const step of steps) {
-    way += Math.abs(step.insertion - last);
+    way += each || Math.abs(step.insertion - last);
     last = step.insertion;
     step.way = way;
   }
@@ -61,11 +62,13 @@ export const readPage = () => {
       direction: stored.direction,
       nodes: lazy(() => points(stored.nodes)),
       pushes: lazy(() => {
-        const values = floats(stored.push);
+        const values = floats(stored.push), tools = stored.tools ? floats(stored.tools) : null;
         return alongWay(Array.from({length: values.length / 5}, (_, i) => {
           const [insertion, push, tip, peak, total] = values.subarray(5 * i, 5 * i + 5);
-          return {insertion, push, tip, peak, total};
-        }));
+          const row = tools ? tools.subarray(7 * i, 7 * i + 7) : null;
+          const tool = (k) => ({insertion: row[k], push: row[k + 1], tip: row[k + 2]});
+          return {insertion, push, tip, peak, total, step: row ? row[0] : 0, tools: row ? [tool(1), tool(4)] : null};
+        }), tools ? 2 : 0);
       }),
     };
   });
@@ -79,7 +82,8 @@ export const readPage = () => {
             insertion: shape.insertion_mm,
             nodes: points(shape.nodes),
             force: floats(shape.force_n),
-          }))),
+            tools: shape.tools_mm ?? null,
+          })), row.shapes[0]?.tools_mm ? 5 : 0),
         ),
         wallTriangle: lazy(() => indices(row.wall_triangle)),
         wallForce: lazy(() => floats(row.wall_force_n)),

@@ -54,7 +54,7 @@ export const outcomes = Object.keys(kOutcomes);
 
 /** "amplatz-stiff, inclination 10\u00b0, azimuth 90\u00b0, roll 0\u00b0", and the moves where it is no straight push. */
 export const planName = (trial) =>
-  `${shown(trial.wire)}, inclination ${degrees(trial.inclination_deg)}, azimuth ` +
+  `${shown(trial.wire)}${trial.catheter ? ` in ${shown(trial.catheter)}` : ""}, inclination ${degrees(trial.inclination_deg)}, azimuth ` +
   `${degrees(trial.azimuth_deg)}, roll ${degrees(trial.roll_deg)}` +
   (trial.script ? `; ${shown(trial.script)}` : "");
 

@@ -1,7 +1,7 @@
 // The chosen trial in the vessel: its wire played along the insertion, forces in color.
 import {gradient} from "./colors.js";
 import {el, section} from "./dom.js";
-import {number, outcomeWord, planName} from "./format.js";
+import {number, outcomeWord, planName, shown} from "./format.js";
 import {makeVessel} from "./vessel3d.js";
 
 const kSpeed = 40; // mm of the hand's way per second
@@ -29,6 +29,7 @@ const shapeAt = (shapes, part) => {
   const next = shapes.findIndex((shape) => shape.way >= way);
   if (next <= 0) return shapes[Math.max(0, next)];
   const a = shapes[next - 1], b = shapes[next];
+  if (a.tools) return a; // two tools are not shown between shapes that were simulated
   // Pulled back, the wire is paired from its tip too.
   const [short, long] = a.nodes.length <= b.nodes.length ? [a, b] : [b, a];
   const gone = b.way > a.way ? (way - a.way) / (b.way - a.way) : 1;
@@ -113,14 +114,23 @@ export const vesselSection = (page, selection) => {
 
   // What is shown now.
   let trial = null, shapes = null, scale = 0;
+  const toolsAtEnd = (push) => push?.tools?.map((tool) => tool.insertion) ?? null;
+  const showStep = (push) =>
+    Array.from(steps.children).forEach((row, k) =>
+      k === push?.step && push.tools ? row.setAttribute("aria-current", "step") : row.removeAttribute("aria-current"));
   const showWire = () => {
     const way = Number(slider.value), end = Number(slider.max);
     const part = end > 0 ? way / end : 1;
     const push = pushAt(trial.pushes(), part);
     const insertion = part > 0 ? push?.insertion ?? 0 : 0;
     const shape = shapes ? shapeAt(shapes, part) : {nodes: trial.nodes(), force: null};
-    vessel?.setWire(shape.nodes, shape.force, scale);
-    const forces = push
+    vessel?.setWire(shape.nodes, shape.force, scale, shape.tools ?? toolsAtEnd(push));
+    showStep(push);
+    const ofTool = (name, tool) =>
+      `${name} ${number(tool.insertion)}\u00a0mm in, hand ${number(tool.push)}\u00a0N, tip ${number(tool.tip)}\u00a0N`;
+    const forces = push?.tools
+      ? `${ofTool("catheter", push.tools[0])}; ${ofTool("wire", push.tools[1])}; largest contact ${number(push.peak)}\u00a0N`
+      : push
       ? `hand ${number(push.push)}\u00a0N, tip ${number(push.tip)}\u00a0N, largest contact ${number(push.peak)}\u00a0N, all contacts ${number(push.total)}\u00a0N`
       : "never entered the vessel";
     const last = trial.pushes()[trial.pushes().length - 1]?.insertion ?? 0;
@@ -169,16 +179,18 @@ export const vesselSection = (page, selection) => {
   });
 
   const sentence = el("p", {class: "chosen", role: "status"});
+  const steps = el("ol", {class: "steps"});
   const node = section("vessel", "The vessel and the wire",
     el("div", {class: "controls"},
       el("label", {for: "pick-trial"}, "Insertion "), pick,
       el("label", {for: "pick-wall"}, "Wall shows "), wall),
     sentence,
+    steps,
     frame,
     el("p", {class: "note", id: "vessel-help"},
       "Drag or use the arrow keys to turn, wheel or + and \u2212 to zoom. Letters name the patient's sides (R, L, A, P, S, I). " +
       "The white arrow is the introducer, the ring the target, the thin line the middle of the lumen. " +
-      "The wire is drawn wider than it is; points are shown to 0.01\u00a0mm. Colors are forces of single nodes and triangles; a contact that the numbers tell spreads over several."),
+      "The wire is drawn wider than it is, a catheter round it wider still; points are shown to 0.01\u00a0mm. Colors are forces of single nodes and triangles; a contact that the numbers tell spreads over several."),
     buttons,
     legend,
     el("div", {class: "controls player"}, play, el("label", {for: "insertion"}, "Insertion"), slider),
@@ -206,6 +218,7 @@ export const vesselSection = (page, selection) => {
         el("strong", {}, trial.plan ? `Plan ${trial.plan.rank}` : `Trial ${id}, not ranked`), ": ",
         el("bdi", {}, planName(trial)),
         trial.plan ? `; ${outcomeWord(trial.outcome)}.` : `; ${trial.excluded ?? outcomeWord(trial.outcome)}.`, warn);
+      steps.replaceChildren(...(trial.steps ?? []).map((step) => el("li", {}, el("bdi", {}, shown(step.text)))));
       vessel?.setEntry(trial.direction);
       show();
     });

@@ -15,7 +15,7 @@ const told = (trial, value, error) =>
 // Title, what to sort by, what to show.
 const kColumns = [
   ["Rank", (t) => t.plan?.rank ?? Infinity, (t) => t.plan?.rank ?? "\u2013"],
-  ["Wire", (t) => t.wire, (t) => el("bdi", {}, shown(t.wire))],
+  ["Wire", (t) => t.wire, (t) => el("bdi", {}, `${shown(t.wire)}${t.catheter ? ` in ${shown(t.catheter)}` : ""}`)],
   ["Inclination", (t) => t.inclination_deg, (t) => degrees(t.inclination_deg)],
   ["Azimuth", (t) => t.azimuth_deg, (t) => degrees(t.azimuth_deg)],
   ["Roll", (t) => t.roll_deg, (t) => degrees(t.roll_deg)],

@@ -77,6 +77,19 @@ const colorVessel = (mesh, forces, scale) => {
   attribute.needsUpdate = true;
 };
 
+const kCatheterRgb = [0.93, 0.93, 0.96];
+
+/** How many of the points lie within so much of the line from its start [mm]. */
+const nodesWithin = (nodes, length) => {
+  const count = nodes.length / 3;
+  let arc = 0;
+  for (let k = 1; k < count; ++k) {
+    arc += Math.hypot(...[0, 1, 2].map((i) => nodes[3 * k + i] - nodes[3 * k - 3 + i]));
+    if (arc > length + 0.6 * (arc / k)) return k; // to the nearest point, half an edge off at most
+  }
+  return count;
+};
+
 const makeTarget = (target, radius) => {
   const group = new Group();
   group.add(new Mesh(new SphereGeometry(Math.max(0.6, 0.2 * radius), 24, 16), new MeshBasicMaterial({color: kTargetColor})));
@@ -253,19 +266,29 @@ export const makeVessel = (frame, page) => {
   return {
     view,
     zoom,
-    /** Shows a wire: points x, y, z in turn, a force per point or none, and the scale's end [N]. */
-    setWire: (nodes, force, scale) => {
+    /** Shows a wire: points x, y, z in turn, a force per point or none, and the scale's end [N]. Of
+        catheter and wire, how far each is in along the points [mm]: the catheter as a wider line. */
+    setWire: (nodes, force, scale, tools = null) => {
       if (wire) scene.remove(wire), dispose(wire);
       wire = null;
-      if (nodes.length >= 6) {
+      const line = (count, linewidth, rgbOf) => {
         const geometry = new LineGeometry();
-        geometry.setPositions(nodes);
-        const colors = new Float32Array(nodes.length);
-        for (let k = 0; k < nodes.length / 3; ++k) {
-          colors.set(forceRgb(force && scale > 0 ? force[k] / scale : 0), 3 * k);
-        }
+        geometry.setPositions(nodes.subarray(0, 3 * count));
+        const colors = new Float32Array(3 * count);
+        for (let k = 0; k < count; ++k) colors.set(rgbOf(force && scale > 0 ? force[k] / scale : 0), 3 * k);
         geometry.setColors(colors);
-        wire = new Line2(geometry, new LineMaterial({linewidth: 4.5, vertexColors: true}));
+        wire.add(new Line2(geometry, new LineMaterial({linewidth, vertexColors: true})));
+      };
+      if (nodes.length >= 6) {
+        wire = new Group();
+        const all = nodes.length / 3;
+        if (tools) {
+          const [inCatheter, inWire] = tools.map((insertion) => nodesWithin(nodes, insertion));
+          if (inCatheter > 1) line(inCatheter, 10, (part) => (part > 0 ? forceRgb(part) : kCatheterRgb));
+          if (inWire > 1) line(inWire, 3.5, forceRgb);
+        } else {
+          line(all, 4.5, forceRgb);
+        }
         scene.add(wire);
       }
       redraw();

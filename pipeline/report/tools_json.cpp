@@ -1,0 +1,81 @@
+#include "pipeline/report/tools_json.h"
+
+#include <algorithm>
+
+#include "pipeline/files/case_wires.h"
+#include "pipeline/files/trial_file.h"
+#include "plan/anatomy/passage.h"
+#include "plan/anatomy/projection.h"
+
+namespace wireplan::pipeline {
+
+std::string describe_tool_script(const plan::Candidate& candidate, const plan::Measured& trial) {
+  std::string text;
+  for (const std::string& step : plan::describe_steps(candidate.steps, trial.metrics.insertion)) {
+    text += (text.empty() ? "" : "; ") + step;
+  }
+  return text;
+}
+
+Json told_steps_json(const plan::Candidate& candidate, const plan::Measured& trial) {
+  Json steps = steps_json(candidate.steps);
+  const std::vector<std::string> told =
+      plan::describe_steps(candidate.steps, trial.metrics.insertion);
+  for (std::size_t k = 0; k < told.size(); ++k) steps[k]["text"] = told[k];
+  return steps;
+}
+
+Json tools_json(const plan::Study& study, const plan::Measured& trial) {
+  Json list = Json::array();
+  for (const plan::ToolMetrics& tool : trial.tools) {
+    Json own = {{"name", tool.name}};
+    for (const plan::ToolMetricField& field : plan::kToolMetricFields) {
+      own[field.name] = tool.*field.value;
+    }
+    list.push_back(std::move(own));
+  }
+  Json json = {{"each", std::move(list)}};
+  const std::optional<plan::Ostium> ostium = plan::find_ostium(study);
+  if (ostium && trial.tools.size() == 2) {
+    const plan::ToolMetrics &catheter = trial.tools[0], &wire = trial.tools[1];
+    json["hook_depth_mm"] = clean(std::max(0.0, catheter.progress - ostium->arc));
+    json["wire_beyond_catheter_mm"] = clean(wire.insertion - catheter.insertion);
+  }
+  return json;
+}
+
+Json catheters_json(const plan::Study& study, const plan::Plan& plan) {
+  Json json = {{"rules", tool_rules_json(study.tool_rules)}};
+  for (const plan::Junction& junction : plan::find_junctions(*study.goal.way)) {
+    const std::optional<plan::Ostium> ostium = plan::find_ostium(study);
+    if (!ostium || !junction.taken || junction.arc != ostium->arc) continue;
+    const plan::View view =
+        plan::find_projections(junction.trunk_direction, junction.branch_direction).best.view;
+    json["ostium"] = {{"at_mm", clean(ostium->arc)},
+                      {"point_mm", to_json(ostium->point)},
+                      {"trunk_diameter_mm", clean(ostium->trunk_diameter)},
+                      {"view",
+                       {{"lao_deg", clean(view.rotation / kRadPerDeg)},
+                        {"cranial_deg", clean(view.tilt / kRadPerDeg)}}}};
+  }
+  json["pairs"] = Json::array();
+  for (const plan::PairFindings& pair : plan.scripts.pairs) {
+    const auto& [catheter, wire, unfit] = pair.pair;
+    const bool tried = pair.nearest_hook >= 0.0 || pair.furthest > 0.0;
+    Json row = {{"catheter", study.catheters[static_cast<std::size_t>(catheter)].tool.wire.name},
+                {"wire", study.wires[static_cast<std::size_t>(wire)].name},
+                {"tried", tried},
+                {"reason", !unfit.empty() ? unfit
+                           : tried        ? pair.stopped
+                                          : "a wire alone works, or no scripts were asked for"},
+                {"scripts_found", pair.found}};
+    if (tried) {
+      if (pair.nearest_hook >= 0.0) row["nearest_hook_mm"] = clean(pair.nearest_hook);
+      row["furthest_mm"] = clean(pair.furthest);
+    }
+    json["pairs"].push_back(std::move(row));
+  }
+  return json;
+}
+
+}  // namespace wireplan::pipeline

@@ -1,0 +1,25 @@
+#pragma once
+/// What a report tells of catheters: which were tried with which wires, and of a script its steps
+/// and what each tool felt.
+#include <string>
+
+#include "pipeline/files/json_reader.h"
+#include "plan/make_plan.h"
+
+namespace wireplan::pipeline {
+
+/// "advance the wire to 250 mm; advance the catheter over the wire to 230 mm; ..."
+std::string describe_tool_script(const plan::Candidate& candidate, const plan::Measured& trial);
+
+/// The steps as a case's files hold them, each with its "text" for the hand.
+Json told_steps_json(const plan::Candidate& candidate, const plan::Measured& trial);
+
+/// Per tool its metrics; beside them the hook: how far the catheter's tip is past the ostium at the
+/// end, and how far the wire is out of it.
+Json tools_json(const plan::Study& study, const plan::Measured& trial);
+
+/// Rules, ostium with the view of the C-arm that shows it, and all pairs: what came of them, or why
+/// they were not tried.
+Json catheters_json(const plan::Study& study, const plan::Plan& plan);
+
+}  // namespace wireplan::pipeline

@@ -1,0 +1,65 @@
+#pragma once
+/// Catheters of a case: which wires go through them, and what a hand does not do with the two.
+#include <string>
+#include <vector>
+
+#include "plan/wire_spread.h"
+#include "simulate/insertion/tool_trial.h"
+#include "simulate/insertion/way.h"
+
+namespace wireplan::plan {
+
+struct Catheter {
+  simulate::Tool tool;
+  WireSpread spread;  // how far its values may be off
+};
+
+/// What scripts of catheter and wire keep to. All assumed unless a source stands beside it.
+struct ToolRules {
+  /// A catheter is only pushed over a wire that leads ("catheters are advanced only over a wire",
+  /// references-2 L) unless its tip is no stiffer than this; assumed: soft tips of 5 F catheters
+  /// have 99 in the catalogue                                                          [N mm^2]
+  double soft_tip = 100.0;
+  double hold = 100.0;     // of wire that is left behind the catheter's hub, to hold it by    [mm]
+  double outside = 50.0;   // of catheter that stays outside the body                          [mm]
+  double most_turn = kPi;  // of the hub in one place: a push or pull follows, so that no twist
+                           // is wound up                                                     [rad]
+  double friction = 0.05;  // Coulomb's coefficient between wire and catheter
+};
+
+/// Where scripts are to bring the tip: the last vessel that the way takes from a wider one.
+struct Ostium {
+  double arc = 0.0;             // along the way                                         [mm]
+  Vec3 point = Vec3::Zero();    //                                                       [mm]
+  Vec3 branch = Vec3::UnitX();  // unit, where the branch goes
+  double trunk_diameter = 0.0;  // just before                                           [mm]
+  double end = 0.0;             // of the way, the target's place                        [mm]
+};
+
+/// A wire in a catheter.
+struct ToolPair {
+  int catheter = 0, wire = 0;  // indices into the study's lists
+  std::string unfit = {};      // why they are not tried; else empty
+};
+
+/// All pairs, wires outermost, each with what speaks against it: a wire as thick as the lumen,
+/// strips, a catheter that ends before the ostium, a wire that is too short behind the catheter's
+/// hub, a curve at the tip that is wider than the vessel that it is to open in.
+std::vector<ToolPair> list_pairs(const std::vector<Catheter>& catheters,
+                                 const std::vector<simulate::Wire>& wires, const Ostium& ostium,
+                                 const ToolRules& rules);
+
+/// What breaks the rules in a script, or is not possible with tools of these lengths; else empty.
+std::string find_broken_rule(const std::vector<simulate::ToolStep>& steps, const Catheter& catheter,
+                             const simulate::Wire& wire, const ToolRules& rules);
+
+/// Steps rounded as files hold them, in degrees and mm.
+std::vector<simulate::ToolStep> as_written(std::vector<simulate::ToolStep> steps);
+
+/// "advance the wire to 250 mm; advance the catheter over the wire to 230 mm; withdraw the wire by
+/// 60 mm; turn the catheter 60 degrees clockwise; ...": as the hand makes them, turns as seen from
+/// the hub toward the patient. The last step goes on to where the trial ended.
+std::vector<std::string> describe_steps(const std::vector<simulate::ToolStep>& steps,
+                                        double insertion);
+
+}  // namespace wireplan::plan

@@ -1,0 +1,478 @@
+#include "plan/tool_search.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+#include <tuple>
+#include <utility>
+
+#include "plan/anatomy/passage.h"
+#include "preprocess/centerline/path_place.h"
+
+namespace wireplan::plan {
+namespace {
+
+using simulate::kBothTools;
+using simulate::ToolStep;
+using simulate::ToolTrial;
+
+/// All chosen.
+struct Template {
+  double beyond = 60.0;      // of the wire past the ostium, at most                          [mm]
+  double before_end = 10.0;  // of it short of where the image ends                           [mm]
+  double leads = 12.0;       // of the wire ahead of the catheter, at least                   [mm]
+  double above[2] = {35.0, 12.0};  // of the catheter's tip past the ostium                    [mm]
+  double below = 15.0;  // ... and before it, in pulls                                   [mm]
+  double cover = 6.0;   // of a curve behind its end, where the wire is withdrawn to     [mm]
+  double turn = 30.0 * kRadPerDeg;
+  int turns = 12;
+  double pull = 2.0;       //                                                               [mm]
+  double toward = 0.0;     // the branch, of the tip's direction: less looks away
+  double far = 0.2;        // what a millimetre between tip and ostium counts as             [mm]
+  double aside = 4.0;      // what a tip square to the branch counts as                     [mm]
+  std::size_t depths = 4;  // hooks of a turn, of the states along a pull, ...
+  double apart = 4.0;      // ... so far from each other                                       [mm]
+  std::size_t tries = 14;  // hooks of a start that the wire is brought out of
+  std::size_t kept = 6;    // scripts of a pair
+  double out = 10.0;       // of the wire between two looks                                 [mm]
+  double astray = 20.0;    // of the wire out of the mouth and not in the branch            [mm]
+  double in_branch = 6.0;  // past the ostium: worth following                              [mm]
+  double follow = 12.0;    // of the catheter over the wire                                 [mm]
+  int follows = 3;
+  double spare = 40.0;  // of the last push, for patients who differ                     [mm]
+};
+constexpr Template kTemplate;
+
+constexpr int kCatheter = 0, kWire = 1;
+
+// Of the search; ten times as much brought half of the wires elsewhere than runs in full   [N]
+constexpr double kScoutResidual = 1e-5;
+
+/// Steps one after the other, pushes of the same tool in one direction as one, turns too.
+std::vector<ToolStep> with(std::vector<ToolStep> steps, const ToolStep& next) {
+  if (!steps.empty() && steps.back().tool == next.tool) {
+    ToolStep& last = steps.back();
+    if (last.push * next.push > 0.0) {
+      last.push += next.push;
+      return steps;
+    }
+    if (last.push == 0.0 && next.push == 0.0) {
+      last.turn += next.turn;
+      if (std::abs(last.turn) < 1e-9) steps.pop_back();
+      return steps;
+    }
+  }
+  steps.push_back(next);
+  return steps;
+}
+
+/// Length from the tip to the end of a catheter's first or last curve [mm].
+double curved_length(const simulate::Wire& tube, bool first) {
+  double length = 0.0, end = 0.0;
+  for (const simulate::Section& section : tube.sections) {
+    length += section.length;
+    if (section.rest_curvature == 0.0) continue;
+    end = length;
+    if (first) break;
+  }
+  return end;
+}
+
+/// A script on its way.
+struct State {
+  std::vector<ToolStep> steps;
+  ToolTrial::Mark mark;
+  double off = 0.0;  // how badly the catheter's tip lies for the ostium                      [mm]
+};
+
+struct FoundScript {
+  std::vector<ToolStep> steps;
+  double peak_force = 0.0;  // in the scout                                                   [N]
+  double turned = 0.0, depth = 0.0;
+};
+
+/// One depth of the catheter and one withdrawal of the wire. Serial.
+struct ToolStart {
+  ToolPair pair;
+  double above = 0.0, withdrawn = 0.0;  //                                                    [mm]
+};
+
+struct StartFindings {
+  std::vector<FoundScript> found;
+  std::vector<ToolStep> closest;
+  double nearest_hook = -1.0, furthest = 0.0;
+  std::string stopped;
+  long branches = 0;
+};
+
+class ToolSearch {
+ public:
+  ToolSearch(const Study& study, const ToolStart& start, const Ostium& ostium,
+             const simulate::VesselModel& vessel, const std::function<bool()>& cancelled)
+      : study_(study),
+        start_(start),
+        ostium_(ostium),
+        cancelled_(cancelled),
+        path_(study.goal.way->path()),
+        catheter_(study.catheters[static_cast<std::size_t>(start.pair.catheter)]),
+        wire_(study.wires[static_cast<std::size_t>(start.pair.wire)]),
+        trial_(tools_of(study, first_candidate(study, start.pair)),
+               make_introducer(study, first_candidate(study, start.pair)), study.goal, vessel,
+               tool_options(study)) {}
+
+  StartFindings run() {
+    if (wire_up() && catheter_up()) {
+      std::vector<State> hooks = turn_and_pull();
+      std::stable_sort(hooks.begin(), hooks.end(),
+                       [](const State& a, const State& b) { return a.off < b.off; });
+      if (hooks.size() > kTemplate.tries) hooks.resize(kTemplate.tries);
+      for (const State& hook : hooks) {
+        if (stop()) break;
+        wire_out(hook);
+      }
+    }
+    return std::move(findings_);
+  }
+
+ private:
+  bool stop() const { return cancelled_ && cancelled_(); }
+
+  double insertion(int tool) const { return trial_.insertion(tool); }
+  double progress() const {
+    return trial_.pushes().empty() ? 0.0
+                                   : preprocess::find_progress(trial_.pushes().back().tip, path_);
+  }
+  State here(double off = 0.0) const { return {steps_, trial_.save(), off}; }
+  void back_to(const State& state) {
+    trial_.restore(state.mark);
+    steps_ = state.steps;
+  }
+
+  /// Makes a step and adds it to the script; takes it back where it ends the trial. False there,
+  /// and where it reaches the target, which keeps the script.
+  bool go(const ToolStep& step) {
+    const State before = here();
+    ++findings_.branches;
+    trial_.make(step);
+    if (!trial_.pushes().empty() && progress() > findings_.furthest) {
+      findings_.furthest = progress();
+      findings_.closest = with(steps_, step);
+    }
+    if (!trial_.ended()) {
+      steps_ = with(steps_, step);
+      return true;
+    }
+    if (trial_.reached()) {
+      keep(with(steps_, step));
+    } else {
+      findings_.stopped = trial_.reason();
+    }
+    back_to(before);
+    return false;
+  }
+
+  /// A script whose last push reached. For patients who differ, that may go on for longer.
+  void keep(std::vector<ToolStep> steps) {
+    if (steps.back().push <= 0.0) return;
+    steps.back().push += kTemplate.spare;
+    FoundScript found{.steps = std::move(steps)};
+    for (const ToolStep& step : found.steps) {
+      if (step.tool == kCatheter) found.turned += step.turn;
+      if (step.tool != kWire) found.depth += step.push;
+    }
+    for (const simulate::Push& push : trial_.pushes()) {
+      found.peak_force = std::max(found.peak_force, push.peak_contact_force);
+    }
+    if (find_broken_rule(found.steps, catheter_, wire_, study_.tool_rules).empty()) {
+      findings_.found.push_back(std::move(found));
+    }
+  }
+
+  /// Beyond the ostium, or as far as the vessel goes there. False where that is not far enough to
+  /// lead the catheter.
+  bool wire_up() {
+    const double to = std::floor(ostium_.arc) + kTemplate.beyond;
+    while (to - insertion(kWire) > 1e-9 && !stop()) {
+      const double by = std::min(kTemplate.out, to - insertion(kWire));
+      if (!go({.tool = kWire, .push = by})) break;
+    }
+    if (insertion(kWire) < to - 1e-9) {  // back from where it ended
+      const double slack = std::min(kTemplate.before_end, insertion(kWire) - 5.0);
+      if (slack > 0.0) go({.tool = kWire, .push = -slack});
+    }
+    return insertion(kWire) > ostium_.arc && findings_.found.empty();
+  }
+
+  /// Over the wire, which is then withdrawn.
+  bool catheter_up() {
+    const double to =
+        std::min(std::floor(ostium_.arc + start_.above), insertion(kWire) - kTemplate.leads);
+    if (to < 2.0 * kTemplate.pull || !go({.tool = kCatheter, .push = to})) return false;
+    const double back = insertion(kWire) - std::max(5.0, to - start_.withdrawn);
+    return back < 1e-9 || go({.tool = kWire, .push = -std::ceil(back)});
+  }
+
+  /// How far the line on from the catheter's tip, which the wire will take, passes the ostium by;
+  /// the further off that is, the less it counts.
+  double off() {
+    const Vec3 tip = trial_.tip(kCatheter), along = trial_.tip_direction(kCatheter);
+    const Vec3 to = ostium_.point - tip;
+    const double depth = std::max(0.0, -to.dot(ostium_.branch));  // of the tip in the branch
+    const double distance = std::max(0.0, to.norm() - depth);
+    if (findings_.nearest_hook < 0.0 || distance < findings_.nearest_hook) {
+      findings_.nearest_hook = distance;
+    }
+    const double ahead = std::max(0.0, to.dot(along));
+    return (to - ahead * along).norm() + kTemplate.far * ahead +
+           kTemplate.aside * (1.0 - along.dot(ostium_.branch));
+  }
+
+  /// Whether the catheter's tip looks away from the branch, so that pulling it past is in vain.
+  bool looks_away() const {
+    return trial_.tip_direction(kCatheter).dot(ostium_.branch) < kTemplate.toward;
+  }
+
+  /// Of each turn the state that lies best while both tools are pulled past the ostium.
+  std::vector<State> turn_and_pull() {
+    std::vector<State> hooks;
+    const State start = here();
+    for (const double side : {1.0, -1.0}) {
+      back_to(start);
+      const int turns = side > 0.0 ? kTemplate.turns / 2 : (kTemplate.turns - 1) / 2;
+      for (int k = side > 0.0 ? 0 : 1; k <= turns && !stop(); ++k) {
+        if (k > 0 && !go({.tool = kCatheter, .turn = side * kTemplate.turn})) break;
+        if (looks_away()) continue;
+        const State turned = here();
+        std::vector<State> own = {here(off())};
+        const double whole = start_.above + kTemplate.below;
+        const int pulls = static_cast<int>(std::ceil(whole / kTemplate.pull));
+        for (int pull = 0; pull < pulls && !stop(); ++pull) {
+          if (!go({.tool = kBothTools, .push = -kTemplate.pull})) break;
+          own.push_back(here(off()));
+        }
+        keep_best(std::move(own), hooks);
+        back_to(turned);
+      }
+    }
+    return hooks;
+  }
+
+  /// Of the states along a pull those that lie best, and not next to each other.
+  static void keep_best(std::vector<State> own, std::vector<State>& hooks) {
+    const auto apart = static_cast<std::ptrdiff_t>(kTemplate.apart / kTemplate.pull);
+    std::vector<std::ptrdiff_t> kept;
+    for (std::size_t n = 0; n < kTemplate.depths; ++n) {
+      std::ptrdiff_t best = -1;
+      for (std::ptrdiff_t k = 0; k < std::ssize(own); ++k) {
+        const bool near = std::any_of(kept.begin(), kept.end(), [&](std::ptrdiff_t other) {
+          return std::abs(other - k) < apart;
+        });
+        const auto slot = static_cast<std::size_t>(k);
+        if (!near && (best < 0 || own[slot].off < own[static_cast<std::size_t>(best)].off))
+          best = k;
+      }
+      if (best < 0) break;
+      kept.push_back(best);
+    }
+    for (const std::ptrdiff_t k : kept)
+      hooks.push_back(std::move(own[static_cast<std::size_t>(k)]));
+  }
+
+  /// Out of the mouth into the branch; where it comes no further the catheter follows it.
+  void wire_out(const State& hook) {
+    back_to(hook);
+    for (int follow = 0; follow <= kTemplate.follows && !stop(); ++follow) {
+      State best = here();
+      double furthest = 0.0, since = 0.0;
+      const double most =
+          insertion(kCatheter) - insertion(kWire) + ostium_.end - ostium_.arc + kTemplate.spare;
+      const int pushes = static_cast<int>(std::ceil(most / kTemplate.out));
+      for (int push = 0; push < pushes; ++push) {
+        const std::size_t found = findings_.found.size();
+        if (!go({.tool = kWire, .push = kTemplate.out})) {
+          if (findings_.found.size() > found) return;
+          break;
+        }
+        if (insertion(kWire) <= insertion(kCatheter)) continue;
+        if (progress() > furthest) {
+          furthest = progress();
+          since = 0.0;
+          best = here();
+          continue;
+        }
+        since += kTemplate.out;
+        if (since < kTemplate.astray) continue;
+        findings_.stopped = "the wire comes no further than " + mm_text(furthest) +
+                            " along the way out of the catheter";
+        break;
+      }
+      if (furthest < ostium_.arc + kTemplate.in_branch) return;
+      back_to(best);
+      const double by = std::min(kTemplate.follow, insertion(kWire) - insertion(kCatheter));
+      if (by < kTemplate.pull || !go({.tool = kCatheter, .push = std::floor(by)})) return;
+    }
+  }
+
+  static std::string mm_text(double value) { return std::to_string(std::lround(value)) + " mm"; }
+
+  const Study& study_;
+  const ToolStart& start_;
+  const Ostium& ostium_;
+  const std::function<bool()>& cancelled_;
+  const Centerline& path_;
+  const Catheter& catheter_;
+  const simulate::Wire& wire_;
+  ToolTrial trial_;
+  std::vector<ToolStep> steps_;
+  StartFindings findings_;
+};
+
+bool alike(const FoundScript& a, const FoundScript& b, double turn, double depth) {
+  return std::abs(a.turned - b.turned) < turn && std::abs(a.depth - b.depth) < depth;
+}
+
+/// Those that differ in turn or depth, first those with most others round them: a hand and a
+/// patient that are not quite as assumed end there. Then the fewest steps and the least force
+/// first.
+std::vector<FoundScript> choose_different(std::vector<FoundScript> from) {
+  constexpr double kNearTurn = 45.0 * kRadPerDeg, kNearDepth = 9.0;    // [rad], [mm]
+  constexpr double kOtherTurn = 20.0 * kRadPerDeg, kOtherDepth = 3.0;  // [rad], [mm]
+  std::vector<int> neighbours;
+  for (const FoundScript& script : from) {
+    neighbours.push_back(
+        static_cast<int>(std::count_if(from.begin(), from.end(), [&](const FoundScript& other) {
+          return alike(script, other, kNearTurn, kNearDepth);
+        })));
+  }
+  std::vector<std::size_t> order(from.size());
+  std::iota(order.begin(), order.end(), 0U);
+  std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
+    return std::tuple(-neighbours[a], from[a].steps.size(), from[a].peak_force) <
+           std::tuple(-neighbours[b], from[b].steps.size(), from[b].peak_force);
+  });
+  std::vector<FoundScript> kept;
+  for (const std::size_t k : order) {
+    const bool same = std::any_of(kept.begin(), kept.end(), [&](const FoundScript& other) {
+      return alike(from[k], other, kOtherTurn, kOtherDepth);
+    });
+    if (!same && kept.size() < kTemplate.kept) kept.push_back(from[k]);
+  }
+  return kept;
+}
+
+}  // namespace
+
+std::optional<Ostium> find_ostium(const Study& study) {
+  if (!study.goal.way) return {};
+  const simulate::Way& way = *study.goal.way;
+  const Centerline& path = way.path();
+  const double end = path.arc_length[path.arc_length.size() - 1];
+  std::optional<Ostium> last;
+  for (const Junction& junction : find_junctions(way)) {
+    if (!junction.taken || junction.arc >= end) continue;
+    Eigen::Index before = 0;
+    while (before + 1 < path.arc_length.size() && path.arc_length[before + 1] < junction.arc) {
+      ++before;
+    }
+    // The spheres shrink toward the ostium already.
+    double radius = path.radius[before];
+    for (Eigen::Index k = before; k >= 0 && path.arc_length[before] - path.arc_length[k] < 15.0;
+         --k) {
+      radius = std::max(radius, path.radius[k]);
+    }
+    last = Ostium{.arc = junction.arc,
+                  .point = junction.point,
+                  .branch = junction.branch_direction,
+                  .trunk_diameter = 2.0 * radius,
+                  .end = end};
+  }
+  return last;
+}
+
+std::vector<ToolPair> pairs_of(const Study& study) {
+  const std::optional<Ostium> ostium = find_ostium(study);
+  if (!ostium) {
+    std::vector<ToolPair> pairs = list_pairs(study.catheters, study.wires, {}, study.tool_rules);
+    for (ToolPair& pair : pairs) pair.unfit = "the way takes no branch that a catheter could hook";
+    return pairs;
+  }
+  return list_pairs(study.catheters, study.wires, *ostium, study.tool_rules);
+}
+
+Candidate first_candidate(const Study& study, const ToolPair& pair) {
+  return {.wire = pair.wire,
+          .inclination = study.inclinations.front(),
+          .azimuth = study.azimuths.front(),
+          .roll = study.rolls.front(),
+          .catheter = pair.catheter};
+}
+
+Study tool_scout_study(const Study& study) {
+  Study own = study;
+  own.insertion.residual_tolerance = std::max(kScoutResidual, own.insertion.residual_tolerance);
+  own.insertion.record_every = 1e4;
+  own.insertion.map_forces = false;
+  return own;
+}
+
+ToolScripts find_tool_scripts(const Study& study, const simulate::VesselModel& vessel,
+                              const BatchOptions& options) {
+  ToolScripts all;
+  const std::optional<Ostium> ostium = find_ostium(study);
+  std::vector<ToolStart> starts;
+  std::vector<std::size_t> owners;
+  for (const ToolPair& pair : pairs_of(study)) {
+    all.pairs.emplace_back().pair = pair;
+    if (!pair.unfit.empty()) continue;
+    const simulate::Wire& tube = study.catheters[static_cast<std::size_t>(pair.catheter)].tool.wire;
+    for (const double above : kTemplate.above) {
+      for (const bool first : {false, true}) {
+        const double withdrawn = curved_length(tube, first) + kTemplate.cover;
+        if (first && withdrawn == curved_length(tube, false) + kTemplate.cover) continue;
+        starts.push_back({pair, above, withdrawn});
+        owners.push_back(all.pairs.size() - 1);
+      }
+    }
+  }
+  const Study scout = tool_scout_study(study);
+  std::vector<StartFindings> findings(starts.size());
+  for_each_slot(
+      static_cast<int>(starts.size()),
+      [&](int slot) {
+        const auto k = static_cast<std::size_t>(slot);
+        findings[k] = ToolSearch(scout, starts[k], *ostium, vessel, options.cancelled).run();
+      },
+      options);
+  for (std::size_t p = 0; p < all.pairs.size(); ++p) {
+    PairFindings& pair = all.pairs[p];
+    std::vector<FoundScript> found;
+    std::vector<ToolStep> closest;
+    for (std::size_t k = 0; k < starts.size(); ++k) {
+      if (owners[k] != p) continue;
+      StartFindings& own = findings[k];
+      all.branches += own.branches;
+      pair.found += static_cast<int>(own.found.size());
+      if (own.nearest_hook >= 0.0 &&
+          (pair.nearest_hook < 0.0 || own.nearest_hook < pair.nearest_hook)) {
+        pair.nearest_hook = own.nearest_hook;
+      }
+      if (closest.empty() || own.furthest > pair.furthest) {
+        pair.furthest = own.furthest;
+        pair.stopped = own.stopped;
+        closest = own.closest;
+      }
+      found.insert(found.end(), own.found.begin(), own.found.end());
+    }
+    std::vector<FoundScript> kept = choose_different(std::move(found));
+    if (pair.found > 0) pair.stopped.clear();
+    if (kept.empty() && !closest.empty()) kept.push_back({.steps = closest});
+    for (FoundScript& script : kept) {
+      Candidate candidate = first_candidate(study, pair.pair);
+      candidate.steps = as_written(std::move(script.steps));
+      all.found.push_back(std::move(candidate));
+    }
+  }
+  return all;
+}
+
+}  // namespace wireplan::plan

@@ -1,0 +1,52 @@
+#pragma once
+/// Scripts of catheter and wire for targets that a wire alone does not reach, from a template that
+/// hands follow (references-2 L):
+///   1. the wire goes up beyond the ostium, and the catheter over it;
+///   2. the wire is withdrawn, so that the catheter's curve forms;
+///   3. the catheter is turned, and both are pulled down or pushed up, until its tip is in the
+///   ostium;
+///   4. the wire goes out into the branch, and where it comes no further, the catheter follows it.
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "plan/batch.h"
+
+namespace wireplan::plan {
+
+/// The last vessel that the study's way takes from a wider one; none where it takes none.
+std::optional<Ostium> find_ostium(const Study& study);
+
+/// Whether there is anything to search: pairs that fit, and an ostium.
+std::vector<ToolPair> pairs_of(const Study& study);
+
+/// A script of the pair begins so: at the study's first inclination, azimuth and roll of both hubs.
+Candidate first_candidate(const Study& study, const ToolPair& pair);
+
+/// What came of a pair.
+struct PairFindings {
+  ToolPair pair;
+  int found = 0;               // scripts that reached in the search
+  double nearest_hook = -1.0;  // of the catheter's tip to the ostium at best; -1: not tried    [mm]
+  double furthest = 0.0;       // of a tip along the way                                      [mm]
+  std::string stopped;         // what stopped the best script, where none reached; else empty
+};
+
+struct ToolScripts {
+  std::vector<Candidate> found;     // best first within a pair; of a pair without one the script
+                                    // that came furthest
+  std::vector<PairFindings> pairs;  // of all pairs, in the order of list_pairs()
+  long branches = 0;                // states that were gone on from
+};
+
+/// The study as scripts are tried in it: on a rigid wall, with long elements and loose residuals.
+Study tool_scout_study(const Study& study);
+
+/// Tries the template for each pair that fits, in parallel, at a few depths of the catheter and
+/// withdrawals of the wire; at all turns by 30 degrees; pulled or pushed by 2 mm. States whose tip
+/// lies best at the ostium are gone on from. Keeps up to three scripts of a pair, which differ in
+/// turn, or in depth. The same at any thread count.
+ToolScripts find_tool_scripts(const Study& study, const simulate::VesselModel& vessel,
+                              const BatchOptions& options);
+
+}  // namespace wireplan::plan
