@@ -271,13 +271,15 @@ export const makeVessel = (frame, page) => {
     setWire: (nodes, force, scale, tools = null) => {
       if (wire) scene.remove(wire), dispose(wire);
       wire = null;
-      const line = (count, linewidth, rgbOf) => {
+      const line = (count, linewidth, rgbOf, inside = false) => {
         const geometry = new LineGeometry();
         geometry.setPositions(nodes.subarray(0, 3 * count));
         const colors = new Float32Array(3 * count);
         for (let k = 0; k < count; ++k) colors.set(rgbOf(force && scale > 0 ? force[k] / scale : 0), 3 * k);
         geometry.setColors(colors);
-        wire.add(new Line2(geometry, new LineMaterial({linewidth, vertexColors: true})));
+        const drawn = new Line2(geometry, new LineMaterial({linewidth, vertexColors: true, depthTest: !inside}));
+        drawn.renderOrder = inside ? 1 : 0; // a wire in a catheter is seen, as on X-rays
+        wire.add(drawn);
       };
       if (nodes.length >= 6) {
         wire = new Group();
@@ -285,7 +287,7 @@ export const makeVessel = (frame, page) => {
         if (tools) {
           const [inCatheter, inWire] = tools.map((insertion) => nodesWithin(nodes, insertion));
           if (inCatheter > 1) line(inCatheter, 10, (part) => (part > 0 ? forceRgb(part) : kCatheterRgb));
-          if (inWire > 1) line(inWire, 3.5, forceRgb);
+          if (inWire > 1) line(inWire, 3, forceRgb, true);
         } else {
           line(all, 4.5, forceRgb);
         }
