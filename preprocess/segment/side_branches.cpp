@@ -21,8 +21,8 @@ constexpr double kSteady = 2.2;    // by which sections may differ from those be
 constexpr double kOstium = 0.3;    // least contact with the artery, of the cross-section
 constexpr double kLeavesMm = 5.0;  // from the contact, behind which the artery is far
 constexpr double kOfArtery = 0.7, kAlwaysMm = 2.0;  // of the artery's radius; what always is
-constexpr double kSectionVoxels = 2.0;            // how long a section is, at least
-constexpr double kOwnPart = 0.5;                  // of its own contrast, where a branch ends
+constexpr double kSectionVoxels = 2.0;              // how long a section is, at least
+constexpr double kOwnPart = 0.5;                    // of its own contrast, where a branch ends
 
 /// Voxels of one distance from the contact.
 struct Section {
