@@ -17,10 +17,11 @@ constexpr double kToolTip = 2.0;                     // that counts as a tip for
 constexpr double kToolOutside = 1.0;                 // penetration that contact does not explain
 constexpr double kToolPatience = 25.0;               // of the last push, without progress     [mm]
 constexpr double kToolTurnStep = 15.0 * kRadPerDeg;  // of a hub between two records
-constexpr double kStepsPerPart = 2.0;    // of the options: a bench cuts a push at 2 mm itself
-constexpr double kDivideLonger = 1.25;   // edges than asked for, ...
-constexpr double kLongestEdge = 1.45;    // ... of it: ToolBench::divide()
-constexpr double kDivideShorter = 0.67;  // ... or shorter: the centreline is divided anew
+constexpr double kStepsPerPart = 2.0;      // of the options: a bench cuts a push at 2 mm itself
+constexpr double kDivideLonger = 1.25;     // edges than asked for, ...
+constexpr double kFiner[] = {1.06, 1.13};  // elements, where a move finds no equilibrium; chosen
+constexpr double kLongestEdge = 1.45;      // ... of it: ToolBench::divide()
+constexpr double kDivideShorter = 0.67;    // ... or shorter: the centreline is divided anew
 
 std::string in_mm(double value) {
   char text[32];
@@ -142,7 +143,7 @@ bool ToolTrial::part(const ToolStep& step) {
                                     in_mm(foremost()) + " of insertion");
     return false;
   }
-  if (!bench_->move(move)) {
+  if (!move_or_divide(move)) {
     if (bench_->through_wall()) {
       end(Outcome::kLeftLumen, "a tool goes through the wall after " + in_mm(foremost()) +
                                    " of insertion, near " +
@@ -157,6 +158,26 @@ bool ToolTrial::part(const ToolStep& step) {
   note(step);
   check_place();
   return !ended();
+}
+
+/// Makes the move. Where it finds no equilibrium, the rest of it is tried with the centreline
+/// divided a little finer: nodes then lie elsewhere at ridges of the wall, and friction is spread
+/// anew.
+bool ToolTrial::move_or_divide(const ToolMove& move) {
+  const std::vector<ToolPlace> start = bench_->places();
+  if (bench_->move(move)) return true;
+  for (const double finer : kFiner) {
+    ToolMove rest = move;
+    double next = foremost();
+    for (std::size_t i = 0; i < start.size(); ++i) {
+      rest.push[i] += start[i].insertion - bench_->places()[i].insertion;
+      rest.turn[i] += start[i].roll - bench_->places()[i].roll;
+      next = std::max(next, bench_->places()[i].insertion + rest.push[i]);
+    }
+    if (bench_->through_wall()) return false;
+    if (bench_->divide(finer * next) && bench_->move(rest)) return true;
+  }
+  return false;
 }
 
 /// Divides the centreline where the move would make its edges too long, or they are much shorter

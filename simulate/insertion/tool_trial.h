@@ -71,6 +71,7 @@ class ToolTrial {
  private:
   bool part(const ToolStep& step);
   bool divide_for(const ToolMove& move);
+  bool move_or_divide(const ToolMove& move);
   void note(const ToolStep& step);
   void check_place();
   bool check_advance(double pushed);
