@@ -83,7 +83,7 @@ void print_sources(const Catalogue& known) {
 }
 
 int print_wires() {
-  const Catalogue known = catalogue();
+  const Catalogue& known = catalogue();
   print_wire_table(known);
   print_sources(known);
   return kDone;
@@ -110,7 +110,7 @@ void print_tube_tables(const Catalogue& known) {
 }
 
 int print_devices(bool as_json) {
-  const Catalogue known = catalogue();
+  const Catalogue& known = catalogue();
   if (as_json) {
     std::cout << known.file.dump(2) << "\n";
     return kDone;

@@ -50,7 +50,7 @@ CaseWires read_wires(JsonReader& root) {
                  "`wireplan wires` lists the catalogue");
     return read;
   }
-  const Catalogue known = catalogue();
+  const Catalogue& known = catalogue();
   std::set<std::string> names;
   for (std::size_t i = 0; i < list.size(); ++i) {
     const std::string key = "wires[" + std::to_string(i) + "]";
@@ -76,7 +76,7 @@ std::vector<Catheter> read_case_catheters(JsonReader& root, const std::vector<De
                  "`wireplan devices` lists the catalogue; without the key wires go in alone");
     return read;
   }
-  const Catalogue known = catalogue();
+  const Catalogue& known = catalogue();
   std::vector<std::string> names;
   for (const Catheter& entry : known.catheters) names.push_back(entry.tube.name);
   std::set<std::string> used;

@@ -192,10 +192,13 @@ Catheter read_catheter(JsonReader& reader, const std::vector<Coating>& coatings,
   return catheter;
 }
 
-Catalogue catalogue() {
-  std::string text;
-  for (const char* part : kDevicesJson) text += part;
-  return read_catalogue(parse_json(text, "devices.json", kDevicesSchema));
+const Catalogue& catalogue() {
+  static const Catalogue known = [] {
+    std::string text;
+    for (const char* part : kDevicesJson) text += part;
+    return read_catalogue(parse_json(text, "devices.json", kDevicesSchema));
+  }();
+  return known;
 }
 
 const CatalogueWire* find_wire(const Catalogue& known, const std::string& name) {

@@ -47,8 +47,8 @@ struct Catalogue {
   Json file;
 };
 
-/// The built-in catalogue.
-Catalogue catalogue();
+/// The built-in catalogue, read when it is first asked for.
+const Catalogue& catalogue();
 
 /// Reads a catheter: of the catalogue, or a case's `own`, which needs neither title, shape nor
 /// coating and may have a "friction".

@@ -147,7 +147,7 @@ void cut_to(simulate::Wire& wire, double length) {
 
 /// A wire of the catalogue, or its end, in edges of one length. Its friction is its own.
 void read_device(JsonReader& reader, simulate::Scene& scene) {
-  const Catalogue known = catalogue();
+  const Catalogue& known = catalogue();
   const std::string name = reader.text("device", std::nullopt);
   const CatalogueWire* found = find_wire(known, name);
   if (found == nullptr) {

@@ -35,7 +35,7 @@ simulate::Section read_tool_section(JsonReader& reader) {
 
 /// A wire or a catheter of the catalogue.
 void read_known_tool(JsonReader& reader, simulate::Tool& tool) {
-  const Catalogue known = catalogue();
+  const Catalogue& known = catalogue();
   const std::string name = reader.text("device", std::nullopt);
   if (const CatalogueWire* wire = find_wire(known, name); wire != nullptr) {
     tool.wire = wire->wire;

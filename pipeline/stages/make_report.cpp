@@ -119,7 +119,7 @@ ReportInput describe_run(Workspace& work) {
   report.input_sha256 = work.input_sha256;
   report.study = work.study();
   report.devices = given.devices;
-  const Catalogue known = catalogue();
+  const Catalogue& known = catalogue();
   for (DeviceWire& device : report.devices) {
     for (NamedValue& each : device.values) each.value.source = cite(known, each.value.source);
   }
