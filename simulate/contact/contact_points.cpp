@@ -115,7 +115,7 @@ const MovingFrame& ContactPoints::frame(int k) const {
 
 Vec3 ContactPoints::position_in(int k, const Eigen::Matrix3Xd& x,
                                 const Eigen::Matrix3Xd& sections) const {
-  const Vec3 p = (*this)[k].at(x);
+  Vec3 p = (*this)[k].at(x);
   if (chain_ == nullptr) return p;
   MovingFrame frame;
   frame.find(*chain_, sections, p);
@@ -123,7 +123,7 @@ Vec3 ContactPoints::position_in(int k, const Eigen::Matrix3Xd& x,
 }
 
 Vec3 ContactPoints::motion_of(int k, const WireMotion& motion) const {
-  const Vec3 moved = motion.of((*this)[k]);
+  Vec3 moved = motion.of((*this)[k]);
   if (chain_ == nullptr) return moved;
   const MovingFrame& here = frame(k);
   Vec3 apart = moved;

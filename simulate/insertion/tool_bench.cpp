@@ -151,7 +151,7 @@ ToolBench::ToolBench(const ToolScene& scene)
 bool ToolBench::lies_free(const State& at) const {
   if (scene_.vessel == nullptr) return true;
   double least = kBench.deepest;
-  for (const Vec3& x : at.state.x.colwise()) {
+  for (const auto& x : at.state.x.colwise()) {
     least = std::min(least, scene_.vessel->lumen.distance(x) - at.composite.rod.radius);
   }
   return least > -kBench.deepest;
