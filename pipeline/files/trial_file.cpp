@@ -213,7 +213,7 @@ std::optional<std::vector<simulate::Shape>> shapes_from_bytes(const std::string&
   std::size_t at = kShapesMagic.size();
   const auto take = [&](void* data, std::size_t count) {
     if (bytes.size() - at < count) return false;
-    std::memcpy(data, bytes.data() + at, count);
+    if (count > 0) std::memcpy(data, bytes.data() + at, count);
     at += count;
     return true;
   };
