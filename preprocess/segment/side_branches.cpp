@@ -38,12 +38,21 @@ struct Contact {
   double radius = 0.0;  // of the artery there                                             [mm]
 };
 
-/// What a branch of an artery of this level has at least [HU].
-double least_value(const LumenField& field, double level) {
+/// How long a section is [mm].
+double section_length(const Grid& grid) {
+  return std::max(kSectionVoxels * std::cbrt(grid.spacing.prod()), grid.spacing.maxCoeff());
+}
+
+/// By how much a voxel stands out of the noise that smoothing leaves [HU].
+double least_contrast(const LumenField& field) {
   const double left =
       field.smoothing_mm > 0.0 ? smoothed_noise(field.grid, field.smoothing_mm) : 1.0;
-  return field.surroundings +
-         std::max(kBranchPart * (level - field.surroundings), kNoises * field.noise * left);
+  return kNoises * field.noise * left;
+}
+
+/// What a branch of an artery of this level has at least [HU].
+double least_value(const LumenField& field, double contrast, double level) {
+  return field.surroundings + std::max(kBranchPart * (level - field.surroundings), contrast);
 }
 
 /// Looks for a branch at one contact after the other.
@@ -53,7 +62,8 @@ class BranchSearch {
       : field_(field),
         artery_(artery),
         voxel_(std::cbrt(field.grid.spacing.prod())),
-        section_mm_(std::max(kSectionVoxels * voxel_, field.grid.spacing.maxCoeff())),
+        section_mm_(section_length(field.grid)),
+        least_contrast_(least_contrast(field)),
         distance_(artery.size(), std::numeric_limits<double>::infinity()),
         open_(artery.size(), 0) {}
 
@@ -87,7 +97,7 @@ class BranchSearch {
   }
 
   std::vector<Section> follow_steady(const Contact& contact) {
-    const double least = least_value(field_, contact.level);
+    const double least = least_value(field_, least_contrast_, contact.level);
     std::priority_queue<Visit, std::vector<Visit>, std::greater<>> visits;
     const auto reach = [&](std::size_t n, double distance) {
       if (distance >= distance_[n]) return;
@@ -166,6 +176,7 @@ class BranchSearch {
   const LumenField& field_;
   const Labels& artery_;
   double voxel_, section_mm_;     //                                                       [mm]
+  double least_contrast_;         //                                                       [HU]
   std::vector<double> distance_;  // in the branch, from the contact                       [mm]
   Labels open_;                   // 1 in the section that is being visited
   std::vector<std::size_t> touched_;
@@ -195,10 +206,12 @@ std::vector<Contact> find_contacts(const LumenField& field, const std::vector<fl
       if (artery[m] == 0) beside[m] = std::max(beside[m], level[n]);
     });
   }
+  const double contrast = least_contrast(field);
   for (std::size_t n = 0; n < artery.size(); ++n) {
     if (beside[n] == 0.0F) continue;
     const auto value = static_cast<double>(field.values[n]);
-    if (value < least_value(field, static_cast<double>(beside[n])) || value > field.upper) {
+    if (value < least_value(field, contrast, static_cast<double>(beside[n])) ||
+        value > field.upper) {
       beside[n] = 0.0F;
     }
   }
@@ -256,9 +269,7 @@ Leak add_branch(const LumenField& field, const Contact& contact,
     });
   }
   added.volume_mm3 = static_cast<double>(voxels.size()) * grid.spacing.prod();
-  const double section_mm =
-      std::max(kSectionVoxels * std::cbrt(grid.spacing.prod()), grid.spacing.maxCoeff());
-  added.radius_mm = std::sqrt(added.volume_mm3 / std::numbers::pi / section_mm /
+  added.radius_mm = std::sqrt(added.volume_mm3 / std::numbers::pi / section_length(grid) /
                               static_cast<double>(sections.size()));
   return added;
 }
