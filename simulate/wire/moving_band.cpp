@@ -282,33 +282,29 @@ void solve_row_back(const double* l, int rows, int before, double* known, double
 
 }  // namespace
 
+/// All rows forward, the pivots, and all rows back, in the order.
+template <int P>
+void MovingBand::solve_rows() {
+  double* const x = ordered_.data();
+  for (const Row& row : rows_) {
+    solve_row_forward<P>(values_.data() + row.offset, row.rows, row.start - row.first,
+                         x + row.first, x + row.start);
+  }
+  for (std::size_t k = 0; k < inverse_.size(); ++k) x[k] *= inverse_[k];
+  for (std::size_t at = rows_.size(); at-- > 0;) {
+    const Row& row = rows_[at];
+    solve_row_back<P>(values_.data() + row.offset, row.rows, row.start - row.first, x + row.first,
+                      x + row.start);
+  }
+}
+
 void MovingBand::solve(Eigen::VectorXd& v) {
   for (const Row& row : rows_) {
     for (int r = 0; r < row.rows; ++r) {
       ordered_[static_cast<std::size_t>(row.start + r)] = v[row.from + r];
     }
   }
-  double* const x = ordered_.data();
-  for (const Row& row : rows_) {
-    const double* l = values_.data() + row.offset;
-    const int before = row.start - row.first;
-    if (width_ == 4) {
-      solve_row_forward<4>(l, row.rows, before, x + row.first, x + row.start);
-    } else {
-      solve_row_forward<8>(l, row.rows, before, x + row.first, x + row.start);
-    }
-  }
-  for (std::size_t k = 0; k < inverse_.size(); ++k) x[k] *= inverse_[k];
-  for (std::size_t at = rows_.size(); at-- > 0;) {
-    const Row& row = rows_[at];
-    const double* l = values_.data() + row.offset;
-    const int before = row.start - row.first;
-    if (width_ == 4) {
-      solve_row_back<4>(l, row.rows, before, x + row.first, x + row.start);
-    } else {
-      solve_row_back<8>(l, row.rows, before, x + row.first, x + row.start);
-    }
-  }
+  width_ == 4 ? solve_rows<4>() : solve_rows<8>();
   for (const Row& row : rows_) {
     for (int r = 0; r < row.rows; ++r) {
       v[row.from + r] = ordered_[static_cast<std::size_t>(row.start + r)];

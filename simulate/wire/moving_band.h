@@ -62,6 +62,8 @@ class MovingBand {
   void find_order(int nodes, int per_node, const SectionBlocks& blocks);
   template <int P>
   bool factor_row(std::size_t at);
+  template <int P>
+  void solve_rows();
 
   int width_ = 4;                // numbers per column of a row of blocks
   std::vector<Row> rows_;        // in the order
