@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "plan/robustness.h"
-#include "tests/shapes.h"
+#include "tests/plan/tube_study.h"
 
 namespace wireplan::plan {
 namespace {
@@ -30,27 +30,18 @@ TEST(Disturbances, OfTheSupportLeaveTheOthersAsTheyAre) {
 }
 
 TEST(RunDisturbed, ASupportFactorIsThatOfTheSupport) {
-  Study study;
-  study.wires = {
-      {.name = "soft", .radius = 0.4, .sections = {{.length = 60.0, .bending_stiffness = 50.0}}}};
-  study.inclinations = study.azimuths = study.rolls = {0.0};
-  study.access = Vec3(0.0, 0.0, 5.0);
-  study.goal = {.point = Vec3(0.0, 0.0, 35.0), .radius = 4.5};
-  study.insertion.length = 32.0;
-  study.insertion.step = 2.0;
-  study.insertion.friction = 0.1;
-  const Candidate candidate{.wire = 0, .inclination = 15.0 * kRadPerDeg};
-  const Surface surface = shapes::straight_tube(4.0, 50.0, 2.0);
+  const TubeStudy tube;
   preprocess::Branch middle;
   middle.line.points.resize(3, 51);
   for (int k = 0; k <= 50; ++k) middle.line.points.col(k) = Vec3(0.0, 0.0, k);
   middle.line.radius.setConstant(51, 4.0);
   middle.line.arc_length = Eigen::VectorXd::LinSpaced(51, 0.0, 50.0);
   const auto last = [&](double support, const Disturbance& disturbance) {
-    simulate::VesselModel vessel(surface, shapes::extruded_wall(surface, 1.0, 0.056));
+    simulate::VesselModel vessel = tube.vessel(0.056);
     vessel.sections = std::make_unique<simulate::SectionChain>(
         std::vector{middle}, simulate::SectionChainOptions{.support = support});
-    const simulate::TrialResult trial = run_disturbed(study, candidate, vessel, disturbance);
+    const simulate::TrialResult trial =
+        run_disturbed(tube.study, tube.candidate, vessel, disturbance);
     EXPECT_FALSE(trial.pushes.empty()) << trial.reason;
     return trial;
   };
