@@ -106,12 +106,11 @@ Json c_arm_json(const std::vector<plan::Junction>& junctions, const Tree& tree,
     if (!junction.taken) continue;
     const plan::Projections found =
         plan::find_projections(junction.trunk_direction, junction.branch_direction, arm);
-    const double cosine = junction.trunk_direction.dot(junction.branch_direction);
     rows.push_back({{"trunk", branch_name(tree, junction.trunk)},
                     {"branch", branch_name(tree, junction.branch)},
                     {"at_mm", junction.arc},
                     {"place_mm", to_json(junction.point)},
-                    {"turn_deg", degrees(std::acos(std::clamp(cosine, -1.0, 1.0)))},
+                    {"turn_deg", degrees(plan::turn_of(junction))},
                     {"best", projection_json(found.best)},
                     {"second", found.second ? projection_json(*found.second) : Json(nullptr)}});
   }

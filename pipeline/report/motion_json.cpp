@@ -1,7 +1,6 @@
 #include "pipeline/report/motion_json.h"
 
 #include <algorithm>
-#include <cmath>
 #include <string>
 #include <vector>
 
@@ -22,28 +21,6 @@ Centerline carried(const Centerline& line, const simulate::SectionChain& chain,
         moved.arc_length[k - 1] + (moved.points.col(k) - moved.points.col(k - 1)).norm();
   }
   return moved;
-}
-
-/// Point of a line, or value along it, at an arc length.
-double part_at(const Centerline& line, double arc, Eigen::Index& k) {
-  const Eigen::Index last = line.arc_length.size() - 1;
-  k = 0;
-  while (k + 1 < last && line.arc_length[k + 1] < arc) ++k;
-  if (last == 0) return 0.0;
-  const double length = line.arc_length[k + 1] - line.arc_length[k];
-  return length > 0.0 ? std::clamp((arc - line.arc_length[k]) / length, 0.0, 1.0) : 0.0;
-}
-
-Vec3 line_point(const Centerline& line, double arc) {
-  Eigen::Index k = 0;
-  const double part = part_at(line, arc, k);
-  if (line.points.cols() == 1) return line.points.col(0);
-  return line.points.col(k) + part * (line.points.col(k + 1) - line.points.col(k));
-}
-
-double turn_of(const plan::Junction& junction) {
-  const double cosine = junction.trunk_direction.dot(junction.branch_direction);
-  return std::acos(std::clamp(cosine, -1.0, 1.0)) / kRadPerDeg;
 }
 
 }  // namespace
@@ -67,12 +44,11 @@ Json motion_json(const simulate::Way& way, const simulate::SectionChain& chain,
   for (std::size_t b = 0; b < tree.size(); ++b) {
     if (tree[b].parent < 0) continue;
     const auto parent = static_cast<std::size_t>(tree[b].parent);
-    const Vec3 rest = line_point(tree[parent].line, tree[b].parent_arc);
+    const Vec3 rest = plan::point_at(tree[parent].line, tree[b].parent_arc);
     const Vec3 shift = chain.displacement(rest, u);
-    Eigen::Index k = 0;
-    const double part = part_at(tree[parent].line, tree[b].parent_arc, k);
+    const plan::LinePart at = plan::find_part(tree[parent].line, tree[b].parent_arc);
     const Eigen::VectorXd& arcs = moved[parent].line.arc_length;
-    if (arcs.size() > 1) moved[b].parent_arc = arcs[k] + part * (arcs[k + 1] - arcs[k]);
+    moved[b].parent_arc = arcs[at.before] + at.part * (arcs[at.before + 1] - arcs[at.before]);
     ostia.push_back({{"branch", branch_name(tree, static_cast<int>(b))},
                      {"place_mm", to_json(rest)},
                      {"shift_mm", shift.norm()},
@@ -87,8 +63,8 @@ Json motion_json(const simulate::Way& way, const simulate::SectionChain& chain,
     });
     if (!junction.taken || same == after.end()) continue;
     turns.push_back({{"branch", branch_name(tree, junction.branch)},
-                     {"at_rest_deg", turn_of(junction)},
-                     {"moved_deg", turn_of(*same)}});
+                     {"at_rest_deg", plan::turn_of(junction) / kRadPerDeg},
+                     {"moved_deg", plan::turn_of(*same) / kRadPerDeg}});
   }
   const auto length_of = [](const Centerline& line) {
     return line.arc_length[line.arc_length.size() - 1] - line.arc_length[0];

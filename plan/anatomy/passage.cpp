@@ -92,11 +92,20 @@ Junction side_junction(const Centerline& way, double arc, const Branch& side) {
 
 }  // namespace
 
-Vec3 point_at(const Centerline& line, double arc) {
+LinePart find_part(const Centerline& line, double arc) {
   expects(line.points.cols() >= 2);
   const Eigen::Index k = segment_at(line, arc);
   const double step = line.arc_length(k + 1) - line.arc_length(k);
-  const double part = step > 0.0 ? std::clamp((arc - line.arc_length(k)) / step, 0.0, 1.0) : 0.0;
+  return {k, step > 0.0 ? std::clamp((arc - line.arc_length(k)) / step, 0.0, 1.0) : 0.0};
+}
+
+double turn_of(const Junction& junction) {
+  const double cosine = junction.trunk_direction.dot(junction.branch_direction);
+  return std::acos(std::clamp(cosine, -1.0, 1.0));
+}
+
+Vec3 point_at(const Centerline& line, double arc) {
+  const auto [k, part] = find_part(line, arc);
   return (1.0 - part) * line.points.col(k) + part * line.points.col(k + 1);
 }
 

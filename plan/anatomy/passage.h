@@ -8,7 +8,15 @@
 
 namespace wireplan::plan {
 
-/// The point of a line at an arc length [mm], between its points; the end where it is beyond one.
+/// Where an arc length [mm] is on a line of at least two points: this part, 0 to 1, of the way from
+/// one point to the next; the end where it is beyond one.
+struct LinePart {
+  Eigen::Index before = 0;
+  double part = 0.0;
+};
+LinePart find_part(const Centerline& line, double arc);
+
+/// The point of a line there.
 Vec3 point_at(const Centerline& line, double arc);
 
 struct Narrowest {
@@ -46,6 +54,9 @@ struct Junction {
   /// Unit vectors from the ostium: where the trunk goes on, and where the branch goes.
   Vec3 trunk_direction = Vec3::UnitZ(), branch_direction = Vec3::UnitX();
 };
+
+/// By how much the branch turns from the trunk [rad].
+double turn_of(const Junction& junction);
 
 /// All along the way, nearest first; none without a tree. It leaves a trunk where it changes from
 /// one branch of the tree to another, and where the branch that it stays in is narrower there than
