@@ -131,6 +131,16 @@ std::map<std::string, std::vector<std::string>> common_table() {
   return table;
 }
 
+// Of a case that starts from voxels, at access and target too.
+void segment_reads_points(std::map<std::string, std::vector<std::string>>& table) {
+  for (const char* end : {"/access/point_mm/", "/target/point_mm/"}) {
+    for (const char* k : {"0", "1", "2"}) {
+      auto& stages = table[std::string(end) + k];
+      stages.insert(stages.begin(), "segment");
+    }
+  }
+}
+
 Json common_changes() {
   return {{"/wall/model", "rigid"},
           {"/wall/poisson_ratio", 0.4},
@@ -219,12 +229,7 @@ TEST_F(RerunMatrix, OfACaseThatStartsFromAVolume) {
       table[std::string("/segmentation/seeds_mm/0/") + k] = {"segment", "report"};
     }
     table["/mask/most_handles"] = table["/mask/most_faces"] = {"segment", "report"};
-    for (const char* end : {"/access/point_mm/", "/target/point_mm/"}) {  // seeds too
-      for (const char* k : {"0", "1", "2"}) {
-        auto& stages = table[std::string(end) + k];
-        stages.insert(stages.begin(), "segment");
-      }
-    }
+    segment_reads_points(table);  // seeds too
     Json changes = common_changes();
     changes["/volume/path"] = "other.nrrd";
     changes["/volume/series"] = "8";
@@ -250,12 +255,7 @@ TEST_F(RerunMatrix, OfACaseThatStartsFromLabels) {
     table["/labels/path"] = table["/labels/table"] = {"report"};  // their contents count
     table["/labels/values/0"] = table["/labels/names/0"] = {"segment", "report"};
     table["/mask/most_handles"] = table["/mask/most_faces"] = {"segment", "report"};
-    for (const char* end : {"/access/point_mm/", "/target/point_mm/"}) {  // must lie in the labels
-      for (const char* k : {"0", "1", "2"}) {
-        auto& stages = table[std::string(end) + k];
-        stages.insert(stages.begin(), "segment");
-      }
-    }
+    segment_reads_points(table);  // must lie in the labels
     Json changes = common_changes();
     changes["/volume/path"] = "other.nrrd";
     changes["/labels/path"] = "other.nii";
