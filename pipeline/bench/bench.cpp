@@ -62,6 +62,14 @@ std::string table_text(const std::vector<Json>& rows) {
   return format_table(lines);
 }
 
+Json aim_row(const std::string& what, const std::string& aim, const Json& found) {
+  Json row;
+  row["what"] = what;
+  row["aim"] = aim;
+  row["found"] = found;
+  return row;
+}
+
 Json aim_entry(const char* what, double aim, bool at_least, const Json& found) {
   const bool met =
       !found.is_null() && (at_least ? found.get<double>() >= aim : found.get<double>() <= aim);

@@ -47,6 +47,9 @@ BenchReport bench_truth(const BenchOptions& options);
 /// Rows as a table for people: columns aligned, numbers with 4 digits.
 std::string table_text(const std::vector<Json>& rows);
 
+/// A row of a table of aims in words, beside what was found (null: unknown).
+Json aim_row(const std::string& what, const std::string& aim, const Json& found);
+
 /// An aim beside what was found (null: unknown), "met" or not; and a list of these as lines.
 Json aim_entry(const char* what, double aim, bool at_least, const Json& found);
 std::string aims_text(const Json& aims);

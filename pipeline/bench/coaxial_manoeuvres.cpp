@@ -98,16 +98,11 @@ std::vector<Json> time_coaxial_manoeuvres(double length) {
 std::vector<Json> list_coaxial_aims(const std::vector<Json>& rows) {
   std::vector<Json> aims;
   const auto add = [&](const char* what, const char* aim, const char* wall, double elements) {
-    Json entry;
-    entry["what"] = what;
-    entry["aim"] = aim;
-    entry["found"] = nullptr;
-    for (const Json& row : rows) {
-      if (row.at("wall") == wall && row.at("element_length_mm") == elements) {
-        entry["found"] = row.at("manoeuvres_per_second_per_core");
-      }
-    }
-    aims.push_back(entry);
+    const auto row = std::find_if(rows.begin(), rows.end(), [&](const Json& each) {
+      return each.at("wall") == wall && each.at("element_length_mm") == elements;
+    });
+    aims.push_back(aim_row(
+        what, aim, row == rows.end() ? Json(nullptr) : row->at("manoeuvres_per_second_per_core")));
   };
   add("catheter over wire, 600 + 600 mm, scouts' elements, 1/s/core", "at least 5", "rigid",
       kScoutElements);

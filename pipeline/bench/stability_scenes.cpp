@@ -95,7 +95,7 @@ constexpr double kCoaxialWire = 45.0;  // in at the start                       
 
 int CoaxialScene::nodes() const {
   const double longest = std::max(kCoaxialWire + step, overlap + kCoaxialPushes * step);
-  return 1 + static_cast<int>(std::ceil(longest - 1e-9));  // elements of 1 mm
+  return 1 + simulate::elements_over(longest, 1.0);
 }
 
 simulate::ToolScene tool_scene_of(const CoaxialScene& given) {

@@ -49,11 +49,7 @@ std::vector<Json> list_throughput_aims(const ThroughputResults& results) {
   const std::vector<Json>& rows = results.rows;
   std::vector<Json> aims;
   const auto add = [&](const std::string& what, const std::string& aim, const Json& found) {
-    Json entry;
-    entry["what"] = what;
-    entry["aim"] = aim;
-    entry["found"] = found;
-    aims.push_back(entry);
+    aims.push_back(aim_row(what, aim, found));
   };
   const auto in_vessel = [](const Json& row) {
     return row.at("surface") != kSTube && !is_paper_scene(row);
