@@ -53,51 +53,91 @@ Vec3 normal_of(const NearestOnTriangle& nearest, const PseudoNormals& normals, E
 
 // ---------------------------------------------------------------- triangles to nodes
 
+/// Each triangle lies in a disc of its plane, which is quickly tested: its middle, normal and
+/// radius by columns 0-2, 3-5, 6, with the plane's place along its normal in 7.
+using Discs = Eigen::Array<double, Eigen::Dynamic, 8>;
+
+/// Triangles that may be the nearest of some node of a block. Arrays are longer than `count`.
+struct Candidates {
+  Discs disc;
+  Eigen::ArrayXd distance;  // no triangle is nearer, to where measure() was asked          [mm]
+  std::vector<int> triangle;
+  Eigen::Index count = 0;
+
+  void clear(std::size_t most) {
+    count = 0;
+    if (triangle.size() >= most) return;
+    disc.resize(static_cast<Eigen::Index>(most), Eigen::NoChange);
+    distance.resize(static_cast<Eigen::Index>(most));
+    triangle.resize(most);
+  }
+  template <class Row>
+  void add(int f, const Row& its_disc) {
+    disc.row(count) = its_disc;
+    triangle[static_cast<std::size_t>(count++)] = f;
+  }
+  void measure(const Vec3& p) {
+    const auto column = [&](int c) { return disc.col(c).head(count); };
+    const auto square =
+        (column(0) - p[0]).square() + (column(1) - p[1]).square() + (column(2) - p[2]).square();
+    const auto height =
+        (column(3) * p[0] + column(4) * p[1] + column(5) * p[2] - column(7)).square();
+    const auto aside = ((square - height).max(0.0).sqrt() - column(6)).max(0.0);
+    distance.head(count) = (height + aside.square()).sqrt();
+  }
+};
+
 /// Distances of triangles to the nodes of a brick. A block of nodes is halved down to two along
 /// each axis, each time without the triangles that cannot be the nearest of any of its nodes.
 class BlockDistances {
  public:
+  /// The candidates of a block, and what is left of them for those of half its side; of one thread.
+  using Memory = std::array<Candidates, 4>;
+
   BlockDistances(SampleGrid& grid, const Surface& surface)
       : grid_(grid), surface_(surface), normals_(compute_pseudo_normals(surface)) {
     const Eigen::Index m = surface.triangles.cols();
-    middle_.resize(3, m);
-    radius_.resize(m);
+    disc_.resize(m, Eigen::NoChange);
     for (Eigen::Index f = 0; f < m; ++f) {
       const Eigen::Vector3i t = surface.triangles.col(f);
       Mat3 corners;
       for (int c = 0; c < 3; ++c) corners.col(c) = surface.vertices.col(t[c]);
-      middle_.col(f) = corners.rowwise().mean();
-      radius_[f] =
-          std::sqrt((corners.colwise() - middle_.col(f)).colwise().squaredNorm().maxCoeff());
+      const Vec3 middle = corners.rowwise().mean(), normal = normals_.face.col(f);
+      const double square = (corners.colwise() - middle).colwise().squaredNorm().maxCoeff();
+      disc_.row(f) << middle.transpose().array(), normal.transpose().array(), std::sqrt(square),
+          normal.dot(middle);
     }
   }
 
   /// Takes over what is shorter than what a node has, and than the grid's limit. Expects a
   /// triangle near.
-  void take(std::size_t slot, const std::vector<int>& near) const {
-    take(slot, {0, 0, 0}, SampleGrid::kSide, near);
+  void take(std::size_t slot, const std::vector<int>& near, Memory& memory) const {
+    memory[0].clear(near.size());
+    for (const int f : near) memory[0].add(f, disc_.row(f));
+    take(slot, {0, 0, 0}, SampleGrid::kSide, memory.data());
   }
 
  private:
-  void take(std::size_t slot, const std::array<int, 3>& first, int side,
-            const std::vector<int>& near) const {
+  void take(std::size_t slot, const std::array<int, 3>& first, int side, Candidates* near) const {
     // The ball round the block; what is farther than the nearest one by its width is no one's.
     const std::array<int, 3>& brick = grid_.sampled[slot];
     const Vec3 low(SampleGrid::kSide * brick[0] + first[0], SampleGrid::kSide * brick[1] + first[1],
                    SampleGrid::kSide * brick[2] + first[2]);
     const Vec3 center = grid_.origin + grid_.spacing * (low.array() + 0.5 * (side - 1)).matrix();
     const double reach = 0.5 * (side - 1) * std::sqrt(3.0) * grid_.spacing;
-    std::vector<double> distance;
-    distance.reserve(near.size());
-    for (const int f : near) distance.push_back((middle_.col(f) - center).norm());
-    const auto nearest = std::min_element(distance.begin(), distance.end());
-    const double least = std::min(grid_.limit, *nearest + reach);
-    std::vector<int> left;
-    left.reserve(near.size());
-    for (std::size_t k = 0; k < near.size(); ++k) {
-      if (distance[k] - radius_[near[k]] - reach <= least + kRounding) left.push_back(near[k]);
+    near->measure(center);
+    Eigen::Index nearest = 0;
+    near->distance.head(near->count).minCoeff(&nearest);
+    const int first_tried = near->triangle[static_cast<std::size_t>(nearest)];
+    const double least =
+        std::min(grid_.limit, to_triangle(center, first_tried).offset.norm() + reach);
+    Candidates* left = near + 1;
+    left->clear(static_cast<std::size_t>(near->count));
+    for (Eigen::Index k = 0; k < near->count; ++k) {
+      if (near->distance[k] - reach > least + kRounding) continue;
+      left->add(near->triangle[static_cast<std::size_t>(k)], near->disc.row(k));
     }
-    if (left.empty()) return;
+    if (left->count == 0) return;
 
     if (side > 2) {
       const int half = side / 2;
@@ -114,34 +154,36 @@ class BlockDistances {
       const int i = node & 1, j = (node >> 1) & 1, k = node >> 2;
       double& value = values[SampleGrid::node_index(first[0] + i, first[1] + j, first[2] + k)];
       const Vec3 p = grid_.origin + grid_.spacing * (low + Vec3(i, j, k));
-      take(value, p, near[static_cast<std::size_t>(nearest - distance.begin())]);
-      for (const int f : left) take(value, p, f);
+      take(value, p, first_tried);
+      left->measure(p);
+      for (Eigen::Index c = 0; c < left->count; ++c) {
+        if (left->distance[c] - kRounding >= std::min(std::abs(value), grid_.limit)) continue;
+        take(value, p, left->triangle[static_cast<std::size_t>(c)]);
+      }
     }
   }
 
   static constexpr double kRounding = 1e-9;  // [mm]
 
-  void take(double& value, const Vec3& p, Eigen::Index f) const {
+  NearestOnTriangle to_triangle(const Vec3& p, Eigen::Index f) const {
     const Eigen::Vector3i t = surface_.triangles.col(f);
-    const Vec3 a = surface_.vertices.col(t[0]);
+    return nearest_on_triangle(p, surface_.vertices.col(t[0]), surface_.vertices.col(t[1]),
+                               surface_.vertices.col(t[2]));
+  }
+
+  void take(double& value, const Vec3& p, Eigen::Index f) const {
     const double bound = std::min(std::abs(value), grid_.limit);
-    const double far = bound + radius_[f] + kRounding;
-    if ((p - middle_.col(f)).squaredNorm() >= far * far) return;
-    const Vec3 plane = normals_.face.col(f);
-    if (std::abs(plane.dot(p - a)) >= bound) return;
-    const NearestOnTriangle nearest =
-        nearest_on_triangle(p, a, surface_.vertices.col(t[1]), surface_.vertices.col(t[2]));
-    const double squared_distance = nearest.offset.squaredNorm();
-    if (squared_distance >= bound * bound) return;
-    const bool outside = nearest.offset.dot(normal_of(nearest, normals_, f, t)) > 0.0;
-    value = outside ? -std::sqrt(squared_distance) : std::sqrt(squared_distance);
+    const NearestOnTriangle nearest = to_triangle(p, f);
+    const double square = nearest.offset.squaredNorm();
+    if (square >= bound * bound) return;
+    const Vec3 normal = normal_of(nearest, normals_, f, surface_.triangles.col(f));
+    value = nearest.offset.dot(normal) > 0.0 ? -std::sqrt(square) : std::sqrt(square);
   }
 
   SampleGrid& grid_;
   const Surface& surface_;
   const PseudoNormals normals_;
-  Eigen::Matrix3Xd middle_;  // of each triangle                                         [mm]
-  Eigen::VectorXd radius_;   // of the ball round its middle that holds it               [mm]
+  Discs disc_;  // of each triangle
 };
 
 // ---------------------------------------------------------------- signs where no wall is near
@@ -172,23 +214,37 @@ void for_each_neighbour(const Index& n, const Visit& visit) {
 
 /// To nodes: sweeps until nothing changes; each brick holds a few layers of them.
 void spread_signs_over_nodes(SampleGrid& grid) {
-  std::vector<Index> front, next;
-  for (const auto& [i, j, k] : grid.sampled) {
+  struct Signed {
+    Index node;
+    double value;
+  };
+  std::vector<Signed> front, next;
+  const auto reach = [&](const Index& n, double value) {
+    double* there = value_at(grid, n);
+    if (there == nullptr || std::isfinite(*there)) return;
+    *there = value;
+    next.push_back({n, value});
+  };
+  // First those beside a distance.
+  for (std::size_t s = 0; s < grid.sampled.size(); ++s) {
+    const auto& [i, j, k] = grid.sampled[s];
     for (int v = 0; v < SampleGrid::kVolume; ++v) {
+      if (std::isfinite(grid.values[s * SampleGrid::kVolume + static_cast<std::size_t>(v)])) {
+        continue;
+      }
       const Index n = {8 * i + (v & 7), 8 * j + ((v >> 3) & 7), 8 * k + (v >> 6)};
-      if (std::isfinite(*value_at(grid, n))) front.push_back(n);
+      for_each_neighbour(n, [&](const Index& neighbour) {
+        const double* known = value_at(grid, neighbour);
+        if (known == nullptr || !std::isfinite(*known)) return;
+        front.push_back({n, std::copysign(grid.limit, *known)});
+      });
     }
   }
-  for (; !front.empty(); std::swap(front, next)) {
+  for (const Signed& first : front) reach(first.node, first.value);
+  for (std::swap(front, next); !front.empty(); std::swap(front, next)) {
     next.clear();
-    for (const Index& n : front) {
-      const double sign = std::copysign(grid.limit, *value_at(grid, n));
-      for_each_neighbour(n, [&](const Index& neighbour) {
-        double* value = value_at(grid, neighbour);
-        if (value == nullptr || std::isfinite(*value)) return;
-        *value = sign;
-        next.push_back(neighbour);
-      });
+    for (const Signed& at : front) {
+      for_each_neighbour(at.node, [&](const Index& neighbour) { reach(neighbour, at.value); });
     }
   }
   for (double& value : grid.values) {
@@ -256,7 +312,8 @@ void scatter_distances(SampleGrid& grid, const Surface& surface,
   }
   const BlockDistances distances(grid, surface);
   for_each_index(grid.sampled.size(), [&](std::size_t s) {
-    if (!near[s].empty()) distances.take(s, near[s]);
+    thread_local BlockDistances::Memory memory;
+    if (!near[s].empty()) distances.take(s, near[s], memory);
   });
 }
 
