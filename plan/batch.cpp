@@ -2,7 +2,6 @@
 
 #include <tbb/blocked_range.h>
 #include <tbb/global_control.h>
-#include <tbb/info.h>
 #include <tbb/parallel_for.h>
 #include <tbb/partitioner.h>
 #include <tbb/task_arena.h>
@@ -13,6 +12,8 @@
 #include <exception>
 #include <mutex>
 #include <variant>
+
+#include "preprocess/cores.h"
 
 namespace wireplan::plan {
 namespace {
@@ -49,7 +50,7 @@ std::vector<bool> for_each_slot(int count, const std::function<void(int slot)>& 
   expects(count >= 0 && options.threads >= 0 && work);
 
   // TBB starts no more threads than there are cores, whatever an arena asks for, unless allowed to.
-  const int cores = tbb::info::default_concurrency();
+  const int cores = core_count();
   const int threads = options.threads > 0 ? options.threads : cores;
   const tbb::global_control allowed(tbb::global_control::max_allowed_parallelism,
                                     static_cast<std::size_t>(std::max(threads, cores)));

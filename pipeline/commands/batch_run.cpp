@@ -28,6 +28,7 @@
 #include "pipeline/report/report.h"
 #include "pipeline/report/verdict_json.h"
 #include "pipeline/stages/stages.h"
+#include "preprocess/cores.h"
 
 namespace wireplan::pipeline {
 namespace {
@@ -181,9 +182,8 @@ class BatchRun {
 
  private:
   void start_what_fits() {
-    const int cores = static_cast<int>(std::max(1U, std::thread::hardware_concurrency()));
-    const std::size_t most =
-        static_cast<std::size_t>(options_.threads > 0 ? options_.threads : cores);
+    const auto most =
+        static_cast<std::size_t>(options_.threads > 0 ? options_.threads : core_count());
     while (!stopping_ && !waiting_.empty() && running_.size() < most) {
       double taken = waiting_.front()->expected_gb;
       for (const Patient* patient : running_)

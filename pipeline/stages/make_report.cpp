@@ -5,7 +5,6 @@
 #include <functional>
 #include <optional>
 #include <string_view>
-#include <thread>
 #include <utility>
 
 #include "pipeline/files/catalogue.h"
@@ -24,6 +23,7 @@
 #include "pipeline/stages/plan_artifact.h"
 #include "pipeline/stages/stored_trials.h"
 #include "pipeline/store/hash.h"
+#include "preprocess/cores.h"
 #include "preprocess/files/vessel_io.h"
 
 namespace wireplan::pipeline {
@@ -177,7 +177,7 @@ Json timing_json(const Workspace& work) {
   const int threads = work.options().threads;
   const Json plans = read_json(work.artifact("plans").folder / kTimingFile, kTimingSchema);
   Json timing;
-  timing["threads"] = threads > 0 ? threads : static_cast<int>(std::thread::hardware_concurrency());
+  timing["threads"] = threads > 0 ? threads : core_count();
   timing["stages"] = Json::array();
   const auto add_stage = [&](const char* stage) {
     if (!work.has(stage)) return;

@@ -4,8 +4,9 @@
 #include <atomic>
 #include <cstddef>
 #include <future>
-#include <thread>
 #include <vector>
+
+#include "preprocess/cores.h"
 
 namespace wireplan::simulate {
 
@@ -21,7 +22,8 @@ void for_each_index(std::size_t count, const Work& work) {
     }
   };
   std::vector<std::future<void>> others;
-  for (std::size_t t = 1; t < std::thread::hardware_concurrency() && t * kAtOnce < count; ++t) {
+  const auto cores = static_cast<std::size_t>(core_count());
+  for (std::size_t t = 1; t < cores && t * kAtOnce < count; ++t) {
     others.push_back(std::async(std::launch::async, run));
   }
   run();
