@@ -192,7 +192,11 @@ std::optional<Centerline> find_line(const preprocess::Image& image, const Vec3& 
     return std::nullopt;
   }
   try {
-    return preprocess::find_centerline(surface, access, target);
+    std::vector<Vec3> guide;
+    if (!found.statistics.ways.empty()) {
+      for (const Vec3& p : found.statistics.ways.back().points.colwise()) guide.push_back(p);
+    }
+    return preprocess::find_centerline(surface, access, target, {.guide = guide});
   } catch (const Error& error) {
     row.outcome = PatientOutcome::kNoCenterline;
     row.message = error.what();

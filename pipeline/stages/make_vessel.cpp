@@ -239,6 +239,28 @@ std::vector<Surface> read_dropped(const fs::path& folder) {
   return dropped;
 }
 
+constexpr const char* kWaysFile = "ways.vtp";  // found by the levels of a volume
+
+/// Of the ways that the segmentation found that between these points; none where the access is not
+/// the one that they start from.
+std::vector<Vec3> known_way(const Workspace& work, const Vec3& access, const Vec3& target) {
+  constexpr double kNear = 10.0;  // to the middle of the lumen that a point was moved to    [mm]
+  std::vector<Vec3> known;
+  if (!work.has("segment")) return known;
+  const fs::path file = work.artifact("segment").folder / kWaysFile;
+  if (!fs::exists(file)) return known;
+  double least = 2.0 * kNear;
+  for (const Centerline& way : preprocess::read_centerlines(file)) {
+    const double off =
+        (way.points.leftCols<1>() - access).norm() + (way.points.rightCols<1>() - target).norm();
+    if (off >= least) continue;
+    least = off;
+    known.clear();
+    for (const Vec3& p : way.points.colwise()) known.push_back(p);
+  }
+  return known;
+}
+
 void require_inside(const Surface& surface, const fs::path& folder, const std::string& key,
                     const Vec3& point) {
   const preprocess::InsideAnswer answer = preprocess::locate_point(surface, point);
@@ -305,6 +327,7 @@ void make_segment(Workspace& work, const fs::path& folder) {
   add_shape(statistics.shape, figures);
   add_touches(given, statistics.touches, statistics.dipping, figures);
   preprocess::write_mask(segmentation.mask, folder / "mask.nrrd");
+  preprocess::write_centerlines(statistics.ways, folder / kWaysFile);
   if (statistics.touches_border) {
     figures["warnings"].push_back(
         "segment: the vessel touches the border of the volume and is closed there by a flat cap");
@@ -386,14 +409,23 @@ void make_centerline(Workspace& work, const fs::path& folder) {
   require_inside(surface, folder_of_surface, access_key(given) + ".point_mm", study.access);
   require_inside(surface, folder_of_surface, target_key(given) + ".point_mm", study.goal.point);
 
-  const Centerline line =
-      preprocess::find_centerline(surface, study.access, study.goal.point,
-                                  {.beyond_mm = given.targets[given.target].beyond_mm});
+  const std::vector<Vec3> guide = known_way(work, study.access, study.goal.point);
+  const Centerline line = preprocess::find_centerline(
+      surface, study.access, study.goal.point,
+      {.beyond_mm = given.targets[given.target].beyond_mm, .guide = guide});
   preprocess::write_centerline(line, folder / "centerline.vtp");
   write_curve_markups(line.points, "centerline", folder / "centerline.mrk.json");
 
   Json figures = figures_of("centerline");
   figures.update(line_figures(line));
+  const std::optional<Vec3> shortcut =
+      guide.empty() ? std::nullopt : preprocess::find_shortcut(surface, line, guide);
+  if (shortcut) {
+    figures["warnings"].push_back(
+        "centerline: at " + place_text(*shortcut) +
+        " mm it takes a shortcut that the arteries' levels do not: vessels that touch there, or a "
+        "narrow place that the surface has closed; look at the outline there");
+  }
   figures["target_lumen_radius_mm"] = line.radius(line.radius.size() - 1);
   std::vector<preprocess::Branch> tree = preprocess::find_tree(surface, study.access);
   name_branches(work, tree);

@@ -207,7 +207,7 @@ std::vector<Stage> stages_to_surface(const Case& given) {
   }
   stages.push_back({.name = "volume", .version = 2, .reads_input = true, .make = make_volume});
   stages.push_back({.name = "segment",
-                    .version = 9,
+                    .version = 10,
                     .reads_input = true,
                     .parameters = {"/segmentation", "/mask"},
                     .make = make_segment});
@@ -227,12 +227,13 @@ std::vector<Stage> stages_of(const Case& given) {
   const bool from_volume = given.volume.has_value(), from_labels = given.labels.has_value();
   std::vector<Stage> stages = stages_to_surface(given);
   stages.push_back({.name = "centerline",
-                    .version = 4,
+                    .version = 5,
                     .after = {"surface"},
                     .parameters = {"/access/point_mm", "/target/point_mm"},
                     .make = make_centerline});
   if (given.study.goal.at_section) read_too(stages.back(), {"/target/beyond_mm"});
-  if (from_labels) stages.back().after.emplace_back("segment");  // names of branches
+  // Names of branches, or the way that was found.
+  if (from_labels || from_volume) stages.back().after.emplace_back("segment");
   Stage anatomy{.name = "anatomy",
                 .version = 3,
                 .reads_input = from_volume,

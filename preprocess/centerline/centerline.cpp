@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <optional>
 #include <utility>
 #include <vector>
 
@@ -41,22 +42,45 @@ struct RawPath {
   double spacing = 0.0;  // of the grid it was found on
 };
 
+/// The first place at which a path takes a shortcut of the guide.
+std::optional<Vec3> shortcut_on(const NearestWall& wall, const Guide& guide, const Points& path) {
+  double before = guide.arc_of(path.front()), radius = 0.0;
+  for (const Vec3& p : path) {
+    const double arc = guide.arc_of(p), here = wall.find(p).distance;
+    if (Guide::is_shortcut(before, arc, std::max(radius, here))) return p;
+    before = arc;
+    radius = here;
+  }
+  return std::nullopt;
+}
+
 /// Searches from the target, which mostly lies in the thinner vessel: then most of the wide one is
 /// never visited.
 RawPath search_path(const NearestWall& wall, const Surface& surface, const Vec3& access,
-                    const Vec3& target, double first_spacing) {
+                    const Vec3& target, const Points& way, double first_spacing) {
   const auto search_on = [&](double spacing, const Vec3& from, const Vec3& to) {
     const double depth = 2.0 * spacing;  // there every ball meets the grid
     return GridSearch(wall, surface, spacing, leave_wall(wall, from, depth),
                       leave_wall(wall, to, depth));
   };
+  const auto middle_of = [](GridSearch& search) {
+    search.stay_near(search.path());
+    expects(search.run(Cost::kMiddle));  // the route itself is such a path
+    return RawPath{.points = search.path(), .spacing = search.spacing()};
+  };
   double spacing = first_spacing;
   for (;; spacing *= 0.5) {
     GridSearch search = search_on(spacing, target, access);
     if (search.run(Cost::kRoute)) {
-      search.stay_near(search.path());
-      expects(search.run(Cost::kMiddle));  // the route itself is such a path
-      return {.points = search.path(), .spacing = spacing};
+      const Guide guide(wall, way);
+      if (!way.empty() && shortcut_on(wall, guide, search.path())) {
+        for (double finer = spacing; finer >= kFinestGrid; finer *= 0.5) {
+          GridSearch along = search_on(finer, target, access);
+          along.follow(guide);
+          if (along.run(Cost::kRoute)) return middle_of(along);
+        }
+      }
+      return middle_of(search);
     }
     if (0.5 * spacing < kFinestGrid) break;
   }
@@ -464,8 +488,8 @@ Centerline find_centerline(const Surface& surface, const Vec3& access, const Vec
   const NearestWall wall(surface);
 
   // Cheapest path on the grid, rid of its steps.
-  const RawPath raw =
-      search_path(wall, surface, access, target, first_spacing(surface, kNodesWanted, options));
+  const RawPath raw = search_path(wall, surface, access, target, options.guide,
+                                  first_spacing(surface, kNodesWanted, options));
   const double sample = options.sample_mm;
   Points line = smooth(wall, resample(raw.points, sample), sample, {.least = 2.0 * raw.spacing});
 
@@ -494,6 +518,14 @@ Centerline find_centerline(const Surface& surface, const Vec3& access, const Vec
   line = smooth(wall, resample(line, sample), sample, {.least = sample, .part = kSmoothing});
 
   return measured(wall, line);
+}
+
+std::optional<Vec3> find_shortcut(const Surface& surface, const Centerline& line,
+                                  const std::vector<Vec3>& guide) {
+  const NearestWall wall(surface);
+  Points points;
+  for (const Vec3& p : line.points.colwise()) points.push_back(p);
+  return shortcut_on(wall, Guide(wall, guide), points);
 }
 
 Vec3 start_tangent(const Centerline& line, double span) {

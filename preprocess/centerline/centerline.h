@@ -1,6 +1,7 @@
 #pragma once
 /// Closed surface -> line along the middle of the lumen from access to target, with inscribed
 /// radius.
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -13,11 +14,15 @@ struct CenterlineOptions {
                            // is too thin for it; 0: chosen from the surface            [mm]
   double sample_mm = 0.5;  // spacing of the points handed on                           [mm]
   double beyond_mm = 0.0;  // the line goes on behind the target, along the ridge       [mm]
+  /// The way from access to target if it is known, as by the levels of a volume. A route that takes
+  /// a shortcut from one part of it to another, through a place where vessels touch, is then found
+  /// again along it, where the surface lets it pass. Empty: the shortest route.
+  std::vector<Vec3> guide = {};
 };
 
 /// Finds the line in three steps (R is the inscribed radius):
-///   1. The shortest passable route. A narrow place makes it longer: at R = 1 mm, length counts
-///      twice.
+///   1. The shortest passable route (that along the guide, if there is one). A narrow place makes
+///      it longer: at R = 1 mm, length counts twice.
 ///   2. Near this route, the path with the least sum of 1/R^2 per length (prototypes C).
 ///   3. Its points are moved to the ridge of the exact wall distance, and the line is smoothed.
 /// Without step 1, the path of step 2 takes wide detours: in a real tree it ran through the
@@ -29,6 +34,10 @@ struct CenterlineOptions {
 /// nearest to the target that is reached) or the vessel ends before `beyond_mm` (with its length).
 Centerline find_centerline(const Surface& surface, const Vec3& access, const Vec3& target,
                            const CenterlineOptions& options = {});
+
+/// Where a line takes a shortcut that its guide does not, if it does. Expects a line with points.
+std::optional<Vec3> find_shortcut(const Surface& surface, const Centerline& line,
+                                  const std::vector<Vec3>& guide);
 
 /// A vessel of the tree: from where it leaves its parent to its end.
 struct Branch {

@@ -32,6 +32,7 @@ struct Node {
   int parent = -1;
   bool settled = false;
   bool allowed = true;  // may the path pass here?
+  double arc = 0.0;     // along the guide, if there is one                                [mm]
 };
 
 /// Which cost a path has per length, for inscribed radius r [mm]. kRoute, 1 + 1/r^2, finds the
@@ -43,6 +44,30 @@ inline double cost_per_mm(Cost cost, double r) {
   const double narrow = 1.0 / (r * r);
   return cost == Cost::kRoute ? 1.0 + narrow : narrow;
 }
+
+/// A way that is known. Each place of the lumen belongs to a part of it: that whose ball it is
+/// deepest in, or nearest to.
+class Guide {
+ public:
+  Guide(const NearestWall& wall, const Points& way);
+
+  double arc_of(const Vec3& p) const;  // of the part that a place belongs to             [mm]
+
+  /// Whether a step between places of these arcs leads to a part much further along, as where
+  /// vessels touch; `radius` is the larger distance from the wall. A branch that leaves a wide
+  /// vessel at a sharp angle is none.
+  static bool is_shortcut(double a, double b, double radius) {
+    return std::abs(a - b) > 2.5 * radius + 5.0;  // chosen
+  }
+
+ private:
+  /// In the middle of the vessel: the way itself may run along the wall.
+  struct Ball {
+    Vec3 center;
+    double radius, arc;  //                                                                [mm]
+  };
+  std::vector<Ball> balls_;
+};
 
 /// Cheapest paths on a grid whose points are made, and their wall distance computed, when first
 /// touched. Two points are joined when their inscribed balls overlap: then no wall is between them,
@@ -122,6 +147,9 @@ class GridSearch {
   /// From now on paths stay in the vessel round `route`: within 1.5 radii of its middle.
   void stay_near(const Points& route);
 
+  /// From now on no step of a path is a shortcut of the guide, which outlives the search.
+  void follow(const Guide& guide);
+
   /// From the goal back to the start.
   Points path() const {
     Points points;
@@ -180,6 +208,7 @@ class GridSearch {
       there = static_cast<int>(nodes_.size());
       const Vec3 point = origin_ + spacing_ * ijk.cast<double>();
       nodes_.push_back({.point = point, .ijk = ijk, .wall = wall_.find(point, node(here).wall)});
+      if (guide_ != nullptr) nodes_.back().arc = guide_->arc_of(point);
     }
     relax(here, there);
   }
@@ -190,6 +219,7 @@ class GridSearch {
     const double length = (a.point - b.point).norm();
     const double r_a = a.wall.distance, r_b = b.wall.distance;
     if (!b.allowed || r_a + r_b < kOverlap * length) return;  // the wall may be between them
+    if (Guide::is_shortcut(a.arc, b.arc, std::max(r_a, r_b))) return;
     const double cost = a.cost + 0.5 * length * (cost_per_mm(kind_, r_a) + cost_per_mm(kind_, r_b));
     if (cost >= b.cost) return;
     b.cost = cost;
@@ -236,6 +266,7 @@ class GridSearch {
   Eigen::Vector3i size_, bricks_;
   std::vector<std::unique_ptr<Brick>> slots_;
   std::vector<Node> nodes_;
+  const Guide* guide_ = nullptr;
   std::priority_queue<Entry, std::vector<Entry>, std::greater<>> queue_;
 };
 

@@ -9,6 +9,7 @@
 #include "preprocess/segment/segment_close.h"
 #include "preprocess/segment/segment_lumen.h"
 #include "preprocess/segment/segment_region.h"
+#include "preprocess/vessel.h"
 
 namespace wireplan::preprocess {
 namespace {
@@ -135,20 +136,39 @@ void tell_levels(const Grid& grid, const std::vector<WayLevel>& way,
   }
 }
 
+/// Points of a way with the inscribed radius there.
+Centerline line_along(const Grid& grid, const std::vector<float>& depth,
+                      const std::vector<WayLevel>& way) {
+  std::vector<Vec3> points;
+  for (const WayLevel& place : way) points.push_back(center_of(grid, place.voxel));
+  points = smooth_line(std::move(points));
+  const auto count = static_cast<Eigen::Index>(points.size());
+  Centerline line{.points = Eigen::Matrix3Xd(3, count),
+                  .radius = Eigen::VectorXd(count),
+                  .arc_length = Eigen::VectorXd::Zero(count)};
+  for (Eigen::Index k = 0; k < count; ++k) {
+    const auto place = static_cast<std::size_t>(k);
+    line.points.col(k) = points[place];
+    line.radius(k) = static_cast<double>(depth[way[place].voxel]);
+    if (k > 0) {
+      line.arc_length(k) = line.arc_length(k - 1) + (points[place] - points[place - 1]).norm();
+    }
+  }
+  return line;
+}
+
 /// The last way as a route, with the narrowest place of all of them.
-Route route_along(const Region& region, const std::vector<std::vector<WayLevel>>& ways) {
-  const std::vector<float> depth = measure_depth(region.grid, region.labels);
+Route route_along(const Region& region, const std::vector<float>& depth,
+                  const std::vector<std::vector<WayLevel>>& ways, const Centerline& last) {
   Route route;
   std::size_t narrowest = ways.front().front().voxel;
   for (const auto& way : ways) {
-    route.points.clear();
     for (const WayLevel& place : way) {
-      route.points.push_back(center_of(region.grid, place.voxel));
       if (depth[place.voxel] < depth[narrowest]) narrowest = place.voxel;
     }
   }
-  route.points = smooth_line(std::move(route.points));
-  route.length_mm = length_of_line(route.points);
+  for (const Vec3& p : last.points.colwise()) route.points.push_back(p);
+  route.length_mm = last.arc_length.tail<1>().value();
   route.narrowest = center_of(region.grid, narrowest);
   route.narrowest_radius_mm = static_cast<double>(depth[narrowest]);
   return route;
@@ -247,7 +267,13 @@ Region find_by_level(const Image& image, const SegmentOptions& options,
   statistics.doubtful = std::move(lumen.doubtful);
   statistics.branches = std::move(lumen.branches);
   statistics.search.leaks = std::move(lumen.leaks);
-  statistics.search.route = route_along(region, ways);
+  const std::vector<float> depth = measure_depth(region.grid, region.labels);
+  statistics.ways.clear();
+  for (const auto& way : ways) {
+    if (way.size() > 1) statistics.ways.push_back(line_along(region.grid, depth, way));
+  }
+  statistics.search.route =
+      route_along(region, depth, ways, line_along(region.grid, depth, ways.back()));
   require_width(region.grid, statistics.search.route);
   return region;
 }

@@ -10,6 +10,7 @@
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
+#include <optional>
 #include <sstream>
 #include <string>
 #include <vector>
@@ -93,6 +94,67 @@ TEST(Centerline, GoesOnBeyondTheTargetAsFarAsAsked) {
     EXPECT_NE(std::string(error.what()).find("the vessel ends 9"), std::string::npos)
         << error.what();
   }
+}
+
+/// Distance from a hairpin: limbs along z at x = +-6 from z = 0, joined by half a circle round the
+/// origin's height of 60.
+double from_hairpin(const Vec3& p) {
+  if (p.z() > 60.0) return std::hypot(std::hypot(p.x(), p.z() - 60.0) - 6.0, p.y());
+  return std::hypot(std::abs(p.x()) - 6.0, p.y());
+}
+
+TEST(Centerline, FollowsItsGuideWhereVesselsTouch) {
+  // Limbs of 4 mm in radius that touch at a height of 20, 2 mm wide.
+  const Surface vessel = shapes::level_set(
+      [](const Vec3& p) {
+        const double touch = 2.0 - std::hypot(p.y(), p.z() - 20.0);
+        const double tubes = std::min(4.0 - from_hairpin(p), p.z());
+        return std::max(tubes, std::min({touch, 6.0 - std::abs(p.x())}));
+      },
+      Vec3(-11.0, -5.0, -1.0), Vec3(11.0, 5.0, 71.0), 0.5);
+  const Vec3 access(-6.0, 0.0, 8.0), target(6.0, 0.0, 8.0);
+  const double round_the_top = 2.0 * 52.0 + 6.0 * kPi;
+  std::vector<Vec3> guide;
+  for (double z = 8.0; z < 60.0; z += 1.0) guide.emplace_back(-6.0, 0.0, z);
+  for (double angle = 0.0; angle < kPi; angle += 0.15) {
+    guide.emplace_back(-6.0 * std::cos(angle), 1.5, 60.0 + 6.0 * std::sin(angle));
+  }
+  for (double z = 60.0; z > 8.0; z -= 1.0) guide.emplace_back(6.0, 1.5, z);
+
+  const Centerline shortest = find_centerline(vessel, access, target);
+  EXPECT_LT(length_of(shortest), 50.0);
+  const std::optional<Vec3> shortcut = find_shortcut(vessel, shortest, guide);
+  ASSERT_TRUE(shortcut.has_value());
+  EXPECT_LT((*shortcut - Vec3(0.0, 0.0, 20.0)).norm(), 6.0);
+
+  const Centerline guided = find_centerline(vessel, access, target, {.guide = guide});
+  EXPECT_FALSE(find_shortcut(vessel, guided, guide).has_value());
+  EXPECT_NEAR(length_of(guided), round_the_top, 0.02 * round_the_top);
+  expect_well_formed(guided, 0.5);
+
+  // A guide that the line keeps to anyway changes nothing; one that leads through walls is told.
+  std::reverse(guide.begin(), guide.end());
+  EXPECT_EQ(find_centerline(vessel, access, target, {.guide = guide}).points, guided.points);
+  const std::vector<Vec3> along = {access, Vec3(-6.0, 0.0, 20.0), Vec3(6.0, 0.0, 20.0), target};
+  EXPECT_EQ(find_centerline(vessel, access, target, {.guide = along}).points, shortest.points);
+}
+
+TEST(Centerline, TakesTheShortestWayWhereTheGuidesIsClosed) {
+  // The same limbs, the touch and no way round the top.
+  const Surface vessel = shapes::level_set(
+      [](const Vec3& p) {
+        const double touch = 2.0 - std::hypot(p.y(), p.z() - 20.0);
+        const double tubes = std::min({4.0 - from_hairpin(p), p.z(), 50.0 - p.z()});
+        return std::max(tubes, std::min({touch, 6.0 - std::abs(p.x())}));
+      },
+      Vec3(-11.0, -5.0, -1.0), Vec3(11.0, 5.0, 51.0), 0.5);
+  const Vec3 access(-6.0, 0.0, 8.0), target(6.0, 0.0, 8.0);
+  std::vector<Vec3> guide;
+  for (double z = 8.0; z < 50.0; z += 1.0) guide.emplace_back(-6.0, 0.0, z);
+  for (double z = 49.0; z > 8.0; z -= 1.0) guide.emplace_back(6.0, 0.0, z);
+  const Centerline line = find_centerline(vessel, access, target, {.guide = guide});
+  EXPECT_LT(length_of(line), 50.0);
+  EXPECT_TRUE(find_shortcut(vessel, line, guide).has_value());
 }
 
 TEST(Centerline, HasTheLumensRadiusNearCaps) {
