@@ -101,6 +101,52 @@ ContactPoints::ContactPoints(const Rod& rod, const VesselModel& vessel, double s
   u_.setZero(3, chain_->nodes());
   frames_.resize(points_.size());
   framed_in_.assign(points_.size(), -1);
+  gathered_.resize(points_.size());
+}
+
+ContactPoints::Gathered& ContactPoints::gathered(int k) const {
+  Gathered& point = gathered_[static_cast<std::size_t>(k)];
+  if (!point.any) {
+    gathered_points_.push_back(k);
+    point.any = true;
+    point.has_hessian = false;
+    point.force.setZero();
+    point.coupled.clear();
+  }
+  return point;
+}
+
+void ContactPoints::gather_hessian(int k, const Vec3& g, const Mat3& H) const {
+  Gathered& point = gathered(k);
+  if (!point.has_hessian) {
+    point.has_hessian = true;
+    point.bending = g;
+    point.H = H;
+    return;
+  }
+  point.bending += g;
+  point.H += H;
+}
+
+void ContactPoints::gather_between(int k, const Vec3& n, int j, const Vec3& m,
+                                   double stiffness) const {
+  // How the force on one changes with each section that moves the other.
+  const auto add = [&](int to, const Vec3& normal, int from, const Vec3& other) {
+    Gathered& point = gathered(to);
+    point.normal = normal;
+    for (const SectionChain::Weight& weight : frame(from).weights()) {
+      const Vec3 change = (stiffness * weight.value) * other;
+      const auto same = std::find_if(point.coupled.begin(), point.coupled.end(),
+                                     [&](const Coupled& c) { return c.section == weight.node; });
+      if (same != point.coupled.end()) {
+        same->change += change;
+      } else {
+        point.coupled.push_back({weight.node, change});
+      }
+    }
+  };
+  add(k, n, j, m);
+  add(j, m, k, n);
 }
 
 /// In the present state, found when first asked for.
@@ -119,7 +165,7 @@ Vec3 ContactPoints::position_in(int k, const Eigen::Matrix3Xd& x,
   if (chain_ == nullptr) return p;
   MovingFrame frame;
   frame.find(*chain_, sections, p);
-  return frame.rest;
+  return frame.rest();
 }
 
 Vec3 ContactPoints::motion_of(int k, const WireMotion& motion) const {
@@ -127,10 +173,10 @@ Vec3 ContactPoints::motion_of(int k, const WireMotion& motion) const {
   if (chain_ == nullptr) return moved;
   const MovingFrame& here = frame(k);
   Vec3 apart = moved;
-  for (const SectionChain::Weight& weight : here.weights) {
+  for (const SectionChain::Weight& weight : here.weights()) {
     apart -= weight.value * motion.of_section(weight.node);
   }
-  return here.inverse * apart;
+  return here.inverse() * apart;
 }
 
 void ContactPoints::scatter(int k, const WireMotion& motion, const Vec3& force,
@@ -138,7 +184,7 @@ void ContactPoints::scatter(int k, const WireMotion& motion, const Vec3& force,
   const Vec3 on_point = on_wire(k, force);
   motion.scatter((*this)[k], on_point, target);
   if (chain_ == nullptr) return;
-  for (const SectionChain::Weight& weight : frame(k).weights) {
+  for (const SectionChain::Weight& weight : frame(k).weights()) {
     target.segment<3>(motion.sections_from() + 3 * weight.node) -= weight.value * on_point;
   }
 }

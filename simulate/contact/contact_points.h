@@ -91,14 +91,14 @@ class ContactPoints {
   /// The state in which they were looked for last.
   const Eigen::Matrix3Xd& nodes() const { return x_; }
   const Eigen::Matrix3Xd& sections() const { return u_; }
-  Vec3 position(int k) const { return chain_ == nullptr ? (*this)[k].at(x_) : frame(k).rest; }
+  Vec3 position(int k) const { return chain_ == nullptr ? (*this)[k].at(x_) : frame(k).rest(); }
   /// The same in another state.
   Vec3 position_in(int k, const Eigen::Matrix3Xd& x, const Eigen::Matrix3Xd& sections) const;
   /// On the wire.
   Vec3 place(int k) const { return (*this)[k].at(x_); }
   /// A force over a point's position, on the wire.
   Vec3 on_wire(int k, const Vec3& force) const {
-    return chain_ == nullptr ? force : Vec3(frame(k).inverse.transpose() * force);
+    return chain_ == nullptr ? force : Vec3(frame(k).inverse().transpose() * force);
   }
   const SectionChain* chain() const { return chain_; }
   /// Of a point's position, in a motion of wire and sections.
@@ -106,7 +106,8 @@ class ContactPoints {
   /// Adds a force over a point's position to its nodes and sections, in the motion's layout.
   void scatter(int k, const WireMotion& motion, const Vec3& force, Eigen::VectorXd& target) const;
 
-  // ---- into a sink of elements.h; all of the state in which they were looked for last
+  // ---- into a sink of elements.h; all of the state in which they were looked for last. Where
+  // sections move, what is added is gathered by points, until finish() takes it to them.
 
   /// Adds the gradient over a point's position.
   template <class Sink>
@@ -114,9 +115,13 @@ class ContactPoints {
   /// And the Hessian, of entries entry(r, c), for a function whose gradient is `g`.
   template <class Sink, class Entry>
   void add_hessian(Sink& sink, int k, const Vec3& g, const Entry& entry) const;
-  /// And the block between two points, n over k by m over j.
+  /// And the block between two points, n over k by m over j times a stiffness. A point's own is the
+  /// same in all.
   template <class Sink>
-  void add_hessian_between(Sink& sink, int k, const Vec3& n, int j, const Vec3& m) const;
+  void add_hessian_between(Sink& sink, int k, const Vec3& n, int j, const Vec3& m,
+                           double stiffness) const;
+  template <class Sink>
+  void finish(Sink& sink) const;
   /// By how much the wire is thinner there than its radius: distances from the wall, as samples
   /// have them, are by so much larger [mm].
   double thinner(int k) const { return thinner_.size() > 0 ? thinner_[k] : 0.0; }
@@ -125,6 +130,26 @@ class ContactPoints {
   double largest_safe_part(const WireMotion& motion, int looks) const;
 
  private:
+  /// A section that moves a point's neighbours: how the force along the point's normal changes.
+  struct Coupled {
+    int section;
+    Vec3 change;
+  };
+  /// What was added at a point, over its position, but `normal` and `coupled` on the wire.
+  struct Gathered {
+    bool any = false, has_hessian = false;
+    Vec3 force;    // gradient                                                              [N]
+    Vec3 bending;  // and that of the function that H is of                                 [N]
+    Mat3 H;        //                                                                    [N/mm]
+    Vec3 normal;
+    std::vector<Coupled> coupled = {};
+  };
+  Gathered& gathered(int k) const;
+  void gather_hessian(int k, const Vec3& g, const Mat3& H) const;
+  void gather_between(int k, const Vec3& n, int j, const Vec3& m, double stiffness) const;
+  template <class Sink>
+  void finish_hessian(Sink& sink, int k, Gathered& point) const;
+
   const MovingFrame& frame(int k) const;
   WallSample look_at(int k, const Vec3& position, double near);
   double least_distance(int k, const Vec3& position) const;
@@ -155,8 +180,9 @@ class ContactPoints {
   mutable std::vector<MovingFrame> frames_;
   mutable std::vector<long long> framed_in_;
   long long state_ = 0;
-  mutable std::vector<Vec3> turned_slopes_;  // scratch, as is
-  mutable std::vector<SectionChain::Weight> bent_weights_;
+  mutable std::vector<Gathered> gathered_;
+  mutable std::vector<int> gathered_points_;
+  mutable std::vector<Vec3> turned_slopes_;  // scratch
 };
 
 // ---------------------------------------------------------------- into a sink of elements.h
@@ -170,12 +196,11 @@ void for_each_node(const ContactPoint& point, const Visit& visit) {
 
 template <class Sink>
 void ContactPoints::add_gradient(Sink& sink, int k, const Vec3& g) const {
-  const Vec3 on_point = on_wire(k, g);
-  for_each_node((*this)[k], [&](int i, double w) { sink.gradient(i, w * on_point); });
-  if (chain_ == nullptr) return;
-  for (const SectionChain::Weight& weight : frame(k).weights) {
-    sink.section_gradient(weight.node, -weight.value * on_point);
+  if (chain_ != nullptr) {
+    gathered(k).force += g;
+    return;
   }
+  for_each_node((*this)[k], [&](int i, double w) { sink.gradient(i, w * g); });
 }
 
 // Entry by entry: as Eigen's outer products they are function calls.
@@ -185,43 +210,21 @@ void ContactPoints::add_hessian(Sink& sink, int k, const Vec3& g, const Entry& e
   for (int c = 0; c < 3; ++c) {
     for (int r = 0; r < 3; ++r) H(r, c) = entry(r, c);
   }
+  if (chain_ != nullptr) return gather_hessian(k, g, H);
   const ContactPoint& point = (*this)[k];
-  const auto add_to_wire = [&] {
-    for_each_node(point, [&](int i, double w_i) {
-      for_each_node(point, [&](int j, double w_j) {
-        if (j <= i) sink.hessian_scaled(i, j, w_i * w_j, H);
-      });
+  for_each_node(point, [&](int i, double w_i) {
+    for_each_node(point, [&](int j, double w_j) {
+      if (j <= i) sink.hessian_scaled(i, j, w_i * w_j, H);
     });
-  };
-  if (chain_ == nullptr) return add_to_wire();
-  const MovingFrame& moved = frame(k);
-  const Vec3 on_point = moved.inverse.transpose() * g;
-  Mat3 B;
-  moved.find_bend(*chain_, u_, on_point, B, turned_slopes_, bent_weights_);
-  H = (moved.inverse.transpose() * (H - B) * moved.inverse).eval();
-  add_to_wire();
-  const std::vector<SectionChain::Weight>& weights = moved.weights;
-  for (std::size_t a = 0; a < weights.size(); ++a) {
-    const double N_a = weights[a].value;
-    const Mat3 turn_a = turned_slopes_[a] * on_point.transpose();
-    const Mat3 cross = -(N_a * H + turn_a);
-    for_each_node(point,
-                  [&](int i, double w) { sink.section_cross(i, weights[a].node, w, cross); });
-    for (std::size_t b = 0; b <= a; ++b) {
-      const double N_b = weights[b].value;
-      const Mat3 turn_b = turned_slopes_[b] * on_point.transpose();
-      sink.section_hessian(weights[a].node, weights[b].node,
-                           N_a * N_b * H + N_b * turn_a.transpose() + N_a * turn_b);
-    }
-  }
+  });
 }
 
 template <class Sink>
 void ContactPoints::add_hessian_between(Sink& sink, int k, const Vec3& n_rest, int j,
-                                        const Vec3& m_rest) const {
+                                        const Vec3& m_rest, double stiffness) const {
   const ContactPoint &p = (*this)[k], &q = (*this)[j];
-  const Vec3 n = on_wire(k, n_rest), m = on_wire(j, m_rest);
-  const Mat3 H = n * m.transpose(), H_transposed = m * n.transpose();
+  const Vec3 n = on_wire(k, n_rest), m = on_wire(j, m_rest), pressed = stiffness * m;
+  const Mat3 H = n * pressed.transpose(), H_transposed = pressed * n.transpose();
   for_each_node(p, [&](int i, double w_i) {
     for_each_node(q, [&](int l, double w_l) {
       if (i == l) {
@@ -231,17 +234,69 @@ void ContactPoints::add_hessian_between(Sink& sink, int k, const Vec3& n_rest, i
       }
     });
   });
-  if (chain_ == nullptr) return;
-  const MovingFrame &at_p = frame(k), &at_q = frame(j);
-  for (const SectionChain::Weight& b : at_q.weights) {
-    for_each_node(p, [&](int i, double w) { sink.section_cross(i, b.node, -w * b.value, H); });
-    for (const SectionChain::Weight& a : at_p.weights) {
-      sink.section_pair(a.node, b.node, a.value * b.value, H);
+  if (chain_ != nullptr) gather_between(k, n, j, m, stiffness);
+}
+
+template <class Sink>
+void ContactPoints::finish(Sink& sink) const {
+  for (const int k : gathered_points_) {
+    Gathered& point = gathered_[static_cast<std::size_t>(k)];
+    point.any = false;
+    const Vec3 force = on_wire(k, point.force);
+    for_each_node((*this)[k], [&](int i, double w) { sink.gradient(i, w * force); });
+    for (const SectionChain::Weight& weight : frame(k).weights()) {
+      sink.section_gradient(weight.node, -weight.value * force);
+    }
+    if constexpr (Sink::kHessian) finish_hessian(sink, k, point);
+  }
+  gathered_points_.clear();
+}
+
+/// With N of the sections that move the point and r of their slopes turned (MovingFrame), f the
+/// force on the wire: wire by section H N + r f', section by section N H N + N f r' + r f' N; and
+/// the normal times what each section changes through the wall.
+template <class Sink>
+void ContactPoints::finish_hessian(Sink& sink, int k, Gathered& point) const {
+  const MovingFrame& moved = frame(k);
+  const std::vector<SectionChain::Weight>& weights = moved.weights();
+  const Vec3 f = moved.inverse().transpose() * point.bending;
+  Mat3 B;
+  moved.find_bend(u_, f, B, turned_slopes_);
+  const Mat3 H = moved.inverse().transpose() * (point.H - B) * moved.inverse();
+  for_each_node((*this)[k], [&](int i, double w_i) {
+    for_each_node((*this)[k], [&](int j, double w_j) {
+      if (j <= i) sink.hessian_scaled(i, j, w_i * w_j, H);
+    });
+  });
+  const auto add = [&](int section, const Mat3& change) {
+    for_each_node((*this)[k], [&](int i, double w) { sink.section_cross(i, section, -w, change); });
+    for (const SectionChain::Weight& weight : weights) {
+      if (weight.node >= section) {
+        sink.section_hessian(weight.node, section, weight.value, change);
+      }
+    }
+  };
+  for (std::size_t b = 0; b < weights.size(); ++b) {
+    Mat3 change = weights[b].value * H;
+    for (int c = 0; c < 3; ++c) change.col(c) += f[c] * turned_slopes_[b];
+    for (Coupled& coupled : point.coupled) {
+      if (coupled.section != weights[b].node) continue;
+      for (int c = 0; c < 3; ++c) change.col(c) += coupled.change[c] * point.normal;
+      coupled.section = -1;
+    }
+    add(weights[b].node, change);
+    for (std::size_t a = 0; a < weights.size(); ++a) {
+      if (weights[b].node < weights[a].node) continue;
+      Mat3 back;
+      for (int c = 0; c < 3; ++c) back.col(c) = turned_slopes_[b][c] * f;
+      sink.section_hessian(weights[b].node, weights[a].node, weights[a].value, back);
     }
   }
-  for (const SectionChain::Weight& a : at_p.weights) {
-    for_each_node(
-        q, [&](int l, double w) { sink.section_cross(l, a.node, -w * a.value, H_transposed); });
+  for (const Coupled& coupled : point.coupled) {
+    if (coupled.section < 0) continue;
+    Mat3 change;
+    for (int c = 0; c < 3; ++c) change.col(c) = coupled.change[c] * point.normal;
+    add(coupled.section, change);
   }
 }
 

@@ -10,19 +10,31 @@
 
 namespace wireplan::simulate {
 
-struct MovingFrame {
-  Vec3 rest = Vec3::Zero();         // X                                                     [mm]
-  Mat3 inverse = Mat3::Identity();  // G^-1
-  std::vector<SectionChain::Weight> weights = {};  // at X; empty: not found yet
-
+class MovingFrame {
+ public:
   /// Finds the place for a point, by Newton's method from where it was.
   void find(const SectionChain& chain, const Eigen::Matrix3Xd& u, const Vec3& point);
+
+  const Vec3& rest() const { return rest_; }        // X                                    [mm]
+  const Mat3& inverse() const { return inverse_; }  // G^-1
+  /// At X.
+  const std::vector<SectionChain::Weight>& weights() const { return weights_; }
 
   /// Second derivatives of a function of X with the gradient `force` over p (G^-T g), beyond those
   /// of dX: the quadratic form -dX' B dX - 2 sum_j (force . du_j)(N_j' . dX). Finds B, of which a
   /// Hessian over X is to be less, and for each weight r_j = G^-T N_j'.
-  void find_bend(const SectionChain& chain, const Eigen::Matrix3Xd& u, const Vec3& force, Mat3& B,
-                 std::vector<Vec3>& r, std::vector<SectionChain::Weight>& scratch) const;
+  void find_bend(const Eigen::Matrix3Xd& u, const Vec3& force, Mat3& B, std::vector<Vec3>& r) const;
+
+ private:
+  void look(const SectionChain& chain);
+  void carry_weights();
+
+  Vec3 rest_ = Vec3::Zero();
+  Mat3 inverse_ = Mat3::Identity();
+  std::vector<SectionChain::Weight> weights_ = {};
+  // Where the chain was asked last: near there weights are those of their Taylor series.
+  Vec3 known_place_ = Vec3::Zero();  //                                                     [mm]
+  std::vector<SectionChain::Weight> known_ = {};  // empty: nowhere yet
 };
 
 }  // namespace wireplan::simulate

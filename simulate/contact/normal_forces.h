@@ -118,8 +118,8 @@ void NormalForces::add(const ContactPoints& points, const ContactSample& sample,
         const ActivePoint& other = sample.active[static_cast<std::size_t>(j)];
         const ContactPoint& other_point = points[other.point];
         if (!in_band(point, other_point)) continue;
-        const Vec3 m = coupling_.stiffness(k, j) * other.wall.gradient;
-        points.add_hessian_between(sink, active.point, n, other.point, m);
+        points.add_hessian_between(sink, active.point, n, other.point, other.wall.gradient,
+                                   coupling_.stiffness(k, j));
       }
     }
   }

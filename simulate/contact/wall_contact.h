@@ -112,7 +112,9 @@ class WallContact {
   void add(Sink& sink) {
     forces_.add(points_, latest_, sink);
     friction_.add(points_, sink);
-    if (points_.chain() != nullptr) add_support(sink);
+    if (points_.chain() == nullptr) return;
+    points_.finish(sink);
+    add_support(sink);
   }
   /// Adds to `product` what the Hessian of add() leaves out, times the motion: far pairs,
   /// friction's dependence on normal forces, and how the wall yields less or more where the wire
@@ -140,7 +142,7 @@ class WallContact {
     }
     if constexpr (Sink::kHessian) {
       for (const SectionChain::Block& block : points_.chain()->stiffness()) {
-        sink.section_hessian(block.i, block.j, support_factor_ * block.value);
+        sink.section_hessian(block.i, block.j, support_factor_, block.value);
       }
     }
   }

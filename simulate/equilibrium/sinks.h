@@ -55,13 +55,10 @@ struct DenseSink {
     H.block<3, 3>(3 * i, section(j)) += scale * block;
     H.block<3, 3>(section(j), 3 * i) += scale * block.transpose();
   }
-  void section_hessian(int i, int j, const Mat3& block) {
-    H.block<3, 3>(section(i), section(j)) += block;
-    if (i != j) H.block<3, 3>(section(j), section(i)) += block.transpose();
-  }
-  void section_pair(int i, int j, double scale, const Mat3& block) {
+  /// i >= j.
+  void section_hessian(int i, int j, double scale, const Mat3& block) {
     H.block<3, 3>(section(i), section(j)) += scale * block;
-    H.block<3, 3>(section(j), section(i)) += scale * block.transpose();
+    if (i != j) H.block<3, 3>(section(j), section(i)) += scale * block.transpose();
   }
 
   void gradient(int i, const Vec3& v) { g.segment<3>(3 * i) += v; }
@@ -126,18 +123,14 @@ struct BandSink : FreeSink<D> {
   SectionBlocks& sections;
 
   void section_cross(int i, int j, double scale, const Mat3& v) {
-    if (is_free(i)) sections.cross(i - first, j) += scale * v;
+    if (!is_free(i)) return;
+    Mat3& target = sections.cross(i - first, j);
+    for (int k = 0; k < 9; ++k) target.data()[k] += scale * v.data()[k];
   }
-  void section_hessian(int i, int j, const Mat3& v) { sections.pair(i, j) += v; }
-  /// Of two points that both move sections: i's rows of one, j's of the other.
-  void section_pair(int i, int j, double scale, const Mat3& v) {
-    if (i == j) {
-      sections.pair(i, i) += scale * (v + v.transpose());
-    } else if (i > j) {
-      sections.pair(i, j) += scale * v;
-    } else {
-      sections.pair(j, i) += scale * v.transpose();
-    }
+  /// i >= j.
+  void section_hessian(int i, int j, double scale, const Mat3& v) {
+    Mat3& target = sections.pair(i, j);
+    for (int k = 0; k < 9; ++k) target.data()[k] += scale * v.data()[k];
   }
 
   WirePass::Energy add_wire(const Rod& rod, const RodState& state) {

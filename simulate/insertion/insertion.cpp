@@ -404,7 +404,7 @@ Vec3 Insertion::at_rest(const Vec3& place) const {
   if (vessel_.sections == nullptr) return place;
   MovingFrame frame;
   frame.find(*vessel_.sections, state_.sections, place);
-  return frame.rest;
+  return frame.rest();
 }
 
 Eigen::Matrix3Xd Insertion::free_nodes_at_rest() const {
@@ -413,7 +413,7 @@ Eigen::Matrix3Xd Insertion::free_nodes_at_rest() const {
   MovingFrame frame;  // each from where the one before was
   for (Eigen::Index i = 0; i < nodes.cols(); ++i) {
     frame.find(*vessel_.sections, state_.sections, nodes.col(i));
-    nodes.col(i) = frame.rest;
+    nodes.col(i) = frame.rest();
   }
   return nodes;
 }

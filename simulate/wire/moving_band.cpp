@@ -1,7 +1,6 @@
 #include "simulate/wire/moving_band.h"
 
 #include <algorithm>
-#include <array>
 #include <tuple>
 
 namespace wireplan::simulate {
@@ -63,9 +62,16 @@ void SectionBlocks::project(int node, const Mat3& P) {
 
 // ---------------------------------------------------------------- factors
 
+namespace {
+
+/// Numbers per column of a block: whole registers.
+constexpr int padded(int per_node) { return per_node <= 4 ? 4 : 8; }
+
+}  // namespace
+
 /// A section follows the last node that it couples with. One that couples with none comes right
 /// before the first section that leads to it, those further away first.
-void MovingBand::find_order(int nodes, int per_node, const SectionBlocks& blocks) {
+void MovingBand::find_sequence(const SectionBlocks& blocks) {
   const int m = blocks.sections();
   after_.assign(static_cast<std::size_t>(m), -1);
   depth_.assign(static_cast<std::size_t>(m), -1);
@@ -103,20 +109,37 @@ void MovingBand::find_order(int nodes, int per_node, const SectionBlocks& blocks
     return std::tuple(after(a), -depth_[static_cast<std::size_t>(a)]) <
            std::tuple(after(b), -depth_[static_cast<std::size_t>(b)]);
   });
+}
 
+/// Whether the order is of the same couplings.
+bool MovingBand::has_order_of(int nodes, int per_node, const SectionBlocks& blocks) {
+  asked_.assign({nodes, per_node, blocks.sections()});
+  for (int j = 0; j < blocks.sections(); ++j) {
+    const SectionBlocks::Cross& cross = blocks.of_section(j);
+    asked_.insert(asked_.end(), {cross.size > 0 ? cross.first : 0, cross.size});
+  }
+  for (const SectionBlocks::Pair& pair : blocks.pairs()) {
+    asked_.insert(asked_.end(), {pair.i, pair.j});
+  }
+  if (asked_ == pattern_) return true;
+  asked_.swap(pattern_);
+  return false;
+}
+
+void MovingBand::find_order(int nodes, int per_node, const SectionBlocks& blocks) {
+  find_sequence(blocks);
+  const int m = blocks.sections();
+  per_node_ = per_node;
   rows_.clear();
-  row_of_.clear();
   place_.resize(static_cast<std::size_t>(nodes + m));
-  int column = 0;
   const auto add = [&](int id, int from, int rows) {
-    place_[static_cast<std::size_t>(id)] = static_cast<int>(rows_.size());
-    for (int r = 0; r < rows; ++r) row_of_.push_back(static_cast<int>(rows_.size()));
-    rows_.push_back({from, rows, column, column, 0});
-    column += rows;
+    const int at = static_cast<int>(rows_.size());
+    place_[static_cast<std::size_t>(id)] = at;
+    rows_.push_back({from, rows, at, 0});
   };
   std::size_t next = 0;
   const auto add_sections = [&](int node) {
-    for (; next < queue_.size() && after(queue_[next]) <= node; ++next) {
+    for (; next < queue_.size() && after_[static_cast<std::size_t>(queue_[next])] <= node; ++next) {
       add(nodes + queue_[next], per_node * nodes + 3 * queue_[next], 3);
     }
   };
@@ -126,189 +149,241 @@ void MovingBand::find_order(int nodes, int per_node, const SectionBlocks& blocks
     add_sections(i);
   }
   // Where each row begins.
-  const auto row = [&](int id) -> Row& {
-    return rows_[static_cast<std::size_t>(place_[static_cast<std::size_t>(id)])];
+  const auto place = [&](int id) { return place_[static_cast<std::size_t>(id)]; };
+  const auto begin_at = [&](int row, int column) {
+    int& first = rows_[static_cast<std::size_t>(row)].first;
+    first = std::min(first, column);
   };
-  for (int i = 1; i < nodes; ++i) row(i).first = row(std::max(0, i - 2)).start;
+  for (int i = 1; i < nodes; ++i) begin_at(place(i), place(std::max(0, i - 2)));
   for (int j = 0; j < m; ++j) {
     const SectionBlocks::Cross& cross = blocks.of_section(j);
-    if (cross.size > 0) row(nodes + j).first = row(cross.first).start;
+    if (cross.size > 0) begin_at(place(nodes + j), place(cross.first));
   }
   for (const SectionBlocks::Pair& pair : blocks.pairs()) {
-    Row &a = row(nodes + pair.i), &b = row(nodes + pair.j);
-    Row &later = a.start > b.start ? a : b, &earlier = a.start > b.start ? b : a;
-    later.first = std::min(later.first, earlier.start);
+    const int a = place(nodes + pair.i), b = place(nodes + pair.j);
+    begin_at(std::max(a, b), std::min(a, b));
   }
+  const int size = per_node * padded(per_node);
   std::ptrdiff_t offset = 0;
-  for (Row& each : rows_) {
-    each.offset = offset;
-    offset += static_cast<std::ptrdiff_t>(each.start + each.rows - each.first) * width_;
+  for (std::size_t at = 0; at < rows_.size(); ++at) {
+    rows_[at].offset = offset;
+    offset += static_cast<std::ptrdiff_t>(static_cast<int>(at) - rows_[at].first + 1) * size;
   }
-  values_.assign(static_cast<std::size_t>(offset), 0.0);
-  inverse_.resize(static_cast<std::size_t>(column));
-  ordered_.resize(static_cast<std::size_t>(column));
+  values_.resize(static_cast<std::size_t>(offset));
+  const auto numbers = rows_.size() * static_cast<std::size_t>(per_node);
+  inverse_.resize(numbers);
+  ordered_.resize(numbers);
 }
 
-/// Row of blocks by row of blocks. Columns hold L times pivots until the row is done.
-template <int P>
+namespace {
+
+/// A block of D columns, each filled up to P numbers, with which the processor calculates at once.
+template <int D, int P>
+struct Tile {
+  using Column = Eigen::Array<double, P, 1>;
+  Column of[D];
+
+  static Eigen::Map<const Column> column(const double* block, int c) {
+    return Eigen::Map<const Column>(block + c * P);
+  }
+  void take(const double* from) {
+    for (int c = 0; c < D; ++c) of[c] = column(from, c);
+  }
+  void put(double* to) const {
+    for (int c = 0; c < D; ++c) Eigen::Map<Column>(to + c * P) = of[c];
+  }
+  /// Less W L'.
+  void subtract(const double* w, const double* l) {
+    for (int m = 0; m < D; ++m) {
+      const Column here = column(w, m);
+      for (int c = 0; c < D; ++c) of[c] -= here * l[m * P + c];
+    }
+  }
+  /// Becomes itself times the inverse of L', L with ones on its diagonal.
+  void solve_right(const double* l) {
+    for (int c = 1; c < D; ++c) {
+      for (int m = 0; m < c; ++m) of[c] -= of[m] * l[m * P + c];
+    }
+  }
+  /// Becomes L below its diagonal, of L D L'. False at a pivot that is not positive.
+  bool factor(double* inverse) {
+    for (int c = 0; c < D; ++c) {
+      if (!(of[c][c] > 0.0)) return false;
+      inverse[c] = 1.0 / of[c][c];
+      for (int r = c + 1; r < D; ++r) {
+        const double part = of[c][r] * inverse[c];
+        for (int k = c + 1; k <= r; ++k) of[k][r] -= part * of[c][k];
+      }
+      for (int r = c + 1; r < D; ++r) of[c][r] *= inverse[c];
+    }
+    return true;
+  }
+};
+
+}  // namespace
+
+/// Blocks hold L times pivots until the row is done.
+template <int D>
 bool MovingBand::factor_row(std::size_t at) {
+  constexpr int P = padded(D), kSize = D * P;
   const Row& here = rows_[at];
-  double* const own = values_.data() + here.offset;  // of column here.first
-  // 1. Columns before the diagonal's block.
-  for (int c = here.first; c < here.start; ++c) {
-    const Row& other = rows_[static_cast<std::size_t>(row_of_[static_cast<std::size_t>(c)])];
+  double* const own = values_.data() + here.offset;  // of block here.first
+  const int last = static_cast<int>(at);
+  Tile<D, P> tile;
+  // 1. Blocks before the diagonal.
+  for (int c = here.first; c < last; ++c) {
+    const Row& other = rows_[static_cast<std::size_t>(c)];
     const int from = std::max(here.first, other.first);
-    const double* l = values_.data() + other.offset +
-                      static_cast<std::ptrdiff_t>(from - other.first) * P + (c - other.start);
-    const double* w = own + static_cast<std::ptrdiff_t>(from - here.first) * P;
-    double* const target = own + static_cast<std::ptrdiff_t>(c - here.first) * P;
-    double sum[P];
-    for (int r = 0; r < P; ++r) sum[r] = target[r];
-    for (int k = from; k < c; ++k, l += P, w += P) {
-      for (int r = 0; r < P; ++r) sum[r] -= w[r] * *l;
-    }
-    for (int r = 0; r < P; ++r) target[r] = sum[r];
+    const double* l =
+        values_.data() + other.offset + static_cast<std::ptrdiff_t>(from - other.first) * kSize;
+    const double* w = own + static_cast<std::ptrdiff_t>(from - here.first) * kSize;
+    double* const target = own + static_cast<std::ptrdiff_t>(c - here.first) * kSize;
+    tile.take(target);
+    for (int k = from; k < c; ++k, l += kSize, w += kSize) tile.subtract(w, l);
+    tile.solve_right(l);
+    tile.put(target);
   }
-  // 2. The diagonal's block less what those leave, and L in their place.
-  double block[P][P];
-  double* const diagonal = own + static_cast<std::ptrdiff_t>(here.start - here.first) * P;
-  for (int c = 0; c < here.rows; ++c) {
-    for (int r = 0; r < P; ++r) block[c][r] = diagonal[c * P + r];
-  }
+  // 2. The diagonal's less what those leave, and L in their place.
+  double* const diagonal = own + static_cast<std::ptrdiff_t>(last - here.first) * kSize;
+  tile.take(diagonal);
   double* w = own;
-  for (int k = here.first; k < here.start; ++k, w += P) {
-    double l[P];
-    for (int r = 0; r < P; ++r) l[r] = w[r] * inverse_[static_cast<std::size_t>(k)];
-    for (int c = 0; c < here.rows; ++c) {
-      for (int r = 0; r < P; ++r) block[c][r] -= w[r] * l[c];
+  for (int k = here.first; k < last; ++k, w += kSize) {
+    const double* const inverse = inverse_.data() + static_cast<std::ptrdiff_t>(k) * D;
+    Tile<D, P> l;
+    l.take(w);
+    for (int m = 0; m < D; ++m) l.of[m] *= inverse[m];
+    for (int m = 0; m < D; ++m) {
+      const auto times_pivot = Tile<D, P>::column(w, m);
+      for (int c = 0; c < D; ++c) tile.of[c] -= times_pivot * l.of[m][c];
     }
-    for (int r = 0; r < P; ++r) w[r] = l[r];
+    l.put(w);
   }
   // 3. Its own factors.
-  for (int c = 0; c < here.rows; ++c) {
-    if (!(block[c][c] > 0.0)) return false;
-    const double inverse = 1.0 / block[c][c];
-    inverse_[static_cast<std::size_t>(here.start + c)] = inverse;
-    for (int r = c + 1; r < here.rows; ++r) {
-      const double part = block[c][r] * inverse;
-      for (int k = c + 1; k <= r; ++k) block[k][r] -= part * block[c][k];
-    }
-    for (int r = c + 1; r < here.rows; ++r) block[c][r] *= inverse;
-  }
-  for (int c = 0; c < here.rows; ++c) {
-    for (int r = 0; r < P; ++r) diagonal[c * P + r] = r > c && r < here.rows ? block[c][r] : 0.0;
-  }
+  if (!tile.factor(inverse_.data() + at * D)) return false;
+  tile.put(diagonal);
   return true;
 }
 
 template <int D>
 bool MovingBand::factor(BlockBand<D>& wire, const SectionBlocks& blocks, double shift) {
-  constexpr int P = D <= 4 ? 4 : 8;
+  constexpr int P = padded(D);
   const int nodes = wire.size();
-  width_ = P;
-  find_order(nodes, D, blocks);
-  // Into the rows' columns; of a block on the diagonal the lower triangle counts.
-  const auto put = [&](int row_id, int column_id, const auto& block) {
+  if (!has_order_of(nodes, D, blocks)) find_order(nodes, D, blocks);
+  std::fill(values_.begin(), values_.end(), 0.0);
+  // Of a block on the diagonal the lower triangle counts.
+  const auto block_at = [&](int row_id, int column_id) {
     const Row& row = rows_[static_cast<std::size_t>(place_[static_cast<std::size_t>(row_id)])];
-    const Row& column =
-        rows_[static_cast<std::size_t>(place_[static_cast<std::size_t>(column_id)])];
-    double* target =
-        values_.data() + row.offset + static_cast<std::ptrdiff_t>(column.start - row.first) * P;
-    for (int c = 0; c < column.rows; ++c) {
-      for (int r = 0; r < row.rows; ++r) target[c * P + r] += block(r, c);
+    const int column = place_[static_cast<std::size_t>(column_id)];
+    return values_.data() + row.offset + static_cast<std::ptrdiff_t>(column - row.first) * D * P;
+  };
+  const auto put_wire = [&](int i, int j, const typename BlockBand<D>::Block& block) {
+    double* const target = block_at(i, j);
+    for (int c = 0; c < D; ++c) {
+      for (int r = 0; r < D; ++r) target[c * P + r] = block(r, c);
     }
   };
   for (int i = 0; i < nodes; ++i) {
-    typename BlockBand<D>::Block own = wire.own(i);
-    own.diagonal().array() += shift;
-    put(i, i, own);
-    if (i >= 1) put(i, i - 1, wire.one(i));
-    if (i >= 2) put(i, i - 2, wire.two(i));
+    put_wire(i, i, wire.own(i));
+    double* const own = block_at(i, i);
+    for (int c = 0; c < D; ++c) own[c * P + c] += shift;
+    if (i >= 1) put_wire(i, i - 1, wire.one(i));
+    if (i >= 2) put_wire(i, i - 2, wire.two(i));
   }
-  Eigen::Matrix<double, 3, D> padded = Eigen::Matrix<double, 3, D>::Zero();
+  const auto put_transposed = [&](int row_id, int column_id, const Mat3& block) {
+    double* const target = block_at(row_id, column_id);
+    for (int c = 0; c < 3; ++c) {
+      for (int r = 0; r < 3; ++r) target[c * P + r] = block(c, r);
+    }
+  };
   for (int j = 0; j < blocks.sections(); ++j) {
     const SectionBlocks::Cross& cross = blocks.of_section(j);
     for (int k = 0; k < cross.size; ++k) {
-      padded.template leftCols<3>() = cross.blocks[static_cast<std::size_t>(k)].transpose();
-      put(nodes + j, cross.first + k, padded);
+      put_transposed(nodes + j, cross.first + k, cross.blocks[static_cast<std::size_t>(k)]);
     }
+    double* const own = block_at(nodes + j, nodes + j);
+    for (int c = 3; c < D; ++c) own[c * P + c] = 1.0;
   }
   for (const SectionBlocks::Pair& pair : blocks.pairs()) {
-    Mat3 value = pair.value;
-    if (pair.i == pair.j) value.diagonal().array() += shift;
-    if (place_[static_cast<std::size_t>(nodes + pair.i)] >=
-        place_[static_cast<std::size_t>(nodes + pair.j)]) {
-      put(nodes + pair.i, nodes + pair.j, value);
+    const int i = nodes + pair.i, j = nodes + pair.j;
+    if (place_[static_cast<std::size_t>(i)] >= place_[static_cast<std::size_t>(j)]) {
+      put_transposed(i, j, pair.value.transpose());
     } else {
-      put(nodes + pair.j, nodes + pair.i, value.transpose());
+      put_transposed(j, i, pair.value);
     }
+    if (i != j) continue;
+    double* const own = block_at(i, i);
+    for (int c = 0; c < 3; ++c) own[c * P + c] += shift;
   }
   for (std::size_t at = 0; at < rows_.size(); ++at) {
-    if (!factor_row<P>(at)) return false;
+    if (!factor_row<D>(at)) return false;
   }
   return true;
 }
 
-namespace {
-
-/// Both halves of a solve with the rows of one block row, P numbers per column of which those
-/// beyond `rows` are 0.
-template <int P>
-void solve_row_forward(const double* l, int rows, int before, const double* known, double* own) {
-  double sum[P] = {};
-  for (int k = 0; k < before; ++k, l += P) {
-    for (int r = 0; r < P; ++r) sum[r] += l[r] * known[k];
-  }
-  for (int r = 0; r < rows; ++r) {
-    own[r] -= sum[r];
-    for (int c = 0; c < r; ++c) own[r] -= l[c * P + r] * own[c];
-  }
-}
-
-template <int P>
-void solve_row_back(const double* l, int rows, int before, double* known, double* own) {
-  const double* diagonal = l + static_cast<std::ptrdiff_t>(before) * P;
-  double found[P] = {};
-  for (int r = rows - 1; r >= 0; --r) {
-    found[r] = own[r];
-    for (int c = 0; c < r; ++c) own[c] -= diagonal[c * P + r] * own[r];
-  }
-  for (int k = 0; k < before; ++k, l += P) {
-    double sum = 0.0;
-    for (int r = 0; r < P; ++r) sum += l[r] * found[r];
-    known[k] -= sum;
-  }
-}
-
-}  // namespace
-
 /// All rows forward, the pivots, and all rows back, in the order.
-template <int P>
+template <int D>
 void MovingBand::solve_rows() {
+  constexpr int P = padded(D), kSize = D * P;
   double* const x = ordered_.data();
-  for (const Row& row : rows_) {
-    solve_row_forward<P>(values_.data() + row.offset, row.rows, row.start - row.first,
-                         x + row.first, x + row.start);
+  for (std::size_t at = 0; at < rows_.size(); ++at) {
+    const double* l = values_.data() + rows_[at].offset;
+    const double* known = x + static_cast<std::ptrdiff_t>(rows_[at].first) * D;
+    double* const own = x + at * D;
+    double sum[P] = {};
+    for (; known < own; known += D, l += kSize) {
+      for (int c = 0; c < D; ++c) {
+        for (int r = 0; r < P; ++r) sum[r] += l[c * P + r] * known[c];
+      }
+    }
+    for (int r = 0; r < D; ++r) {
+      own[r] -= sum[r];
+      for (int c = 0; c < r; ++c) own[r] -= l[c * P + r] * own[c];
+    }
   }
   for (std::size_t k = 0; k < inverse_.size(); ++k) x[k] *= inverse_[k];
   for (std::size_t at = rows_.size(); at-- > 0;) {
-    const Row& row = rows_[at];
-    solve_row_back<P>(values_.data() + row.offset, row.rows, row.start - row.first, x + row.first,
-                      x + row.start);
+    const double* l = values_.data() + rows_[at].offset;
+    double* known = x + static_cast<std::ptrdiff_t>(rows_[at].first) * D;
+    double* const own = x + at * D;
+    const double* const diagonal = l + (own - known) * P;
+    for (int r = D - 1; r > 0; --r) {
+      for (int c = 0; c < r; ++c) own[c] -= diagonal[c * P + r] * own[r];
+    }
+    double found[P] = {};
+    std::copy(own, own + D, found);
+    for (; known < own; known += D, l += kSize) {
+      for (int c = 0; c < D; ++c) {
+        double sum = 0.0;
+        for (int r = 0; r < P; ++r) sum += l[c * P + r] * found[r];
+        known[c] -= sum;
+      }
+    }
   }
 }
 
 void MovingBand::solve(Eigen::VectorXd& v) {
+  double* x = ordered_.data();
   for (const Row& row : rows_) {
-    for (int r = 0; r < row.rows; ++r) {
-      ordered_[static_cast<std::size_t>(row.start + r)] = v[row.from + r];
-    }
+    for (int r = 0; r < per_node_; ++r) x[r] = r < row.rows ? v[row.from + r] : 0.0;
+    x += per_node_;
   }
-  width_ == 4 ? solve_rows<4>() : solve_rows<8>();
+  switch (per_node_) {
+    case 3:
+      solve_rows<3>();
+      break;
+    case 4:
+      solve_rows<4>();
+      break;
+    case 5:
+      solve_rows<5>();
+      break;
+    default:
+      solve_rows<6>();
+  }
+  x = ordered_.data();
   for (const Row& row : rows_) {
-    for (int r = 0; r < row.rows; ++r) {
-      v[row.from + r] = ordered_[static_cast<std::size_t>(row.start + r)];
-    }
+    for (int r = 0; r < row.rows; ++r) v[row.from + r] = x[r];
+    x += per_node_;
   }
 }
 

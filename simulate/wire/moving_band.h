@@ -54,25 +54,28 @@ class MovingBand {
   void solve(Eigen::VectorXd& v);
 
  private:
+  /// Blocks from the column `first` of the order to the row's own.
   struct Row {
-    int from, rows, first;  // in the vector; first column in the order
-    int start;              // own first column in the order
-    std::ptrdiff_t offset;  // of column `first` among the values
+    int from, rows;  // in the vector
+    int first;
+    std::ptrdiff_t offset;  // of block `first` among the values
   };
+  bool has_order_of(int nodes, int per_node, const SectionBlocks& blocks);
   void find_order(int nodes, int per_node, const SectionBlocks& blocks);
-  template <int P>
+  void find_sequence(const SectionBlocks& blocks);
+  template <int D>
   bool factor_row(std::size_t at);
-  template <int P>
+  template <int D>
   void solve_rows();
 
-  int width_ = 4;                // numbers per column of a row of blocks
+  int per_node_ = 0;             // D
   std::vector<Row> rows_;        // in the order
   std::vector<int> place_;       // of each node, then each section, in the order
-  std::vector<double> values_;   // L, by rows of blocks, column by column
+  std::vector<double> values_;   // L, by rows of blocks of D columns, which sections fill with 0
   std::vector<double> inverse_;  // 1 / D
-  std::vector<int> row_of_;      // of each column
   std::vector<double> ordered_;
-  // Scratch of find_order().
+  std::vector<int> pattern_, asked_;  // what the order was found for; scratch
+  // Scratch of find_sequence(): sections in the order, the node that each follows.
   std::vector<int> after_, depth_, queue_;
   std::vector<std::vector<int>> joined_;
 };

@@ -203,6 +203,65 @@ TEST(MovingVessel, WireAndSectionsTogetherMoveAtNoCostOfContact) {
   EXPECT_GT(std::abs(after.support - before.support), 0.01 * before.support);
 }
 
+// ---------------------------------------------------------------- factors
+
+/// Wire and sections at random, diagonally dominant, and the same as a dense matrix. Of six
+/// sections one couples with nodes far apart, as where a wire folds back, and two with sections
+/// alone.
+template <int D>
+void expect_solves_like_dense(double shift) {
+  constexpr int kNodes = 14, kSections = 6;
+  constexpr int kSize = D * kNodes + 3 * kSections;
+  std::mt19937_64 random(D);
+  BlockBand<D> band;
+  band.reset(kNodes);
+  SectionBlocks sections;
+  sections.reset(kNodes, kSections);
+  Eigen::MatrixXd dense = Eigen::MatrixXd::Zero(kSize, kSize);
+  const auto put = [&](int row, int column, auto& block) {
+    for (double& value : block.reshaped()) value = uniform(random);
+    if (row == column) {
+      block = (0.5 * (block + block.transpose())).eval();
+      block.diagonal().array() += 20.0;
+    }
+    dense.block(row, column, block.rows(), block.cols()) = block;
+    dense.block(column, row, block.cols(), block.rows()) = block.transpose();
+  };
+  for (int i = 0; i < kNodes; ++i) {
+    put(D * i, D * i, band.own(i));
+    if (i >= 1) put(D * i, D * (i - 1), band.one(i));
+    if (i >= 2) put(D * i, D * (i - 2), band.two(i));
+  }
+  const auto section = [](int j) { return D * kNodes + 3 * j; };
+  for (const auto& [node, j] : {std::pair(3, 0), {4, 0}, {6, 1}, {5, 1}, {1, 2}, {12, 2}, {9, 3}}) {
+    put(D * node, section(j), sections.cross(node, j));
+  }
+  for (int j = 0; j < kSections; ++j) {
+    put(section(j), section(j), sections.pair(j, j));
+    if (j > 0) put(section(j), section(j - 1), sections.pair(j, j - 1));
+  }
+  dense.diagonal().array() += shift;
+  MovingBand factors;
+  for (int round = 0; round < 2; ++round) {  // again, in the order of before
+    ASSERT_TRUE(factors.factor(band, sections, shift));
+    Eigen::VectorXd right(kSize);
+    for (double& value : right) value = uniform(random);
+    Eigen::VectorXd found = right;
+    factors.solve(found);
+    EXPECT_LT((dense * found - right).norm(), 1e-12 * right.norm());
+  }
+  sections.pair(5, 5)(1, 1) = -20.0 - shift;
+  EXPECT_FALSE(factors.factor(band, sections, shift));
+}
+
+TEST(MovingVessel, FactorsOfWireAndSectionsSolveAsADenseMatrix) {
+  for (const double shift : {0.0, 3.0}) {
+    expect_solves_like_dense<3>(shift);
+    expect_solves_like_dense<4>(shift);
+    expect_solves_like_dense<6>(shift);
+  }
+}
+
 // ---------------------------------------------------------------- V18: straightening
 
 /// The wave of references M drawn out fivefold along its axis, so that slopes are small (the closed
