@@ -207,7 +207,7 @@ class Planner {
     std::vector<Candidate> starts;
     for (const int id : start_ids) starts.push_back(candidate(id));
     keep_what_reaches(find_manoeuvres(study_at(study_, Level::kScout), starts, vessel_.path,
-                                      vessel_.rigid_model(), kTurnsOfScouts, options_.batch),
+                                      vessel_.scout_model(), kTurnsOfScouts, options_.batch),
                       start_ids);
     if (!plan_.scripts.found.empty()) return;
     keep_what_reaches(

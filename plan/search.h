@@ -20,7 +20,8 @@ bool needs_search(const Study& study, bool exhaustive);
 ///     vessels are followed;
 ///   - contact points up to twice as far apart, residuals up to 1e-4 N, no forces per triangle.
 /// Scouts are run on a rigid wall: one that yields costs several times as much (MEASUREMENTS.md),
-/// and its compliance is then never computed where no good plan goes.
+/// and its compliance is then never computed where no good plan goes. A vessel that moves as a
+/// whole does so under scouts too: a stiff wire may pass it that way alone.
 Study scout_study(const Study& study);
 
 /// What a level says of a candidate.

@@ -78,8 +78,9 @@ std::vector<Measured> find_or_run(const Study& study, const PlanVessel& vessel,
   const std::vector<std::size_t> later(others, missing.end());
   missing.erase(others, missing.end());
   const Level level = runs[missing.front()].level;
-  const simulate::VesselModel& model =
-      level == Level::kFull && !tools ? vessel.model() : vessel.rigid_model();
+  const simulate::VesselModel& model = tools                   ? vessel.rigid_model()
+                                       : level == Level::kFull ? vessel.model()
+                                                               : vessel.scout_model();
   const Study own = study_at(study, level);
   const int found = static_cast<int>(runs.size() - missing.size());
   BatchOptions options{.threads = batch.threads, .cancelled = batch.cancelled};

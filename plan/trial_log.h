@@ -80,6 +80,12 @@ struct PlanVessel {
   const Centerline& path;  // access to target
   bool yields = false;
   std::function<const simulate::VesselModel&()> model, rigid_model;
+  /// The rigid wall of a vessel that moves as a whole; empty: it does not.
+  std::function<const simulate::VesselModel&()> moving_model = {};
+  /// What scouts and probes meet.
+  const simulate::VesselModel& scout_model() const {
+    return moving_model ? moving_model() : rigid_model();
+  }
 };
 
 /// The study at a level.

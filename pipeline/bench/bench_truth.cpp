@@ -170,7 +170,8 @@ std::vector<TruthTrial> measure_case(const Case& given, const BenchOptions& opti
       .path = work.path(),
       .yields = given.wall.elastic,
       .model = [&]() -> const simulate::VesselModel& { return work.model(); },
-      .rigid_model = [&]() -> const simulate::VesselModel& { return work.rigid_model(); }};
+      .rigid_model = [&]() -> const simulate::VesselModel& { return work.rigid_model(); },
+      .moving_model = work.moving_model()};
   NoLog log;
   plan::PlanOptions search{.exhaustive = given.exhaustive,
                            .manoeuvres = plan::Manoeuvring::kNever,

@@ -49,7 +49,8 @@ plan::PlanVessel plan_vessel(Workspace& work) {
   return {.path = work.path(),
           .yields = work.given().wall.elastic,
           .model = [&]() -> const simulate::VesselModel& { return work.model(); },
-          .rigid_model = [&]() -> const simulate::VesselModel& { return work.rigid_model(); }};
+          .rigid_model = [&]() -> const simulate::VesselModel& { return work.rigid_model(); },
+          .moving_model = work.moving_model()};
 }
 
 plan::Plan plan_until(Workspace& work, Until until, StoredTrials& log) {
@@ -65,12 +66,13 @@ std::string small_sphere_warning(double radius, double lumen_radius) {
 }
 
 // What the report tells of the scouts; null where there are none.
-Json scouting_json(const std::optional<plan::ScoutSummary>& scouting) {
+Json scouting_json(const std::optional<plan::ScoutSummary>& scouting, bool moves) {
   if (!scouting) return nullptr;
   const plan::ScoutError& error = scouting->error;
   return {{"element_length_mm", scouting->element_length},
           {"step_mm", scouting->step},
           {"wall", "rigid"},
+          {"moves_as_a_whole", moves},
           {"trials", scouting->trials},
           {"probed", scouting->probed},
           {"compared", error.compared},
@@ -110,7 +112,7 @@ void make_trials(Workspace& work, const fs::path& folder) {
 
   Json figures = figures_of("trials");
   figures["trials"] = plan.candidates.size();
-  figures["scout"] = scouting_json(plan.scouting);
+  figures["scout"] = scouting_json(plan.scouting, work.given().wall.support.has_value());
   figures["tangent"] = to_json(study.tangent);
   figures["insertion_length_mm"] = study.insertion.length;
   figures["lumen_grid_mm"] = vessel.lumen.grid_spacing();
@@ -178,7 +180,8 @@ ShareOutcome run_share(Workspace& work, const Share& share) {
   StoredTrials log(work);
   plan::PlanVessel vessel = plan_vessel(work);
   if (share.shards > 1) {  // one of the processes makes the field, where there is a trial to run
-    for (auto* model : {&vessel.model, &vessel.rigid_model}) {
+    for (auto* model : {&vessel.model, &vessel.rigid_model, &vessel.moving_model}) {
+      if (!*model) continue;
       *model = [&work, make = *model]() -> const simulate::VesselModel& {
         work.share_field();
         return make();

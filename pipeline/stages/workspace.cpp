@@ -182,6 +182,15 @@ const simulate::VesselModel& Workspace::model() {
   return *stock.model;
 }
 
+std::function<const simulate::VesselModel&()> Workspace::moving_model() {
+  if (!given_.wall.support) return {};
+  return [this]() -> const simulate::VesselModel& {
+    rigid_model();
+    let_sections_move(models());
+    return *models().model;
+  };
+}
+
 /// Cross-sections of the tree on the case's support, held where the wire goes in.
 std::unique_ptr<const simulate::SectionChain> Workspace::section_chain() {
   if (!given_.wall.support) return nullptr;

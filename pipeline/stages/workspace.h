@@ -73,6 +73,9 @@ class Workspace {
   /// The same with a wall that does not yield or move. Both are one object: the use of either ends
   /// before the other is asked for.
   const simulate::VesselModel& rigid_model();
+  /// Makes the rigid one whose cross-sections move all the same, for scouts; empty where they do
+  /// not.
+  std::function<const simulate::VesselModel&()> moving_model();
   /// Makes the field of the vessel a piece in the store, unless another process did: for shards, so
   /// that one of them computes it. rigid_model() takes it from there.
   void share_field();

@@ -98,7 +98,7 @@ const spreadRow = (robustness, trial, first) => {
 };
 
 const scoutRow = (scout) => ["Coarse trials that sorted out the rest",
-  `${plural(scout.trials, "trial")} with elements of ${number(scout.element_length_mm)}\u00a0mm in a rigid wall; of them ${scout.probed} run there with fine elements, ${scout.compared} in full`,
+  `${plural(scout.trials, "trial")} with elements of ${number(scout.element_length_mm)}\u00a0mm in a ${scout.moves_as_a_whole ? "rigid wall that moves as a whole" : "rigid wall"}; of them ${scout.probed} run there with fine elements, ${scout.compared} in full`,
   `score off by ${number(scout.median_score_error)} in the middle; ${plural(scout.missed, "plan")} seen as failing that reach, ${scout.false_reached} the other way`];
 
 export const uncertainSection = (page) => {
