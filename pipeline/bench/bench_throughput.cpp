@@ -7,6 +7,7 @@
 #include "pipeline/bench/bench_report.h"
 #include "pipeline/bench/bench_walls.h"
 #include "pipeline/bench/coaxial_manoeuvres.h"
+#include "pipeline/bench/moving_vessel.h"
 #include "pipeline/bench/throughput_results.h"
 #include "pipeline/bench/timed_batch.h"
 #include "pipeline/stages/stages.h"
@@ -336,6 +337,8 @@ BenchReport bench_throughput(const BenchOptions& options) {
   report.description = describe_throughput(surface, size.length, size.finest);
   // The quick size is too short to hold against them.
   std::vector<Json> aims = options.quick ? std::vector<Json>{} : list_throughput_aims(results);
+  const std::vector<Json> moving = time_moving_vessel(vessel, size.EI, size.length, size.repeats);
+  if (!options.quick) aims.push_back(moving_aim(moving));
   const std::vector<Json> coaxial = time_coaxial_manoeuvres(size.coaxial);
   if (!options.quick) {
     for (const Json& aim : list_coaxial_aims(coaxial)) aims.push_back(aim);
@@ -343,6 +346,7 @@ BenchReport bench_throughput(const BenchOptions& options) {
   report.results = {{"aims", Json::array()},
                     {"s_tube", results.s_tube},
                     {"coaxial", coaxial},
+                    {"moving_vessel", moving},
                     {"same_on_two_threads", results.same}};
   for (const Json& aim : aims) report.results["aims"].push_back(aim);
   report.rows = std::move(results.rows);

@@ -192,6 +192,12 @@ TEST(Bench, EveryInsertionIsInBalanceAndTheSameOnTwoThreads) {
                                               {"s-tube rigid", 8},
                                               {"paper-tube rigid", 1},
                                               {"paper-tube elastic", 1}}));
+  for (const Json& row : throughput.result.at("results").at("moving_vessel")) {
+    EXPECT_GT(row.at("sections"), 5);
+    EXPECT_GT(row.at("moved_mm"), 0.0);
+    EXPECT_EQ(row.at("outcome_moving"), row.at("outcome_fixed"));
+    EXPECT_LT(row.at("iterations_moving"), 6.0);
+  }
   const Json& coaxial = throughput.result.at("results").at("coaxial");
   EXPECT_EQ(coaxial.size(), 4u);
   for (const Json& row : coaxial) {
