@@ -53,6 +53,10 @@ void read_robustness(JsonReader& root, Case& input) {
   if (input.wall.support) {
     unknowns.support_low = support_low;
     unknowns.support_high = support_high;
+  } else if (!reader.raw("support_factor").is_null()) {
+    input.told.push_back(
+        "robustness.support_factor is without effect: wall.support_kpa_per_mm gives no support, so "
+        "the vessel does not move as a whole");
   }
   unknowns.angle =
       reader.number("angle_deg", clean(unknowns.angle / kRadPerDeg), {.min = 0.0, .max = 45.0}) *

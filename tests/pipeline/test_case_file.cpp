@@ -60,6 +60,8 @@ TEST_F(CaseFile, CrossSectionsMoveWhereASupportIsGivenAlone) {
   EXPECT_FALSE(case_parameters(read(json))["wall"].contains("support_kpa_per_mm"));
   json["robustness"]["support_factor"] = {0.5, 2};
   EXPECT_EQ(read(json).robustness.unknowns.support_high, 1.0) << "there is none to be disturbed";
+  ASSERT_EQ(read(json).told.size(), 1u);
+  EXPECT_EQ(read(json).told[0].find("robustness.support_factor is without effect"), 0u);
   json["wall"]["support_kpa_per_mm"] = nullptr;
   EXPECT_FALSE(read(json).wall.support);
   json["wall"]["support_kpa_per_mm"] = 1;
