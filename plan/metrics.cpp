@@ -122,6 +122,7 @@ Measured measure(const simulate::TrialResult& trial, const Study& study, const C
           .progress = find_progress(trial, path),
           .last_tip = trial.pushes.empty() ? study.access : trial.pushes.back().tip,
           .nodes = trial.nodes,
+          .sections = trial.sections,
           .tools = compute_tool_metrics(trial, path)};
 }
 

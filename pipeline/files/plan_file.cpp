@@ -93,6 +93,13 @@ Json measured_to_json(const plan::Measured& measured) {
   return json;
 }
 
+/// Of a repeat: with how it moved the vessel.
+Json repeat_to_json(const plan::Measured& measured) {
+  Json json = measured_to_json(measured);
+  if (measured.sections.size() > 0) json["sections_mm"] = to_json(measured.sections);
+  return json;
+}
+
 plan::Measured measured_of(const Json& json) {
   plan::Measured measured = {.outcome = outcome_of(json.at("outcome")),
                              .reason = json.at("reason"),
@@ -101,6 +108,7 @@ plan::Measured measured_of(const Json& json) {
                              .progress = number_of(json.at("progress_mm")),
                              .last_tip = point_of(json.at("last_tip_mm"))};
   if (json.contains("tools")) measured.tools = tools_of_json(json.at("tools"));
+  if (json.contains("sections_mm")) measured.sections = points_of(json.at("sections_mm"));
   return measured;
 }
 
@@ -200,7 +208,7 @@ plan::RobustnessOptions robustness_of(const Json& json) {
 }  // namespace
 
 std::string measured_text(const plan::Measured& measured, bool with_shape) {
-  Json json = measured_to_json(measured);
+  Json json = repeat_to_json(measured);
   json["schema"] = kMeasuredSchema;
   json["cpu_s"] = measured.cpu_seconds;
   if (with_shape) json["nodes_mm"] = to_json(measured.nodes);
@@ -228,7 +236,7 @@ Json plan_to_json(const plan::Plan& plan) {
   }
   for (const plan::RepeatedTrials& repeats : plan.repeated) {
     Json own = Json::array();
-    for (const plan::Measured& trial : repeats.trials) own.push_back(measured_to_json(trial));
+    for (const plan::Measured& trial : repeats.trials) own.push_back(repeat_to_json(trial));
     repeated.push_back({{"trial", repeats.trial}, {"trials", std::move(own)}});
   }
   return {

@@ -1,10 +1,13 @@
 #include "pipeline/report/motion_json.h"
 
 #include <algorithm>
+#include <cmath>
 #include <string>
 #include <vector>
 
 #include "plan/anatomy/passage.h"
+#include "plan/anatomy/projection.h"
+#include "plan/statistics.h"
 
 namespace wireplan::pipeline {
 
@@ -23,7 +26,68 @@ Centerline carried(const Centerline& line, const simulate::SectionChain& chain,
   return moved;
 }
 
+Json view_json(const plan::View& view) {
+  return {{"rotation_deg", view.rotation / kRadPerDeg}, {"tilt_deg", view.tilt / kRadPerDeg}};
+}
+
+/// Where a vessel turns off the way's, and which view shows that, at rest and moved.
+Json turn_json(const std::vector<preprocess::Branch>& tree, const plan::Junction& rest,
+               const plan::Junction& moved) {
+  const auto best_view = [](const plan::Junction& at) {
+    return plan::find_projections(at.trunk_direction, at.branch_direction).best.view;
+  };
+  const plan::View before = best_view(rest), after = best_view(moved);
+  // Of lines of sight: from its other end a line shows the same.
+  const double along =
+      std::abs(plan::detector_direction(before).dot(plan::detector_direction(after)));
+  return {{"branch", branch_name(tree, rest.branch)},
+          {"at_rest_deg", plan::turn_of(rest) / kRadPerDeg},
+          {"moved_deg", plan::turn_of(moved) / kRadPerDeg},
+          {"from_access_mm", rest.arc},
+          {"moved_from_access_mm", moved.arc},
+          {"view_at_rest", view_json(before)},
+          {"view_moved", view_json(after)},
+          {"view_change_deg", std::acos(std::min(along, 1.0)) / kRadPerDeg}};
+}
+
+Json low_median_high(std::vector<double> values) {
+  const plan::Spread spread = plan::find_spread(std::move(values));
+  return {{"low", spread.low}, {"median", spread.median}, {"high", spread.high}};
+}
+
+/// Of one number of each branch's row under a key, over the repeats that have the row.
+void put_spreads(const std::vector<Json>& repeats, const char* key,
+                 const std::vector<const char*>& numbers, Json& into) {
+  into[key] = Json::array();
+  for (const Json& row : repeats.front().at(key)) {
+    Json spreads = {{"branch", row.at("branch")}};
+    for (const char* number : numbers) {
+      std::vector<double> values;
+      for (const Json& repeat : repeats) {
+        for (const Json& same : repeat.at(key)) {
+          if (same.at("branch") == row.at("branch")) values.push_back(same.at(number));
+        }
+      }
+      spreads[number] = low_median_high(std::move(values));
+    }
+    into[key].push_back(std::move(spreads));
+  }
+}
+
 }  // namespace
+
+Json motion_spread_json(const std::vector<Json>& repeats) {
+  expects(!repeats.empty());
+  Json json = {{"repeats", repeats.size()}};
+  for (const char* number : {"most_mm", "moved_way_length_mm"}) {
+    std::vector<double> values;
+    for (const Json& repeat : repeats) values.push_back(repeat.at(number));
+    json[number] = low_median_high(std::move(values));
+  }
+  put_spreads(repeats, "ostia", {"shift_mm"}, json);
+  put_spreads(repeats, "turns", {"moved_deg", "moved_from_access_mm", "view_change_deg"}, json);
+  return json;
+}
 
 Json motion_json(const simulate::Way& way, const simulate::SectionChain& chain,
                  const Eigen::Matrix3Xd& u) {
@@ -62,9 +126,7 @@ Json motion_json(const simulate::Way& way, const simulate::SectionChain& chain,
       return other.branch == junction.branch && other.taken;
     });
     if (!junction.taken || same == after.end()) continue;
-    turns.push_back({{"branch", branch_name(tree, junction.branch)},
-                     {"at_rest_deg", plan::turn_of(junction) / kRadPerDeg},
-                     {"moved_deg", plan::turn_of(*same) / kRadPerDeg}});
+    turns.push_back(turn_json(tree, junction, *same));
   }
   const auto length_of = [](const Centerline& line) {
     return line.arc_length[line.arc_length.size() - 1] - line.arc_length[0];

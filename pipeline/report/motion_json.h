@@ -2,6 +2,7 @@
 /// How a wire moves the vessel as a whole, for the report: what shifts by how much, and what that
 /// does to lengths and angles.
 #include <Eigen/Core>
+#include <vector>
 
 #include "pipeline/files/json_reader.h"
 #include "simulate/insertion/way.h"
@@ -12,5 +13,9 @@ namespace wireplan::pipeline {
 /// Of the shape in which a trial ended: `u` (3, nodes of the chain) [mm].
 Json motion_json(const simulate::Way& way, const simulate::SectionChain& chain,
                  const Eigen::Matrix3Xd& u);
+
+/// Of a plan's repeats under disturbances, each as motion_json() tells it, at least one: medians
+/// and the bounds of the central 90 %.
+Json motion_spread_json(const std::vector<Json>& repeats);
 
 }  // namespace wireplan::pipeline

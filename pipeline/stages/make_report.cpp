@@ -88,6 +88,20 @@ Eigen::Matrix3Xd moved_by(const Workspace& work, const ReportInput& report, int 
   return read_trial(work, report.plan.levels[static_cast<std::size_t>(trial)], trial).sections;
 }
 
+/// What a plan's repeats under disturbances do to the vessel, those that reached; null without any.
+Json find_motion_of_repeats(const ReportInput& report, const simulate::SectionChain& chain,
+                            int trial) {
+  std::vector<Json> motions;
+  for (const plan::RepeatedTrials& plan : report.plan.repeated) {
+    if (plan.trial != trial) continue;
+    for (const plan::Measured& repeat : plan.trials) {
+      if (!repeat.metrics.reached || repeat.sections.cols() != chain.nodes()) continue;
+      motions.push_back(motion_json(*report.study.goal.way, chain, repeat.sections));
+    }
+  }
+  return motions.empty() ? Json(nullptr) : motion_spread_json(motions);
+}
+
 /// What the best plan of each wire, or its closest attempt where it has none, does to the vessel;
 /// null where its cross-sections do not move.
 Json find_motion(Workspace& work, const ReportInput& report) {
@@ -104,6 +118,8 @@ Json find_motion(Workspace& work, const ReportInput& report) {
                       {"wire", report.study.wires[wire].name},
                       {"outcome", outcome_name(report.plan.trials[k].outcome)}});
     trials.back().update(motion_json(*report.study.goal.way, *chain, u));
+    const Json over = find_motion_of_repeats(report, *chain, id);
+    if (!over.is_null()) trials.back()["under_disturbances"] = over;
   }
   return {{"support_kpa_per_mm", clean(*work.given().wall.support / kMpaPerKpa)},
           {"support_source", "given, not measured on the patient; published: 0.01 to 10"},

@@ -156,6 +156,34 @@ TEST(Report, TellsHowTheWallMovedAndWhereTheWorkWent) {
   expect_valid(report, folder.path());
 }
 
+TEST(Report, TellsHowTheVesselMovesAsAWholeAlsoUnderDisturbances) {
+  // 16 ways in, so that most are scouted; they all lean and shove the tube aside.
+  const TemporaryFolder folder;
+  write_finished_tube(folder.path());
+  const Json report =
+      run_to_report(folder / "case.json", folder / "cache", 0,
+                    {"wall.support_kpa_per_mm=1", "access.inclination_deg=[15, 20, 25, 30]",
+                     "access.azimuth_deg=[0, 90, 180, 270]", "robustness.repeats=4"});
+  EXPECT_TRUE(report.at("numerics").at("scout").at("moves_as_a_whole"));
+  ASSERT_FALSE(report.at("ranking").empty());
+  for (const Json& trial : report.at("trials")) EXPECT_NE(trial.at("outcome"), "left_lumen");
+  const Json& motion = report.at("vessel_motion").at("trials").at(0);
+  EXPECT_EQ(motion.at("trial"), report.at("ranking")[0].at("trial"));
+  EXPECT_GT(motion.at("most_mm"), 1e-3);
+  EXPECT_LT(motion.at("most_mm"), 3.0);
+  const Json& most = motion.at("under_disturbances").at("most_mm");
+  EXPECT_EQ(motion.at("under_disturbances").at("repeats"), 4);
+  EXPECT_LE(most.at("low"), most.at("median"));
+  EXPECT_GT(most.at("high").get<double>(), 1.5 * most.at("low").get<double>())
+      << "the support is spread over a hundredfold";
+  const std::string warnings = report.at("provenance").at("warnings").dump();
+  for (const char* told : {"not measured on the patient", "no layers, no prestress",
+                           "2.3 mm after fitting one value, 4.6 mm without"}) {
+    EXPECT_NE(warnings.find(told), std::string::npos) << warnings;
+  }
+  expect_valid(report, folder.path());
+}
+
 TEST(Report, MapsTheForcesOnTheWall) {
   const TemporaryFolder folder;
   write_finished_tube(folder.path());
