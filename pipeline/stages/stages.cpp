@@ -267,7 +267,7 @@ std::vector<Stage> stages_of(const Case& given) {
   stages.push_back(trials);
   Stage manoeuvres = trials;
   manoeuvres.name = "manoeuvres";
-  manoeuvres.version = 21;
+  manoeuvres.version = 22;
   manoeuvres.after.push_back("trials");
   read_too(manoeuvres, {"/manoeuvres"});
   const bool tools = !given.catheters.empty();
@@ -284,7 +284,7 @@ std::vector<Stage> stages_of(const Case& given) {
   stages.push_back(manoeuvres);
   Stage plans = trials;
   plans.name = "plans";
-  plans.version = 6;
+  plans.version = 7;
   plans.after.insert(plans.after.end(), {"trials", "manoeuvres"});
   if (voxels != nullptr) plans.after.emplace_back(voxels);
   read_too(plans, {"/manoeuvres", "/robustness"});

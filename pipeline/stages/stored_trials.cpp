@@ -18,6 +18,9 @@ using plan::Level;
 // Stages whose artifacts hold trials in full, and their shapes on the way.
 constexpr std::array kTrialStages = {"trials", "manoeuvres"};
 
+// Of what trials of catheter and wire do; counts up where the same script comes to something else.
+constexpr int kToolTrialVersion = 2;
+
 std::string level_folder(Level level) {
   return level == Level::kFull ? "" : plan::level_name(level);
 }
@@ -88,6 +91,7 @@ std::string StoredTrials::key_of(const plan::Run& run, const std::string& shared
     const plan::Catheter& known = study.catheters[static_cast<std::size_t>(catheter)];
     const simulate::Wire tube =
         run.disturbance ? plan::disturbed_tube(study, catheter, *run.disturbance) : known.tool.wire;
+    lines.push_back({"tools", std::to_string(kToolTrialVersion)});
     lines.push_back({"catheter", wire_json(tube).dump()});
     lines.push_back(
         {"lumen",

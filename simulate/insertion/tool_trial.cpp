@@ -111,7 +111,9 @@ bool ToolTrial::make(const ToolStep& step, bool last) {
     }
     if (!part({step.tool, by / whole * step.push, by / whole * step.turn})) break;
     done += by;
-    if (last && step.push > 0.0 && !check_advance(by)) break;
+    // Within another tool it brings no tip on.
+    const bool leads = foremost_of(step.tool) > foremost() - 1e-9;
+    if (last && step.push > 0.0 && leads && !check_advance(by)) break;
   }
   return !ended();
 }

@@ -42,8 +42,8 @@ class ToolTrial {
             const VesselModel& vessel, const ToolTrialOptions& options);
 
   /// Makes a step, in parts of two of the options' steps or 15 degrees, as far as the tool has
-  /// length and the trial has not ended. The `last` one ends too where the tip comes no further.
-  /// False where the trial has ended.
+  /// length and the trial has not ended. The `last` one ends too where the tip of a tool that
+  /// leads comes no further. False where the trial has ended.
   bool make(const ToolStep& step, bool last = false);
 
   bool ended() const { return outcome_.has_value(); }

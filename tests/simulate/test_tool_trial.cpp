@@ -175,6 +175,27 @@ TEST(ToolTrial, ANewDivisionOfTheCentrelineKeepsTheShape) {
   }
 }
 
+TEST(ToolTrial, AWireThatComesUpInsideTheCatheterIsNotTakenForStuck) {
+  // The catheter leads by 90 mm, which is more than the last push is given without progress.
+  Centerline path;
+  path.points.resize(3, 150);
+  for (Eigen::Index k = 0; k < 150; ++k) {
+    path.points.col(k) = Vec3(0.0, 0.0, 5.0 + static_cast<double>(k));
+  }
+  path.radius = Eigen::VectorXd::Constant(150, kAorta);
+  path.arc_length = Eigen::VectorXd::LinSpaced(150, 0.0, 149.0);
+  const auto way = std::make_shared<Way>(path);
+  const Goal goal{.point = way->section().center, .radius = kAorta, .at_section = true, .way = way};
+  const TrialResult result =
+      run_tool_trial({hooked_catheter(), straight_wire(20.0)}, kUpward, goal, aorta(), coarse(),
+                     {{.tool = 1, .push = 116.0},
+                      {.tool = 0, .push = 110.0},
+                      {.tool = 1, .push = -100.0},
+                      {.tool = 1, .push = 180.0}});
+  EXPECT_EQ(result.outcome, Outcome::kReached) << result.reason;
+  EXPECT_GT(result.tools[1].insertion.back(), 140.0);
+}
+
 TEST(ToolTrial, RecordsWhatEachToolFeels) {
   ToolTrial trial = hooked_trial();
   ASSERT_TRUE(trial.make({.tool = 1, .push = 100.0}));
