@@ -79,7 +79,8 @@ std::vector<simulate::Tool> tools_of(const Study& study, const Candidate& candid
 
 simulate::ToolTrialOptions tool_options(const Study& study) {
   simulate::ToolTrialOptions options{.friction_between = study.tool_rules.friction,
-                                     .insertion = study.insertion};
+                                     .insertion = study.insertion,
+                                     .take_off = find_ostium(study.goal)};
   options.insertion.element_length *= kToolElements;
   return options;
 }

@@ -22,6 +22,8 @@ struct Study {
   std::vector<WireSpread> spreads = {};  // of each wire; empty: its values are taken for known
   std::vector<Catheter> catheters = {};  // that wires may be pushed through, see tool_search.h
   ToolRules tool_rules = {};
+  std::vector<std::string> suggested =
+      {};  // why each catheter is there; empty: the case names them
 };
 
 struct Candidate {

@@ -4,10 +4,13 @@
 #include <cmath>
 #include <cstdio>
 
+#include "plan/anatomy/passage.h"
+
 namespace wireplan::plan {
 namespace {
 
 using simulate::ToolStep;
+using simulate::Until;
 
 constexpr double kWireStart = 4.0;  // of a wire in the vessel before the first step          [mm]
 
@@ -58,7 +61,50 @@ std::string why_unfit(const Catheter& catheter, const simulate::Wire& wire, cons
   return {};
 }
 
+/// Largest radius of the line within `length` mm before its point k: the spheres shrink toward an
+/// ostium already [mm].
+double widest_before(const Centerline& line, Eigen::Index k, double length) {
+  double radius = line.radius[k];
+  for (Eigen::Index i = k; i >= 0 && line.arc_length[k] - line.arc_length[i] < length; --i) {
+    radius = std::max(radius, line.radius[i]);
+  }
+  return radius;
+}
+
+/// Mean radius of the line from an arc length on, over so many mm or to its end [mm].
+double mean_radius(const Centerline& line, double from, double length) {
+  double sum = 0.0, count = 0.0;
+  for (Eigen::Index i = 0; i < line.arc_length.size(); ++i) {
+    const double beyond = line.arc_length[i] - from;
+    if (beyond < 0.0 || (beyond > length && count > 0.0)) continue;
+    sum += line.radius[i];
+    ++count;
+  }
+  return sum / std::max(1.0, count);
+}
+
 }  // namespace
+
+std::optional<Ostium> find_ostium(const simulate::Goal& goal) {
+  constexpr double kBefore = 15.0, kInto = 10.0;  // that diameters are taken over           [mm]
+  if (!goal.way) return {};
+  const Centerline& path = goal.way->path();
+  std::optional<Ostium> last;
+  for (const Junction& junction : find_junctions(*goal.way)) {
+    const double end = path.arc_length[path.arc_length.size() - 1];
+    if (!junction.taken || junction.arc >= end) continue;
+    Ostium& here = last.emplace();
+    here.arc = junction.arc;
+    here.point = junction.point;
+    here.trunk = junction.trunk_direction;
+    here.branch = junction.branch_direction;
+    const Eigen::Index before = find_part(path, junction.arc).before;
+    here.trunk_diameter = 2.0 * widest_before(path, before, kBefore);
+    here.branch_diameter = 2.0 * mean_radius(path, junction.arc + 2.0, kInto);
+    here.end = end;
+  }
+  return last;
+}
 
 std::vector<ToolPair> list_pairs(const std::vector<Catheter>& catheters,
                                  const std::vector<simulate::Wire>& wires, const Ostium& ostium,
@@ -74,8 +120,11 @@ std::vector<ToolPair> list_pairs(const std::vector<Catheter>& catheters,
   return pairs;
 }
 
-std::string find_broken_rule(const std::vector<ToolStep>& steps, const Catheter& catheter,
-                             const simulate::Wire& wire, const ToolRules& rules) {
+namespace {
+
+/// Of steps that are all made whole.
+std::string find_broken_when_whole(const std::vector<ToolStep>& steps, const Catheter& catheter,
+                                   const simulate::Wire& wire, const ToolRules& rules) {
   const simulate::Wire& tube = catheter.tool.wire;
   const bool soft =
       !tube.sections.empty() && tube.sections.front().bending_stiffness <= rules.soft_tip;
@@ -84,7 +133,17 @@ std::string find_broken_rule(const std::vector<ToolStep>& steps, const Catheter&
     const ToolStep& step = steps[k];
     const std::string where = "step " + std::to_string(k + 1) + ": ";
     const bool of_catheter = step.tool != 1, of_wire = step.tool != 0;
-    if (of_catheter) turned = step.turn == 0.0 ? 0.0 : turned + step.turn;
+    const double length = std::abs(step.push);
+    if (of_catheter && length > 0.0 && std::abs(turned) > rules.turn_per_length * length + 1e-9) {
+      return where + "the catheter was turned by " +
+             std::to_string(std::lround(std::abs(turned) / kRadPerDeg)) +
+             " degrees, and is moved by " + millimetres_of(length) + " alone; " +
+             std::to_string(std::lround(rules.turn_per_length / kRadPerDeg)) +
+             " degrees per mm are the most";
+    }
+    if (of_catheter && (step.turn != 0.0 || length > 0.0)) {
+      turned = step.turn == 0.0 ? 0.0 : turned + step.turn;
+    }
     if (std::abs(turned) > rules.most_turn + 1e-9) {
       return where + "the catheter is turned by more than " +
              std::to_string(std::lround(rules.most_turn / kRadPerDeg)) + " degrees in one place";
@@ -106,43 +165,104 @@ std::string find_broken_rule(const std::vector<ToolStep>& steps, const Catheter&
   return {};
 }
 
+}  // namespace
+
+std::string find_broken_rule(const std::vector<ToolStep>& steps, const Catheter& catheter,
+                             const simulate::Wire& wire, const ToolRules& rules) {
+  std::string broken = find_broken_when_whole(steps, catheter, wire, rules);
+  if (!broken.empty()) return broken;
+  std::vector<ToolStep> ended = steps;
+  for (ToolStep& step : ended) {
+    if (step.until != Until::kMade && step.push < 0.0) step.push = 0.0;
+  }
+  return find_broken_when_whole(ended, catheter, wire, rules);
+}
+
 std::vector<ToolStep> as_written(std::vector<ToolStep> steps) {
   for (ToolStep& step : steps) {
     step.turn = clean(step.turn / kRadPerDeg) * kRadPerDeg;
     step.push = step.turn != 0.0 ? 0.0 : clean(step.push);
+    step.at =
+        step.until == Until::kFacing ? clean(step.at / kRadPerDeg) * kRadPerDeg : clean(step.at);
   }
   return steps;
 }
 
+namespace {
+
+/// To the nearest whole number.
+std::string whole_number(double value) { return std::to_string(std::lround(value)); }
+
+/// " until its tip is 20 mm past the ostium", of several tools "the catheter's tip"; empty of steps
+/// that are made whole.
+std::string tell_end(const ToolStep& step) {
+  if (step.until == Until::kMade) return {};
+  const std::string tip =
+      step.tool == simulate::kBothTools ? " until the catheter's tip " : " until its tip ";
+  switch (step.until) {
+    case Until::kMade:
+      break;
+    case Until::kInBranch:
+      return step.at < 0.5 ? tip + "falls into the ostium"
+                           : tip + "is " + whole_number(step.at) + " mm past the ostium";
+    case Until::kLevel:
+      if (std::abs(step.at) < 0.5) return tip + "is level with the ostium";
+      return tip + (step.at > 0.0
+                        ? "is " + whole_number(step.at) + " mm beyond the level of the ostium"
+                        : "is " + whole_number(-step.at) + " mm short of the level of the ostium");
+    case Until::kFacing: {
+      const double angle = step.at / kRadPerDeg;
+      if (std::abs(angle) < 0.5) return tip + "looks toward the branch";
+      return tip + "looks " + whole_number(std::abs(angle)) + " degrees " +
+             (angle > 0.0 ? "clockwise" : "counterclockwise") + " of the branch";
+    }
+  }
+  return {};
+}
+
+}  // namespace
+
 std::vector<std::string> describe_steps(const std::vector<ToolStep>& steps, double insertion) {
   std::vector<std::string> told;
   double tube_in = 0.0, wire_in = kWireStart;
-  char text[200];
+  bool tube_known = true, wire_known = true;
   for (std::size_t k = 0; k < steps.size(); ++k) {
     const ToolStep& step = steps[k];
     const bool both = step.tool == simulate::kBothTools, of_wire = step.tool == 1;
-    const bool last = k + 1 == steps.size();
-    const char* name = both ? "catheter and wire together" : of_wire ? "the wire" : "the catheter";
+    const std::string name = both      ? "catheter and wire together"
+                             : of_wire ? "the wire"
+                                       : "the catheter";
+    const std::string end = tell_end(step);
     if (of_wire || both) wire_in += step.push;
     if (!of_wire) tube_in += step.push;
+    if (!end.empty() && (of_wire || both)) wire_known = false;
+    if (!end.empty() && !of_wire) tube_known = false;
+    std::string text;
     if (step.turn != 0.0) {
-      std::snprintf(text, sizeof text, "turn %s %.0f degrees %s", name,
-                    std::abs(step.turn) / kRadPerDeg,
-                    step.turn > 0.0 ? "clockwise" : "counterclockwise");
-    } else if (last && step.push > 0.0) {
-      std::snprintf(text, sizeof text, "advance %s until its tip is at the target, %.0f mm in",
-                    name, insertion);
-    } else if (step.push > 0.0 && both) {
-      std::snprintf(text, sizeof text, "advance %s by %.0f mm", name, step.push);
+      const std::string side = step.turn > 0.0 ? " clockwise" : " counterclockwise";
+      const double angle = std::abs(step.turn) / kRadPerDeg;
+      text = "turn " + name +
+             (end.empty() ? " " + whole_number(angle) + " degrees" + side
+                          : side + end + ", by " + whole_number(angle) + " degrees at most");
+    } else if (k + 1 == steps.size() && step.push > 0.0 && end.empty()) {
+      text = "advance " + name + " until its tip is at the target, " + whole_number(insertion) +
+             " mm in";
     } else if (step.push > 0.0) {
-      const bool over = !of_wire && wire_in >= tube_in;
-      std::snprintf(text, sizeof text, "advance %s%s to %.0f mm", name,
-                    over ? " over the wire" : "", of_wire ? wire_in : tube_in);
+      const bool over = !of_wire && !both && (wire_in >= tube_in || !wire_known);
+      const bool known = !both && (of_wire ? wire_known : tube_known);
+      text = "advance " + name;
+      text += over ? " over the wire" : "";
+      text += end;
+      text += !end.empty() ? ", by " + whole_number(step.push) + " mm at most"
+              : known      ? " to " + whole_number(of_wire ? wire_in : tube_in) + " mm"
+                           : " by " + whole_number(step.push) + " mm";
     } else {
-      std::snprintf(text, sizeof text, "%s %s by %.0f mm", of_wire ? "withdraw" : "pull back", name,
-                    -step.push);
+      text = (of_wire ? "withdraw " : "pull back ") + name;
+      text += end;
+      text += end.empty() ? " by " + whole_number(-step.push) + " mm"
+                          : ", by " + whole_number(-step.push) + " mm at most";
     }
-    told.emplace_back(text);
+    told.push_back(std::move(text));
   }
   return told;
 }

@@ -1,5 +1,6 @@
 #pragma once
 /// Catheters of a case: which wires go through them, and what a hand does not do with the two.
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -24,17 +25,20 @@ struct ToolRules {
   double outside = 50.0;   // of catheter that stays outside the body                          [mm]
   double most_turn = kPi;  // of the hub in one place: a push or pull follows, so that no twist
                            // is wound up                                                     [rad]
-  double friction = 0.05;  // Coulomb's coefficient between wire and catheter
+  double turn_per_length = 0.5 * kPi;  // of the hub, for the push or pull of the catheter that
+                                       // follows: more winds up                         [rad/mm]
+  double friction = 0.05;              // Coulomb's coefficient between wire and catheter
 };
 
 /// Where scripts are to bring the tip: the last vessel that the way takes from a wider one.
-struct Ostium {
-  double arc = 0.0;             // along the way                                         [mm]
-  Vec3 point = Vec3::Zero();    //                                                       [mm]
-  Vec3 branch = Vec3::UnitX();  // unit, where the branch goes
-  double trunk_diameter = 0.0;  // just before                                           [mm]
-  double end = 0.0;             // of the way, the target's place                        [mm]
+struct Ostium : simulate::TakeOff {
+  double trunk_diameter = 0.0;   // just before                                          [mm]
+  double branch_diameter = 0.0;  // of the way, mean over 10 mm beyond it               [mm]
+  double end = 0.0;              // of the way, the target's place                       [mm]
 };
+
+/// None where the way takes none, or is not known.
+std::optional<Ostium> find_ostium(const simulate::Goal& goal);
 
 /// A wire in a catheter.
 struct ToolPair {
@@ -50,6 +54,7 @@ std::vector<ToolPair> list_pairs(const std::vector<Catheter>& catheters,
                                  const ToolRules& rules);
 
 /// What breaks the rules in a script, or is not possible with tools of these lengths; else empty.
+/// Steps that end before they are made whole may break none either.
 std::string find_broken_rule(const std::vector<simulate::ToolStep>& steps, const Catheter& catheter,
                              const simulate::Wire& wire, const ToolRules& rules);
 
@@ -58,7 +63,8 @@ std::vector<simulate::ToolStep> as_written(std::vector<simulate::ToolStep> steps
 
 /// "advance the wire to 250 mm; advance the catheter over the wire to 230 mm; withdraw the wire by
 /// 60 mm; turn the catheter 60 degrees clockwise; ...": as the hand makes them, turns as seen from
-/// the hub toward the patient. The last step goes on to where the trial ended.
+/// the hub toward the patient. "to" is said as long as no step before ended by what was seen. The
+/// last step goes on to where the trial ended.
 std::vector<std::string> describe_steps(const std::vector<simulate::ToolStep>& steps,
                                         double insertion);
 

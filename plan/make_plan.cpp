@@ -16,6 +16,8 @@ constexpr std::size_t kPlansTried = 3;
 constexpr int kTries = 8;
 // Turns of the hub in one script: that scouts find, and that are searched for in full.
 constexpr int kTurnsOfScouts = 3, kTurns = 1;
+// Neighbours of a script of tools that are run in full in its place.
+constexpr std::size_t kSparesTried = 2;
 // Which plans are the best is found from so many repeats of each that may be. Plans that fall
 // behind let others up, which are repeated next.
 constexpr int kFirstRepeats = 32;
@@ -140,8 +142,9 @@ class Planner {
     plan_.scripts.branches += search.branches;
     std::vector<Run> runs;
     for (const Candidate& found : search.found) runs.push_back({.candidate = found});
-    const std::vector<Measured> trials =
+    std::vector<Measured> trials =
         find_or_run(study_, vessel_, runs, log_, options_.batch, plan_.full);
+    try_spares(search, runs, trials);
     for (PairFindings& pair : search.pairs) {
       std::vector<std::size_t> own, reached;
       for (std::size_t k = 0; k < runs.size(); ++k) {
@@ -165,6 +168,33 @@ class Planner {
       }
     }
     plan_.scripts.pairs = std::move(search.pairs);
+  }
+
+  // Where a script does not reach in full that holds in the search, the first of its neighbours
+  // that does stands in for it.
+  void try_spares(const ToolScripts& search, std::vector<Run>& runs,
+                  std::vector<Measured>& trials) {
+    for (std::size_t tried = 0; tried < kSparesTried; ++tried) {
+      std::vector<Run> next;
+      std::vector<std::size_t> owners;
+      for (std::size_t k = 0; k < runs.size(); ++k) {
+        if (trials[k].outcome == simulate::Outcome::kReached) continue;
+        if (tried >= search.spares[k].size()) continue;
+        const bool known = std::any_of(runs.begin(), runs.end(), [&](const Run& run) {
+          return run.candidate.steps == search.spares[k][tried].steps;
+        });
+        if (known) continue;
+        next.push_back({.candidate = search.spares[k][tried]});
+        owners.push_back(k);
+      }
+      const std::vector<Measured> found =
+          find_or_run(study_, vessel_, next, log_, silent_, plan_.full);
+      for (std::size_t n = 0; n < next.size(); ++n) {
+        if (found[n].outcome != simulate::Outcome::kReached) continue;
+        runs[owners[n]] = next[n];
+        trials[owners[n]] = found[n];
+      }
+    }
   }
 
   // Whether one of the best straight plans works in at least half of a few tries under

@@ -6,7 +6,7 @@
 #include <tuple>
 #include <utility>
 
-#include "plan/anatomy/passage.h"
+#include "plan/tool_neighbours.h"
 #include "preprocess/centerline/path_place.h"
 
 namespace wireplan::plan {
@@ -15,6 +15,7 @@ namespace {
 using simulate::kBothTools;
 using simulate::ToolStep;
 using simulate::ToolTrial;
+using simulate::Until;
 
 /// All chosen.
 struct Template {
@@ -39,7 +40,11 @@ struct Template {
   double in_branch = 6.0;  // past the ostium: worth following                              [mm]
   double follow = 12.0;    // of the catheter over the wire                                 [mm]
   int follows = 3;
-  double spare = 40.0;  // of the last push, for patients who differ                     [mm]
+  double spare = 40.0;  // of the last push, for patients who differ ...                  [mm]
+  double slack = 12.0;  // ... and of pushes and pulls that end by what is seen           [mm]
+  double turn_slack = 30.0 * kRadPerDeg;  // ... and of turns
+  std::size_t weighed = 5;                // scripts of a start whose neighbours are tried
+  double steady = 0.5;  // of these that reach: a neighbour may stand in for the script
 };
 constexpr Template kTemplate;
 
@@ -50,7 +55,7 @@ constexpr double kScoutResidual = 1e-5;
 
 /// Steps one after the other, pushes of the same tool in one direction as one, turns too.
 std::vector<ToolStep> with(std::vector<ToolStep> steps, const ToolStep& next) {
-  if (!steps.empty() && steps.back().tool == next.tool) {
+  if (!steps.empty() && steps.back().tool == next.tool && steps.back().until == Until::kMade) {
     ToolStep& last = steps.back();
     if (last.push * next.push > 0.0) {
       last.push += next.push;
@@ -82,14 +87,25 @@ double curved_length(const simulate::Wire& tube, bool first) {
 struct State {
   std::vector<ToolStep> steps;
   ToolTrial::Mark mark;
-  double off = 0.0;  // how badly the catheter's tip lies for the ostium                      [mm]
+  double off = 0.0;     // how badly the catheter's tip lies for the ostium                   [mm]
+  double level = 0.0;   // of the catheter's tip beyond the ostium                            [mm]
+  double facing = 0.0;  // where it looked after the turn, NaN: nowhere                    [rad]
 };
 
 struct FoundScript {
   std::vector<ToolStep> steps;
   double peak_force = 0.0;  // in the scout                                                   [N]
   double turned = 0.0, depth = 0.0;
+  double share = 0.0;                   // of it and its neighbours that reach
+  std::vector<ToolScript> spares = {};  // neighbours that do
 };
+
+/// What the hand does until it sees that: rounded as it is told.
+void end_at(ToolStep& step, Until until, double at) {
+  step.until = until;
+  const double unit = until == Until::kFacing ? 5.0 * kRadPerDeg : 0.5;  // [rad], [mm]
+  step.at = unit * std::round(at / unit);
+}
 
 /// One depth of the catheter and one withdrawal of the wire. Serial.
 struct ToolStart {
@@ -99,11 +115,45 @@ struct ToolStart {
 
 struct StartFindings {
   std::vector<FoundScript> found;
+  int count = 0;  // found, of which those are kept
   std::vector<ToolStep> closest;
   double nearest_hook = -1.0, furthest = 0.0;
   std::string stopped;
   long branches = 0;
 };
+
+bool alike(const FoundScript& a, const FoundScript& b, double turn, double depth) {
+  return std::abs(a.turned - b.turned) < turn && std::abs(a.depth - b.depth) < depth;
+}
+
+/// At most so many that differ in turn or depth. First those whose neighbours reach, as far as that
+/// was tried, and with most others round them: a hand and a patient that are not quite as assumed
+/// end there. Then the fewest steps and the least force first.
+std::vector<FoundScript> choose_different(const std::vector<FoundScript>& from, std::size_t most) {
+  constexpr double kNearTurn = 45.0 * kRadPerDeg, kNearDepth = 9.0;    // [rad], [mm]
+  constexpr double kOtherTurn = 20.0 * kRadPerDeg, kOtherDepth = 3.0;  // [rad], [mm]
+  std::vector<int> neighbours;
+  for (const FoundScript& script : from) {
+    neighbours.push_back(
+        static_cast<int>(std::count_if(from.begin(), from.end(), [&](const FoundScript& other) {
+          return alike(script, other, kNearTurn, kNearDepth);
+        })));
+  }
+  std::vector<std::size_t> order(from.size());
+  std::iota(order.begin(), order.end(), 0U);
+  std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
+    return std::tuple(-from[a].share, -neighbours[a], from[a].steps.size(), from[a].peak_force) <
+           std::tuple(-from[b].share, -neighbours[b], from[b].steps.size(), from[b].peak_force);
+  });
+  std::vector<FoundScript> kept;
+  for (const std::size_t k : order) {
+    const bool same = std::any_of(kept.begin(), kept.end(), [&](const FoundScript& other) {
+      return alike(from[k], other, kOtherTurn, kOtherDepth);
+    });
+    if (!same && kept.size() < most) kept.push_back(from[k]);
+  }
+  return kept;
+}
 
 class ToolSearch {
  public:
@@ -121,6 +171,11 @@ class ToolSearch {
                tool_options(study)) {}
 
   StartFindings run() {
+    if (trial_.ended()) {
+      findings_.stopped = trial_.reason();
+      return std::move(findings_);
+    }
+    const ToolTrial::Mark start = trial_.save();
     if (wire_up() && catheter_up()) {
       std::vector<State> hooks = turn_and_pull();
       std::stable_sort(hooks.begin(), hooks.end(),
@@ -131,6 +186,8 @@ class ToolSearch {
         wire_out(hook);
       }
     }
+    trial_.restore(start);
+    weigh_found();
     return std::move(findings_);
   }
 
@@ -142,7 +199,10 @@ class ToolSearch {
     return trial_.pushes().empty() ? 0.0
                                    : preprocess::find_progress(trial_.pushes().back().tip, path_);
   }
-  State here(double off = 0.0) const { return {steps_, trial_.save(), off}; }
+  State here(double off = 0.0) const {
+    return {steps_, trial_.save(), off, trial_.measure(Until::kLevel, kCatheter),
+            trial_.measure(Until::kFacing, kCatheter)};
+  }
   void back_to(const State& state) {
     trial_.restore(state.mark);
     steps_ = state.steps;
@@ -177,8 +237,9 @@ class ToolSearch {
     steps.back().push += kTemplate.spare;
     FoundScript found{.steps = std::move(steps)};
     for (const ToolStep& step : found.steps) {
-      if (step.tool == kCatheter) found.turned += step.turn;
-      if (step.tool != kWire) found.depth += step.push;
+      if (step.turn != 0.0) found.turned += step.until == Until::kFacing ? step.at : step.turn;
+      if (step.tool == kCatheter) found.depth += step.push;
+      if (step.tool == kBothTools) found.depth += step.until == Until::kLevel ? step.at : 0.0;
     }
     for (const simulate::Push& push : trial_.pushes()) {
       found.peak_force = std::max(found.peak_force, push.peak_contact_force);
@@ -186,6 +247,38 @@ class ToolSearch {
     if (find_broken_rule(found.steps, catheter_, wire_, study_.tool_rules).empty()) {
       findings_.found.push_back(std::move(found));
     }
+  }
+
+  /// Of the scripts that stand first without it, how often they and their neighbours reach.
+  void weigh_found() {
+    findings_.count = static_cast<int>(findings_.found.size());
+    std::vector<FoundScript> chosen = choose_different(findings_.found, kTemplate.weighed);
+    findings_.found.clear();
+    std::vector<ToolScript> all;
+    std::vector<std::size_t> owners;
+    for (std::size_t k = 0; k < chosen.size(); ++k) {
+      for (ToolScript& script : list_neighbours(chosen[k].steps)) {
+        all.push_back(std::move(script));
+        owners.push_back(k);
+      }
+    }
+    const std::vector<bool> reached = try_scripts(trial_, all, cancelled_);
+    findings_.branches += std::ssize(all);
+    for (std::size_t k = 0; k < chosen.size(); ++k) {
+      double tried = 0.0, held = 0.0;
+      for (std::size_t n = 0; n < all.size(); ++n) {
+        if (owners[n] != k) continue;
+        const bool own = tried == 0.0;
+        ++tried;
+        if (!reached[n]) continue;
+        ++held;
+        if (!own && find_broken_rule(all[n], catheter_, wire_, study_.tool_rules).empty()) {
+          chosen[k].spares.push_back(all[n]);
+        }
+      }
+      chosen[k].share = held / tried;
+    }
+    findings_.found = std::move(chosen);
   }
 
   /// Beyond the ostium, or as far as the vessel goes there. False where that is not far enough to
@@ -249,6 +342,7 @@ class ToolSearch {
         for (int pull = 0; pull < pulls && !stop(); ++pull) {
           if (!go({.tool = kBothTools, .push = -kTemplate.pull})) break;
           own.push_back(here(off()));
+          own.back().facing = turned.facing;
         }
         keep_best(std::move(own), hooks);
         back_to(turned);
@@ -281,6 +375,7 @@ class ToolSearch {
   /// Out of the mouth into the branch; where it comes no further the catheter follows it.
   void wire_out(const State& hook) {
     back_to(hook);
+    end_by_sight(hook);
     for (int follow = 0; follow <= kTemplate.follows && !stop(); ++follow) {
       State best = here();
       double furthest = 0.0, since = 0.0;
@@ -308,8 +403,27 @@ class ToolSearch {
       }
       if (furthest < ostium_.arc + kTemplate.in_branch) return;
       back_to(best);
+      end_at(steps_.back(), Until::kInBranch, furthest - ostium_.arc);
+      steps_.back().push += kTemplate.slack;
       const double by = std::min(kTemplate.follow, insertion(kWire) - insertion(kCatheter));
       if (by < kTemplate.pull || !go({.tool = kCatheter, .push = std::floor(by)})) return;
+    }
+  }
+
+  /// The turn and the pull of a hook end where they brought the tip to, not by their length.
+  void end_by_sight(const State& hook) {
+    for (ToolStep& step : steps_) {
+      if (step.turn != 0.0 && std::isfinite(hook.facing)) {
+        const double side = step.turn > 0.0 ? 1.0 : -1.0;
+        const double most = std::min(std::abs(step.turn) + kTemplate.turn_slack,
+                                     std::max(std::abs(step.turn), study_.tool_rules.most_turn));
+        step.turn = side * most;
+        end_at(step, Until::kFacing, hook.facing);
+      }
+      if (step.tool == kBothTools && std::isfinite(hook.level)) {
+        step.push -= kTemplate.slack;
+        end_at(step, Until::kLevel, hook.level);
+      }
     }
   }
 
@@ -327,70 +441,10 @@ class ToolSearch {
   StartFindings findings_;
 };
 
-bool alike(const FoundScript& a, const FoundScript& b, double turn, double depth) {
-  return std::abs(a.turned - b.turned) < turn && std::abs(a.depth - b.depth) < depth;
-}
-
-/// Those that differ in turn or depth, first those with most others round them: a hand and a
-/// patient that are not quite as assumed end there. Then the fewest steps and the least force
-/// first.
-std::vector<FoundScript> choose_different(std::vector<FoundScript> from) {
-  constexpr double kNearTurn = 45.0 * kRadPerDeg, kNearDepth = 9.0;    // [rad], [mm]
-  constexpr double kOtherTurn = 20.0 * kRadPerDeg, kOtherDepth = 3.0;  // [rad], [mm]
-  std::vector<int> neighbours;
-  for (const FoundScript& script : from) {
-    neighbours.push_back(
-        static_cast<int>(std::count_if(from.begin(), from.end(), [&](const FoundScript& other) {
-          return alike(script, other, kNearTurn, kNearDepth);
-        })));
-  }
-  std::vector<std::size_t> order(from.size());
-  std::iota(order.begin(), order.end(), 0U);
-  std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
-    return std::tuple(-neighbours[a], from[a].steps.size(), from[a].peak_force) <
-           std::tuple(-neighbours[b], from[b].steps.size(), from[b].peak_force);
-  });
-  std::vector<FoundScript> kept;
-  for (const std::size_t k : order) {
-    const bool same = std::any_of(kept.begin(), kept.end(), [&](const FoundScript& other) {
-      return alike(from[k], other, kOtherTurn, kOtherDepth);
-    });
-    if (!same && kept.size() < kTemplate.kept) kept.push_back(from[k]);
-  }
-  return kept;
-}
-
 }  // namespace
 
-std::optional<Ostium> find_ostium(const Study& study) {
-  if (!study.goal.way) return {};
-  const simulate::Way& way = *study.goal.way;
-  const Centerline& path = way.path();
-  const double end = path.arc_length[path.arc_length.size() - 1];
-  std::optional<Ostium> last;
-  for (const Junction& junction : find_junctions(way)) {
-    if (!junction.taken || junction.arc >= end) continue;
-    Eigen::Index before = 0;
-    while (before + 1 < path.arc_length.size() && path.arc_length[before + 1] < junction.arc) {
-      ++before;
-    }
-    // The spheres shrink toward the ostium already.
-    double radius = path.radius[before];
-    for (Eigen::Index k = before; k >= 0 && path.arc_length[before] - path.arc_length[k] < 15.0;
-         --k) {
-      radius = std::max(radius, path.radius[k]);
-    }
-    last = Ostium{.arc = junction.arc,
-                  .point = junction.point,
-                  .branch = junction.branch_direction,
-                  .trunk_diameter = 2.0 * radius,
-                  .end = end};
-  }
-  return last;
-}
-
 std::vector<ToolPair> pairs_of(const Study& study) {
-  const std::optional<Ostium> ostium = find_ostium(study);
+  const std::optional<Ostium> ostium = find_ostium(study.goal);
   if (!ostium) {
     std::vector<ToolPair> pairs = list_pairs(study.catheters, study.wires, {}, study.tool_rules);
     for (ToolPair& pair : pairs) pair.unfit = "the way takes no branch that a catheter could hook";
@@ -418,7 +472,7 @@ Study tool_scout_study(const Study& study) {
 ToolScripts find_tool_scripts(const Study& study, const simulate::VesselModel& vessel,
                               const BatchOptions& options) {
   ToolScripts all;
-  const std::optional<Ostium> ostium = find_ostium(study);
+  const std::optional<Ostium> ostium = find_ostium(study.goal);
   std::vector<ToolStart> starts;
   std::vector<std::size_t> owners;
   for (const ToolPair& pair : pairs_of(study)) {
@@ -451,7 +505,7 @@ ToolScripts find_tool_scripts(const Study& study, const simulate::VesselModel& v
       if (owners[k] != p) continue;
       StartFindings& own = findings[k];
       all.branches += own.branches;
-      pair.found += static_cast<int>(own.found.size());
+      pair.found += own.count;
       if (own.nearest_hook >= 0.0 &&
           (pair.nearest_hook < 0.0 || own.nearest_hook < pair.nearest_hook)) {
         pair.nearest_hook = own.nearest_hook;
@@ -463,13 +517,20 @@ ToolScripts find_tool_scripts(const Study& study, const simulate::VesselModel& v
       }
       found.insert(found.end(), own.found.begin(), own.found.end());
     }
-    std::vector<FoundScript> kept = choose_different(std::move(found));
+    std::vector<FoundScript> kept = choose_different(found, kTemplate.kept);
     if (pair.found > 0) pair.stopped.clear();
+    if (!kept.empty()) pair.held = kept.front().share;
     if (kept.empty() && !closest.empty()) kept.push_back({.steps = closest});
     for (FoundScript& script : kept) {
       Candidate candidate = first_candidate(study, pair.pair);
       candidate.steps = as_written(std::move(script.steps));
-      all.found.push_back(std::move(candidate));
+      all.found.push_back(candidate);
+      all.spares.emplace_back();
+      if (script.share < kTemplate.steady) continue;
+      for (ToolScript& spare : script.spares) {
+        candidate.steps = as_written(std::move(spare));
+        all.spares.back().push_back(candidate);
+      }
     }
   }
   return all;

@@ -6,16 +6,12 @@
 ///   3. the catheter is turned, and both are pulled down or pushed up, until its tip is in the
 ///   ostium;
 ///   4. the wire goes out into the branch, and where it comes no further, the catheter follows it.
-#include <optional>
 #include <string>
 #include <vector>
 
 #include "plan/batch.h"
 
 namespace wireplan::plan {
-
-/// The last vessel that the study's way takes from a wider one; none where it takes none.
-std::optional<Ostium> find_ostium(const Study& study);
 
 /// Whether there is anything to search: pairs that fit, and an ostium.
 std::vector<ToolPair> pairs_of(const Study& study);
@@ -27,16 +23,19 @@ Candidate first_candidate(const Study& study, const ToolPair& pair);
 struct PairFindings {
   ToolPair pair;
   int found = 0;               // scripts that reached in the search
+  double held = 0.0;           // of the best one and its neighbours, the part that reached
   double nearest_hook = -1.0;  // of the catheter's tip to the ostium at best; -1: not tried    [mm]
   double furthest = 0.0;       // of a tip along the way                                      [mm]
   std::string stopped;         // what stopped the best script, where none reached; else empty
 };
 
 struct ToolScripts {
-  std::vector<Candidate> found;     // best first within a pair; of a pair without one the script
-                                    // that came furthest
-  std::vector<PairFindings> pairs;  // of all pairs, in the order of list_pairs()
-  long branches = 0;                // states that were gone on from
+  std::vector<Candidate> found;  // best first within a pair; of a pair without one the script
+                                 // that came furthest
+  std::vector<std::vector<Candidate>> spares;  // of each what differs a little and reached too, to
+                                               // stand in for it; only where most of it did
+  std::vector<PairFindings> pairs;             // of all pairs, in the order of list_pairs()
+  long branches = 0;                           // states that were gone on from
 };
 
 /// The study as scripts are tried in it: on a rigid wall, with long elements and loose residuals.
@@ -44,8 +43,11 @@ Study tool_scout_study(const Study& study);
 
 /// Tries the template for each pair that fits, in parallel, at a few depths of the catheter and
 /// withdrawals of the wire; at all turns by 30 degrees; pulled or pushed by 2 mm. States whose tip
-/// lies best at the ostium are gone on from. Keeps up to three scripts of a pair, which differ in
-/// turn, or in depth. The same at any thread count.
+/// lies best at the ostium are gone on from. A found script turns and pulls until the tip looks and
+/// lies as it did then, and leads the wire out as far into the branch: what a hand sees, which
+/// holds where friction and stiffness are others. Keeps up to six scripts of a pair, which differ
+/// in turn, or in depth, first those of whose neighbours (tool_neighbours.h) most reach too. The
+/// same at any thread count.
 ToolScripts find_tool_scripts(const Study& study, const simulate::VesselModel& vessel,
                               const BatchOptions& options);
 

@@ -420,6 +420,7 @@ Case read_case(const std::filesystem::path& path, const std::vector<std::string>
   input.told = std::move(wires.told);
   input.devices = std::move(wires.devices);
   for (const DeviceWire& device : input.devices) input.study.wires.push_back(device.wire);
+  input.suggest_catheters = root.has("catheters") && root.raw("catheters") == kSuggestCatheters;
   input.catheters = read_case_catheters(root, input.devices);
   if (input.catheters.empty()) {
     if (root.has("tool_rules")) {
@@ -511,10 +512,8 @@ Json case_parameters(const Case& input) {
   json["wires"] = Json::array();
   for (const DeviceWire& device : input.devices) json["wires"].push_back(device.json);
   if (!input.catheters.empty()) {
-    json["catheters"] = Json::array();
-    for (const Catheter& catheter : input.catheters) {
-      json["catheters"].push_back(catheter.json);
-    }
+    json["catheters"] =
+        input.suggest_catheters ? Json(kSuggestCatheters) : catheters_json_of(input.catheters);
     json["tool_rules"] = tool_rules_json(study.tool_rules);
   }
   json["tip_roll_deg"] = degrees_json(study.rolls);

@@ -66,6 +66,7 @@ struct Case {
   plan::Study study;
   std::vector<DeviceWire> devices;  // of the study's wires, in their order
   std::vector<Catheter> catheters;  // of the study's, in their order
+  bool suggest_catheters = false;   // these are the catalogue's, to choose from by the anatomy
   /// Of every wire, where the case gives them in the place of the wires' own.
   std::optional<plan::FactorSpread> friction_spread, stiffness_spread;
   Manoeuvring manoeuvres = Manoeuvring::kWhenNeeded;

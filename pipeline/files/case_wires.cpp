@@ -37,6 +37,14 @@ DeviceWire named_wire(const std::string& name, const std::string& key, const Cat
   return none;
 }
 
+/// Of the catalogue, as a case takes it.
+Catheter case_catheter(const Catalogue& known, std::size_t place) {
+  Catheter catheter = known.catheters[place];
+  catheter.json = known.file.at("catheters").at(place);
+  for (const char* told : {"title", "shape"}) catheter.json.erase(told);
+  return catheter;
+}
+
 }  // namespace
 
 CaseWires read_wires(JsonReader& root) {
@@ -71,14 +79,19 @@ std::vector<Catheter> read_case_catheters(JsonReader& root, const std::vector<De
   std::vector<Catheter> read;
   if (!root.has("catheters")) return read;
   const Json& list = root.raw("catheters");
-  if (!list.is_array() || list.empty()) {
-    problems.add("catheters", list.dump(), "a list of catalogue names and catheters, at least one",
-                 "`wireplan devices` lists the catalogue; without the key wires go in alone");
-    return read;
-  }
   const Catalogue& known = catalogue();
   std::vector<std::string> names;
   for (const Catheter& entry : known.catheters) names.push_back(entry.tube.name);
+  if (list == kSuggestCatheters) {
+    for (std::size_t k = 0; k < names.size(); ++k) read.push_back(case_catheter(known, k));
+    return read;
+  }
+  if (!list.is_array() || list.empty()) {
+    problems.add("catheters", list.dump(),
+                 "a list of catalogue names and catheters, at least one, or \"suggest\"",
+                 "`wireplan devices` lists the catalogue; without the key wires go in alone");
+    return read;
+  }
   std::set<std::string> used;
   for (const DeviceWire& wire : wires) used.insert(wire.wire.name);
   for (std::size_t i = 0; i < list.size(); ++i) {
@@ -96,10 +109,7 @@ std::vector<Catheter> read_case_catheters(JsonReader& root, const std::vector<De
                          : "did you mean \"" + nearest + "\"?");
         continue;
       }
-      const auto place = static_cast<std::size_t>(found - names.begin());
-      read.push_back(known.catheters[place]);
-      read.back().json = known.file.at("catheters").at(place);
-      for (const char* told : {"title", "shape"}) read.back().json.erase(told);
+      read.push_back(case_catheter(known, static_cast<std::size_t>(found - names.begin())));
     } else {
       JsonReader reader(list[i], key, problems);
       read.push_back(read_catheter(reader, known.coatings, /*own=*/true));
@@ -112,6 +122,12 @@ std::vector<Catheter> read_case_catheters(JsonReader& root, const std::vector<De
     }
   }
   return read;
+}
+
+Json catheters_json_of(const std::vector<Catheter>& catheters) {
+  Json json = Json::array();
+  for (const Catheter& catheter : catheters) json.push_back(catheter.json);
+  return json;
 }
 
 std::vector<plan::Catheter> catheters_of(const std::vector<Catheter>& catheters,
@@ -141,6 +157,9 @@ plan::ToolRules read_tool_rules(JsonReader& root) {
   rules.most_turn =
       reader.number("most_turn_deg", rules.most_turn / kRadPerDeg, {.min = 0.0, .max = 360.0}) *
       kRadPerDeg;
+  rules.turn_per_length = reader.number("turn_deg_per_mm", rules.turn_per_length / kRadPerDeg,
+                                        {.min = 0.0, .max = 3600.0, .open_min = true}) *
+                          kRadPerDeg;
   rules.friction = reader.number("friction_between_tools", rules.friction, kFrictionRange);
   reader.finish();
   return rules;
@@ -151,6 +170,7 @@ Json tool_rules_json(const plan::ToolRules& rules) {
           {"hold_mm", rules.hold},
           {"outside_mm", rules.outside},
           {"most_turn_deg", clean(rules.most_turn / kRadPerDeg)},
+          {"turn_deg_per_mm", clean(rules.turn_per_length / kRadPerDeg)},
           {"friction_between_tools", rules.friction}};
 }
 

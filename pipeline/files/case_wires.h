@@ -23,9 +23,14 @@ struct CaseWires {
 /// Reads "wires". A wire without sections where a name is not known.
 CaseWires read_wires(JsonReader& root);
 
+/// In the place of the list: catheters of the catalogue are chosen by the anatomy.
+inline constexpr const char* kSuggestCatheters = "suggest";
+
 /// Reads "catheters", beside the wires, which the names must differ from; none where the case has
-/// no such key.
+/// no such key, all of the catalogue where it asks for suggestions.
 std::vector<Catheter> read_case_catheters(JsonReader& root, const std::vector<DeviceWire>& wires);
+
+Json catheters_json_of(const std::vector<Catheter>& catheters);
 
 /// As trials take them, their values as far off as the case says of all wires, or as their own
 /// tell.

@@ -156,6 +156,17 @@ std::vector<simulate::ToolTrack> tracks_from_json(const Json& list) {
 }
 
 constexpr std::array kToolNames = {"both", "catheter", "wire"};  // of ToolStep::tool, from -1
+constexpr std::array kUntilNames = {"level_mm", "in_branch_mm", "facing_deg"};  // from kLevel on
+
+const char* until_name(simulate::Until until) {
+  return kUntilNames.at(static_cast<std::size_t>(until) - 1);
+}
+
+simulate::Until until_of(const std::string& name) {
+  const auto found = std::find(kUntilNames.begin(), kUntilNames.end(), name);
+  expects(found != kUntilNames.end());
+  return static_cast<simulate::Until>(found - kUntilNames.begin() + 1);
+}
 
 // One key of the root per line: compact, and still to be read and compared by eye.
 std::string to_lines(const Json& object) {
@@ -301,6 +312,10 @@ Json steps_json(const std::vector<simulate::ToolStep>& steps) {
     } else {
       row["push_mm"] = clean(step.push);
     }
+    if (step.until != simulate::Until::kMade) {
+      const bool angle = step.until == simulate::Until::kFacing;
+      row["until"] = {{until_name(step.until), clean(angle ? step.at / kRadPerDeg : step.at)}};
+    }
     list.push_back(std::move(row));
   }
   return list;
@@ -314,7 +329,15 @@ std::vector<simulate::ToolStep> steps_of(const Json& list) {
     expects(found != kToolNames.end());
     steps.push_back({.tool = static_cast<int>(found - kToolNames.begin()) - 1,
                      .push = row.value("push_mm", 0.0),
-                     .turn = row.value("turn_deg", 0.0) * kRadPerDeg});
+                     .turn = row.value("turn_deg", 0.0) * kRadPerDeg,
+                     .until = {},
+                     .at = 0.0});
+    if (!row.contains("until")) continue;
+    simulate::ToolStep& step = steps.back();
+    const Json::const_iterator until = row.at("until").begin();
+    step.until = until_of(until.key());
+    step.at =
+        number_of(until.value()) * (step.until == simulate::Until::kFacing ? kRadPerDeg : 1.0);
   }
   return steps;
 }

@@ -35,7 +35,7 @@ Json tools_json(const plan::Study& study, const plan::Measured& trial) {
     list.push_back(std::move(own));
   }
   Json json = {{"each", std::move(list)}};
-  const std::optional<plan::Ostium> ostium = plan::find_ostium(study);
+  const std::optional<plan::Ostium> ostium = plan::find_ostium(study.goal);
   if (ostium && trial.tools.size() == 2) {
     const plan::ToolMetrics &catheter = trial.tools[0], &wire = trial.tools[1];
     json["hook_depth_mm"] = clean(std::max(0.0, catheter.progress - ostium->arc));
@@ -47,7 +47,7 @@ Json tools_json(const plan::Study& study, const plan::Measured& trial) {
 Json catheters_json(const plan::Study& study, const plan::Plan& plan) {
   Json json = {{"rules", tool_rules_json(study.tool_rules)}};
   for (const plan::Junction& junction : plan::find_junctions(*study.goal.way)) {
-    const std::optional<plan::Ostium> ostium = plan::find_ostium(study);
+    const std::optional<plan::Ostium> ostium = plan::find_ostium(study.goal);
     if (!ostium || !junction.taken || junction.arc != ostium->arc) continue;
     const plan::View view =
         plan::find_projections(junction.trunk_direction, junction.branch_direction).best.view;
@@ -57,6 +57,10 @@ Json catheters_json(const plan::Study& study, const plan::Plan& plan) {
                       {"view",
                        {{"lao_deg", clean(view.rotation / kRadPerDeg)},
                         {"cranial_deg", clean(view.tilt / kRadPerDeg)}}}};
+  }
+  for (std::size_t k = 0; k < study.suggested.size(); ++k) {
+    json["suggested"].push_back(
+        {{"catheter", study.catheters[k].tool.wire.name}, {"reason", study.suggested[k]}});
   }
   json["pairs"] = Json::array();
   for (const plan::PairFindings& pair : plan.scripts.pairs) {
@@ -69,6 +73,7 @@ Json catheters_json(const plan::Study& study, const plan::Plan& plan) {
                            : tried        ? pair.stopped
                                           : "a wire alone works, or no scripts were asked for"},
                 {"scripts_found", pair.found}};
+    if (pair.found > 0) row["neighbours_reach"] = pair.held;
     if (tried) {
       if (pair.nearest_hook >= 0.0) row["nearest_hook_mm"] = clean(pair.nearest_hook);
       row["furthest_mm"] = clean(pair.furthest);

@@ -150,6 +150,11 @@ void make_manoeuvres(Workspace& work, const fs::path& folder) {
   figures["starts"] = scripts.starts_tried;
   figures["branches"] = scripts.branches;
   figures["scripts"] = scripts_json(scripts);
+  if (work.given().suggest_catheters && work.study().catheters.empty()) {
+    figures["warnings"].push_back(
+        "manoeuvres: no catheter of the catalogue is suggested: the way takes no branch from a "
+        "wider vessel, or one that none goes into; name catheters, or leave out the key");
+  }
   if (!work.given().catheters.empty()) {
     figures["pairs"] = pairs_json(scripts);
     figures["warnings"].push_back(

@@ -57,6 +57,7 @@ Json pairs_json(const plan::Scripts& scripts) {
                     {"catheter", pair.pair.catheter},
                     {"unfit", pair.pair.unfit},
                     {"found", pair.found},
+                    {"held", pair.held},
                     {"nearest_hook_mm", clean(pair.nearest_hook)},
                     {"furthest_mm", clean(pair.furthest)},
                     {"stopped", pair.stopped}});
@@ -84,6 +85,7 @@ plan::Scripts read_scripts(const Json& figures, const plan::Study& study) {
                                       .wire = pair.at("wire"),
                                       .unfit = pair.at("unfit")},
                              .found = pair.at("found"),
+                             .held = pair.at("held"),
                              .nearest_hook = pair.at("nearest_hook_mm"),
                              .furthest = pair.at("furthest_mm"),
                              .stopped = pair.at("stopped")});

@@ -267,7 +267,7 @@ std::vector<Stage> stages_of(const Case& given) {
   stages.push_back(trials);
   Stage manoeuvres = trials;
   manoeuvres.name = "manoeuvres";
-  manoeuvres.version = 22;
+  manoeuvres.version = 23;
   manoeuvres.after.push_back("trials");
   read_too(manoeuvres, {"/manoeuvres"});
   const bool tools = !given.catheters.empty();
@@ -315,6 +315,8 @@ Json used_parameters(const Case& given) {
       parameters["labels"]["table"] = name_only(given.labels->table_given);
     }
   }
+  // What is chosen from; a catalogue that has changed is another case.
+  if (given.suggest_catheters) parameters["catheters"] = catheters_json_of(given.catheters);
   if (section_name(given).empty()) return parameters;
   const AccessInput& access = given.accesses[given.access];
   const TargetInput& target = given.targets[given.target];

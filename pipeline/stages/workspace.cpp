@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "pipeline/report/report.h"
+#include "plan/catheter_choice.h"
 #include "preprocess/centerline/centerline.h"
 #include "preprocess/files/vessel_io.h"
 
@@ -246,6 +247,7 @@ const plan::Study& Workspace::study() {
     if (k == served.front()) study.tangent = preprocess::start_tangent(other, kTangentSpan);
   }
   if (study.insertion.length == 0.0) study.insertion.length = choose_insertion(study);
+  if (given_.suggest_catheters) plan::keep_suggested(study);
   study_ = std::move(study);
   return *study_;
 }

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <limits>
 #include <map>
 #include <utility>
 
@@ -22,6 +23,9 @@ constexpr double kDivideLonger = 1.25;     // edges than asked for, ...
 constexpr double kFiner[] = {1.06, 1.13};  // elements, where a move finds no equilibrium; chosen
 constexpr double kLongestEdge = 1.45;      // ... of it: ToolBench::divide()
 constexpr double kDivideShorter = 0.67;    // ... or shorter: the centreline is divided anew
+constexpr double kAtEnd = 0.02;            // of a part: so near, a step is at what ends it; chosen
+constexpr double kShortestToEnd = 0.1;     // of a part, near what ends it; chosen
+constexpr double kLooksAside = 0.1;        // sine, of a tip against the trunk: less looks nowhere
 
 std::string in_mm(double value) {
   char text[32];
@@ -97,23 +101,63 @@ Vec3 ToolTrial::tip_direction(int tool) const {
   return (nodes.col(last) - nodes.col(std::max<Eigen::Index>(0, last - 2))).normalized();
 }
 
+double ToolTrial::measure(Until until, int tool) const {
+  const double unknown = std::numeric_limits<double>::quiet_NaN();
+  if (!options_.take_off || !goal_.way) return unknown;
+  const TakeOff& branch = *options_.take_off;
+  const int watched = tool == kBothTools ? 0 : tool;
+  if (until == Until::kInBranch) {
+    return preprocess::find_progress(tip(watched), goal_.way->path()) - branch.arc;
+  }
+  if (until == Until::kLevel) return (tip(watched) - branch.point).dot(branch.trunk);
+  const Vec3 looks = tip_direction(watched);
+  const Vec3 side = looks - looks.dot(branch.trunk) * branch.trunk;
+  const Vec3 to = branch.branch - branch.branch.dot(branch.trunk) * branch.trunk;
+  if (until == Until::kMade || side.norm() < kLooksAside || to.norm() < kLooksAside) return unknown;
+  return std::atan2(branch.trunk.dot(to.cross(side)), to.dot(side));
+}
+
+/// How much of the step is left until what ends it [mm of push, rad of turn]; at most 0 where that
+/// has come. Empty where nothing ends it.
+std::optional<double> ToolTrial::missing(const ToolStep& step) const {
+  const double now = step.until == Until::kMade ? NAN : measure(step.until, step.tool);
+  if (!std::isfinite(now)) return {};
+  if (step.until == Until::kInBranch) return step.at - now;
+  if (step.until == Until::kLevel) return step.push > 0.0 ? step.at - now : now - step.at;
+  // The tip has passed what ends it by a quarter turn at most; beyond that it has yet to come.
+  double left = std::remainder(step.at - now, 2.0 * kPi);
+  if (step.turn < 0.0) left = -left;
+  return left < -0.5 * kPi ? left + 2.0 * kPi : left;
+}
+
 bool ToolTrial::make(const ToolStep& step, bool last) {
   expects(step.tool >= kBothTools && step.tool < static_cast<int>(record_.tools.size()));
   const double whole = std::abs(step.push) + std::abs(step.turn) / kToolTurnStep;
   const double most = step.turn == 0.0 ? kStepsPerPart * options_.insertion.step : 1.0;
+  const double unit = step.turn == 0.0 ? 1.0 : kToolTurnStep;
   furthest_ = since_furthest_ = 0.0;
   ++step_;
   for (double done = 0.0; whole - done > 1e-9 && !ended();) {
     double by = std::min(most, whole - done);
+    if (const std::optional<double> left = missing(step)) {
+      if (*left / unit < kAtEnd * most) break;
+      by = std::min(by, std::max(kShortestToEnd * most, *left / unit));
+    }
     if (last && step.push > 0.0) {
       by = std::min(by, options_.insertion.length - foremost_of(step.tool));
       if (by < 1e-9) break;
     }
-    if (!part({step.tool, by / whole * step.push, by / whole * step.turn})) break;
+    if (!part({.tool = step.tool, .push = by / whole * step.push, .turn = by / whole * step.turn}))
+      break;
     done += by;
     // Within another tool it brings no tip on.
     const bool leads = foremost_of(step.tool) > foremost() - 1e-9;
     if (last && step.push > 0.0 && leads && !check_advance(by)) break;
+  }
+  // The end of each step is looked at.
+  if (!ended() && options_.insertion.map_forces && since_shape_ > 0.0) {
+    since_shape_ = 0.0;
+    record_.shapes.push_back(shape_here());
   }
   return !ended();
 }

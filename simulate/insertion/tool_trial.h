@@ -18,12 +18,33 @@ namespace wireplan::simulate {
 
 inline constexpr int kBothTools = -1;
 
+/// Where the way takes a branch: what the hand watches on the screen.
+struct TakeOff {
+  double arc = 0.0;             // of the ostium, along the way                            [mm]
+  Vec3 point = Vec3::Zero();    // there                                                   [mm]
+  Vec3 trunk = Vec3::UnitZ();   // unit, where the trunk goes on
+  Vec3 branch = Vec3::UnitX();  // unit, where the branch goes
+};
+
+/// What ends a step before the whole of it is made, of the tip of its tool, of several together of
+/// the outermost.
+enum class Until {
+  kMade,      // nothing
+  kLevel,     // the tip comes to be `at` mm beyond the ostium along the trunk, from either side
+  kInBranch,  // the tip is `at` mm past the ostium along the way, in the branch
+  kFacing,    // the tip, seen against the trunk, comes to look `at` rad from the branch, turned
+              // right-handed about the trunk
+};
+
 /// One step of the hand on one tool, or on all together, which is pushed (pulled where negative) or
 /// turned.
 struct ToolStep {
   int tool = 0;       // from the outside in: 0 the catheter, 1 the wire; or kBothTools
   double push = 0.0;  //                                                                  [mm]
   double turn = 0.0;  // of its hub, right-handed about the introducer's direction       [rad]
+  Until until = Until::kMade;
+  double at = 0.0;  // see Until                                                     [mm, rad]
+  bool operator==(const ToolStep&) const = default;
 };
 
 /// What is fixed of a trial of tools.
@@ -32,6 +53,7 @@ struct ToolTrialOptions {
   /// Elements, steps, tolerance, friction of the wall. `length` bounds the foremost tip in the last
   /// step of a script alone, since a wire may be further in before.
   InsertionOptions insertion;
+  std::optional<TakeOff> take_off;  // that steps may end at; without one they are made whole
 };
 
 class ToolTrial {
@@ -41,9 +63,9 @@ class ToolTrial {
   ToolTrial(const std::vector<Tool>& tools, const Introducer& introducer, const Goal& goal,
             const VesselModel& vessel, const ToolTrialOptions& options);
 
-  /// Makes a step, in parts of two of the options' steps or 15 degrees, as far as the tool has
-  /// length and the trial has not ended. The `last` one ends too where the tip of a tool that
-  /// leads comes no further. False where the trial has ended.
+  /// Makes a step, in parts of two of the options' steps or 15 degrees (less near what ends it), as
+  /// far as the tool has length and the trial has not ended. The `last` one ends too where the tip
+  /// of a tool that leads comes no further. False where the trial has ended.
   bool make(const ToolStep& step, bool last = false);
 
   bool ended() const { return outcome_.has_value(); }
@@ -53,6 +75,9 @@ class ToolTrial {
   double insertion(int tool) const;
   Vec3 tip(int tool) const;
   Vec3 tip_direction(int tool) const;  // unit, onward
+  /// What `until` measures of the tip: less in magnitude than `at` comes first. NaN where it cannot
+  /// be told, as without a take-off.
+  double measure(Until until, int tool) const;
   const std::vector<Push>& pushes() const { return record_.pushes; }
 
   /// Ends the trial, unless it has ended: as reached if the tip is in the goal, else as missed.
@@ -70,6 +95,7 @@ class ToolTrial {
 
  private:
   bool part(const ToolStep& step);
+  std::optional<double> missing(const ToolStep& step) const;
   bool divide_for(const ToolMove& move);
   bool move_or_divide(const ToolMove& move);
   void note(const ToolStep& step);

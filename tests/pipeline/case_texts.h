@@ -197,11 +197,9 @@ inline Json full_case(Json json) {
                           {"friction", 0.1}};
   json["catheters"][0]["sections"][0] = {{"length_mm", 600}, {"bending_stiffness_n_mm2", 99}};
   json["catheters"][1] = "cobra-c2";
-  json["tool_rules"] = {{"soft_tip_n_mm2", 90},
-                        {"hold_mm", 80},
-                        {"outside_mm", 40},
-                        {"most_turn_deg", 170},
-                        {"friction_between_tools", 0.1}};
+  json["tool_rules"] = {{"soft_tip_n_mm2", 90},  {"hold_mm", 80},
+                        {"outside_mm", 40},      {"most_turn_deg", 170},
+                        {"turn_deg_per_mm", 60}, {"friction_between_tools", 0.1}};
   json["tip_roll_deg"] = {0, 180};
   json["friction"] = 0.12;
   json["friction_factor"] = 0.9;

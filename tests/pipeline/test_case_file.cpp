@@ -16,6 +16,7 @@
 #include "pipeline/files/case_file.h"
 #include "pipeline/files/catalogue.h"
 #include "pipeline/files/scene_file.h"
+#include "pipeline/stages/stages.h"
 #include "preprocess/volume/image.h"
 #include "tests/pipeline/case_texts.h"
 #include "tests/pipeline/small_case.h"
@@ -87,6 +88,18 @@ TEST_F(CaseFile, ParametersReadBackAsTheSameCase) {
     const Json parameters = case_parameters(read(json));
     EXPECT_EQ(parameters, case_parameters(read(parameters)));
   }
+}
+
+TEST_F(CaseFile, LeavesTheChoiceOfCathetersToTheAnatomy) {
+  Json json = full_case(volume_case());
+  json["catheters"] = "suggest";
+  const Case given = read(json);
+  EXPECT_TRUE(given.suggest_catheters);
+  EXPECT_EQ(given.study.catheters.size(), catalogue().catheters.size());
+  EXPECT_EQ(case_parameters(given).at("catheters"), "suggest");
+  EXPECT_EQ(case_parameters(read(case_parameters(given))), case_parameters(given));
+  EXPECT_TRUE(used_parameters(given).at("catheters").is_array()) << "keys have what is chosen from";
+  EXPECT_FALSE(read(full_case(volume_case())).suggest_catheters);
 }
 
 TEST_F(CaseFile, TakesListsOfNamedAccessesAndTargets) {
@@ -172,6 +185,7 @@ TEST_F(CaseFile, NamesEachMistakeWithItsRemedy) {
       {"wires=[3]", {"wires[0] is 3, expected an object"}},
       {"catheters=[\"cobra-c4\"]", {"catheters[0] is \"cobra-c4\"", "did you mean \"cobra-c"}},
       {"catheters=[]", {"catheters is []", "at least one", "wireplan devices"}},
+      {"catheters=\"sugest\"", {"catheters is \"sugest\"", "or \"suggest\""}},
       {"catheters=[\"sos\", \"sos\"]", {"catheters[1] is \"sos\" again"}},
       {"tool_rules={\"hold_mm\": 5}", {"tool_rules is given", "only beside \"catheters\""}},
       {"access.point_mm=[1, 2]", {"access.point_mm is [1,2]", "three numbers [x, y, z]"}},

@@ -28,6 +28,8 @@ inline std::string text_of(const Run& run) {
     text += " tool " + std::to_string(step.tool);
     add(step.push);
     add(step.turn);
+    text += " until " + std::to_string(static_cast<int>(step.until));
+    add(step.at);
   }
   if (run.elements) {
     text += " elements";

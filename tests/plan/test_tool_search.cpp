@@ -7,7 +7,9 @@
 #include <string>
 #include <vector>
 
+#include "plan/catheter_choice.h"
 #include "plan/judge.h"
+#include "plan/tool_neighbours.h"
 #include "plan/tool_search.h"
 #include "tests/plan/memory_log.h"
 #include "tests/shapes.h"
@@ -17,6 +19,7 @@ namespace {
 
 using simulate::kBothTools;
 using simulate::ToolStep;
+using simulate::Until;
 
 Catheter catheter_of(double length, double inner, double curve_radius = 10.0) {
   Catheter catheter;
@@ -41,7 +44,7 @@ simulate::Wire wire_of(double length, double radius) {
           .friction = 0.04};
 }
 
-const Ostium kOstium{.arc = 300.0, .trunk_diameter = 20.0, .end = 340.0};
+const Ostium kOstium{{.arc = 300.0}, 20.0, 5.0, 340.0};
 
 std::string unfit(const Catheter& catheter, const simulate::Wire& wire) {
   return list_pairs({catheter}, {wire}, kOstium, {}).at(0).unfit;
@@ -107,6 +110,92 @@ TEST(ToolRules, NameTheStepThatBreaksThem) {
       "");
 }
 
+TEST(ToolRules, BoundTheTurnByTheWayThatFollows) {
+  const Catheter soft = catheter_of(650.0, 1.0);
+  const simulate::Wire wire = wire_of(1200.0, 0.44);
+  std::vector<ToolStep> steps = {{.tool = 1, .push = 200.0},         {.tool = 0, .push = 100.0},
+                                 {.tool = 0, .turn = kPi},           {.tool = 1, .push = -50.0},
+                                 {.tool = kBothTools, .push = -1.5}, {.tool = 1, .push = 100.0}};
+  EXPECT_EQ(find_broken_rule(steps, soft, wire, {}),
+            "step 5: the catheter was turned by 180 degrees, and is moved by 1.5 mm alone; 90 "
+            "degrees per mm are the most");
+  steps[4].push = -2.0;
+  EXPECT_EQ(find_broken_rule(steps, soft, wire, {}), "");
+  EXPECT_NE(find_broken_rule(steps, soft, wire, {.turn_per_length = 80.0 * kRadPerDeg}), "");
+}
+
+/// Sections from the tip on: a straight length, then curves of so many degrees at a radius; a
+/// radius below 0 curves the other way.
+Catheter shaped(double straight, const std::vector<std::pair<double, double>>& curves) {
+  Catheter catheter;
+  catheter.tool.wire.name = "shaped";
+  catheter.tool.wire.radius = 0.83;
+  auto& sections = catheter.tool.wire.sections;
+  sections.push_back({.length = straight, .bending_stiffness = 99.0});
+  for (const auto& [angle, radius] : curves) {
+    sections.push_back({.length = angle * kRadPerDeg * std::abs(radius),
+                        .bending_stiffness = 99.0,
+                        .rest_curvature = 1.0 / radius});
+  }
+  sections.push_back({.length = 600.0, .bending_stiffness = 332.0});
+  return catheter;
+}
+
+Ostium turning_by(double angle, double trunk, double branch) {
+  Ostium ostium = kOstium;
+  ostium.trunk = Vec3::UnitZ();
+  ostium.branch = Vec3(std::sin(angle * kRadPerDeg), 0.0, std::cos(angle * kRadPerDeg));
+  ostium.trunk_diameter = trunk;
+  ostium.branch_diameter = branch;
+  return ostium;
+}
+
+TEST(CatheterShapes, AreThoseOfCirclesAndLines) {
+  const CurveShape quarter = find_shape(shaped(8.0, {{90.0, 10.0}}).tool.wire);
+  EXPECT_NEAR(quarter.turn, 0.5 * kPi, 1e-9);
+  EXPECT_NEAR(quarter.reach, 10.0 + 8.0, 0.01) << "radius, and the straight tip across";
+  EXPECT_EQ(quarter.kind, CurveKind::kHooked);
+  const CurveShape half = find_shape(shaped(8.0, {{180.0, 10.0}}).tool.wire);
+  EXPECT_NEAR(half.reach, 20.0, 0.01);
+  EXPECT_EQ(half.kind, CurveKind::kReversed);
+  const CurveShape cobra = find_shape(shaped(8.0, {{90.0, 10.0}, {60.0, -30.0}}).tool.wire);
+  EXPECT_EQ(cobra.kind, CurveKind::kHooked);
+  EXPECT_EQ(find_shape(shaped(8.0, {}).tool.wire).kind, CurveKind::kStraight);
+  EXPECT_EQ(find_shape(shaped(0.0, {{330.0, 7.0}}).tool.wire).kind, CurveKind::kRing);
+  EXPECT_EQ(find_shape(shaped(8.0, {{45.0, 10.0}}).tool.wire).kind, CurveKind::kSimple);
+}
+
+TEST(CatheterChoice, FollowsTheTakeOffAndTheTrunk) {
+  const std::vector<Catheter> known = {shaped(8.0, {{45.0, 10.0}}),                 // vertebral
+                                       shaped(8.0, {{90.0, 8.0}, {60.0, -25.0}}),   // small Cobra
+                                       shaped(8.0, {{90.0, 12.0}, {60.0, -30.0}}),  // large Cobra
+                                       shaped(8.0, {{60.0, 8.0}, {170.0, 12.0}}),   // Simmons
+                                       shaped(0.0, {{330.0, 7.0}})};                // pigtail
+  const auto chosen = [&](double angle, double trunk, double branch) {
+    std::vector<int> list;
+    for (const Suggestion& s : suggest_catheters(known, turning_by(angle, trunk, branch))) {
+      list.push_back(s.catheter);
+    }
+    return list;
+  };
+  EXPECT_EQ(chosen(150.0, 22.0, 5.0), (std::vector<int>{3})) << "30 degrees down: reversed";
+  EXPECT_EQ(chosen(90.0, 40.0, 5.0), (std::vector<int>{2, 1})) << "Cobras, the wider one first";
+  EXPECT_EQ(chosen(90.0, 8.0, 5.0), (std::vector<int>{1, 2}));
+  EXPECT_EQ(chosen(30.0, 22.0, 5.0), (std::vector<int>{0}));
+  EXPECT_TRUE(chosen(90.0, 22.0, 1.6).empty()) << "thicker than the branch";
+  const std::vector<Suggestion> simmons = suggest_catheters(known, turning_by(150.0, 22.0, 5.0));
+  EXPECT_EQ(simmons.at(0).reason.find("the branch turns by 150 degrees from its trunk, which asks "
+                                      "for a reversed curve; this one is "),
+            0U)
+      << simmons.at(0).reason;
+  const std::vector<Suggestion> next =
+      suggest_catheters({known[0], known[1]}, turning_by(150.0, 22.0, 5.0));
+  ASSERT_EQ(next.size(), 1U);
+  EXPECT_EQ(next[0].catheter, 1);
+  EXPECT_NE(next[0].reason.find("of which none is there; a hooked curve comes next"),
+            std::string::npos);
+}
+
 TEST(ToolSteps, ReadAsTheHandMakesThem) {
   const std::vector<std::string> told = describe_steps({{.tool = 1, .push = 216.0},
                                                         {.tool = 0, .push = 212.0},
@@ -123,6 +212,65 @@ TEST(ToolSteps, ReadAsTheHandMakesThem) {
       "pull back catheter and wire together by 8 mm",
       "advance the wire until its tip is at the target, 247 mm in"};
   EXPECT_EQ(told, expected);
+}
+
+TEST(ToolSteps, SayWhatEndsThem) {
+  const std::vector<std::string> told =
+      describe_steps({{.tool = 1, .push = 216.0},
+                      {.tool = 0, .push = 212.0},
+                      {.tool = 0, .turn = -kPi / 2.0, .until = Until::kFacing, .at = kPi / 6.0},
+                      {.tool = kBothTools, .push = -40.0, .until = Until::kLevel, .at = -6.0},
+                      {.tool = kBothTools, .push = -9.0, .until = Until::kInBranch, .at = 0.0},
+                      {.tool = 1, .push = 60.0, .until = Until::kInBranch, .at = 18.0},
+                      {.tool = 0, .push = 12.0},
+                      {.tool = 1, .push = 90.0}},
+                     247.4);
+  const std::vector<std::string> expected = {
+      "advance the wire to 220 mm",
+      "advance the catheter over the wire to 212 mm",
+      "turn the catheter counterclockwise until its tip looks 30 degrees clockwise of the branch, "
+      "by 90 degrees at most",
+      "pull back catheter and wire together until the catheter's tip is 6 mm short of the level of "
+      "the ostium, by 40 mm at most",
+      "pull back catheter and wire together until the catheter's tip falls into the ostium, by 9 "
+      "mm "
+      "at most",
+      "advance the wire until its tip is 18 mm past the ostium, by 60 mm at most",
+      "advance the catheter over the wire by 12 mm",
+      "advance the wire until its tip is at the target, 247 mm in"};
+  EXPECT_EQ(told, expected);
+}
+
+TEST(ToolRules, HoldWhereAStepEndsEarly) {
+  // Pulled back by 100 mm the hub has room, but the tip may look right before that.
+  const std::vector<ToolStep> steps = {
+      {.tool = 1, .push = 500.0},
+      {.tool = 0, .push = 400.0},
+      {.tool = kBothTools, .push = -100.0, .until = Until::kLevel, .at = 0.0},
+      {.tool = 0, .push = 250.0}};
+  EXPECT_EQ(find_broken_rule(steps, catheter_of(650.0, 1.0), wire_of(2000.0, 0.44), {}),
+            "step 4: less than 50 mm of catheter stay outside");
+}
+
+TEST(ToolNeighbours, DifferInOneStepByWhatAHandDoesNotFeel) {
+  const ToolScript script = {{.tool = 1, .push = 200.0},
+                             {.tool = 0, .push = 180.0},
+                             {.tool = 0, .turn = -0.5 * kPi, .until = Until::kFacing, .at = 0.2},
+                             {.tool = kBothTools, .push = -40.0, .until = Until::kLevel, .at = 5.0},
+                             {.tool = 1, .push = 60.0, .until = Until::kInBranch, .at = 18.0},
+                             {.tool = 0, .push = 12.0},
+                             {.tool = 1, .push = 90.0}};
+  const std::vector<ToolScript> all = list_neighbours(script);
+  ASSERT_EQ(all.size(), 7U);
+  EXPECT_EQ(all[0], script);
+  EXPECT_EQ(all[1][3].at, 7.0) << "ended earlier, on the way down";
+  EXPECT_EQ(all[2][3].at, 3.0);
+  EXPECT_NEAR(all[3][2].at, 0.2 + kNeighbourTurn, 1e-12) << "turned less, counterclockwise";
+  EXPECT_NEAR(all[4][2].at, 0.2 - kNeighbourTurn, 1e-12);
+  EXPECT_EQ(all[5][5].push, 10.0);
+  EXPECT_EQ(all[6][5].push, 14.0);
+  EXPECT_EQ(all[6][1], script[1]) << "the catheter's way up the aorta is the same";
+  EXPECT_EQ(list_neighbours({{.tool = 1, .push = 20.0}}).size(), 1U);
 }
 
 // An aorta of 9 mm radius along z from 0 to 130 mm, with branches of 3 mm radius toward +x and -x
@@ -201,11 +349,50 @@ double turned(const Candidate& candidate) {
   return sum / kRadPerDeg;
 }
 
+TEST(ToolNeighbours, ComeToTheSameAsWhenMadeOneByOne) {
+  // Straight up the aorta, past where the branches leave it: 95 mm of wire reach.
+  const Study study = tool_scout_study(toward(1.0));
+  const auto way =
+      std::make_shared<simulate::Way>(line_through({{0.0, 0.0, 5.0}, {0.0, 0.0, 100.0}}));
+  const simulate::Goal goal{
+      .point = way->section().center, .radius = kAorta, .at_section = true, .way = way};
+  const Candidate candidate = first_candidate(study, {});
+  const auto trial = [&] {
+    return simulate::ToolTrial(tools_of(study, candidate), make_introducer(study, candidate), goal,
+                               aorta(), tool_options(study));
+  };
+  // Pulled by some 8, 10 and 16 mm, of which the last leaves the wire short.
+  std::vector<ToolScript> scripts;
+  for (const double turn : {0.5 * kPi, 0.4 * kPi, -0.5 * kPi}) {
+    for (const double level : {-18.0, -20.0, -26.0}) {
+      scripts.push_back({{.tool = 1, .push = 60.0},
+                         {.tool = 0, .push = 45.0},
+                         {.tool = 0, .turn = turn},
+                         {.tool = kBothTools, .push = -30.0, .until = Until::kLevel, .at = level},
+                         {.tool = 1, .push = 43.0}});
+    }
+  }
+  simulate::ToolTrial shared = trial();
+  const std::vector<bool> reached = try_scripts(shared, scripts, {});
+  EXPECT_EQ(shared.pushes().size(), 0U) << "it is back where all begin";
+  int count = 0;
+  for (std::size_t k = 0; k < scripts.size(); ++k) {
+    SCOPED_TRACE(k);
+    simulate::ToolTrial own = trial();
+    for (std::size_t i = 0; i < scripts[k].size() && !own.ended(); ++i) {
+      own.make(scripts[k][i], i + 1 == scripts[k].size());
+    }
+    EXPECT_EQ(reached[k], own.reached()) << own.reason();
+    count += own.reached() ? 1 : 0;
+  }
+  EXPECT_EQ(count, 6) << "two of each three";
+}
+
 TEST(ToolSearch, TargetsOnEitherSideHaveMirroredScripts) {
   std::vector<ToolScripts> found;
   for (const double side : {1.0, -1.0}) {
     const Study study = toward(side);
-    const std::optional<Ostium> ostium = find_ostium(study);
+    const std::optional<Ostium> ostium = find_ostium(study.goal);
     ASSERT_TRUE(ostium.has_value());
     EXPECT_NEAR(ostium->arc, kLevel - 5.0 + kAorta, 2.5);
     EXPECT_NEAR(ostium->branch.x(), side, 0.02);
@@ -224,6 +411,18 @@ TEST(ToolSearch, TargetsOnEitherSideHaveMirroredScripts) {
   const double there = turned(found[0].found[0]), back = turned(found[1].found[0]);
   EXPECT_GT(std::abs(there), 45.0);
   EXPECT_NEAR(there, -back, 31.0) << "turns are tried by 30 degrees";
+}
+
+TEST(CatheterChoice, LeavesTheStudyWhatTheWayAsksFor) {
+  Study study = toward(1.0);
+  study.catheters.push_back(shaped(8.0, {{170.0, 12.0}}));
+  keep_suggested(study);
+  ASSERT_EQ(study.catheters.size(), 1U);
+  EXPECT_EQ(study.catheters[0].tool.wire.name, "hook") << "the branch is square to its trunk";
+  ASSERT_EQ(study.suggested.size(), 1U);
+  study.goal.way.reset();
+  keep_suggested(study);
+  EXPECT_TRUE(study.catheters.empty() && study.suggested.empty());
 }
 
 TEST(ToolSearch, MakePlanRanksScriptsOfCatheterAndWire) {

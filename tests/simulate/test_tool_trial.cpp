@@ -196,6 +196,60 @@ TEST(ToolTrial, AWireThatComesUpInsideTheCatheterIsNotTakenForStuck) {
   EXPECT_GT(result.tools[1].insertion.back(), 140.0);
 }
 
+/// Along the aorta and out into the branch toward +x; steps may end at that.
+ToolTrial watched_trial() {
+  Centerline path;
+  path.points.resize(3, 136);
+  path.radius.resize(136);
+  for (Eigen::Index k = 0; k < 136; ++k) {
+    const double s = static_cast<double>(k), up = std::min(s, kOstium - 5.0);
+    path.points.col(k) = Vec3(s - up, 0.0, 5.0 + up);
+    path.radius[k] = s - up > kAorta - 1.0 ? kRenal : kAorta;
+  }
+  path.arc_length = Eigen::VectorXd::LinSpaced(136, 0.0, 135.0);
+  const auto way = std::make_shared<Way>(path);
+  const Goal goal{.point = way->section().center, .radius = 3.0, .at_section = true, .way = way};
+  ToolTrialOptions options = coarse();
+  options.take_off = TakeOff{
+      .arc = kOstium - 5.0 + kAorta, .point = Vec3(kAorta, 0.0, kOstium), .trunk = Vec3::UnitZ()};
+  return {{hooked_catheter(), straight_wire(20.0)}, kUpward, goal, aorta(), options};
+}
+
+TEST(ToolTrial, StepsEndByWhatIsSeenOfTheTip) {
+  // The shortest part of a push is 0.2 mm, of a turn 1.5 degrees.
+  for (const double side : {1.0, -1.0}) {
+    SCOPED_TRACE(side);
+    ToolTrial trial = watched_trial();
+    ASSERT_TRUE(trial.make({.tool = 1, .push = 200.0, .until = Until::kLevel, .at = 15.0}));
+    EXPECT_NEAR(trial.tip(1).z(), kOstium + 15.0, 0.21);
+    ASSERT_TRUE(trial.make({.tool = 0, .push = 200.0, .until = Until::kLevel, .at = 8.0}));
+    EXPECT_NEAR(trial.tip(0).z(), kOstium + 8.0, 0.21);
+    ASSERT_TRUE(trial.make({.tool = 1, .push = -60.0}));
+    const Vec3 looked = trial.tip_direction(0);
+    const double before = trial.measure(Until::kFacing, 0);
+    EXPECT_NEAR(before, std::atan2(looked.y(), looked.x()), 1e-9) << "the branch goes along x";
+    const double at = before + side * 150.0 * kRadPerDeg;
+    ASSERT_TRUE(
+        trial.make({.tool = 0, .turn = side * 1.9 * kPi, .until = Until::kFacing, .at = at}));
+    EXPECT_NEAR(std::remainder(trial.measure(Until::kFacing, 0) - at, 2.0 * kPi), 0.0, 0.06);
+    EXPECT_LT(std::abs(trial.bench().places()[0].roll), 1.8 * kPi) << "not the whole turn";
+    ASSERT_TRUE(trial.make({.tool = kBothTools, .push = -60.0, .until = Until::kLevel, .at = 1.0}));
+    EXPECT_NEAR(trial.tip(0).z(), kOstium + 1.0, 0.21);
+    const double insertion = trial.insertion(0);
+    ASSERT_TRUE(trial.make({.tool = kBothTools, .push = -60.0, .until = Until::kLevel, .at = 1.0}));
+    EXPECT_EQ(trial.insertion(0), insertion) << "it is there already";
+    ASSERT_TRUE(trial.make({.tool = kBothTools, .push = -2.0, .until = Until::kLevel, .at = -9.0}));
+    EXPECT_NEAR(trial.insertion(0), insertion - 2.0, 1e-9) << "and no more than the step";
+  }
+}
+
+TEST(ToolTrial, StepsWithoutATakeOffAreMadeWhole) {
+  ToolTrial trial = hooked_trial();
+  ASSERT_TRUE(trial.make({.tool = 1, .push = 80.0, .until = Until::kLevel, .at = -90.0}));
+  EXPECT_NEAR(trial.insertion(1), 84.0, 1e-9);
+  EXPECT_TRUE(std::isnan(trial.measure(Until::kLevel, 1)));
+}
+
 TEST(ToolTrial, RecordsWhatEachToolFeels) {
   ToolTrial trial = hooked_trial();
   ASSERT_TRUE(trial.make({.tool = 1, .push = 100.0}));

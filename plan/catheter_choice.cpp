@@ -1,0 +1,128 @@
+#include "plan/catheter_choice.h"
+
+#include <algorithm>
+#include <cmath>
+#include <tuple>
+
+#include "plan/number_text.h"
+
+namespace wireplan::plan {
+namespace {
+
+constexpr double kShapeStep = 0.25;  // along a shape [mm]
+
+double in_degrees(double angle) { return angle / kRadPerDeg; }
+
+const char* kind_name(CurveKind kind) {
+  switch (kind) {
+    case CurveKind::kStraight:
+      return "straight tip";
+    case CurveKind::kSimple:
+      return "simple curve";
+    case CurveKind::kHooked:
+      return "hooked curve";
+    case CurveKind::kReversed:
+      return "reversed curve";
+    case CurveKind::kRing:
+      return "ring";
+  }
+  return "";
+}
+
+double take_off_of(const Ostium& ostium) {
+  return std::acos(std::clamp(ostium.trunk.dot(ostium.branch), -1.0, 1.0));
+}
+
+}  // namespace
+
+CurveShape find_shape(const simulate::Wire& tube) {
+  // Sections are listed from the tip; the shape is laid out from the shaft on, along x.
+  CurveShape shape;
+  double angle = 0.0, across = 0.0, low = 0.0, high = 0.0;
+  for (auto section = tube.sections.rbegin(); section != tube.sections.rend(); ++section) {
+    if (section->rest_curvature == 0.0 && angle == 0.0) continue;  // the shaft
+    const int steps = std::max(1, static_cast<int>(std::ceil(section->length / kShapeStep)));
+    const double h = section->length / steps;
+    for (int k = 0; k < steps; ++k) {
+      angle += 0.5 * h * section->rest_curvature;
+      across += h * std::sin(angle);
+      angle += 0.5 * h * section->rest_curvature;
+      shape.turn = std::max(shape.turn, std::abs(angle));
+      low = std::min(low, across);
+      high = std::max(high, across);
+    }
+  }
+  // Curves that turn back first (Cobra) turn the tip by what they do from there.
+  double from_tip = 0.0;
+  for (const simulate::Section& section : tube.sections) {
+    from_tip += section.length * section.rest_curvature;
+    shape.turn = std::max(shape.turn, std::abs(from_tip));
+  }
+  shape.reach = high - low;
+  const double turn = in_degrees(shape.turn);
+  shape.kind = turn < 20.0    ? CurveKind::kStraight
+               : turn < 75.0  ? CurveKind::kSimple
+               : turn < 150.0 ? CurveKind::kHooked
+               : turn < 300.0 ? CurveKind::kReversed
+                              : CurveKind::kRing;
+  return shape;
+}
+
+CurveKind asked_for(double take_off) {
+  return in_degrees(take_off) < 60.0    ? CurveKind::kSimple
+         : in_degrees(take_off) > 120.0 ? CurveKind::kReversed
+                                        : CurveKind::kHooked;
+}
+
+std::vector<Suggestion> suggest_catheters(const std::vector<Catheter>& catheters,
+                                          const Ostium& ostium, std::size_t most) {
+  const double take_off = take_off_of(ostium);
+  const CurveKind kind = asked_for(take_off);
+  struct Row {
+    int kinds_off = 0;  // from what is asked for
+    double misfit = 0.0;
+    int catheter = 0;
+    CurveShape shape;
+  };
+  std::vector<Row> rows;
+  for (int c = 0; c < std::ssize(catheters); ++c) {
+    const simulate::Wire& tube = catheters[static_cast<std::size_t>(c)].tool.wire;
+    const CurveShape shape = find_shape(tube);
+    if (shape.kind == CurveKind::kStraight || shape.kind == CurveKind::kRing) continue;
+    if (2.0 * tube.radius >= ostium.branch_diameter) continue;
+    rows.push_back({std::abs(static_cast<int>(shape.kind) - static_cast<int>(kind)),
+                    std::abs(shape.reach - ostium.trunk_diameter), c, shape});
+  }
+  std::sort(rows.begin(), rows.end(), [](const Row& a, const Row& b) {
+    return std::tie(a.kinds_off, a.misfit, a.catheter) <
+           std::tie(b.kinds_off, b.misfit, b.catheter);
+  });
+  std::vector<Suggestion> suggestions;
+  for (const Row& row : rows) {
+    if (suggestions.size() == most || row.kinds_off != rows.front().kinds_off) break;
+    std::string reason = "the branch turns by " + three_digits(in_degrees(take_off)) +
+                         " degrees from its trunk, which asks for a " + kind_name(kind);
+    if (row.kinds_off > 0)
+      reason +=
+          std::string(", of which none is there; a ") + kind_name(row.shape.kind) + " comes next";
+    reason += "; this one is " + three_digits(row.shape.reach) + " mm wide, the trunk " +
+              three_digits(ostium.trunk_diameter) + " mm and the branch " +
+              three_digits(ostium.branch_diameter) + " mm";
+    suggestions.push_back({row.catheter, std::move(reason)});
+  }
+  return suggestions;
+}
+
+void keep_suggested(Study& study) {
+  std::vector<Catheter> kept;
+  study.suggested.clear();
+  if (const std::optional<Ostium> ostium = find_ostium(study.goal)) {
+    for (Suggestion& suggestion : suggest_catheters(study.catheters, *ostium)) {
+      kept.push_back(study.catheters[static_cast<std::size_t>(suggestion.catheter)]);
+      study.suggested.push_back(std::move(suggestion.reason));
+    }
+  }
+  study.catheters = std::move(kept);
+}
+
+}  // namespace wireplan::plan

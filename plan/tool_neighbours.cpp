@@ -1,0 +1,147 @@
+#include "plan/tool_neighbours.h"
+
+#include <algorithm>
+#include <cmath>
+#include <iterator>
+#include <utility>
+
+namespace wireplan::plan {
+namespace {
+
+using simulate::ToolStep;
+using simulate::ToolTrial;
+using simulate::Until;
+
+constexpr double kSamePart = 1e-9;  // of steps                                        [mm, rad]
+
+/// A script that is under way, from its first step that is not yet made whole.
+struct Rest {
+  std::size_t script = 0;
+  ToolScript steps;
+};
+
+double sign_of(double value) { return value > 0.0 ? 1.0 : value < 0.0 ? -1.0 : 0.0; }
+
+/// Whether the first steps of two have a part in common, to be made for both at once.
+bool begin_alike(const ToolScript& a, const ToolScript& b) {
+  const ToolStep &one = a.front(), &other = b.front();
+  if (one == other && (a.size() == 1) == (b.size() == 1)) return true;
+  return a.size() > 1 && b.size() > 1 && one.tool == other.tool && one.until == other.until &&
+         one.until != Until::kInBranch && sign_of(one.push) == sign_of(other.push) &&
+         sign_of(one.turn) == sign_of(other.turn);
+}
+
+/// Whether what ends step `a` comes before what ends `b`.
+bool ends_sooner(const ToolStep& a, const ToolStep& b) {
+  if (a.until == Until::kMade) {
+    return std::abs(a.push) + std::abs(a.turn) < std::abs(b.push) + std::abs(b.turn);
+  }
+  const double less =
+      a.until == Until::kFacing ? std::remainder(a.at - b.at, 2.0 * kPi) : a.at - b.at;
+  return sign_of(a.push + a.turn) * less < 0.0;
+}
+
+/// What is left of a step once `made` is; a step that ends by what is seen is left as it is, unless
+/// it is that.
+bool leave_rest(ToolStep& step, const ToolStep& made) {
+  if (step.until != Until::kMade) return step.at != made.at;
+  step.push -= made.push;
+  step.turn -= made.turn;
+  return std::abs(step.push) + std::abs(step.turn) > kSamePart;
+}
+
+class SharedTrials {
+ public:
+  SharedTrials(ToolTrial& trial, std::size_t count, const std::function<bool()>& cancelled)
+      : trial_(trial), cancelled_(cancelled), reached_(count, false) {}
+
+  void go_on(std::vector<Rest> rests) {
+    while (!rests.empty() && !(cancelled_ && cancelled_())) {
+      const auto alike_end = std::stable_partition(
+          rests.begin() + 1, rests.end(),
+          [&](const Rest& rest) { return begin_alike(rests.front().steps, rest.steps); });
+      std::vector<Rest> alike(rests.begin(), alike_end);
+      rests.erase(rests.begin(), alike_end);
+      const ToolTrial::Mark before = trial_.save();
+      make_common(std::move(alike));
+      trial_.restore(before);
+    }
+  }
+
+  const std::vector<bool>& reached() const { return reached_; }
+
+ private:
+  void make_common(std::vector<Rest> alike) {
+    ToolStep common = alike.front().steps.front();
+    for (const Rest& rest : alike) {
+      if (ends_sooner(rest.steps.front(), common)) common = rest.steps.front();
+    }
+    const bool last = alike.front().steps.size() == 1;
+    trial_.make(common, last);
+    std::vector<Rest> left;
+    for (Rest& rest : alike) {
+      if (trial_.ended() || last) {
+        reached_[rest.script] = trial_.reached();
+        continue;
+      }
+      if (!leave_rest(rest.steps.front(), common)) rest.steps.erase(rest.steps.begin());
+      left.push_back(std::move(rest));
+    }
+    if (!trial_.ended()) go_on(std::move(left));
+  }
+
+  ToolTrial& trial_;
+  const std::function<bool()>& cancelled_;
+  std::vector<bool> reached_;
+};
+
+/// The script with a step changed: by so many mm or rad, further in its own direction.
+ToolScript with_change(ToolScript script, std::size_t step, double by) {
+  ToolStep& own = script[step];
+  if (own.until != Until::kMade) {
+    own.at += sign_of(own.push + own.turn) * by;
+  } else if (own.turn != 0.0) {
+    own.turn += sign_of(own.turn) * by;
+  } else {
+    own.push += sign_of(own.push) * by;
+  }
+  return script;
+}
+
+}  // namespace
+
+std::vector<ToolScript> list_neighbours(const ToolScript& script) {
+  std::vector<ToolScript> all = {script};
+  const auto add = [&](const auto& is_it, double by) {
+    const auto found = std::find_if(script.begin(), script.end(), is_it);
+    if (found == script.end() || found + 1 == script.end()) return;
+    const auto step = static_cast<std::size_t>(found - script.begin());
+    const double size = std::abs(found->push) + std::abs(found->turn);
+    for (const double change : {-by, by}) {
+      if (size + change > kSamePart) all.push_back(with_change(script, step, change));
+    }
+  };
+  const auto is_pull = [](const ToolStep& s) {
+    return s.tool == simulate::kBothTools && s.push < 0.0;
+  };
+  add(is_pull, kNeighbourDepth);
+  add([](const ToolStep& s) { return s.turn != 0.0; }, kNeighbourTurn);
+  // The first advance of the catheter is over the wire, in the trunk.
+  int advances = 0;
+  add([&](const ToolStep& s) { return s.tool == 0 && s.push > 0.0 && ++advances == 2; },
+      kNeighbourDepth);
+  return all;
+}
+
+std::vector<bool> try_scripts(ToolTrial& trial, const std::vector<ToolScript>& scripts,
+                              const std::function<bool()>& cancelled) {
+  std::vector<Rest> rests;
+  for (std::size_t k = 0; k < scripts.size(); ++k) {
+    if (!scripts[k].empty()) rests.push_back({k, scripts[k]});
+  }
+  SharedTrials shared(trial, scripts.size(), cancelled);
+  shared.go_on(std::move(rests));
+  return shared.reached();
+}
+
+}  // namespace wireplan::plan
