@@ -1,8 +1,11 @@
 #include "pipeline/files/viewer_files.h"
 
+#include <cmath>
 #include <map>
 #include <utility>
 #include <vector>
+
+#include "simulate/insertion/start_line.h"
 
 namespace wireplan::pipeline {
 namespace {
@@ -72,6 +75,50 @@ void write_curve_markups(const std::vector<NamedCurve>& curves, const std::files
 void write_curve_markups(const Eigen::Matrix3Xd& points, const std::string& name,
                          const std::filesystem::path& path) {
   write_curve_markups({{name, points}}, path);
+}
+
+namespace {
+
+/// Of each step of a script the last shape in it: -1 where it has none.
+std::vector<int> shapes_at_ends(const simulate::TrialResult& trial, std::size_t steps) {
+  constexpr double kSame = 1e-3;  // of shapes that were kept with fewer digits  [mm, rad]
+  std::vector<int> at_end(steps, -1);
+  std::size_t push = 0;
+  for (std::size_t k = 0; k < trial.shapes.size(); ++k) {
+    const simulate::Shape& shape = trial.shapes[k];
+    const auto is_of = [&](std::size_t p) {
+      for (std::size_t i = 0; i < trial.tools.size(); ++i) {
+        if (std::abs(trial.tools[i].insertion[p] - shape.tools[i]) > kSame) return false;
+      }
+      return std::abs(trial.tools.front().roll[p] - shape.hub_angle) <= kSame;
+    };
+    std::size_t own = push;
+    while (own < trial.steps.size() && !is_of(own)) ++own;
+    if (own == trial.steps.size()) continue;
+    push = own;
+    const auto step = static_cast<std::size_t>(trial.steps[own]);
+    if (step < steps) at_end[step] = static_cast<int>(k);
+  }
+  return at_end;
+}
+
+}  // namespace
+
+void write_step_markups(const simulate::TrialResult& trial, const std::vector<std::string>& told,
+                        const std::string& name, const std::vector<std::string>& tools,
+                        const std::filesystem::path& folder) {
+  const std::vector<int> at_end = shapes_at_ends(trial, told.size());
+  for (std::size_t i = 0; i < tools.size(); ++i) {
+    std::vector<NamedCurve> curves;
+    for (std::size_t step = 0; step < told.size(); ++step) {
+      if (at_end[step] < 0) continue;
+      const simulate::Shape& shape = trial.shapes[static_cast<std::size_t>(at_end[step])];
+      const Eigen::Matrix3Xd line = simulate::line_up_to(shape.nodes, shape.tools[i]);
+      if (line.cols() < 2) continue;  // it is still outside
+      curves.push_back({"step " + std::to_string(step + 1) + ": " + told[step], line});
+    }
+    write_curve_markups(curves, folder / (name + "-" + tools[i] + "-steps.mrk.json"));
+  }
 }
 
 void write_plan_markups(const PlanMarkups& plan, const std::filesystem::path& path) {

@@ -420,6 +420,10 @@ Json artifacts_json(const ReportInput& input) {
     const auto id = static_cast<std::size_t>(input.judgement.ranking.plans[k - 1].trial);
     if (input.plan.candidates[id].catheter < 0) continue;
     add("trials/plan-" + std::to_string(k) + "-catheter.pvd", "its catheter, as a time series");
+    add("trials/plan-" + std::to_string(k) + "-catheter-steps.mrk.json",
+        "its catheter at the end of each step, for 3D Slicer");
+    add("trials/plan-" + std::to_string(k) + "-wire-steps.mrk.json",
+        "its wire at the end of each step, for 3D Slicer");
   }
   for (std::size_t k = 1; k <= input.judgement.ranking.plans.size(); ++k) {
     add("trials/plan-" + std::to_string(k) + ".mrk.json",

@@ -378,11 +378,19 @@ Json cut_slices_panel(Workspace& work, const PageInput& page, const std::vector<
 
 /// The insertion of a trial that can be played, where it was kept; for viewers too, in a folder of
 /// that name.
-std::optional<PageInsertion> read_insertion(const Workspace& work, int id, const std::string& name,
+std::optional<PageInsertion> read_insertion(const Workspace& work, const ReportInput& report,
+                                            int id, const std::string& name,
                                             const fs::path& folder) {
   std::optional<simulate::TrialResult> trial = find_played(work, id);
   if (!trial) return {};
   if (!name.empty()) write_shapes(*trial, name, folder);
+  const auto k = static_cast<std::size_t>(id);
+  const plan::Candidate& candidate = report.plan.candidates[k];
+  if (!name.empty() && candidate.catheter >= 0) {
+    write_step_markups(
+        *trial, plan::describe_steps(candidate.steps, report.plan.trials[k].metrics.insertion),
+        name, {"catheter", "wire"}, folder);
+  }
   return PageInsertion{id, std::move(trial->shapes), std::move(trial->peak_forces)};
 }
 
@@ -447,8 +455,9 @@ void make_report(Workspace& work, const fs::path& folder) {
   for (std::size_t k = 0; k < played.size(); ++k) {
     jobs.push_back([&, k] {
       const bool for_viewers = k < std::min(kPlansShown, plans.size());
-      insertions[k] = read_insertion(
-          work, played[k], for_viewers ? "plan-" + std::to_string(k + 1) : "", folder / "trials");
+      insertions[k] =
+          read_insertion(work, report, played[k],
+                         for_viewers ? "plan-" + std::to_string(k + 1) : "", folder / "trials");
     });
   }
   jobs.push_back([&] { write_ranked_markups(report, page, folder / "trials"); });
