@@ -33,8 +33,8 @@ constexpr double kLipschitz = 1.2;
 /// sections that slide past each other by 1 mm per mm has a norm of 1.6.
 constexpr double kSheared = 2.0;
 
-std::vector<ContactPoint> build_points(const Rod& rod, double most_apart) {
-  std::vector<ContactPoint> points;
+void build_points(const Rod& rod, double most_apart, std::vector<ContactPoint>& points) {
+  points.clear();
   const int edges = rod.nodes() - 1;
   double before = 0.0;  // length of wire that the next point gets from behind it
   for (int e = 0; e < edges; ++e) {
@@ -49,7 +49,6 @@ std::vector<ContactPoint> build_points(const Rod& rod, double most_apart) {
     before = half;
   }
   points.push_back({edges - 1, 1.0, before, 0.0});
-  return points;
 }
 
 }  // namespace
@@ -84,19 +83,19 @@ void WireMotion::scatter(const ContactPoint& point, const Vec3& force,
 
 ContactPoints::ContactPoints(const Rod& rod, const VesselModel& vessel, double spacing,
                              double reach)
-    : lumen_(vessel.lumen), chain_(vessel.sections.get()), reach_(reach) {
+    : lumen_(vessel.lumen), chain_(vessel.sections.get()), spacing_(spacing), reach_(reach) {
   expects(spacing > 0.0 && lumen_.band() > reach);
-  points_ = build_points(rod, spacing);
+  build_points(rod, spacing, points_);
   if (rod.thinner.size() > 0) {
     thinner_.resize(size());
     for (int k = 0; k < size(); ++k) thinner_[k] = at_point(rod.thinner, (*this)[k]);
   }
   x_.setZero(3, rod.nodes());
-  asleep_until_.setConstant(size(), kAwake);
-  known_position_.setConstant(3, size(), std::numeric_limits<double>::infinity());
-  known_distance_.setZero(size());
+  asleep_until_.resize(size());
+  known_position_.resize(3, size());
+  known_distance_.resize(size());
   known_.resize(points_.size());
-  touched_.assign(points_.size(), 0);
+  forget();
   if (chain_ == nullptr) return;
   u_.setZero(3, chain_->nodes());
   frames_.resize(points_.size());
@@ -147,6 +146,28 @@ void ContactPoints::gather_between(int k, const Vec3& n, int j, const Vec3& m,
   };
   add(k, n, j, m);
   add(j, m, k, n);
+}
+
+void ContactPoints::forget() {
+  travelled_ = 0.0;
+  asleep_until_.setConstant(kAwake);
+  known_position_.setConstant(std::numeric_limits<double>::infinity());
+  known_distance_.setZero();
+  touched_.assign(points_.size(), 0);
+}
+
+void ContactPoints::take(const Rod& rod) {
+  const int before = size();
+  build_points(rod, spacing_, points_);
+  expects(size() == before && rod.nodes() == x_.cols() && rod.thinner.size() > 0);
+  for (int k = 0; k < size(); ++k) {
+    const double thinner = at_point(rod.thinner, (*this)[k]), more = thinner - thinner_[k];
+    if (more == 0.0) continue;
+    thinner_[k] = thinner;
+    known_distance_[k] += more;
+    known_[static_cast<std::size_t>(k)].distance += more;
+    if (asleep_until_[k] > kAwake) asleep_until_[k] += more / kLipschitz;
+  }
 }
 
 /// In the present state, found when first asked for.

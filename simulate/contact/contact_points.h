@@ -71,6 +71,11 @@ class ContactPoints {
   /// axis [mm]. Keeps a reference to the vessel.
   ContactPoints(const Rod& rod, const VesselModel& vessel, double spacing, double reach);
 
+  /// The wire is this rod from now on, with as many nodes and points at the same places of edges.
+  void take(const Rod& rod);
+  /// What was looked up; samples are then as of new points.
+  void forget();
+
   int size() const { return static_cast<int>(points_.size()); }
   const ContactPoint& operator[](int k) const { return points_[static_cast<std::size_t>(k)]; }
   /// The first that may touch; see free_from().
@@ -158,7 +163,7 @@ class ContactPoints {
 
   const Lumen& lumen_;
   const SectionChain* const chain_;
-  double reach_;
+  double spacing_, reach_;
   std::vector<ContactPoint> points_;  // proximal to distal
   Eigen::VectorXd thinner_;           // per point, see Rod; distances from the wall have it in them
   int first_free_ = 0;

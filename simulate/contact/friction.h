@@ -35,8 +35,8 @@ class Friction {
  public:
   Friction(double coefficient, double slip, int points);
   bool acts() const { return coefficient_ > 0.0; }
-  /// Of the coefficient, per point.
-  void take_parts(Eigen::VectorXd parts) { part_ = std::move(parts); }
+  /// Of the coefficient, per point; to be set where it is not all.
+  Eigen::VectorXd& parts() { return part_; }
 
   // ---- the lag
 

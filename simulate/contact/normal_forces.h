@@ -22,6 +22,8 @@ class NormalForces {
   NormalForces(const ContactLaw& law, const VesselModel& vessel, double radius, int points);
   bool yielding() const { return yielding_; }
 
+  /// What was found last, from which the next search for forces would start.
+  void forget() { press_.setZero(); }
   /// First in a solve: all points get new feet.
   void begin();
   /// Finds force and yield of the active points, and both energies. On a wall that yields, points

@@ -19,6 +19,7 @@ double reach(const Rod& rod, const VesselModel& vessel, const ContactLaw& law) {
 
 WallContact::WallContact(const Rod& rod, const VesselModel& vessel, const ContactOptions& options)
     : lumen_(vessel.lumen),
+      law_(options.law),
       radius_(rod.radius),
       felt_from_(rod.radius + options.law.reach()),
       points_(rod, vessel, options.spacing, reach(rod, vessel, options.law)),
@@ -31,17 +32,41 @@ WallContact::WallContact(const Rod& rod, const VesselModel& vessel, const Contac
   memory_.anchor.setZero(3, m);
   memory_.normal_force.setZero(m);
   if (forces_.yielding()) memory_.triangle.assign(static_cast<std::size_t>(m), -1);
-  if (rod.rubs.size() > 0) {
-    Eigen::VectorXd parts(m);
-    for (int k = 0; k < m; ++k) parts[k] = at_point(rod.rubs, points_[k]);
-    friction_.take_parts(std::move(parts));
-  }
+  take_parts(rod);
   predicted_.setZero(m);
   latest_.active.reserve(static_cast<std::size_t>(m));
   touches_.reserve(static_cast<std::size_t>(m));
 }
 
 // ---------------------------------------------------------------- the trial's part
+
+void WallContact::take(const Rod& rod) {
+  expects(rod.radius == radius_);
+  points_.take(rod);
+  take_parts(rod);
+}
+
+void WallContact::forget() {
+  points_.forget();
+  forces_.forget();
+}
+
+/// Of the coefficient of friction.
+void WallContact::take_parts(const Rod& rod) {
+  if (rod.rubs.size() == 0) return;
+  Eigen::VectorXd& parts = friction_.parts();
+  parts.resize(points_.size());
+  for (int k = 0; k < points_.size(); ++k) parts[k] = at_point(rod.rubs, points_[k]);
+}
+
+void WallContact::find_slopes(std::vector<Slope>& slopes) const {
+  slopes.clear();
+  for (const ActivePoint& active : latest_.active) {
+    const double energy = law_.at(active.wall.distance - radius_ + active.yield).energy;
+    if (energy == 0.0) continue;
+    slopes.push_back({.point = active.point, .by_share = energy, .by_thinner = -active.force});
+  }
+}
 
 void WallContact::start_at(const RodState& state) {
   memory_.x = state.x;

@@ -44,6 +44,11 @@ class WallContact {
 
   // ---- the trial's part
 
+  /// The wire is this rod from now on: of several tools in other places, with as many nodes and as
+  /// thick at most. What points remember stays.
+  void take(const Rod& rod);
+  /// What was looked up and found in samples: solves go then as with a new one.
+  void forget();
   /// Only points nearer to the tip than this touch; those behind it are still in the introducer
   /// [mm]. At the start: all.
   void free_from(double tip_distance) { points_.free_from(tip_distance); }
@@ -63,6 +68,14 @@ class WallContact {
   const ContactPoint& point(int k) const { return points_[k]; }
   /// Points that touch in the latest sample, proximal to distal.
   const std::vector<Touch>& touches();
+
+  /// Points that touch in the latest sample, and what the energy of contact gains there, all nodes
+  /// held, per length of wire that a point stands for [N] and per length that it is thinner [N].
+  struct Slope {
+    int point;
+    double by_share, by_thinner;
+  };
+  void find_slopes(std::vector<Slope>& slopes) const;
 
   const Memory& memory() const { return memory_; }
   void restore(const Memory& memory) { memory_ = memory; }
@@ -147,10 +160,12 @@ class WallContact {
     }
   }
   bool has_lag() const { return forces_.yielding() || friction_.acts(); }
+  void take_parts(const Rod& rod);
   void find(const RodState& state);
   const ContactSample& rub();
 
   const Lumen& lumen_;
+  const ContactLaw law_;
   const double radius_;
   const double felt_from_;  // distance from the wall of a wire's axis                     [mm]
   ContactPoints points_;

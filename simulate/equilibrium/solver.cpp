@@ -65,6 +65,11 @@ Energy Statics::evaluate(const Problem& problem, const RodState& state,
   return assemble_with_contact(problem, state, sink);
 }
 
+double Statics::energy(const Problem& problem, const RodState& state) {
+  EnergySink sink;
+  return assemble(problem, state, sink).total();
+}
+
 HeldEnd Statics::held_end(const Problem& problem, const RodState& state) {
   // Elements that reach from the free nodes to those before.
   HeldSink sink{problem.first};

@@ -17,6 +17,8 @@ class Statics {
   /// ones included: minus the gradient is the force of the rod and its loads on a node [N].
   static Energy evaluate(const Problem& problem, const RodState& state,
                          Eigen::Ref<Eigen::Matrix3Xd> gradient);
+  /// The energy alone, of what there is but contact with a vessel [N mm].
+  static double energy(const Problem& problem, const RodState& state);
   /// What keeps the nodes before the first free one, and their edges, where they are.
   static HeldEnd held_end(const Problem& problem, const RodState& state);
   /// The energy that node i gains per length of bent wire that is added to its `length` as it is

@@ -1,10 +1,7 @@
 #include "simulate/insertion/tool_bench.h"
 
-#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
-
-#include "simulate/wire/bend_to.h"
 
 namespace wireplan::simulate {
 namespace {
@@ -22,9 +19,8 @@ struct BenchTuning {
   double jump = 0.5;  // of a node off its guess, in the shortest part in a vessel              [mm]
   double deepest = 1.0;      // past the wall                                  [mm]
   double least_work = 1e-7;  // that counts so                                [N mm]
-  double nudge = 1e-3;  // of the tip of each tool but the first curved one, in a guess       [rad]
-  int most_solves = 4;  // of a part that runs out of iterations, from where it got
-  double snap = 1.0;    // off the way of before in a part: a jump, not to go on [mm]
+  int most_solves = 4;       // of a part that runs out of iterations, from where it got
+  double snap = 1.0;         // off the way of before in a part: a jump, not to go on [mm]
   double least_start = 1.0;  // of tools that are brought in [mm]
   int most_followed = 6;     // more solves of a jump in a vessel
   int load_steps = 10;       // where the full loads have no equilibrium at once
@@ -54,41 +50,6 @@ int count_elements(const ToolScene& scene) {
     longest = std::max(longest, largest_insertion(places));
   }
   return elements_over(longest, scene.element_length);
-}
-
-/// A list of values at the middles of edges of length h, at s; beyond the ends that of the ends.
-template <class At>
-auto between_middles(double s, double h, Eigen::Index edges, const At& at) {
-  const double place = std::clamp(s / h - 0.5, 0.0, static_cast<double>(edges - 1));
-  const Eigen::Index e = std::min(static_cast<Eigen::Index>(place), edges - 2);
-  const double part = place - static_cast<double>(e);
-  using Value = std::decay_t<decltype(at(e))>;
-  return Value((1.0 - part) * at(e) + part * at(e + 1));
-}
-
-/// Straight tools whose end comes nearer to its start get the shape of a column that buckles;
-/// unlike buckle_column() they bend the more, the softer they are.
-void lean_aside(const Rod& rod, const Vec3& point, const std::optional<Vec3>& plane,
-                BentWire& wire) {
-  constexpr double kStraight = 1e-6;  // of the length
-  const double length = rod.rest_length.sum();
-  const Vec3 along = wire.edges.col(0).normalized();
-  const double less = (wire.end() - point).dot(along);
-  if (length - (wire.end() - wire.start).norm() > kStraight * length ||
-      less <= kStraight * length) {
-    return;
-  }
-  const Vec3 axis = plane ? *plane : along.cross(reference_normal(along));
-  const auto compliance = [&](int i) { return rod.bend[i] > 0.0 ? 1.0 / rod.bend[i] : 0.0; };
-  double total = 0.0, so_far = 0.0;
-  for (int i = 0; i < rod.nodes(); ++i) total += compliance(i);
-  const double most = 2.0 * std::sqrt(less / length);
-  for (int i = 0; i + 1 < rod.nodes(); ++i) {
-    so_far += compliance(i);
-    wire.edges.col(i) =
-        (rotation_by(most * std::sin(2.0 * kPi * so_far / total) * axis) * wire.edges.col(i))
-            .eval();
-  }
 }
 
 /// How a move is cut: the lengths of its parts, as parts of it, and its longest push.
@@ -161,7 +122,9 @@ bool ToolBench::lies_free(const State& at) const {
 void ToolBench::settle_at(const std::vector<ToolPlace>& places) {
   place(places, now_);
   now_.state = unloaded(now_);
-  if (now_.contact != nullptr) now_.contact->start_at(now_.state);
+  now_.memory = {};
+  touch(now_);
+  if (contact_ != nullptr) contact_->start_at(now_.state);
   const RodState start = now_.state;
   settled_ = solve(now_);
   if (!settled_) {
@@ -173,8 +136,10 @@ void ToolBench::settle_at(const std::vector<ToolPlace>& places) {
       if (!settled_) break;
     }
   }
-  if (now_.contact != nullptr) now_.contact->settle();
-  find_energy(now_);
+  take_forces(now_);
+  if (contact_ == nullptr) return;
+  contact_->settle();
+  now_.memory = contact_->memory();
 }
 
 /// From places so far back that the tools lie free, all at once.
@@ -208,17 +173,20 @@ bool ToolBench::move(const ToolMove& by) {
   const Parts parts = parts_of(scene_, by);
   const std::vector<ToolPlace> start = now_.places;
   double done = 0.0, size = parts.first;
-  Shape drift;  // of the last part
-  double slope = slope_along(now_, by.push, 1.0);
+  Shape drift;                                  // of the last part
+  if (contact_ != nullptr) contact_->forget();  // so that a mark goes on as it did before
+  find_slopes(now_, by, false);
+  double slope = slope_of_move(now_, by, 1.0);
   while (done < 1.0 - 1e-12) {
     const double part = 1.0 - done < 1.01 * size ? 1.0 - done : size;
     const bool may_cut = part > 1.01 * parts.shortest;
-    State next;
+    State& next = next_;
     place(moved(start, by, done + part), next);
     const Shape followed = follow(next);
     next.state = guess(followed, drift, part);
     const Eigen::VectorXd slid = slides(now_, next);
     carry_contact(now_, slid, next);
+    touch(next);
     const Eigen::Matrix3Xd guessed = next.state.x;
     bool solved = solve(next);
     if (!solved && drift.x.cols() > 0) {  // then from where it was
@@ -231,6 +199,7 @@ bool ToolBench::move(const ToolMove& by) {
     }
     if (!solved) {
       if (!may_cut) {
+        touch(now_);
         report(by);
         return false;
       }
@@ -239,10 +208,10 @@ bool ToolBench::move(const ToolMove& by) {
     }
     double against_wall = 0.0;
     rubbed += rub(slid, next, against_wall);
-    find_energy(next);
 
     // The work of the hands against what the energy gained.
-    const double next_slope = slope_along(next, by.push, -1.0);
+    find_slopes(next, by, false);
+    const double next_slope = slope_of_move(next, by, -1.0);
     double work = 0.5 * part * (slope + next_slope) + against_wall;
     double scale = part * std::max(std::abs(slope), std::abs(next_slope)) + std::abs(rubbed);
     for (std::size_t i = 0; i < by.turn.size(); ++i) {
@@ -250,10 +219,9 @@ bool ToolBench::move(const ToolMove& by) {
       work += turn;
       scale += std::abs(turn);
     }
-    const double gained = next.energy.total() - now_.energy.total();
+    const double gained = next.energy - now_.energy;
     const double excess = work - gained - rubbed;
-    const double allowed =
-        next.contact != nullptr ? kBench.unbalanced_in_vessel : kBench.unbalanced;
+    const double allowed = contact_ != nullptr ? kBench.unbalanced_in_vessel : kBench.unbalanced;
     const double unknown = scene_.residual_tolerance * part * parts.farthest;
     const bool jumped = std::abs(excess) > allowed * scale + kBench.least_work + unknown;
     if (jumped && may_cut) {
@@ -261,14 +229,14 @@ bool ToolBench::move(const ToolMove& by) {
       continue;
     }
     const double off = std::sqrt((next.state.x - guessed).colwise().squaredNorm().maxCoeff());
-    const bool ripples = next.contact != nullptr && off < kBench.jump;
+    const bool ripples = contact_ != nullptr && off < kBench.jump;
     const double released = jumped && !ripples ? std::max(0.0, excess) : 0.0;
-    now_ = std::move(next);
+    std::swap(now_, next_);
     drift = shape();
     drift.x = (drift.x - followed.x) / part;
     drift.angles = (drift.angles - followed.angles) / part;
     if (part * std::sqrt(drift.x.colwise().squaredNorm().maxCoeff()) > kBench.snap) drift = {};
-    slope = is_smooth(now_, by.push) ? next_slope : slope_along(now_, by.push, 1.0);
+    slope = is_smooth(now_, by.push) ? next_slope : slope_of_move(now_, by, 1.0);
     record_.released += released;
     record_.unbalanced += excess - released;
     record_.heat += rubbed;
@@ -304,7 +272,7 @@ Problem ToolBench::problem_of(const State& at) const {
     }
   }
   problem.load = &at.load;
-  problem.contact = at.contact.get();
+  problem.contact = contact_.get();
   problem.plane = scene_.plane;
   const Vec3& moment = scene_.loads.tip_moment;
   if (!moment.isZero(0.0)) {
@@ -317,9 +285,8 @@ Problem ToolBench::problem() const { return problem_of(now_); }
 
 void ToolBench::place(const std::vector<ToolPlace>& places, State& at) const {
   at.places = places;
-  at.composite = build_composite(scene_.tools, places, elements_);
-  at.load = scene_.loads.gravity * at.composite.rod.mass.transpose();
-  at.load.rightCols<1>() += scene_.loads.tip_force;
+  build_composite(scene_.tools, places, elements_, at.composite);
+  set_load(at.composite.rod, at.load);
   if (scene_.vessel == nullptr) return;
   if (scene_.contact.friction > 0.0) {
     at.composite.rod.rubs.setZero(at.load.cols());
@@ -328,7 +295,25 @@ void ToolBench::place(const std::vector<ToolPlace>& places, State& at) const {
                                at.composite.outside.row(static_cast<Eigen::Index>(i)).transpose();
     }
   }
-  at.contact = std::make_unique<WallContact>(at.composite.rod, *scene_.vessel, scene_.contact);
+}
+
+void ToolBench::set_load(const Rod& rod, Eigen::Matrix3Xd& load) const {
+  load = scene_.loads.gravity * rod.mass.transpose();
+  load.rightCols<1>() += scene_.loads.tip_force;
+}
+
+/// Has contact be that of the state's tools, with what they remember.
+void ToolBench::touch(const State& at) {
+  if (scene_.vessel == nullptr) return;
+  const Rod& rod = at.composite.rod;
+  if (contact_ == nullptr || contact_->memory().x.cols() != rod.nodes()) {
+    contact_ = std::make_unique<WallContact>(rod, *scene_.vessel, scene_.contact);
+  } else {
+    contact_->take(rod);
+  }
+  if (at.memory.x.cols() == 0) return;
+  contact_->restore(at.memory);
+  contact_->predict(0.0);
 }
 
 /// How far the outermost tool slides past each node, forward; where a tip covers a part of the
@@ -347,151 +332,15 @@ Eigen::VectorXd ToolBench::slides(const State& from, const State& to) const {
 /// What holds the nodes at the wall is held against the tool there, not against the node, which
 /// slides along it.
 void ToolBench::carry_contact(const State& from, const Eigen::VectorXd& slides, State& to) const {
-  if (to.contact == nullptr) return;
-  ContactMemory memory = from.contact->memory();
+  if (scene_.vessel == nullptr) return;
+  to.memory = from.memory;
   const Eigen::Index n = from.state.x.cols();
-  expects(memory.anchor.cols() == n && to.contact->memory().anchor.cols() == n);
+  expects(to.memory.anchor.cols() == n);
   for (Eigen::Index i = 0; i < n; ++i) {
     const Vec3 along = slides[i] * edge_tangent(from.state, std::min(i, n - 2));
-    memory.x.col(i) -= along;
-    memory.anchor.col(i) -= along;
+    to.memory.x.col(i) -= along;
+    to.memory.anchor.col(i) -= along;
   }
-  to.contact->restore(memory);
-  to.contact->predict(0.0);
-}
-
-/// As the tools lie together without loads, each in one plane with its hub.
-RodState ToolBench::unloaded(const State& at) const {
-  const Rod& rod = at.composite.rod;
-  const ToolTerms& terms = at.composite.terms;
-  RodState state = straight_state(rod, scene_.point, scene_.direction, 0.0);
-  Vec3 t = scene_.direction, d = reference_normal(t);
-  for (int i = 0; i + 1 < rod.nodes(); ++i) {
-    Vec3 turn = Vec3::Zero();
-    for (int k = 0; k < terms.twists(); ++k) {
-      const Vec3 toward = std::cos(terms.roll[k]) * d + std::sin(terms.roll[k]) * t.cross(d);
-      turn += terms.rest(k, i) * t.cross(toward);
-    }
-    const Mat3 rotation = rotation_by(turn);  // about an axis square to t: no twist
-    t = rotation * t;
-    d = rotation * d;
-    state.x.col(i + 1) = state.x.col(i) + rod.rest_length[i] * t;
-  }
-  bend_to_support(at, state.x);
-  Eigen::MatrixXd angles(rod.nodes() - 1, terms.twists());
-  for (int k = 0; k < terms.twists(); ++k) angles.col(k).setConstant(terms.roll[k]);
-  set_frames(angles, state);
-  return state;
-}
-
-ToolBench::Shape ToolBench::shape() const {
-  const std::vector<int>& twisted = now_.composite.terms.tool;
-  Shape shape{now_.state.x, Eigen::MatrixXd(now_.state.x.cols() - 1, twisted.size())};
-  for (std::size_t k = 0; k < twisted.size(); ++k) {
-    shape.angles.col(static_cast<Eigen::Index>(k)) = angles(twisted[k]);
-  }
-  return shape;
-}
-
-/// The centreline of now, as much longer or shorter as it is to be, and the tools' angles on it.
-ToolBench::Shape ToolBench::follow(const State& to) const {
-  const double h = now_.composite.edge_length(), h_new = to.composite.edge_length();
-  const Eigen::Index before = now_.state.x.cols() - 1, edges = to.composite.rod.nodes() - 1;
-  const bool divided_anew = h != h_new || before != edges;
-  const Shape from = shape();
-  Shape next{from.x, Eigen::MatrixXd(edges, from.angles.cols())};
-  if (divided_anew) next.x.resize(3, edges + 1);
-  next.x.col(0) = from.x.col(0);
-  for (Eigen::Index e = 0; e < edges; ++e) {
-    const double middle = (static_cast<double>(e) + 0.5) * h_new;
-    if (divided_anew) {
-      const Vec3 t = between_middles(middle, h, before,
-                                     [&](Eigen::Index k) { return edge_tangent(now_.state, k); });
-      next.x.col(e + 1) = next.x.col(e) + h_new * t.normalized();
-    }
-    for (Eigen::Index k = 0; k < from.angles.cols(); ++k) {
-      // Tools that lie in one plane, curved to opposite sides, would stay so when that is a saddle.
-      next.angles(e, k) =
-          between_middles(middle, h, before, [&](Eigen::Index i) { return from.angles(i, k); }) +
-          kBench.nudge * static_cast<double>(k * e) / static_cast<double>(edges);
-    }
-  }
-  if (divided_anew) bend_to_support(to, next.x);
-  return next;
-}
-
-/// The shape that was followed, and what the tools came off such shapes before, `drift` per part.
-RodState ToolBench::guess(const Shape& followed, const Shape& drift, double part) const {
-  RodState state;
-  state.x = followed.x;
-  Eigen::MatrixXd turned = followed.angles;
-  if (drift.x.cols() > 0) {
-    const Eigen::Matrix3Xd x = followed.x + part * drift.x;
-    for (Eigen::Index e = 0; e + 1 < x.cols(); ++e) {  // no edge gets longer by that
-      const Vec3 edge = x.col(e + 1) - x.col(e);
-      const double length = (followed.x.col(e + 1) - followed.x.col(e)).norm();
-      state.x.col(e + 1) = state.x.col(e) + (length / edge.norm()) * edge;
-    }
-    turned += part * drift.angles;
-  }
-  set_frames(turned, state);
-  return state;
-}
-
-void ToolBench::bend_to_support(const State& to, Eigen::Matrix3Xd& x) const {
-  if (!scene_.distal) return;
-  const Rod& rod = to.composite.rod;
-  const Eigen::Index edges = x.cols() - 1;
-  const bool clamped = scene_.distal->kind == SupportKind::kClamped;
-  BentWire wire{.start = x.col(0), .edges = x.rightCols(edges) - x.leftCols(edges)};
-  wire.end_direction = wire.edges.col(edges - 1).normalized();
-  lean_aside(rod, scene_.distal->point, scene_.plane, wire);
-  bend_to(rod, {.start = true, .end = clamped}, scene_.distal->point, scene_.distal->direction,
-          wire);
-  for (Eigen::Index e = 0; e < edges; ++e) x.col(e + 1) = x.col(e) + wire.edges.col(e);
-  // What that left is spread evenly.
-  const Vec3 gap = scene_.distal->point - x.col(edges);
-  for (Eigen::Index i = 1; i <= edges; ++i) {
-    x.col(i) += (static_cast<double>(i) / static_cast<double>(edges)) * gap;
-  }
-}
-
-/// Reference directors carried along from the introducer without twist, and the tools' angles.
-void ToolBench::set_frames(const Eigen::MatrixXd& angles, RodState& state) const {
-  const Eigen::Index edges = state.x.cols() - 1;
-  state.director.resize(3, edges);
-  state.reference_twist = Eigen::VectorXd::Zero(edges + 1);
-  Vec3 t = scene_.direction, d = reference_normal(t);
-  for (Eigen::Index e = 0; e < edges; ++e) {
-    const Vec3 next = edge_tangent(state, e);
-    d = parallel_transport(d, t, next);
-    d = (d - d.dot(next) * next).normalized();
-    state.director.col(e) = d;
-    t = next;
-  }
-  state.theta = angles.reshaped();
-}
-
-Vec3 ToolBench::edge_tangent(const RodState& state, Eigen::Index e) {
-  return (state.x.col(e + 1) - state.x.col(e)).normalized();
-}
-
-Eigen::VectorXd ToolBench::angles(int tool) const {
-  const std::vector<int>& twisted = now_.composite.terms.tool;
-  const auto found = std::find(twisted.begin(), twisted.end(), tool);
-  if (found == twisted.end()) return {};
-  const RodState& state = now_.state;
-  const Eigen::Index edges = state.x.cols() - 1;
-  const Vec3 t = edge_tangent(state, 0);
-  const Vec3 zero = parallel_transport(reference_normal(scene_.direction), scene_.direction, t);
-  const Vec3 d = state.director.col(0);
-  double turned = std::atan2(zero.cross(d).dot(t), zero.dot(d));
-  Eigen::VectorXd result = state.theta.segment((found - twisted.begin()) * edges, edges);
-  for (Eigen::Index e = 0; e < edges; ++e) {
-    if (e > 0) turned += state.reference_twist[e];
-    result[e] += turned;
-  }
-  return result;
 }
 
 bool ToolBench::solve(State& at) {
@@ -505,9 +354,10 @@ bool ToolBench::solve(State& at) {
     if (found.iterations < scene_.max_iterations) break;
   }
   record_.residual = found.residual;
-  if (!found.converged || at.contact == nullptr) return found.converged;
-  through_wall_ = at.contact->latest().lost;
-  for (const Touch& touch : at.contact->touches()) {
+  at.energy = found.energy;
+  if (!found.converged || contact_ == nullptr) return found.converged;
+  through_wall_ = contact_->latest().lost;
+  for (const Touch& touch : contact_->touches()) {
     through_wall_ = through_wall_ || touch.penetration > kBench.deepest;
   }
   return !through_wall_;
@@ -516,9 +366,9 @@ bool ToolBench::solve(State& at) {
 /// On from where a solve got, taken for a jump: friction that is held to where the tools were may
 /// have no equilibrium there. So anchors follow, and friction opposes the rest. Adds its heat.
 bool ToolBench::follow_jump(State& at, double& rubbed) {
-  for (int k = 0; k < kBench.most_followed && at.contact != nullptr; ++k) {
-    rubbed += at.contact->settle();
-    at.contact->predict(0.0);
+  for (int k = 0; k < kBench.most_followed && contact_ != nullptr; ++k) {
+    rubbed += contact_->settle();
+    contact_->predict(0.0);
     if (solve(at)) return true;
   }
   return false;
@@ -533,9 +383,10 @@ double ToolBench::free_force(int tool) const {
 }
 
 void ToolBench::report(const ToolMove& by) {
+  record_.energy = find_energy(now_);
+  find_slopes(now_, by, true);
   feel(now_, by);
   const std::size_t count = scene_.tools.size();
-  record_.energy = now_.energy;
   record_.tools.assign(count, {});
   record_.contacts.clear();
   for (std::size_t i = 0; i < count; ++i) {
@@ -544,13 +395,7 @@ void ToolBench::report(const ToolMove& by) {
     tool.push_force = now_.force[i];
     tool.hub_torque = now_.torque[i];
     tool.tip = nodes_of(static_cast<int>(i)).rightCols<1>();
-    const Eigen::VectorXd angle = angles(static_cast<int>(i));
-    if (angle.size() > 0) {
-      const double h = now_.composite.rod.rest_length[0];
-      tool.twist = between_middles(tool.place.insertion, h, angle.size(),
-                                   [&](Eigen::Index k) { return angle[k]; }) -
-                   tool.place.roll;
-    }
+    tool.twist = twist_of(static_cast<int>(i));
   }
   for (const Touch& touch : now_.touches) {
     for (std::size_t i = 0; i < count; ++i) {

@@ -20,6 +20,7 @@
 /// nodes go with the foremost tip, that is less the nearer to it they are.
 #include <memory>
 #include <optional>
+#include <span>
 #include <vector>
 
 #include "simulate/equilibrium/solver.h"
@@ -146,10 +147,12 @@ class ToolBench {
     std::vector<ToolPlace> places;
     Composite composite;
     Eigen::Matrix3Xd load;
-    std::unique_ptr<WallContact> contact;  // with the vessel
     RodState state;
-    Energy energy;
+    ContactMemory memory;  // with the vessel
+    double energy = 0.0;   // once solved                                             [N mm]
     std::vector<Touch> touches;
+    std::vector<WallContact::Slope> presses;
+    std::vector<double> slope;   // of the energy, per push of each tool alone, once found    [N]
     std::vector<double> torque;  // of the hands ...
     std::vector<double> force;   // ... without friction between tools, once felt
   };
@@ -162,6 +165,8 @@ class ToolBench {
 
   Problem problem_of(const State& at) const;
   void place(const std::vector<ToolPlace>& places, State& at) const;
+  void set_load(const Rod& rod, Eigen::Matrix3Xd& load) const;
+  void touch(const State& at);
   RodState unloaded(const State& at) const;
   bool lies_free(const State& at) const;
   void settle_at(const std::vector<ToolPlace>& places);
@@ -172,17 +177,22 @@ class ToolBench {
   ContactMemory spread_contact(const State& from, const State& to) const;
   void bend_to_support(const State& to, Eigen::Matrix3Xd& x) const;
   void set_frames(const Eigen::MatrixXd& angles, RodState& state) const;
+  double twist_of(int tool) const;
   Eigen::VectorXd slides(const State& from, const State& to) const;
   void carry_contact(const State& from, const Eigen::VectorXd& slides, State& to) const;
   static double outside_part(const State& at, std::size_t tool, const Touch& touch);
   bool solve(State& at);
   bool follow_jump(State& at, double& rubbed);
   double rub(const Eigen::VectorXd& slides, State& at, double& by_hands);
-  void find_energy(State& at) const;
+  void take_forces(State& at);
+  Energy find_energy(State& at);
+  void find_slopes(State& at, const ToolMove& direction, bool all);
+  double slope_of_move(const State& at, const ToolMove& by, double side);
   void feel(State& at, const ToolMove& direction) const;
-  double energy_at(const State& at, const std::vector<ToolPlace>& places) const;
-  bool is_smooth(const State& at, const std::vector<double>& push) const;
-  double slope_along(const State& at, const std::vector<double>& push, double side) const;
+  using Pushes = std::span<const double>;  // of all tools
+  double energy_at(const State& at, Pushes push, double by);
+  bool is_smooth(const State& at, Pushes push) const;
+  double slope_along(const State& at, Pushes push, double side);
   double side_of(const State& at, std::size_t tool, const ToolMove& direction) const;
   double leads(const State& at, std::size_t tool, double side) const;
   static Vec3 edge_tangent(const RodState& state, Eigen::Index e);
@@ -193,10 +203,14 @@ class ToolBench {
 
   const ToolScene scene_;
   int elements_ = 0;
-  State now_;
+  State now_, next_;                      // next_: where a part of a move leads
+  std::unique_ptr<WallContact> contact_;  // with the vessel, of the state that touched last
   ToolRecord record_;
   Statics statics_;
-  std::vector<RubbedPoint> rubbed_;  // scratch
+  std::vector<RubbedPoint> rubbed_;  // scratch, as is
+  std::vector<ToolPlace> pushed_;
+  Composite other_;
+  Eigen::Matrix3Xd other_load_;
   bool settled_ = false, through_wall_ = false;
 };
 

@@ -14,18 +14,21 @@ bool ToolBench::divide(double longest) {
   State next;
   place(now_.places, next);
   next.state = guess(follow(next), {}, 0.0);
-  if (next.contact != nullptr) {
-    next.contact->restore(spread_contact(now_, next));
-    next.contact->predict(0.0);
-  }
+  if (scene_.vessel != nullptr) next.memory = spread_contact(now_, next);
+  touch(next);
   double rubbed = 0.0;
   if (!solve(next) && !follow_jump(next, rubbed)) {
     elements_ = before;
+    touch(now_);
     return false;
   }
-  if (next.contact != nullptr) next.contact->settle();
+  if (contact_ != nullptr) {
+    contact_->settle();
+    next.memory = contact_->memory();
+  }
   const std::vector<double> none(scene_.tools.size(), 0.0);
   find_energy(next);
+  find_slopes(next, {none, none}, true);
   feel(next, {none, none});
   now_ = std::move(next);
   return true;
@@ -35,7 +38,7 @@ ToolBench::Mark ToolBench::save() const {
   return {.elements = elements_,
           .places = now_.places,
           .state = now_.state,
-          .memory = now_.contact != nullptr ? now_.contact->memory() : ContactMemory{},
+          .memory = now_.memory,
           .record = record_};
 }
 
@@ -44,12 +47,12 @@ void ToolBench::restore(const Mark& mark) {
   State at;
   place(mark.places, at);
   at.state = mark.state;
-  if (at.contact != nullptr) {
-    at.contact->restore(mark.memory);
-    at.contact->predict(0.0);
-  }
+  at.memory = mark.memory;
+  touch(at);
+  if (contact_ != nullptr) contact_->forget();
   const std::vector<double> none(scene_.tools.size(), 0.0);
   find_energy(at);
+  find_slopes(at, {none, none}, true);
   feel(at, {none, none});
   now_ = std::move(at);
   record_ = mark.record;
@@ -60,7 +63,7 @@ void ToolBench::restore(const Mark& mark) {
 /// What the nodes remember, at the nodes of another division of the same centreline: of the nearest
 /// node, for their share of length.
 ContactMemory ToolBench::spread_contact(const State& from, const State& to) const {
-  const ContactMemory& known = from.contact->memory();
+  const ContactMemory& known = from.memory;
   const double h = from.composite.rod.rest_length[0], h_new = to.composite.rod.rest_length[0];
   const Eigen::Index last = from.state.x.cols() - 1, n = to.state.x.cols();
   ContactMemory memory{.x = to.state.x,

@@ -15,6 +15,7 @@ ToolSpot look_at(const Wire& wire, double from_tip) {
   const double from = std::clamp(from_tip - start, 0.0, section.length);
   ToolSpot local;
   local.there = from_tip > 0.0;
+  local.tapers = section.tapered();
   local.EI = section.EI(from);
   local.GJ = section.twist_stiffness > 0.0 ? section.twist_stiffness : local.EI / 1.3;
   local.EA = section.axial_stiffness > 0.0 ? section.axial_stiffness
@@ -42,98 +43,147 @@ void add_lead(const Wire& wire, double insertion, double& stored, double& compli
   }
 }
 
-/// Integrals over the nodes' hats, and what comes of them.
+/// Integrals over the nodes' hats, and what comes of them, in the memory of a composite.
 class Builder {
  public:
-  Builder(const std::vector<Tool>& tools, const std::vector<ToolPlace>& places, int elements)
-      : tools_(tools), places_(places), n_(elements + 1) {
+  Builder(const std::vector<Tool>& tools, const std::vector<ToolPlace>& places, int elements,
+          Composite& into)
+      : tools_(tools),
+        places_(places),
+        n_(elements + 1),
+        rod_(into.rod),
+        terms_(into.terms),
+        outside_(into.outside),
+        axial_(into.axial),
+        ends_(into.ends) {
     for (const ToolPlace& place : places) length_ = std::max(length_, place.insertion);
     h_ = length_ / elements;
+    terms_.tool.clear();
     for (std::size_t i = 0; i < tools.size(); ++i) {
       if (!tools[i].wire.straight()) terms_.tool.push_back(static_cast<int>(i));
     }
     const int T = terms_.twists();
-    compliance_ = axial_ = mass_ = Eigen::VectorXd::Zero(n_);
+    rod_.bend.setZero(n_);
+    rod_.mass.setZero(n_);
+    axial_.setZero(n_);
     outside_.setZero(static_cast<Eigen::Index>(tools.size()), n_);
-    torsional_ = terms_.rest = terms_.twist = Eigen::MatrixXd::Zero(T, n_);
-    terms_.mutual = Eigen::MatrixXd::Zero(T * (T - 1) / 2, n_);
-    terms_.lead = terms_.roll = Eigen::VectorXd::Zero(T);
+    terms_.rest.setZero(T, n_);
+    terms_.twist.setZero(T, n_);
+    terms_.mutual.setZero(T * (T - 1) / 2, n_);
+    terms_.lead.setZero(T);
+    terms_.roll.setZero(T);
+    terms_.stored = 0.0;
   }
 
-  Composite build() {
+  void build() {
+    find_ends();
     for (int e = 0; e + 1 < n_; ++e) integrate_edge(e);
     add_leads();
     finish_twist();
-    const Rod rod = make_rod();
-    return {rod, terms_, outside_ * rod.share.cwiseInverse().asDiagonal()};
+    finish_rod();
+    for (int i = 0; i < n_; ++i) outside_.col(i) /= rod_.share[i];
   }
 
  private:
-  /// Gauss' rule on each part of the edge between ends of sections: exact where they do not taper.
-  void integrate_edge(int e) {
-    const double start = e * h_, end = e + 2 == n_ ? length_ : (e + 1) * h_;
-    std::vector<double> ends = {start, end};
+  /// The tools at a place, and what its length counts with.
+  struct Local {
+    std::array<ToolSpot, kMostTools> at;
+    double compliance = 0.0, per_EA = 0.0, mass = 0.0;  // 1/K, 1/EA
+    Eigen::Index outermost = 0;
+    bool even = false;  // the same up to the next end of a section
+  };
+
+  /// Ends of sections within the centreline, from the introducer on.
+  void find_ends() {
+    ends_.clear();
     for (std::size_t i = 0; i < tools_.size(); ++i) {
       double s = places_[i].insertion;
       for (const Section& section : tools_[i].wire.sections) {
-        if (s > start && s < end) ends.push_back(s);
+        if (s > 0.0 && s < length_) ends_.push_back(s);
         s -= section.length;
       }
     }
-    std::sort(ends.begin(), ends.end());
+    std::sort(ends_.begin(), ends_.end());
+  }
+
+  /// Part by part of the edge between ends of sections.
+  void integrate_edge(int e) {
+    const double end = e + 2 == n_ ? length_ : (e + 1) * h_;
+    double from = e * h_;
+    while (next_ < ends_.size() && ends_[next_] < end) {
+      integrate_part(e, from, ends_[next_]);
+      from = std::max(from, ends_[next_++]);
+      known_ = false;
+    }
+    integrate_part(e, from, end);
+  }
+
+  /// By the middle where no tool tapers, else by Gauss' rule.
+  void integrate_part(int e, double from, double to) {
+    const double part = to - from, middle = 0.5 * (from + to);
+    if (part <= 1e-12 * h_) return;  // of rounding; none of its points may lie past a tip
+    if (!known_) look(middle);
+    known_ = true;
+    if (local_.even) {
+      add_point(e, middle, part);
+      return;
+    }
     constexpr std::array<double, 3> kPoint = {-0.7745966692414834, 0.0, 0.7745966692414834};
     constexpr std::array<double, 3> kWeight = {5.0 / 18.0, 8.0 / 18.0, 5.0 / 18.0};
-    for (std::size_t k = 0; k + 1 < ends.size(); ++k) {
-      const double part = ends[k + 1] - ends[k], middle = 0.5 * (ends[k] + ends[k + 1]);
-      if (part <= 1e-12 * h_) continue;  // of rounding; none of its points may lie past a tip
-      for (std::size_t p = 0; p < 3; ++p) {
-        const double s = middle + 0.5 * part * kPoint[p], w = s / h_ - e;
-        add_point(s, kWeight[p] * part, {Share{e, 1.0 - w}, Share{e + 1, w}});
-      }
+    for (std::size_t p = 0; p < 3; ++p) {
+      const double s = middle + 0.5 * part * kPoint[p];
+      look(s);
+      add_point(e, s, kWeight[p] * part);
     }
   }
 
-  struct Share {
-    int node;
-    double weight;
-  };
-
-  void add_point(double s, double length, const std::array<Share, 2>& shares) {
-    std::array<ToolSpot, kMostTools> local;
-    double K = 0.0, EA = 0.0, mass = 0.0;
-    Eigen::Index outermost = 0;
+  void look(double s) {
+    double K = 0.0, EA = 0.0;
+    local_.mass = 0.0;
+    local_.even = true;
     for (std::size_t i = 0; i < tools_.size(); ++i) {
-      local[i] = look_at(tools_[i].wire, places_[i].insertion - s);
-      if (!local[i].there) continue;
-      if (K == 0.0) outermost = static_cast<Eigen::Index>(i);
-      K += local[i].EI;
-      EA += local[i].EA;
-      mass += local[i].mass;
+      ToolSpot& spot = local_.at[i];
+      spot = look_at(tools_[i].wire, places_[i].insertion - s);
+      if (!spot.there) continue;
+      if (K == 0.0) local_.outermost = static_cast<Eigen::Index>(i);
+      K += spot.EI;
+      EA += spot.EA;
+      local_.mass += spot.mass;
+      local_.even = local_.even && !spot.tapers;
     }
-    for (const Share& share : shares) {
-      const double w = share.weight * length;
-      compliance_[share.node] += w / K;
-      axial_[share.node] += w / EA;
-      mass_[share.node] += w * mass;
-      outside_(outermost, share.node) += w;
-      for (int t = 0; t < terms_.twists(); ++t) add_curve(t, share.node, w, K, local);
-    }
+    local_.compliance = 1.0 / K;
+    local_.per_EA = 1.0 / EA;
   }
 
-  void add_curve(int t, int node, double w, double K,
-                 const std::array<ToolSpot, kMostTools>& local) {
-    const auto at = [&](int row) -> const ToolSpot& {
-      return local[static_cast<std::size_t>(terms_.tool[static_cast<std::size_t>(row)])];
-    };
-    const ToolSpot& here = at(t);
-    torsional_(t, node) += w / here.GJ;
-    if (!here.there) return;
-    const double moment = here.EI * here.curvature;
-    terms_.rest(t, node) += w * moment / K;
-    terms_.stored += 0.5 * w * moment * (here.curvature - moment / K);
+  void add_point(int e, double s, double length) {
+    const double w = s / h_ - e;
+    add_share(e, (1.0 - w) * length);
+    add_share(e + 1, w * length);
+  }
+
+  void add_share(int node, double w) {
+    rod_.bend[node] += w * local_.compliance;
+    axial_[node] += w * local_.per_EA;
+    rod_.mass[node] += w * local_.mass;
+    outside_(local_.outermost, node) += w;
+    for (int t = 0; t < terms_.twists(); ++t) add_curve(t, node, w);
+  }
+
+  const ToolSpot& spot_of(int t) const {
+    return local_.at[static_cast<std::size_t>(terms_.tool[static_cast<std::size_t>(t)])];
+  }
+
+  void add_curve(int t, int node, double w) {
+    const ToolSpot& here = spot_of(t);
+    terms_.twist(t, node) += w / here.GJ;
+    if (!here.there || here.curvature == 0.0) return;
+    const double moment = here.EI * here.curvature, turn = moment * local_.compliance;
+    terms_.rest(t, node) += w * turn;
+    terms_.stored += 0.5 * w * moment * (here.curvature - turn);
     for (int k = t + 1; k < terms_.twists(); ++k) {
-      if (!at(k).there) continue;
-      terms_.mutual(ToolTerms::pair(t, k), node) -= w * moment * at(k).EI * at(k).curvature / K;
+      const ToolSpot& other = spot_of(k);
+      if (!other.there) continue;
+      terms_.mutual(ToolTerms::pair(t, k), node) -= w * turn * other.EI * other.curvature;
     }
   }
 
@@ -144,7 +194,7 @@ class Builder {
       const auto i = static_cast<std::size_t>(terms_.tool[static_cast<std::size_t>(t)]);
       const double insertion = places_[i].insertion;
       double compliance = kLeast / look_at(tools_[i].wire, insertion).GJ;
-      torsional_(t, 0) -= compliance;
+      terms_.twist(t, 0) -= compliance;
       add_lead(tools_[i].wire, insertion, terms_.stored, compliance);
       terms_.lead[t] = 1.0 / compliance;
       terms_.roll[t] = places_[i].roll;
@@ -153,58 +203,63 @@ class Builder {
 
   /// Twist reaches to the ends, as that of one wire (build_rod).
   void finish_twist() {
-    for (int i = 1; i + 1 < n_; ++i) {
-      Eigen::VectorXd sum = torsional_.col(i);
-      if (i == 1) sum += torsional_.col(0);
-      if (i == n_ - 2) sum += torsional_.col(n_ - 1);
-      terms_.twist.col(i) = sum.cwiseInverse();
-    }
+    Eigen::MatrixXd& twist = terms_.twist;  // so far integrals of w/GJ
+    twist.col(1) += twist.col(0);
+    twist.col(n_ - 2) += twist.col(n_ - 1);
+    twist.col(0).setZero();
+    twist.col(n_ - 1).setZero();
+    for (int i = 1; i + 1 < n_; ++i) twist.col(i) = twist.col(i).cwiseInverse();
   }
 
-  Rod make_rod() const {
-    Rod rod;
+  void finish_rod() {
+    Rod& rod = rod_;
+    rod.radius = 0.0;
     for (const Tool& tool : tools_) rod.radius = std::max(rod.radius, tool.wire.radius);
     rod.twisted = terms_.twists() > 0;
-    rod.rest_length = Eigen::VectorXd::Constant(n_ - 1, h_);
-    rod.per_length = rod.rest_length.cwiseInverse();
-    rod.bend = compliance_.cwiseInverse();
+    rod.rest_length.setConstant(n_ - 1, h_);
+    rod.per_length.setConstant(n_ - 1, 1.0 / h_);
+    rod.bend = rod.bend.cwiseInverse();  // so far integrals of w/K
     rod.proximal_bend = rod.bend[0];
     rod.distal_bend = rod.bend[n_ - 1];
     rod.bend[0] = rod.bend[n_ - 1] = 0.0;
-    rod.strip = rod.twist = rod.rest_angle = Eigen::VectorXd::Zero(n_);
-    rod.share = Eigen::VectorXd::Constant(n_, h_);
+    rod.strip.setZero(n_);
+    rod.twist.setZero(n_);
+    rod.rest_angle.setZero(n_);
+    rod.share.setConstant(n_, h_);
     rod.share[0] = rod.share[n_ - 1] = 0.5 * h_;
-    rod.mass = mass_;
     rod.thinner.setZero(n_);
-    for (std::size_t i = 0; i < tools_.size(); ++i) {
-      const double less = rod.radius - tools_[i].wire.radius;
-      rod.thinner +=
-          less * outside_.row(static_cast<Eigen::Index>(i)).transpose().cwiseQuotient(rod.share);
+    for (int i = 0; i < n_; ++i) {
+      for (std::size_t k = 0; k < tools_.size(); ++k) {
+        const double less = rod.radius - tools_[k].wire.radius;
+        rod.thinner[i] += less * outside_(static_cast<Eigen::Index>(k), i) / rod.share[i];
+      }
     }
     // An edge stretches as the hats of its ends do: it must not jump either.
     rod.stretch.resize(n_ - 1);
     for (int e = 0; e + 1 < n_; ++e) {
       rod.stretch[e] = 2.0 / (axial_[e] / rod.share[e] + axial_[e + 1] / rod.share[e + 1]);
     }
-    rod.tip_distance = Eigen::VectorXd::LinSpaced(n_, length_, 0.0);
-    return rod;
+    rod.tip_distance.setLinSpaced(n_, length_, 0.0);
   }
 
   const std::vector<Tool>& tools_;
   const std::vector<ToolPlace>& places_;
   const int n_;  // nodes
   double length_ = 0.0, h_ = 0.0;
-  Eigen::VectorXd compliance_, axial_;  // (n) integrals of w/K, w/EA
-  Eigen::VectorXd mass_;                // (n) of w times mass
-  Eigen::MatrixXd outside_;             // (tools, n) of w where a tool is the outermost
-  Eigen::MatrixXd torsional_;           // (T, n) of w/GJ
-  ToolTerms terms_;
+  Rod& rod_;
+  ToolTerms& terms_;
+  Eigen::MatrixXd& outside_;   // (tools, n) so far of w where a tool is the outermost
+  Eigen::VectorXd& axial_;     // (n) integrals of w/EA
+  std::vector<double>& ends_;  // of sections, see find_ends()
+  std::size_t next_ = 0;       // of them
+  Local local_;
+  bool known_ = false;  // it is that of the part between ends under way
 };
 
 }  // namespace
 
-Composite build_composite(const std::vector<Tool>& tools, const std::vector<ToolPlace>& places,
-                          int elements) {
+void build_composite(const std::vector<Tool>& tools, const std::vector<ToolPlace>& places,
+                     int elements, Composite& composite) {
   expects(!tools.empty() && tools.size() <= kMostTools && places.size() == tools.size());
   expects(elements >= 2);
   double longest = 0.0;
@@ -214,7 +269,14 @@ Composite build_composite(const std::vector<Tool>& tools, const std::vector<Tool
     longest = std::max(longest, places[i].insertion);
   }
   expects(longest > 0.0);
-  return Builder(tools, places, elements).build();
+  Builder(tools, places, elements, composite).build();
+}
+
+Composite build_composite(const std::vector<Tool>& tools, const std::vector<ToolPlace>& places,
+                          int elements) {
+  Composite composite;
+  build_composite(tools, places, elements, composite);
+  return composite;
 }
 
 }  // namespace wireplan::simulate

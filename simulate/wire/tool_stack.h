@@ -34,6 +34,7 @@ constexpr int kMostTools = 3;
 /// A tool at one place of it; past its tip what its tip has.
 struct ToolSpot {
   bool there = false;                   // not past its tip
+  bool tapers = false;                  // there
   double EI = 0.0, EA = 0.0, GJ = 0.0;  //                                     [N mm^2, N]
   double curvature = 0.0;               //                                          [1/mm]
   double mass = 0.0;                    // per length                               [t/mm]
@@ -61,7 +62,9 @@ struct ToolTerms {
 struct Composite {
   Rod rod;
   ToolTerms terms;
-  Eigen::MatrixXd outside;  // (tools, n) the part of a node's share where a tool is the outermost
+  Eigen::MatrixXd outside;   // (tools, n) the part of a node's share where a tool is the outermost
+  Eigen::VectorXd axial;     // (n) integrals of w/EA, and ...                          [mm/N]
+  std::vector<double> ends;  // ... places of ends of sections: scratch                   [mm]
 
   double edge_length() const { return rod.rest_length[0]; }  //                           [mm]
 };
@@ -71,5 +74,8 @@ struct Composite {
 /// insertions from 0 to the tools' lengths, one of them above 0, and no strips.
 Composite build_composite(const std::vector<Tool>& tools, const std::vector<ToolPlace>& places,
                           int elements);
+/// The same in memory that is reused.
+void build_composite(const std::vector<Tool>& tools, const std::vector<ToolPlace>& places,
+                     int elements, Composite& composite);
 
 }  // namespace wireplan::simulate
