@@ -107,7 +107,8 @@ class Newton {
     const bool met = result_.residual <= options_.residual_tolerance;
     if (!met || contact_ == nullptr || contact_->lag_is_fresh()) return;
     contact_->refresh(true);
-    eager_until_ = result_.iterations + kTuning.eager_again;
+    // Curved tools in one another went round between two lags.
+    if (problem_.tools == nullptr) eager_until_ = result_.iterations + kTuning.eager_again;
     wire_energy_ = differentiate(state_);
     energy_ = wire_energy_ + contact_->energy().total();
     result_.residual = largest_force();
