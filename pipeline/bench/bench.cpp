@@ -127,6 +127,10 @@ void run_bench(const std::string& name, const std::filesystem::path& folder,
     throw Error("bench: --case is '" + options.case_path +
                 "', expected none: only throughput takes a case");
   }
+  if (make_report != bench_throughput && !options.rows.empty()) {
+    throw Error("bench: " + name + " is given rows, '" + options.rows.front() +
+                "', expected none: only throughput takes them");
+  }
   if (make_report != bench_segmentation && (options.patients > 0 || !options.data.empty())) {
     throw Error("bench: " + name +
                 " is given patients or --data, expected none: only segmentation takes them");

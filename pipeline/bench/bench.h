@@ -21,6 +21,8 @@ struct BenchOptions {
   std::string case_path = {};
   std::vector<std::string> overrides = {};
   std::filesystem::path cache = {};  // of truth too
+  /// And which rows: some of "vessel", "s-tube", "paper", "moving", "coaxial"; empty: all.
+  std::vector<std::string> rows = {};
   /// Segmentation alone: how many patients are drawn (0: 100, or 2 of the quick size), from which
   /// seed on, and the folder of real cases with labels (empty: what WIREPLAN_DATA names, if that).
   int patients = 0;

@@ -2,7 +2,9 @@
 // error of the tip beside every speed.
 #include <algorithm>
 #include <cmath>
+#include <iostream>
 #include <map>
+#include <set>
 
 #include "pipeline/bench/bench_report.h"
 #include "pipeline/bench/bench_walls.h"
@@ -190,6 +192,13 @@ Json row_of(const InsertionBatch& batch, const BatchTiming& timing,
   return row;
 }
 
+void tell(const Json& row) { std::cout << line_of(row) << std::flush; }
+
+void add_row(Json row, ThroughputResults& results) {
+  tell(row);
+  results.rows.push_back(std::move(row));
+}
+
 // ---------------------------------------------------------------- what is run
 
 /// Straight and curved wires against either wall, over the element lengths.
@@ -217,11 +226,10 @@ void run_vessel(const std::string& name, const Vessel& vessel, const Size& size,
         const BatchTiming& timing = timings[e];
         const std::size_t count = batch.candidates.size();
         for (const int threads : {1, 2}) {
-          results.rows.push_back(
-              row_of(batch, timing, finer, {.count = count, .threads = threads}));
+          add_row(row_of(batch, timing, finer, {.count = count, .threads = threads}), results);
         }
         for (std::size_t k = 0; !curved && k < count; ++k) {
-          results.rows.push_back(row_of(batch, timing, finer, {.first = k, .count = 1}));
+          add_row(row_of(batch, timing, finer, {.first = k, .count = 1}), results);
         }
         results.same = results.same && timing.same;
       }
@@ -268,7 +276,7 @@ void run_s_tube(const Size& size, ThroughputResults& results) {
           options.step = push;
           const InsertionBatch batch = make_batch(kSTube, vessel, "rigid", {wire}, {0.0}, options);
           const BatchTiming timing = time_batch(batch, model, {.repeats = size.repeats});
-          results.rows.push_back(row_of(batch, timing, finer, {.count = 1}));
+          add_row(row_of(batch, timing, finer, {.count = 1}), results);
           results.same = results.same && timing.same;
           ends.push_back(timing.trials.front());
         }
@@ -287,7 +295,7 @@ void run_paper_scene(const std::string& name, const Vessel& vessel, const Wire& 
     const SharedModel model(vessel, wall);
     const BatchTiming timing = time_batch(batch, model, {.repeats = size.repeats});
     const std::vector<TrialResult> finer = run_finer(batch, model, size.finest);
-    results.rows.push_back(row_of(batch, timing, finer, {.count = 1}));
+    add_row(row_of(batch, timing, finer, {.count = 1}), results);
     results.same = results.same && timing.same;
   }
 }
@@ -300,47 +308,76 @@ Wire paper_wire() {
           .sections = {{.length = 40.0, .bending_stiffness = 800.0, .axial_stiffness = 16000.0}}};
 }
 
+/// The names of rows that are asked for, checked.
+std::set<std::string> rows_asked_for(const BenchOptions& options) {
+  const std::set<std::string> known = {"vessel", "s-tube", "paper", "moving", "coaxial"};
+  for (const std::string& name : options.rows) {
+    if (known.count(name) > 0) continue;
+    throw Error("bench: throughput is asked for the rows '" + name +
+                "', expected some of vessel, s-tube, paper, moving and coaxial, or none for all of "
+                "them");
+  }
+  if (options.rows.empty()) return known;
+  std::set<std::string> rows(options.rows.begin(), options.rows.end());
+  if (!options.case_path.empty() &&
+      rows.count("vessel") + rows.count("paper") + rows.count("moving") == 0) {
+    throw Error("bench: --case is '" + options.case_path +
+                "', expected none: it is the vessel of the rows vessel, paper and moving alone");
+  }
+  return rows;
+}
+
+/// Of a case, or made here; with its name.
+Vessel vessel_of(const BenchOptions& options, const Size& size, std::string& name) {
+  name = "arterial-tree";
+  if (options.case_path.empty()) return make_arterial_tree(size.tree_edge);
+  const Case given = read_case(options.case_path, options.overrides);
+  name = given.name;
+  return vessel_of_case(given, options.cache);
+}
+
+/// The paper's tube, and where there is a case what its Fig. 6 asks for: a real artery.
+void run_paper(const Vessel* artery, const Size& size, ThroughputResults& results,
+               std::vector<BenchSurface>& surfaces) {
+  const Vessel tube = make_paper_tube();
+  run_paper_scene(kPaperTube, tube, paper_wire(), 36.0, size, results);
+  surfaces.push_back({kPaperTube, tube.surface});
+  if (artery == nullptr) return;
+  Vessel coarse{
+      .surface = decimate(artery->surface, kPaperTriangles), .path = artery->path, .wall = {}};
+  coarse.wall = preprocess::extrude_wall(coarse.surface, {}).wall;
+  run_paper_scene(kPaperArtery, coarse, straight_wire(521.0, 400.0), 200.0, size, results);
+  surfaces.push_back({kPaperArtery, coarse.surface});
+}
+
 }  // namespace
 
 BenchReport bench_throughput(const BenchOptions& options) {
   const Size& size = options.quick ? kQuick : kFull;
-
-  // The vessel: of a case, or made here.
+  const std::set<std::string> asked = rows_asked_for(options);
+  const auto wanted = [&](const char* rows) { return asked.count(rows) > 0; };
+  const bool of_case = !options.case_path.empty();
+  ThroughputResults results;
+  BenchReport report;
   std::string surface = "arterial-tree";
   Vessel vessel;
-  if (options.case_path.empty()) {
-    vessel = make_arterial_tree(size.tree_edge);
-  } else {
-    const Case given = read_case(options.case_path, options.overrides);
-    surface = given.name;
-    vessel = vessel_of_case(given, options.cache);
+  if (wanted("vessel") || wanted("moving") || of_case) vessel = vessel_of(options, size, surface);
+  if (wanted("vessel")) {
+    run_vessel(surface, vessel, size, results);
+    report.surfaces.push_back({surface, vessel.surface});
   }
-
-  ThroughputResults results;
-  run_vessel(surface, vessel, size, results);
-  BenchReport report;
-  report.surfaces.push_back({surface, vessel.surface});
-  run_s_tube(size, results);
-  const Vessel tube = make_paper_tube();
-  run_paper_scene(kPaperTube, tube, paper_wire(), 36.0, size, results);
-  report.surfaces.push_back({kPaperTube, tube.surface});
-
-  // The paper's Fig. 6 asks for a real artery.
-  if (!options.case_path.empty()) {
-    Vessel artery{
-        .surface = decimate(vessel.surface, kPaperTriangles), .path = vessel.path, .wall = {}};
-    artery.wall = preprocess::extrude_wall(artery.surface, {}).wall;
-    run_paper_scene(kPaperArtery, artery, straight_wire(521.0, 400.0), 200.0, size, results);
-    report.surfaces.push_back({kPaperArtery, artery.surface});
-  }
+  if (wanted("s-tube")) run_s_tube(size, results);
+  if (wanted("paper")) run_paper(of_case ? &vessel : nullptr, size, results, report.surfaces);
+  std::vector<Json> moving, coaxial;
+  if (wanted("moving")) moving = time_moving_vessel(vessel, size.EI, size.length, size.repeats);
+  if (wanted("coaxial")) coaxial = time_coaxial_manoeuvres(size.coaxial, tell);
 
   report.description = describe_throughput(surface, size.length, size.finest);
-  // The quick size is too short to hold against them.
-  std::vector<Json> aims = options.quick ? std::vector<Json>{} : list_throughput_aims(results);
-  const std::vector<Json> moving = time_moving_vessel(vessel, size.EI, size.length, size.repeats);
-  if (!options.quick) aims.push_back(moving_aim(moving));
-  const std::vector<Json> coaxial = time_coaxial_manoeuvres(size.coaxial);
-  if (!options.quick) {
+  const bool inserted = !results.rows.empty();
+  std::vector<Json> aims;
+  if (!options.quick) {  // which is too short to hold against them
+    if (inserted) aims = list_throughput_aims(results);
+    if (!moving.empty()) aims.push_back(moving_aim(moving));
     for (const Json& aim : list_coaxial_aims(coaxial)) aims.push_back(aim);
   }
   report.results = {{"aims", Json::array()},
@@ -348,12 +385,26 @@ BenchReport bench_throughput(const BenchOptions& options) {
                     {"coaxial", coaxial},
                     {"moving_vessel", moving},
                     {"same_on_two_threads", results.same}};
-  for (const Json& aim : aims) report.results["aims"].push_back(aim);
-  report.rows = std::move(results.rows);
-  report.text = table_text(shorten_throughput(report.rows)) + "\n" + table_text(results.s_tube) +
-                "\n" + table_text(coaxial) + "\n" + table_text(aims) + "On one thread and on two " +
-                (results.same ? "the same to the last bit\n" : "NOT THE SAME\n");
-  report.plot = plot_throughput(report.rows, surface);
+  std::vector<Json> found;  // aims of rows that are not asked for are not
+  for (const Json& aim : aims) {
+    if (options.rows.empty() || !aim.at("found").is_null()) found.push_back(aim);
+  }
+  for (const Json& aim : found) report.results["aims"].push_back(aim);
+  report.plot = plot_throughput(results.rows, moving, coaxial, surface);
+  report.text = "\n";
+  for (const std::vector<Json>& table :
+       {shorten_throughput(results.rows), results.s_tube, moving, coaxial, found}) {
+    if (!table.empty()) report.text += table_text(table) + "\n";
+  }
+  if (inserted) {
+    report.text += std::string("On one thread and on two ") +
+                   (results.same ? "the same to the last bit\n" : "NOT THE SAME\n");
+  } else {
+    report.results["same_on_two_threads"] = nullptr;
+  }
+  report.rows = inserted           ? std::move(results.rows)
+                : !coaxial.empty() ? std::move(coaxial)
+                                   : std::move(moving);
   return report;
 }
 

@@ -71,14 +71,16 @@ Json time_manoeuvre(const simulate::ToolScene& scene, const char* wall) {
   row["residual_n"] = clean(residual);
   row["heat_n_mm"] = clean(record.heat);
   row["unbalanced_n_mm"] = clean(record.unbalanced);
-  row["tip_mm"] = {clean(record.tools[0].tip.x()), clean(record.tools[0].tip.y()),
-                   clean(record.tools[0].tip.z())};
+  row["tip_x_mm"] = clean(record.tools[0].tip.x());
+  row["tip_y_mm"] = clean(record.tools[0].tip.y());
+  row["tip_z_mm"] = clean(record.tools[0].tip.z());
   return row;
 }
 
 }  // namespace
 
-std::vector<Json> time_coaxial_manoeuvres(double length) {
+std::vector<Json> time_coaxial_manoeuvres(double length,
+                                          const std::function<void(const Json&)>& tell) {
   Vessel tube = make_long_s_tube();
   tube.wall = preprocess::extrude_wall(tube.surface, {}).wall;
   std::vector<Json> rows;
@@ -90,6 +92,7 @@ std::vector<Json> time_coaxial_manoeuvres(double length) {
               : simulate::VesselModel(tube.surface, tube.wall, options);
     for (const double element_length : {kScoutElements, kFullElements}) {
       rows.push_back(time_manoeuvre(coaxial_scene(vessel, length, element_length), wall));
+      tell(rows.back());
     }
   }
   return rows;

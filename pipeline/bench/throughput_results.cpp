@@ -1,6 +1,7 @@
 #include "pipeline/bench/throughput_results.h"
 
 #include <algorithm>
+#include <cmath>
 
 #include "pipeline/files/text.h"
 #include "pipeline/report/plot.h"
@@ -92,7 +93,8 @@ std::vector<Json> list_throughput_aims(const ThroughputResults& results) {
   return aims;
 }
 
-Picture plot_throughput(const std::vector<Json>& rows, const std::string& surface) {
+Picture plot_throughput(const std::vector<Json>& rows, const std::vector<Json>& moving,
+                        const std::vector<Json>& coaxial, const std::string& surface) {
   const std::vector<LegendEntry> legend = {
       {"rigid, straight", Color(0.05F, 0.10F, 0.65F)},
       {"rigid, curved", Color(0.00F, 0.60F, 0.55F)},
@@ -104,9 +106,21 @@ Picture plot_throughput(const std::vector<Json>& rows, const std::string& surfac
   const char* kError = "tip's distance from that of the finest elements [mm]";
   FrontPlot vessel{surface + ", over the element length", kTime, kError, {}};
   FrontPlot tube{"S-tube, over the length of a push and how well it is solved", kTime, kError, {}};
+  FrontPlot paper{"the paper's scenes", kTime, kError, {}};
+  FrontPlot manoeuvres{"a catheter over a wire",
+                       "time of one manoeuvre on one core [ms]",
+                       "energy out of balance [N mm]",
+                       {}};
+  FrontPlot shifts{
+      "a vessel that moves as a whole", kTime, "largest shift of a cross-section [mm]", {}};
   for (std::size_t k = 0; k < legend.size(); ++k) {
-    vessel.lines.push_back({k, {}});
-    tube.lines.push_back({k, {}});
+    for (FrontPlot* plot : {&vessel, &tube, &paper, &shifts, &manoeuvres}) {
+      plot->lines.push_back({k, {}});
+    }
+  }
+  for (const Json& row : moving) {
+    shifts.lines[2].points.emplace_back(row.at("cpu_ms_moving").get<double>(),
+                                        std::max(kLeastError, row.at("moved_mm").get<double>()));
   }
   for (const Json& row : rows) {
     if (row.at("threads") != 1 || row.at("position_error_mm").is_null()) continue;
@@ -115,10 +129,22 @@ Picture plot_throughput(const std::vector<Json>& rows, const std::string& surfac
     const std::size_t line = fine_tip ? 4U : (elastic ? 2U : 0U) + (curved ? 1U : 0U);
     const Eigen::Vector2d point(row.at("cpu_ms_per_insertion").get<double>(),
                                 std::max(kLeastError, row.at("position_error_mm").get<double>()));
-    if (row.at("surface") == surface) vessel.lines[line].points.push_back(point);
-    if (row.at("surface") == kSTube) tube.lines[line].points.push_back(point);
+    FrontPlot& plot = row.at("surface") == surface ? vessel : is_paper_scene(row) ? paper : tube;
+    plot.lines[line].points.push_back(point);
   }
-  return draw_fronts("Error of the tip against run time", {vessel, tube}, 2, legend);
+  for (const Json& row : coaxial) {
+    const double per_second = row.at("manoeuvres_per_second_per_core").get<double>();
+    const double off = std::abs(row.at("unbalanced_n_mm").get<double>());
+    manoeuvres.lines[row.at("wall") == "elastic" ? 3U : 1U].points.emplace_back(
+        1e3 / per_second, std::max(kLeastError, off));
+  }
+  std::vector<FrontPlot> plots;
+  for (const FrontPlot& plot : {vessel, tube, paper, shifts, manoeuvres}) {
+    const bool has_points = std::any_of(plot.lines.begin(), plot.lines.end(),
+                                        [](const auto& line) { return !line.points.empty(); });
+    if (has_points) plots.push_back(plot);
+  }
+  return draw_fronts("Error against run time", plots, 2, legend);
 }
 
 Json describe_throughput(const std::string& surface, double length, double finest) {
@@ -176,6 +202,22 @@ Json describe_throughput(const std::string& surface, double length, double fines
         {"warm_up_ms",
          "that the first insertions of the row took longer, for responses of the wall "
          "that no row above had found"}}}};
+}
+
+std::string line_of(const Json& row) {
+  const auto text = [&](const char* key) { return row.at(key).get<std::string>(); };
+  const auto number = [&](const char* key) { return row.at(key).get<double>(); };
+  if (row.contains("manoeuvres_per_second_per_core")) {
+    return format("coaxial, %s, h %g mm: %.3g 1/s/core, %s\n", text("wall").c_str(),
+                  number("element_length_mm"), number("manoeuvres_per_second_per_core"),
+                  text("outcome").c_str());
+  }
+  const Json& EI = row.at("bending_stiffness_n_mm2");
+  return format("%s, %s, %s%s, h %g mm, pushes of %g mm, %d threads: %.4g 1/s/core, %s\n",
+                text("surface").c_str(), text("wall").c_str(), text("wire").c_str(),
+                EI.is_null() ? "" : format(" of EI %g", EI.get<double>()).c_str(),
+                number("element_length_mm"), number("push_mm"), row.at("threads").get<int>(),
+                number("insertions_per_second_per_core"), text("outcomes").c_str());
 }
 
 std::vector<Json> shorten_throughput(const std::vector<Json>& rows) {

@@ -29,11 +29,17 @@ struct ThroughputResults {
 /// What is asked of wireplan, beside what these rows say.
 std::vector<Json> list_throughput_aims(const ThroughputResults& results);
 
-/// Error of the tip against run time, in this vessel and in the S-tube.
-Picture plot_throughput(const std::vector<Json>& rows, const std::string& surface);
+/// Against run time: error of the tip, in this vessel, in the S-tube and in the paper's scenes; of
+/// a vessel that moves its largest shift, and of coaxial manoeuvres their energy out of balance.
+/// What there are rows of.
+Picture plot_throughput(const std::vector<Json>& rows, const std::vector<Json>& moving,
+                        const std::vector<Json>& coaxial, const std::string& surface);
 
 /// Scenes and columns; `length` of an insertion, `finest` elements that errors count from [mm].
 Json describe_throughput(const std::string& surface, double length, double finest);
+
+/// A row of insertions or of a coaxial manoeuvre on one line, for who waits.
+std::string line_of(const Json& row);
 
 /// The columns that fit a terminal.
 std::vector<Json> shorten_throughput(const std::vector<Json>& rows);

@@ -319,9 +319,11 @@ void add_bench(CLI::App& app, int& code) {
       ->add_option("NAME", arguments->name,
                    "accuracy, stability, throughput, preprocess, segmentation, measured or truth")
       ->required();
-  bench->add_option("N|FOLDER|CASE", arguments->of,
-                    "Segmentation: how many patients [100]; measured: folder of the frames "
-                    "[guide3d]; truth: cases [all]");
+  bench->add_option(
+      "N|FOLDER|CASE|ROWS", arguments->of,
+      "Segmentation: how many patients [100]; measured: folder of the frames "
+      "[guide3d]; truth: cases [all]; throughput: some of vessel, s-tube, paper, moving and "
+      "coaxial [all]");
   bench->add_option("--trials", arguments->options.trials, "Truth: trials of each case [12]")
       ->check(CLI::Range(1, 100'000));
   bench->add_option("-o,--output", arguments->output, "Folder for results [wireplan-out/bench]");
@@ -340,7 +342,8 @@ void add_bench(CLI::App& app, int& code) {
       "Writes NAME.json, NAME.csv and the plot NAME.png, and prints the table.\n"
       "  accuracy   each method's error and time on scenes whose answer is known\n"
       "  stability  stiff and extreme scenes: which method converges, stops or fails\n"
-      "  throughput insertions per second and core, rigid and yielding, with their error\n"
+      "  throughput insertions per second and core, rigid and yielding, with their error; rows of\n"
+      "             the vessel, the S-tube, the paper's scenes and of coaxial tools\n"
       "  segmentation  patients drawn at random (see phantom --random) and real ones with labels,\n"
       "             each from two points: overlap, surface, way, leaks, refusals\n"
       "  measured   real wires in a phantom, measured by X-ray: one push at eight rolls, and from\n"
@@ -351,6 +354,8 @@ void add_bench(CLI::App& app, int& code) {
   bench->callback([&code, arguments] {
     if (arguments->name == "truth") {
       arguments->options.cases = arguments->of;
+    } else if (arguments->name == "throughput") {
+      arguments->options.rows = arguments->of;
     } else if (arguments->name == "measured" && !arguments->of.empty()) {
       if (arguments->of.size() > 1) {
         throw Error("bench: measured is given '" + arguments->of[0] + "' and '" + arguments->of[1] +

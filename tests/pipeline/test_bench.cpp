@@ -204,7 +204,7 @@ TEST(Bench, EveryInsertionIsInBalanceAndTheSameOnTwoThreads) {
     SCOPED_TRACE(row.dump());
     EXPECT_EQ(row.at("outcome"), "converged");
     EXPECT_LE(row.at("residual_n"), 1e-6);
-    EXPECT_GT(row.at("tip_mm").at(2), 40.0);
+    EXPECT_GT(row.at("tip_z_mm"), 40.0);
   }
   expect_written(throughput, "throughput", "1/s/core");
 }
@@ -456,6 +456,27 @@ TEST(Bench, TruthIsToldOfACaseThatIsNotThere) {
 TEST(Bench, CaseIsForThroughputAlone) {
   const TemporaryFolder folder;
   EXPECT_THROW(run_bench("accuracy", folder.path(), {.case_path = "cases/abdomen"}), Error);
+}
+
+TEST(Bench, ThroughputRunsTheRowsThatItIsAskedForAndTellsThemOneByOne) {
+  const TemporaryFolder folder;
+  testing::internal::CaptureStdout();
+  run_bench("throughput", folder.path(), {.quick = true, .rows = {"coaxial"}});
+  const std::string text = testing::internal::GetCapturedStdout();
+  EXPECT_EQ(text.find("coaxial, rigid, h 4 mm: "), 0U) << text;
+  EXPECT_NE(text.find("\ncoaxial, elastic, h 1 mm: "), std::string::npos) << text;
+  EXPECT_EQ(text.find("s-tube"), std::string::npos) << text;
+  const Json result = read_json(folder / "throughput.json", kBenchSchema);
+  EXPECT_EQ(result.at("rows").size(), 4U);
+  EXPECT_EQ(result.at("rows"), result.at("results").at("coaxial"));
+  EXPECT_TRUE(result.at("results").at("same_on_two_threads").is_null());
+  expect_same_rows(result.at("rows"), folder / "throughput.csv");
+
+  EXPECT_THROW(run_bench("throughput", folder.path(), {.rows = {"tube"}}), Error);
+  EXPECT_THROW(
+      run_bench("throughput", folder.path(), {.case_path = "cases/abdomen", .rows = {"coaxial"}}),
+      Error);
+  EXPECT_THROW(run_bench("stability", folder.path(), {.rows = {"coaxial"}}), Error);
 }
 
 TEST(Bench, UnknownNameIsToldWithTheKnownOnes) {
