@@ -327,9 +327,8 @@ std::set<std::string> rows_asked_for(const BenchOptions& options) {
   return rows;
 }
 
-/// Of a case, or made here; with its name.
+/// Of a case, whose name it takes, or made here.
 Vessel vessel_of(const BenchOptions& options, const Size& size, std::string& name) {
-  name = "arterial-tree";
   if (options.case_path.empty()) return make_arterial_tree(size.tree_edge);
   const Case given = read_case(options.case_path, options.overrides);
   name = given.name;

@@ -269,11 +269,9 @@ Region find_by_level(const Image& image, const SegmentOptions& options,
   statistics.search.leaks = std::move(lumen.leaks);
   const std::vector<float> depth = measure_depth(region.grid, region.labels);
   statistics.ways.clear();
-  for (const auto& way : ways) {
-    if (way.size() > 1) statistics.ways.push_back(line_along(region.grid, depth, way));
-  }
-  statistics.search.route =
-      route_along(region, depth, ways, line_along(region.grid, depth, ways.back()));
+  for (const auto& way : ways) statistics.ways.push_back(line_along(region.grid, depth, way));
+  statistics.search.route = route_along(region, depth, ways, statistics.ways.back());
+  std::erase_if(statistics.ways, [](const Centerline& line) { return line.points.cols() < 2; });
   require_width(region.grid, statistics.search.route);
   return region;
 }
