@@ -256,8 +256,8 @@ Json describe_columns() {
        "tube without plaque, over two voxels in radius"},
       {"way_right",
        "each point of the centerline lies within the true radius of the true axis (of the wider "
-       "artery where it leaves that), and none of its steps skips more of it than 2.5 radii and 5 "
-       "mm; so at both ends"},
+       "artery where their lumens are one), and none of its steps skips more of it than 2.5 radii "
+       "and 5 mm; so at both ends"},
       {"outside_percent",
        "of the mask, neither in the truth nor next to it (corners included), "
        "over the truth"},

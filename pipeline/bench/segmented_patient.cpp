@@ -133,13 +133,14 @@ void measure_surface(const Surface& surface, const Grid& grid, const Centerline&
   row.surface_p95_mm = p95_of(errors);
 }
 
-/// How far from the way a line may be: the radius there, or, as far along it as a wider artery's
-/// radius from where the way leaves that, the wider one's, since lines cut corners.
+/// How far from the way a line may be: the radius there, or that of a wider artery whose lumen is
+/// one with it there, as at its mouth, since lines cut corners.
 Centerline widened(Centerline way) {
   const Centerline narrow = way;
   for (Eigen::Index i = 0; i < way.points.cols(); ++i) {
     for (Eigen::Index j = 0; j < way.points.cols(); ++j) {
-      if (std::abs(narrow.arc_length(i) - narrow.arc_length(j)) > narrow.radius(j)) continue;
+      const double apart = (narrow.points.col(i) - narrow.points.col(j)).norm();
+      if (apart > narrow.radius(i) + narrow.radius(j)) continue;
       way.radius(i) = std::max(way.radius(i), narrow.radius(j));
     }
   }

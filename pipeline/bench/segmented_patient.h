@@ -37,9 +37,10 @@ struct PatientRow {
 };
 
 /// Whether a line keeps to the true way: each of its points lies within the way's radius at the
-/// place next to it (as far from a mouth as the wider artery's radius, within that: lines cut
-/// corners); no step skips more of the way than two and a half radii and 5 mm, as those across
-/// limbs that kiss do; and it begins and ends with the way, to the same tolerance.
+/// place next to it (where a wider artery's lumen is one with that, as at a mouth, within the
+/// wider one's: lines cut corners); no step skips more of the way than two and a half radii and 5
+/// mm, as those across limbs that kiss do; and it begins and ends with the way, to the same
+/// tolerance.
 bool is_way_right(const Centerline& line, const Centerline& way);
 
 /// Segmented from the two clicked points alone, no band given; then its surface and centerline with

@@ -102,6 +102,43 @@ Centerline drawn_way(const DrawnAnatomy& body, const PhantomSpec& spec) {
                    index_at(axes.back(), body.target_at));
 }
 
+/// How far a point lies outside of a lumen [mm]; negative inside.
+double outside(const Centerline& lumen, const Vec3& p) {
+  return ((lumen.points.colwise() - p).colwise().norm().transpose() - lumen.radius).minCoeff();
+}
+
+/// Whether arteries of the way touch elsewhere than where one leaves the other, or one touches
+/// itself: their lumens would be one there, and the way through that as true as the drawn one.
+bool touches_itself(DrawnAnatomy& body) {
+  constexpr double kApart = 0.25;  // mm between lumens: less is no wall
+  std::vector<Centerline> way;
+  for (const std::string& name : body.way) way.push_back(phantom_axis(body.tube(name)));
+  for (const Centerline& axis : way) {
+    for (Eigen::Index j = 0; j < axis.points.cols(); ++j) {
+      for (Eigen::Index i = 0; i < j; ++i) {
+        const double both = axis.radius(i) + axis.radius(j);
+        if (axis.arc_length(j) - axis.arc_length(i) < 4.0 * both) break;
+        if ((axis.points.col(i) - axis.points.col(j)).norm() < both + kApart) return true;
+      }
+    }
+  }
+  for (const Centerline& parent : way) {
+    for (const Centerline& child : way) {
+      if (&parent == &child || outside(child, parent.points.col(0)) < 0.0) continue;
+      // What leaves the parent's lumen is clear of it soon.
+      bool clear = outside(parent, child.points.col(0)) > 0.0;
+      double left_at = 0.0;
+      for (Eigen::Index j = 0; j < child.points.cols(); ++j) {
+        const double away = outside(parent, child.points.col(j)), radius = child.radius(j);
+        if (!clear && away < 0.0) left_at = child.arc_length(j);
+        clear = clear || child.arc_length(j) - left_at > 3.0 * (radius + 1.0);
+        if (clear && away < radius + kApart) return true;
+      }
+    }
+  }
+  return false;
+}
+
 void add_narrow_place(Draws& draws, const DrawnScan& scan, DrawnAnatomy& body) {
   // In an artery along z where slices are thick, and not so thin that they would cut it in two.
   std::vector<std::string> places;
@@ -124,6 +161,23 @@ void add_narrow_place(Draws& draws, const DrawnScan& scan, DrawnAnatomy& body) {
                            : draws.between(0.3, 0.7);
   add_stenosis(tube, at, draws.between(5.0, 12.0), share);
   body.features.emplace_back("stenosis");
+}
+
+DrawnAnatomy draw_body(bool abdomen, const DrawnScan& scan, Draws& draws) {
+  DrawnAnatomy body = abdomen ? draw_abdomen(draws, scan) : draw_arch(draws, scan);
+  const auto resample_all = [&] {
+    for (PhantomTube& tube : body.tubes) {
+      tube = with_points_every(tube, tube.kind == PhantomTubeKind::kArtery ? 2.5 : 5.0);
+    }
+  };
+  resample_all();
+  bend_all(body, draws);
+  for (const DrawnLoop& loop : body.loops) {
+    add_kissing_loop(body.tube(loop.tube), loop.side, loop.gap);
+  }
+  if (draws.chance(0.35)) add_narrow_place(draws, scan, body);
+  resample_all();
+  return body;
 }
 
 /// HU along every vessel: of arteries the contrast falls from the height of the access to that of
@@ -278,19 +332,10 @@ RandomPatient draw_patient(std::uint64_t seed) {
   const bool abdomen = draws.chance(0.65);
   patient.anatomy = abdomen ? "abdomen" : "arch";
   const DrawnScan scan = draw_scan(draws, patient.features);
-  DrawnAnatomy body = abdomen ? draw_abdomen(draws, scan) : draw_arch(draws, scan);
-  const auto resample_all = [&] {
-    for (PhantomTube& tube : body.tubes) {
-      tube = with_points_every(tube, tube.kind == PhantomTubeKind::kArtery ? 2.5 : 5.0);
-    }
-  };
-  resample_all();
-  bend_all(body, draws);
-  for (const DrawnLoop& loop : body.loops) {
-    add_kissing_loop(body.tube(loop.tube), loop.side, loop.gap);
-  }
-  if (draws.chance(0.35)) add_narrow_place(draws, scan, body);
-  resample_all();
+  DrawnAnatomy body;
+  do {
+    body = draw_body(abdomen, scan, draws);
+  } while (touches_itself(body));
 
   PhantomSpec& spec = patient.spec;
   spec.body_center = body.body_center;

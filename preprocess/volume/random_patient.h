@@ -49,6 +49,7 @@ inline constexpr PatientFeature kPatientFeatures[] = {
 
 /// Deterministic: the same seed gives the same patient. The volume has 0.5 to 10 million voxels,
 /// 0.6 to 0.9 mm in the slice, slices 0.5 to 5 mm, cropped round the way.
+/// An anatomy whose way touches itself is drawn anew.
 RandomPatient draw_patient(std::uint64_t seed);
 
 /// The true axis from the place next to the access to that next to the target, as the volume shows

@@ -388,6 +388,17 @@ TEST(Bench, AWayIsRightThatKeepsToTheTrueOneAndSkipsNothingOfIt) {
   EXPECT_FALSE(is_way_right(line_through({{0, 0, 40}, {0, 0, 60}, {50, 0, 60}}, 3.0), way))
       << "late";
 
+  // A branch that leaves a trunk of 14 mm radius backwards, at 25 degrees: its lumen is one with
+  // the trunk's for 40 mm. A line that crosses within that, and one that crosses beyond.
+  const Vec3 tip = {60.0 * std::sin(25.0 * kPi / 180.0), 0,
+                    60.0 - 60.0 * std::cos(25.0 * kPi / 180.0)};
+  Centerline acute = line_through({{0, 0, 0}, {0, 0, 60}, tip}, 14.0);
+  for (Eigen::Index i = 0; i < acute.points.cols(); ++i) {
+    if (acute.points(0, i) > 0.0) acute.radius(i) = 3.0;
+  }
+  EXPECT_TRUE(is_way_right(line_through({{0, 0, 0}, {0, 0, 44}, {7.46, 0, 44}, tip}, 3.0), acute));
+  EXPECT_FALSE(is_way_right(line_through({{0, 0, 0}, {0, 0, 19}, {19, 0, 19.2}, tip}, 3.0), acute));
+
   // Limbs of 4 mm radius that come back to 0.5 mm from each other, and a line that steps across.
   const Centerline loop = line_through(
       {{0, 0, 0}, {0, 0, 40}, {-20, 0, 60}, {4, 0, 80}, {28, 0, 60}, {8.5, 0, 40}, {8.5, 0, 0}},
