@@ -184,6 +184,7 @@ std::vector<ToolStep> as_written(std::vector<ToolStep> steps) {
     step.push = step.turn != 0.0 ? 0.0 : clean(step.push);
     step.at =
         step.until == Until::kFacing ? clean(step.at / kRadPerDeg) * kRadPerDeg : clean(step.at);
+    step.try_turn = clean(step.try_turn / kRadPerDeg) * kRadPerDeg;
   }
   return steps;
 }
@@ -261,6 +262,14 @@ std::vector<std::string> describe_steps(const std::vector<ToolStep>& steps, doub
       text += end;
       text += end.empty() ? " by " + whole_number(-step.push) + " mm"
                           : ", by " + whole_number(-step.push) + " mm at most";
+    }
+    if (step.tries > 0) {
+      text += "; where it passes the branch by, withdraw it and try again with both ";
+      text += whole_number(step.try_pull) + " mm back, then on, of where they were, then with the ";
+      text += "catheter turned " + whole_number(std::abs(step.try_turn) / kRadPerDeg) + " degrees ";
+      text += step.try_turn > 0.0 ? "clockwise" : "counterclockwise";
+      text += ", then to the other side, then by twice as much, ";
+      text += std::to_string(step.tries) + " times at most";
     }
     told.push_back(std::move(text));
   }

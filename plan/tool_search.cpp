@@ -43,8 +43,10 @@ struct Template {
   double spare = 40.0;  // of the last push, for patients who differ ...                  [mm]
   double slack = 12.0;  // ... and of pushes and pulls that end by what is seen           [mm]
   double turn_slack = 30.0 * kRadPerDeg;  // ... and of turns
-  std::size_t weighed = 5;                // scripts of a start whose neighbours are tried
-  double steady = 0.5;  // of these that reach: a neighbour may stand in for the script
+  int again = 8;  // tries more of a wire that passes the ostium by, from so far beside
+  double again_pull = 3.0, again_turn = 15.0 * kRadPerDeg;  //                          [mm, rad]
+  std::size_t weighed = 5;  // scripts of a start whose neighbours are tried
+  double steady = 0.5;      // of these that reach: a neighbour may stand in for the script
 };
 constexpr Template kTemplate;
 
@@ -235,6 +237,7 @@ class ToolSearch {
   void keep(std::vector<ToolStep> steps) {
     if (steps.back().push <= 0.0) return;
     steps.back().push += kTemplate.spare;
+    let_try_again(steps);
     FoundScript found{.steps = std::move(steps)};
     for (const ToolStep& step : found.steps) {
       if (step.turn != 0.0) found.turned += step.until == Until::kFacing ? step.at : step.turn;
@@ -247,6 +250,22 @@ class ToolSearch {
     if (find_broken_rule(found.steps, catheter_, wire_, study_.tool_rules).empty()) {
       findings_.found.push_back(std::move(found));
     }
+  }
+
+  /// A wire that passes the ostium by is withdrawn and led out again with the catheter turned a
+  /// little, first the way that it was turned before.
+  static void let_try_again(std::vector<ToolStep>& steps) {
+    double side = 1.0;
+    ToolStep* out = nullptr;
+    for (ToolStep& step : steps) {
+      if (step.turn != 0.0) side = step.turn > 0.0 ? 1.0 : -1.0;
+      if (step.tool == kBothTools || step.turn != 0.0) out = nullptr;
+      if (step.tool == kWire && step.push > 0.0 && out == nullptr) out = &step;
+    }
+    if (out == nullptr) return;
+    out->tries = kTemplate.again;
+    out->try_pull = kTemplate.again_pull;
+    out->try_turn = side * kTemplate.again_turn;
   }
 
   /// Of the scripts that stand first without it, how often they and their neighbours reach.

@@ -316,6 +316,11 @@ Json steps_json(const std::vector<simulate::ToolStep>& steps) {
       const bool angle = step.until == simulate::Until::kFacing;
       row["until"] = {{until_name(step.until), clean(angle ? step.at / kRadPerDeg : step.at)}};
     }
+    if (step.tries > 0) {
+      row["tries"] = {{"most", step.tries},
+                      {"pull_mm", clean(step.try_pull)},
+                      {"turn_deg", clean(step.try_turn / kRadPerDeg)}};
+    }
     list.push_back(std::move(row));
   }
   return list;
@@ -332,8 +337,13 @@ std::vector<simulate::ToolStep> steps_of(const Json& list) {
                      .turn = row.value("turn_deg", 0.0) * kRadPerDeg,
                      .until = {},
                      .at = 0.0});
-    if (!row.contains("until")) continue;
     simulate::ToolStep& step = steps.back();
+    if (row.contains("tries")) {
+      step.tries = row.at("tries").at("most");
+      step.try_pull = number_of(row.at("tries").at("pull_mm"));
+      step.try_turn = number_of(row.at("tries").at("turn_deg")) * kRadPerDeg;
+    }
+    if (!row.contains("until")) continue;
     const Json::const_iterator until = row.at("until").begin();
     step.until = until_of(until.key());
     step.at =

@@ -25,7 +25,8 @@ constexpr double kLongestEdge = 1.45;      // ... of it: ToolBench::divide()
 constexpr double kDivideShorter = 0.67;    // ... or shorter: the centreline is divided anew
 constexpr double kAtEnd = 0.02;            // of a part: so near, a step is at what ends it; chosen
 constexpr double kShortestToEnd = 0.1;     // of a part, near what ends it; chosen
-constexpr double kLooksAside = 0.1;        // sine, of a tip against the trunk: less looks nowhere
+constexpr double kTryOut = 20.0, kTryIn = 5.0;  // of a tool that passes a branch by: ToolStep  [mm]
+constexpr double kLooksAside = 0.1;  // sine, of a tip against the trunk: less looks nowhere
 
 std::string in_mm(double value) {
   char text[32];
@@ -132,11 +133,26 @@ std::optional<double> ToolTrial::missing(const ToolStep& step) const {
 
 bool ToolTrial::make(const ToolStep& step, bool last) {
   expects(step.tool >= kBothTools && step.tool < static_cast<int>(record_.tools.size()));
+  expects(step.tries == 0 || (step.tool > 0 && step.push > 0.0));
+  ++step_;
+  const double from = step.tries > 0 ? insertion(step.tool) : 0.0;
+  for (int tried = 0; advance(step, last, tried < step.tries); ++tried) {
+    try_again(step, from, tried + 1);
+  }
+  // The end of each step is looked at.
+  if (!ended() && options_.insertion.map_forces && since_shape_ > 0.0) {
+    since_shape_ = 0.0;
+    record_.shapes.push_back(shape_here());
+  }
+  return !ended();
+}
+
+/// Part by part. True where it stops since the tool passes the branch by, if that is looked for.
+bool ToolTrial::advance(const ToolStep& step, bool last, bool looks) {
   const double whole = std::abs(step.push) + std::abs(step.turn) / kToolTurnStep;
   const double most = step.turn == 0.0 ? kStepsPerPart * options_.insertion.step : 1.0;
   const double unit = step.turn == 0.0 ? 1.0 : kToolTurnStep;
   furthest_ = since_furthest_ = 0.0;
-  ++step_;
   for (double done = 0.0; whole - done > 1e-9 && !ended();) {
     double by = std::min(most, whole - done);
     if (const std::optional<double> left = missing(step)) {
@@ -150,16 +166,42 @@ bool ToolTrial::make(const ToolStep& step, bool last) {
     if (!part({.tool = step.tool, .push = by / whole * step.push, .turn = by / whole * step.turn}))
       break;
     done += by;
+    if (looks && passes_by(step)) return true;
     // Within another tool it brings no tip on.
     const bool leads = foremost_of(step.tool) > foremost() - 1e-9;
     if (last && step.push > 0.0 && leads && !check_advance(by)) break;
   }
-  // The end of each step is looked at.
-  if (!ended() && options_.insertion.map_forces && since_shape_ > 0.0) {
-    since_shape_ = 0.0;
-    record_.shapes.push_back(shape_here());
+  return false;
+}
+
+/// Whether the tool has come out of the one outside it, and not into the branch.
+bool ToolTrial::passes_by(const ToolStep& step) const {
+  const double out = insertion(step.tool) - insertion(step.tool - 1);
+  return out >= kTryOut && measure(Until::kInBranch, step.tool) < kTryIn;
+}
+
+/// Takes the tool of a push back to where the push began, and brings all to where the next try
+/// begins.
+void ToolTrial::try_again(const ToolStep& step, double from, int tried) {
+  struct Place {
+    double push = 0.0, turn = 0.0;
+  };
+  const auto place = [&](int k) -> Place {
+    if (k == 0) return {};
+    const int size = 1 + (k - 1) / 4;
+    const double side = k % 2 == 1 ? 1.0 : -1.0;
+    return (k - 1) % 4 < 2 ? Place{.push = -side * size * step.try_pull}
+                           : Place{.turn = side * size * step.try_turn};
+  };
+  ++tries_;
+  const Place before = place(tried - 1), next = place(tried);
+  const double start = from + before.push;
+  advance({.tool = step.tool, .push = start - insertion(step.tool)}, false, false);
+  const ToolStep moves[] = {{.tool = step.tool - 1, .turn = next.turn - before.turn},
+                            {.tool = kBothTools, .push = next.push - before.push}};
+  for (const ToolStep& move : moves) {
+    if (!ended() && (move.push != 0.0 || move.turn != 0.0)) advance(move, false, false);
   }
-  return !ended();
 }
 
 /// A part of a step, which is recorded; false where it ends the trial or the tool has no length
@@ -397,6 +439,8 @@ void ToolTrial::end_where_it_is(Outcome outcome, const std::string& reason) {
 void ToolTrial::end(Outcome outcome, const std::string& reason) {
   outcome_ = record_.outcome = outcome;
   record_.reason = reason;
+  if (tries_ == 0) return;
+  record_.reason += "; tried again " + std::to_string(tries_) + (tries_ == 1 ? " time" : " times");
 }
 
 TrialResult ToolTrial::finish() {
@@ -429,6 +473,7 @@ ToolTrial::Mark ToolTrial::save() const {
           .pushes = record_.pushes.size(),
           .shapes = record_.shapes.size(),
           .step = step_,
+          .tries = tries_,
           .since_shape = since_shape_,
           .best_distance = best_distance_};
 }
@@ -438,6 +483,7 @@ void ToolTrial::restore(const Mark& mark) {
   record_.pushes.resize(mark.pushes);
   record_.steps.resize(mark.pushes);
   step_ = mark.step;
+  tries_ = mark.tries;
   record_.shapes.resize(mark.shapes);
   for (ToolTrack& track : record_.tools) {
     for (auto* column : {&track.insertion, &track.roll, &track.push_force, &track.hub_torque,

@@ -44,6 +44,12 @@ struct ToolStep {
   double turn = 0.0;  // of its hub, right-handed about the introducer's direction       [rad]
   Until until = Until::kMade;
   double at = 0.0;  // see Until                                                     [mm, rad]
+  /// Of a push of a tool that leads: where it is 20 mm out of the one outside it, and not in the
+  /// branch, it is withdrawn to where the step began, and the push begins anew with both pulled
+  /// back by `try_pull` from where they were, then pushed on by it, then the outer one turned by
+  /// `try_turn`, then to the other side, then all that by twice as much, ...; so often. Chosen.
+  int tries = 0;
+  double try_pull = 0.0, try_turn = 0.0;  //                                        [mm, rad]
   bool operator==(const ToolStep&) const = default;
 };
 
@@ -87,13 +93,16 @@ class ToolTrial {
   struct Mark {
     ToolBench::Mark bench;
     std::size_t pushes = 0, shapes = 0;
-    int step = -1;
+    int step = -1, tries = 0;
     double since_shape = 0.0, best_distance = 0.0;
   };
   Mark save() const;
   void restore(const Mark& mark);
 
  private:
+  bool advance(const ToolStep& step, bool last, bool looks);
+  bool passes_by(const ToolStep& step) const;
+  void try_again(const ToolStep& step, double from, int tried);
   bool part(const ToolStep& step);
   std::optional<double> missing(const ToolStep& step) const;
   bool divide_for(const ToolMove& move);
@@ -115,6 +124,7 @@ class ToolTrial {
   TrialResult record_;
   std::optional<Outcome> outcome_;
   int step_ = -1;  // of the script, under way
+  int tries_ = 0;  // that were made again
   double since_shape_ = 0.0, best_distance_ = 0.0;
   double furthest_ = 0.0, since_furthest_ = 0.0;  // of the last step
   std::vector<double> peak_;                      // per triangle of the wall, largest force  [N]

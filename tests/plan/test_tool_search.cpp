@@ -2,6 +2,7 @@
 // a branch on either side, that mirrored targets have mirrored scripts.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <memory>
 #include <string>
@@ -221,7 +222,13 @@ TEST(ToolSteps, SayWhatEndsThem) {
                       {.tool = 0, .turn = -kPi / 2.0, .until = Until::kFacing, .at = kPi / 6.0},
                       {.tool = kBothTools, .push = -40.0, .until = Until::kLevel, .at = -6.0},
                       {.tool = kBothTools, .push = -9.0, .until = Until::kInBranch, .at = 0.0},
-                      {.tool = 1, .push = 60.0, .until = Until::kInBranch, .at = 18.0},
+                      {.tool = 1,
+                       .push = 60.0,
+                       .until = Until::kInBranch,
+                       .at = 18.0,
+                       .tries = 8,
+                       .try_pull = 3.0,
+                       .try_turn = -15.0 * kRadPerDeg},
                       {.tool = 0, .push = 12.0},
                       {.tool = 1, .push = 90.0}},
                      247.4);
@@ -235,7 +242,10 @@ TEST(ToolSteps, SayWhatEndsThem) {
       "pull back catheter and wire together until the catheter's tip falls into the ostium, by 9 "
       "mm "
       "at most",
-      "advance the wire until its tip is 18 mm past the ostium, by 60 mm at most",
+      "advance the wire until its tip is 18 mm past the ostium, by 60 mm at most; where it passes "
+      "the branch by, withdraw it and try again with both 3 mm back, then on, of where they were, "
+      "then with the catheter turned 15 degrees counterclockwise, then to the other side, then by "
+      "twice as much, 8 times at most",
       "advance the catheter over the wire by 12 mm",
       "advance the wire until its tip is at the target, 247 mm in"};
   EXPECT_EQ(told, expected);
@@ -411,6 +421,56 @@ TEST(ToolSearch, TargetsOnEitherSideHaveMirroredScripts) {
   const double there = turned(found[0].found[0]), back = turned(found[1].found[0]);
   EXPECT_GT(std::abs(there), 45.0);
   EXPECT_NEAR(there, -back, 31.0) << "turns are tried by 30 degrees";
+}
+
+TEST(ToolSearch, AWireThatPassesTheBranchByIsLedOutAnew) {
+  const Study study = toward(1.0);
+  const ToolScripts found = find_tool_scripts(study, aorta(), {.threads = 2});
+  ASSERT_FALSE(found.found.empty());
+  Candidate script = found.found[0];
+  const auto out = std::find_if(script.steps.begin(), script.steps.end(),
+                                [](const ToolStep& step) { return step.tries > 0; });
+  ASSERT_NE(out, script.steps.end()) << "the first push of the wire after turn and pull";
+  EXPECT_EQ(out->tool, 1);
+  EXPECT_GT(out->push, 0.0);
+  EXPECT_NEAR(std::abs(out->try_turn), 15.0 * kRadPerDeg, 1e-12);
+  EXPECT_EQ(out->try_pull, 3.0);
+  const auto turn = std::find_if(script.steps.begin(), script.steps.end(),
+                                 [](const ToolStep& step) { return step.turn != 0.0; });
+  ASSERT_NE(turn, script.steps.end());
+  ASSERT_EQ(turn->until, Until::kFacing);
+  const int tries = out->tries;
+  // Turned on from where it was found to reach, until the wire goes past.
+  simulate::TrialResult once = run_candidate(study, script, aorta());
+  const auto turns = static_cast<int>(turn - script.steps.begin());
+  double hub_there = 0.0;
+  for (std::size_t k = 0; k < once.steps.size(); ++k) {
+    if (once.steps[k] == turns) hub_there = once.tools[0].roll[k];
+  }
+  turn->until = Until::kMade;
+  out->tries = 0;
+  for (int k = 1; k <= 12 && once.outcome == simulate::Outcome::kReached; ++k) {
+    turn->turn = hub_there + k * 15.0 * kRadPerDeg;
+    once = run_candidate(study, script, aorta());
+  }
+  ASSERT_NE(once.outcome, simulate::Outcome::kReached);
+  EXPECT_EQ(once.reason.find("tried again"), std::string::npos);
+  out->tries = tries;
+  const simulate::TrialResult again = run_candidate(study, script, aorta());
+  EXPECT_EQ(again.outcome, simulate::Outcome::kReached) << again.reason;
+  EXPECT_NE(again.reason.find("tried again"), std::string::npos) << again.reason;
+  // The wire is withdrawn to where the push began, then both by 3 mm, before it comes out again.
+  const auto step = static_cast<int>(out - script.steps.begin());
+  const auto first = static_cast<std::size_t>(
+      std::find(again.steps.begin(), again.steps.end(), step) - again.steps.begin());
+  const double wire = again.tools[1].insertion[first - 1];
+  const double catheter = again.tools[0].insertion[first - 1];
+  bool both_back = false;
+  for (std::size_t k = first; k < again.steps.size() && again.steps[k] == step; ++k) {
+    both_back = both_back || (std::abs(again.tools[1].insertion[k] - (wire - 3.0)) < 1e-9 &&
+                              std::abs(again.tools[0].insertion[k] - (catheter - 3.0)) < 1e-9);
+  }
+  EXPECT_TRUE(both_back);
 }
 
 TEST(CatheterChoice, LeavesTheStudyWhatTheWayAsksFor) {
