@@ -93,8 +93,9 @@ RawPath search_path(const NearestWall& wall, const Surface& surface, const Vec3&
               place_text(access) + " mm inside the vessel surface (finest search grid " +
               number_text(spacing) + " mm): the nearest place reached, " + place_text(reached) +
               " mm, is " + number_text((target - reached).norm()) +
-              " mm from the target. Check the segmentation band (segmentation.lower_hu, "
-              "upper_hu), which may cut the vessel there, and the target point");
+              " mm from the target, expected a lumen that is open there; look whether the band of "
+              "the segmentation cuts the vessel there, or the surface's pieces hardly touch: mend "
+              "it there, or move the target");
 }
 
 // ---------------------------------------------------------------------------------- the ridge

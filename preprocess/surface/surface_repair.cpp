@@ -19,6 +19,7 @@ namespace {
 // Of two closed pieces, one in the other, the inner one is the lumen if it holds this part of the
 // outer's volume: the two are the skins of a wall. A smaller one is a cavity or a crumb.
 constexpr double kInnerSkin = 0.2;
+constexpr double kSkinLength = 0.8;  // of the other skin's
 // Pieces of less than this part of the largest's area are crumbs.
 constexpr double kCrumb = 0.05;
 // A vessel's area is more than this part of its length squared: 600 times that at 1 m and 0.1 mm.
@@ -55,14 +56,34 @@ Mend turned_piece(const Surface& piece) {
           .place = middle_of(piece)};
 }
 
+/// Points spread evenly over a surface's area, at most so many [mm]. The golden section steps
+/// through the triangles, so that no order in which a program writes them falls into step with it.
+std::vector<Vec3> spread_points(const Surface& surface, int count) {
+  constexpr double kGolden = 0.6180339887498949;
+  std::vector<double> area_up_to;
+  double area = 0.0;
+  for (const auto& t : surface.triangles.colwise()) {
+    const Vec3 a = surface.vertices.col(t(0)), b = surface.vertices.col(t(1)),
+               c = surface.vertices.col(t(2));
+    area_up_to.push_back(area += 0.5 * (b - a).cross(c - a).norm());
+  }
+  std::vector<Vec3> points;
+  for (int k = 0; k < std::min(count, static_cast<int>(surface.triangles.cols())); ++k) {
+    const double at = area * std::fmod(kGolden * (k + 0.5), 1.0);
+    const auto found = std::upper_bound(area_up_to.begin(), area_up_to.end() - 1, at);
+    const Eigen::Vector3i t = surface.triangles.col(found - area_up_to.begin());
+    points.emplace_back(surface.vertices(Eigen::all, t).rowwise().mean());
+  }
+  return points;
+}
+
 /// Whether a piece lies inside a closed surface, and how far from its wall in the median.
 InsideAnswer locate_piece(const Surface& piece, const Surface& closed) {
-  constexpr Eigen::Index kSamples = 20;
-  const Eigen::Index stride = std::max<Eigen::Index>(1, piece.vertices.cols() / kSamples);
+  constexpr int kSamples = 60;
   int inside = 0;
   std::vector<double> distances;
-  for (Eigen::Index v = 0; v < piece.vertices.cols(); v += stride) {
-    const InsideAnswer answer = locate_point(closed, piece.vertices.col(v));
+  for (const Vec3& point : spread_points(piece, kSamples)) {
+    const InsideAnswer answer = locate_point(closed, point);
     inside += answer.inside ? 1 : 0;
     distances.push_back(answer.distance);
   }
@@ -117,11 +138,9 @@ bool cut_each_other(const Surface& a, const Surface& b) {
   return false;
 }
 
-/// The vessel with a closed piece that overlaps it; empty where it does not.
-std::optional<Surface> unite(const Surface& vessel, const Piece& piece, const std::string& origin,
-                             std::vector<Mend>& mends) {
-  const Surface& closed = piece.surface;
-  if (!cut_each_other(vessel, closed) || check_surface(closed).open_edges > 0) return {};
+/// The vessel with a closed piece that overlaps it.
+Surface unite(const Surface& vessel, const Surface& closed, const std::string& origin,
+              std::vector<Mend>& mends) {
   std::optional<Surface> united = union_of(largest_piece(vessel), closed);
   if (!united) {
     throw Error(origin + ": a closed piece of the surface, " + number_text(length_of(closed)) +
@@ -133,48 +152,77 @@ std::optional<Surface> unite(const Surface& vessel, const Piece& piece, const st
                    .count = static_cast<int>(closed.triangles.cols()),
                    .place = middle_of(closed),
                    .size = length_of(closed)});
-  return united;
+  return std::move(*united);
 }
+
+/// The vessel, put together from closed or open pieces.
+class Assembly {
+ public:
+  Assembly(const std::vector<Piece>& pieces, const std::string& origin, std::vector<Mend>& mends)
+      : origin_(origin), mends_(mends), largest_(area_of(pieces.front().surface)) {
+    if (pieces.front().turned) mends_.push_back(turned_piece(pieces.front().surface));
+    require_area(pieces.front().surface, origin_);
+    vessel_ = close_openings(pieces.front().surface, origin_, mends_);
+    for (std::size_t k = 1; k < pieces.size(); ++k) left_.push_back(&pieces[k].surface);
+  }
+
+  /// Takes what belongs to the vessel, the largest first. A piece may overlap a smaller one alone,
+  /// so those that are left are looked at again.
+  void take_pieces() {
+    for (std::size_t before = left_.size() + 1; left_.size() < before;) {
+      before = left_.size();
+      left_.erase(std::remove_if(left_.begin(), left_.end(),
+                                 [&](const Surface* piece) { return take(*piece); }),
+                  left_.end());
+    }
+  }
+
+  Surface vessel() const { return largest_piece(vessel_); }
+  const std::vector<const Surface*>& left() const { return left_; }
+
+ private:
+  /// Whether the piece is united with the vessel, or takes its place: an inner skin of a wall.
+  bool take(const Surface& piece) {
+    const bool cuts = cut_each_other(vessel_, piece);
+    const InsideAnswer there =
+        area_of(piece) < kCrumb * largest_ ? InsideAnswer{} : locate_piece(piece, vessel_);
+    // A skin that touches the other is as long as that; a branch whose root is deep is not.
+    if (there.inside && (!cuts || length_of(piece) > kSkinLength * length_of(vessel_))) {
+      std::vector<Mend> of_piece;
+      Surface inner = largest_piece(close_openings(piece, origin_, of_piece));
+      if (signed_volume(inner) >= kInnerSkin * std::abs(signed_volume(vessel_))) {
+        mends_ = std::move(of_piece);  // what was mended on the outer skin does not matter
+        mends_.push_back({.kind = MendKind::kOuterSkin,
+                          .count = static_cast<int>(vessel_.triangles.cols()),
+                          .place = middle_of(vessel_),
+                          .size = there.distance});
+        vessel_ = std::move(inner);
+        return true;
+      }
+    }
+    if (!cuts || check_surface(piece).open_edges > 0) return false;
+    vessel_ = unite(vessel_, piece, origin_, mends_);
+    return true;
+  }
+
+  const std::string& origin_;
+  std::vector<Mend>& mends_;
+  double largest_;  // area of the largest piece                                       [mm^2]
+  Surface vessel_;
+  std::vector<const Surface*> left_;
+};
 
 /// The vessel among closed or open pieces: the largest, closed, with what overlaps it; or a piece
 /// within it that is the inner skin of its wall.
 Surface choose_piece(const std::vector<Piece>& pieces, const std::string& origin,
                      std::vector<Mend>& mends, std::vector<Surface>& dropped) {
-  const Surface& first = pieces.front().surface;
-  const double largest = area_of(first);
-  if (pieces.front().turned) mends.push_back(turned_piece(first));
-  require_area(first, origin);
-  Surface vessel = close_openings(first, origin, mends);
-  const auto drop = [&](const Surface& piece) {
-    mends.push_back(dropped_piece(piece));
-    dropped.push_back(piece);
-  };
-  for (std::size_t k = 1; k < pieces.size(); ++k) {
-    const Surface& piece = pieces[k].surface;
-    const InsideAnswer there =
-        area_of(piece) < kCrumb * largest ? InsideAnswer{} : locate_piece(piece, vessel);
-    if (!there.inside) {
-      if (std::optional<Surface> united = unite(vessel, pieces[k], origin, mends)) {
-        vessel = std::move(*united);
-      } else {
-        drop(piece);
-      }
-      continue;
-    }
-    std::vector<Mend> of_piece;
-    Surface inner = largest_piece(close_openings(piece, origin, of_piece));
-    if (signed_volume(inner) < kInnerSkin * std::abs(signed_volume(vessel))) {
-      drop(piece);
-      continue;
-    }
-    mends = std::move(of_piece);  // what was mended on the outer skin does not matter
-    mends.push_back({.kind = MendKind::kOuterSkin,
-                     .count = static_cast<int>(vessel.triangles.cols()),
-                     .place = middle_of(vessel),
-                     .size = there.distance});
-    vessel = std::move(inner);
+  Assembly assembly(pieces, origin, mends);
+  assembly.take_pieces();
+  for (const Surface* piece : assembly.left()) {
+    mends.push_back(dropped_piece(*piece));
+    dropped.push_back(*piece);
   }
-  return largest_piece(vessel);
+  return assembly.vessel();
 }
 
 struct Wording {
@@ -248,17 +296,16 @@ std::vector<std::string> tell_mends(const std::vector<Mend>& mends) {
 
 std::string tell_dropped(const std::vector<Surface>& dropped, const Surface& vessel,
                          const Vec3& point) {
-  constexpr Eigen::Index kSamples = 500;  // vertices, to see where it comes near
+  constexpr int kSamples = 500;  // to see where it comes near
   for (const Surface& piece : dropped) {
     if (!locate_point(piece, point).inside) continue;
     double apart = std::numeric_limits<double>::infinity();
     Vec3 nearest = point;
-    const Eigen::Index stride = std::max<Eigen::Index>(1, piece.vertices.cols() / kSamples);
-    for (Eigen::Index v = 0; v < piece.vertices.cols(); v += stride) {
-      const InsideAnswer answer = locate_point(vessel, piece.vertices.col(v));
+    for (const Vec3& place : spread_points(piece, kSamples)) {
+      const InsideAnswer answer = locate_point(vessel, place);
       if (answer.distance >= apart) continue;
       apart = answer.distance;
-      nearest = piece.vertices.col(v);
+      nearest = place;
     }
     return "lies in a piece of the surface, " + number_text(length_of(piece)) +
            " mm long, that is not joined with the vessel and was dropped: it comes within " +

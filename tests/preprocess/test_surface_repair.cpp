@@ -5,6 +5,7 @@
 #include <cstdlib>
 #include <filesystem>
 #include <functional>
+#include <numeric>
 #include <optional>
 #include <random>
 #include <set>
@@ -256,6 +257,97 @@ TEST(SurfaceRepair, UnitesClosedPiecesThatOverlap) {
   EXPECT_TRUE(locate_point(repaired.surface, Vec3(18, 0, 30)).inside);
 }
 
+/// The same with its triangles and vertices in another order.
+Surface reordered(const Surface& s, const std::vector<int>& vertices,
+                  const std::vector<int>& triangles) {
+  std::vector<int> number(vertices.size());
+  for (std::size_t k = 0; k < vertices.size(); ++k) {
+    number[static_cast<std::size_t>(vertices[k])] = static_cast<int>(k);
+  }
+  Surface result{.vertices = s.vertices(Eigen::all, vertices),
+                 .triangles = s.triangles(Eigen::all, triangles)};
+  for (int& v : result.triangles.reshaped()) v = number[static_cast<std::size_t>(v)];
+  return result;
+}
+
+/// 0 to n-1 so that every (n / 20)th is one of the first of `sorted`.
+std::vector<int> first_at_each_step(const std::vector<int>& sorted) {
+  const std::size_t step = sorted.size() / 20;
+  std::vector<int> order(sorted.size());
+  std::size_t first = 0, other = (sorted.size() + step - 1) / step;
+  for (std::size_t k = 0; k < order.size(); ++k) {
+    order[k] = sorted[k % step == 0 ? first++ : other++];
+  }
+  return order;
+}
+
+/// Whatever order a program writes its triangles in: as they are, backward, and so that who looks
+/// at every n / 20th sees the lowest alone (as in tubes of 20 lines of vertices), or the highest.
+std::vector<Surface> in_several_orders(const Surface& s) {
+  std::vector<int> vertices(static_cast<std::size_t>(s.vertices.cols())),
+      triangles(static_cast<std::size_t>(s.triangles.cols()));
+  std::iota(vertices.begin(), vertices.end(), 0);
+  std::iota(triangles.begin(), triangles.end(), 0);
+  std::vector<Surface> orders = {s};
+  const auto height = [&](int t) { return s.vertices(2, s.triangles.col(t)).sum(); };
+  std::stable_sort(vertices.begin(), vertices.end(),
+                   [&](int a, int b) { return s.vertices(2, a) < s.vertices(2, b); });
+  std::stable_sort(triangles.begin(), triangles.end(),
+                   [&](int a, int b) { return height(a) < height(b); });
+  for (int turn = 0; turn < 2; ++turn) {
+    orders.push_back(reordered(s, vertices, triangles));
+    orders.push_back(reordered(s, first_at_each_step(vertices), first_at_each_step(triangles)));
+    std::reverse(vertices.begin(), vertices.end());
+    std::reverse(triangles.begin(), triangles.end());
+  }
+  return orders;
+}
+
+TEST(SurfaceRepair, UnitesAJunctionInWhateverOrderItsTrianglesCome) {
+  // A branch whose root lies on the trunk's axis, as thick as the trunk or thinner, larger than it
+  // or not: never a crumb, nor one of them the outer skin of the other.
+  for (const double radius : {2.0, 5.0}) {
+    for (const double length : {20.0, 40.0}) {
+      const Surface trunk = shapes::straight_tube(5.0, 30.0, 1.5);
+      const Surface straight = shapes::straight_tube(radius, length, 1.2);
+      double expected = 0.0;
+      for (const Surface& order : in_several_orders(straight)) {
+        SCOPED_TRACE(testing::Message() << radius << ' ' << length);
+        Surface branch = order;
+        for (auto p : branch.vertices.colwise()) p = Vec3(p.z() + 0.1, p.x() + 0.07, p.y() + 15.3);
+        const RepairedSurface repaired = repair_surface(shapes::joined(branch, trunk), "x");
+        EXPECT_TRUE(is_sound(check_surface(repaired.surface)));
+        EXPECT_EQ(count_of(repaired, MendKind::kUnited), 1);
+        EXPECT_EQ(repaired.mends.size(), 1U);
+        EXPECT_TRUE(locate_point(repaired.surface, Vec3(length - 1.0, 0, 15)).inside);
+        EXPECT_TRUE(locate_point(repaired.surface, Vec3(0, 0, 1)).inside);
+        const double volume = signed_volume(repaired.surface);
+        EXPECT_LT(volume, signed_volume(trunk) + (length - 3.0) / length * signed_volume(straight));
+        EXPECT_GT(volume, signed_volume(trunk) + (length - 6.0) / length * signed_volume(straight));
+        if (expected == 0.0) expected = volume;
+        EXPECT_NEAR(volume, expected, 1e-3 * expected);
+      }
+    }
+  }
+}
+
+TEST(SurfaceRepair, UnitesAPieceThatOverlapsASmallerOneAlone) {
+  // Trunk, a thin stem, and a branch, larger than the stem, at its end: the branch is looked at
+  // before the stem is part of the vessel.
+  const Surface trunk = shapes::straight_tube(5.0, 40.0, 1.5);
+  Surface stem = shapes::straight_tube(1.5, 20.0, 0.8),
+          branch = shapes::straight_tube(2.5, 20.0, 0.8);
+  for (auto p : stem.vertices.colwise()) p = Vec3(p.z(), p.x(), p.y() + 20.0);
+  for (auto p : branch.vertices.colwise()) p = Vec3(p.y() + 18.0, p.z() - 1.0, p.x() + 20.1);
+  ASSERT_GT(signed_volume(branch), signed_volume(stem));
+  const RepairedSurface repaired =
+      repair_surface(shapes::joined(shapes::joined(trunk, stem), branch), "x");
+  EXPECT_TRUE(is_sound(check_surface(repaired.surface)));
+  EXPECT_EQ(count_of(repaired, MendKind::kUnited), 2);
+  EXPECT_TRUE(repaired.dropped.empty());
+  EXPECT_TRUE(locate_point(repaired.surface, Vec3(18, 17, 20)).inside);
+}
+
 TEST(SurfaceRepair, AUnionDoesNotDependOnMemory) {
   // A tube through another: of the patches that it cuts, CGAL keeps three, in an order of its own.
   const Surface trunk = shapes::straight_tube(5.0, 60.0, 1.5);
@@ -317,11 +409,14 @@ TEST(SurfaceRepair, TakesTheInnerSkinOfAWallWhoseSkinsHangTogether) {
 }
 
 TEST(SurfaceRepair, TakesTheInnerOfTwoSkinsThatAreApart) {
-  for (const bool open : {true, false}) {
-    SCOPED_TRACE(open);
+  // Open, closed within each other, and closed with their caps in one plane.
+  for (const double beyond : {-1.0, 1.0, 0.0}) {
+    SCOPED_TRACE(beyond);
+    const bool open = beyond < 0.0;
     const Surface inner = open ? open_tube(3.0, 30.0, 0.9) : shapes::straight_tube(3.0, 30.0, 0.9);
-    Surface outer = open ? open_tube(4.0, 30.0, 1.0) : shapes::straight_tube(4.0, 32.0, 1.0);
-    if (!open) outer.vertices.row(2).array() -= 1.0;
+    Surface outer =
+        open ? open_tube(4.0, 30.0, 1.0) : shapes::straight_tube(4.0, 30.0 + 2.0 * beyond, 1.0);
+    if (!open) outer.vertices.row(2).array() -= beyond;
     const RepairedSurface repaired = repair_surface(shapes::joined(outer, inner), "x");
     EXPECT_TRUE(is_sound(check_surface(repaired.surface)));
     EXPECT_NEAR(mend_of(repaired, MendKind::kOuterSkin).size, 1.0, 0.1);
