@@ -70,6 +70,11 @@ std::string lower_case(std::string text) {
   return text;
 }
 
+std::string trimmed(const std::string& text) {
+  const std::size_t first = text.find_first_not_of(" \t\r"), last = text.find_last_not_of(" \t\r");
+  return first == std::string::npos ? "" : text.substr(first, last - first + 1);
+}
+
 std::string one_decimal(double value) {
   std::ostringstream text;
   text << std::fixed << std::setprecision(1) << value;
@@ -149,6 +154,23 @@ double count_values(const itk::ImageIOBase& io) {
 void require_room(double needed, double stored, double most_packed, const std::string& format,
                   const fs::path& path) {
   if (needed > most_packed * stored) throw Error(path.string() + ": " + damaged(format));
+}
+
+double size_beside(const fs::path& header, const std::string& name) {
+  const fs::path file = header.parent_path() / name;
+  std::error_code unknown;
+  if (fs::is_regular_file(file, unknown)) {
+    const auto size = fs::file_size(file, unknown);
+    if (!unknown) return static_cast<double>(size);
+  }
+  throw Error(header.string() + ": its voxels lie in " + name +
+              ", which is no file that can be read; put it where the header names it, or save the "
+              "volume as one file");
+}
+
+Error voxels_in_list(const fs::path& path, const std::string& ending) {
+  return Error(path.string() + ": its voxels lie in a list of files, expected them in one; " +
+               "save the volume as one " + ending + " file");
 }
 
 void tell_header(const itk::ImageIOBase& io, VolumeHeader& told) {

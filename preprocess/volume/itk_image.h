@@ -35,6 +35,9 @@ std::string without_path(const std::string& message, const std::filesystem::path
 
 std::string lower_case(std::string text);
 
+/// Without blanks at both ends.
+std::string trimmed(const std::string& text);
+
 std::string one_decimal(double value);  // with one digit behind the point
 
 /// How far the axes are from right angles, at most.
@@ -68,6 +71,13 @@ inline constexpr double kMostDeflated = 1040.0;
 /// is taken only for what a file can hold, whatever a damaged header promises.
 void require_room(double needed, double stored, double most_packed, const std::string& format,
                   const std::filesystem::path& path);
+
+/// The size of the file beside a header that holds its voxels [bytes].
+double size_beside(const std::filesystem::path& header, const std::string& name);
+
+/// Of a header whose voxels lie in several files; `ending` is that of a format that has them in
+/// one.
+Error voxels_in_list(const std::filesystem::path& path, const std::string& ending);
 
 /// Sizes, spacing and type of voxels as they stand in a header, sound or not.
 void tell_header(const itk::ImageIOBase& io, VolumeHeader& told);

@@ -8,21 +8,18 @@
 #include <bit>
 #include <cctype>
 #include <cmath>
-#include <cstdio>
 #include <cstdlib>
 #include <fstream>
-#include <iomanip>
 #include <limits>
-#include <map>
 #include <optional>
 #include <set>
 #include <sstream>
 
 #include "itkMetaImageIO.h"
-#include "itkNrrdImageIO.h"
 #include "preprocess/volume/byte_stream.h"
 #include "preprocess/volume/dicom_check.h"
 #include "preprocess/volume/nifti_file.h"
+#include "preprocess/volume/nrrd_file.h"
 
 namespace wireplan::preprocess {
 namespace {
@@ -75,16 +72,6 @@ struct MetaHeader {
   std::string unit;        // of length, as it is told
   double mm = 1.0;         // of a unit of length
 };
-
-Error voxels_in_list(const fs::path& path, const std::string& ending) {
-  return Error(path.string() + ": its voxels lie in a list of files, expected them in one; " +
-               "save the volume as one " + ending + " file");
-}
-
-std::string trimmed(const std::string& text) {
-  const std::size_t first = text.find_first_not_of(" \t\r"), last = text.find_last_not_of(" \t\r");
-  return first == std::string::npos ? "" : text.substr(first, last - first + 1);
-}
 
 double meta_unit(const std::string& unit, const fs::path& path) {
   const std::string name = lower_case(unit);
@@ -152,19 +139,6 @@ MetaHeader read_meta_header(const fs::path& path, const std::string& no_image) {
     require(keys.count(key) > 0);
   header.end = static_cast<std::streamoff>(file.tellg());
   return header;
-}
-
-/// The size of the file beside a header that holds its voxels [bytes].
-double size_beside(const fs::path& header, const std::string& name) {
-  const fs::path file = header.parent_path() / name;
-  std::error_code unknown;
-  if (fs::is_regular_file(file, unknown)) {
-    const auto size = fs::file_size(file, unknown);
-    if (!unknown) return static_cast<double>(size);
-  }
-  throw Error(header.string() + ": its voxels lie in " + name +
-              ", which is no file that can be read; put it where the header names it, or save the "
-              "volume as one file");
 }
 
 /// Refuses a header that promises more than there is.
@@ -278,199 +252,12 @@ Image read_meta(const fs::path& path, VolumeHeader& told) {
   return image;
 }
 
-/// The fields of an NRRD's header, "name: value", in small letters but for the name of a file; none
-/// where it is no NRRD. NrrdIO writes a line that it does not understand into 1024 characters of
-/// its stack, so long ones are refused: all but comments, what somebody adds as "key:=value", and
-/// "content", which is taken as it is.
-std::map<std::string, std::string> nrrd_fields(const fs::path& path, const std::string& no_image) {
-  constexpr std::size_t kMost = 10000, kLongest = 500;  // lines, characters
-  std::map<std::string, std::string> fields;
-  std::ifstream file(path, std::ios::binary);
-  std::string line;
-  const auto require = [&](bool sound) {
-    if (!sound) throw Error(path.string() + ": " + no_image);
-  };
-  if (!std::getline(file, line) || !line.starts_with("NRRD")) return fields;
-  require(line.size() <= kLongest);
-  while (std::getline(file, line) && !trimmed(line).empty()) {
-    const std::size_t colon = line.find(": ");
-    const bool added = line.find(":=") < colon;
-    if (line.front() == '#') continue;
-    std::string name = lower_case(trimmed(line.substr(0, colon)));
-    require(fields.size() < kMost && (line.size() <= kLongest || added || name == "content"));
-    if (colon == std::string::npos) continue;
-    if (name == "datafile") name = "data file";
-    const std::string value = trimmed(line.substr(colon + 2));
-    fields[name] = name == "data file" ? value : lower_case(value);
-  }
-  return fields;
-}
-
-/// Of the unit that all axes of space have; mm where none is told.
-double nrrd_unit(const std::map<std::string, std::string>& fields, const fs::path& path) {
-  const auto found = fields.find("space units");
-  if (found == fields.end()) return 1.0;
-  static const std::map<std::string, double> kUnits = {
-      {"", 1.0},    {"mm", 1.0},          {"millimeter", 1.0},  {"millimeters", 1.0},
-      {"cm", 10.0}, {"centimeter", 10.0}, {"m", 1000.0},        {"meter", 1000.0},
-      {"um", 1e-3}, {"micron", 1e-3},     {"micrometer", 1e-3}, {"\xc2\xb5m", 1e-3}};
-  std::set<double> scales;
-  std::istringstream text(found->second);
-  for (std::string unit; text >> std::quoted(unit);) {
-    const auto known = kUnits.find(trimmed(unit));
-    scales.insert(known == kUnits.end() ? 0.0 : known->second);
-  }
-  if (scales.size() != 1 || *scales.begin() == 0.0) {
-    throw Error(path.string() + ": space units " + found->second +
-                ", expected one of mm, cm, m, um for all axes; mend the header");
-  }
-  return *scales.begin();
-}
-
-/// Refuses places beyond any patient's: where an axis is longer than a number can be, ITK says 1
-/// mm.
-void require_near(const std::map<std::string, std::string>& fields, const fs::path& path) {
-  constexpr double kFar = 1e6;  // a kilometre in mm; in m beyond all bounds
-  for (const char* key : {"space directions", "space origin"}) {
-    const auto found = fields.find(key);
-    if (found == fields.end()) continue;
-    std::string text = found->second;
-    std::replace_if(
-        text.begin(), text.end(), [](char c) { return c == '(' || c == ')' || c == ','; }, ' ');
-    std::istringstream words(text);
-    for (std::string word; words >> word;) {
-      if (word == "none" || std::abs(std::strtod(word.c_str(), nullptr)) <= kFar) continue;
-      throw Error(path.string() + ": " + key + " has " + word.substr(0, 40) +
-                  ", expected numbers within a kilometre; mend the header");
-    }
-  }
-}
-
-/// The segments that 3D Slicer names in a header ("Segment0_Name:=aorta").
-std::vector<NamedSegment> nrrd_segments(const fs::path& path) {
-  std::map<int, NamedSegment> segments;
-  std::ifstream file(path, std::ios::binary);
-  constexpr std::size_t kLongest = 100000;  // lines
-  std::string line;
-  for (std::size_t k = 0; k < kLongest && std::getline(file, line) && !trimmed(line).empty(); ++k) {
-    int number = 0, read = 0;
-    if (std::sscanf(line.c_str(), "Segment%6d_%n", &number, &read) != 1 || read == 0) continue;
-    const std::string field = trimmed(line.substr(static_cast<std::size_t>(read)));
-    const auto value_of = [&](const std::string& key) -> std::optional<std::string> {
-      if (!field.starts_with(key + ":=")) return std::nullopt;
-      return field.substr(key.size() + 2);
-    };
-    if (const auto name = value_of("Name")) segments[number].name = *name;
-    if (const auto value = value_of("LabelValue"))
-      segments[number].value = std::atoi(value->c_str());
-    if (const auto layer = value_of("Layer")) segments[number].layer = std::atoi(layer->c_str());
-  }
-  std::vector<NamedSegment> result;
-  for (const auto& [number, segment] : segments) result.push_back(segment);
-  return result;
-}
-
-/// What the fields of a header tell, sound or not, before ITK is asked.
-void tell_nrrd(const std::map<std::string, std::string>& fields, const fs::path& path,
-               VolumeHeader& told) {
-  if (fields.empty()) return;
-  told.format = "NRRD";
-  told.segments = nrrd_segments(path);
-  const auto value = [&](const char* key) {
-    const auto found = fields.find(key);
-    return found == fields.end() ? std::string() : found->second;
-  };
-  told.stored_as = value("type");
-  std::istringstream units(value("space units"));
-  units >> std::quoted(told.length_unit);
-  std::istringstream sizes(value("sizes"));
-  std::array<int, 3> size{};
-  if (sizes >> size[0] >> size[1] >> size[2]) told.size = size;
-}
-
-/// Volumes whose voxels have several values, one for each of these.
-std::vector<Image> read_values(itk::ImageIOBase& io, const fs::path& path, double mm_per_unit) {
-  constexpr unsigned kMost = 250;
-  const std::size_t count = io.GetNumberOfComponents();
-  const Grid grid = header_grid(io, path, mm_per_unit);
-  require_volume(grid, path);
-  if (count > kMost) throw several_values(io.GetNumberOfComponents(), path);
-  std::vector<float> values;
-  append_voxels(io, path, values);
-  if (values.size() != count * grid.voxels()) throw Error(path.string() + ": " + damaged("NRRD"));
-  std::vector<Image> layers(count, {.grid = grid, .values = std::vector<float>(grid.voxels())});
-  for (std::size_t n = 0; n < values.size(); ++n) layers[n % count].values[n / count] = values[n];
-  return layers;
-}
-
-/// The file beside the header that holds the voxels; empty where they lie behind the header. Lists
-/// are refused: NrrdIO prints numbers into names as the header tells it to.
-std::string nrrd_data_file(const std::map<std::string, std::string>& fields, const fs::path& path) {
-  const auto found = fields.find("data file");
-  if (found == fields.end()) return {};
-  if (lower_case(found->second).starts_with("list") ||
-      found->second.find('%') != std::string::npos) {
-    throw voxels_in_list(path, ".nrrd");
-  }
-  return found->second;
-}
-
-/// NrrdIO takes the room that a header asks for, however few bytes are stored.
-void require_whole_nrrd(const itk::ImageIOBase& io, const std::string& encoding, double stored,
-                        const fs::path& path) {
-  const double values = count_values(io), bytes = values * io.GetComponentSize();
-  if (encoding.starts_with("gz")) return require_room(bytes, stored, kMostDeflated, "NRRD", path);
-  const bool text = encoding == "ascii" || encoding == "text" || encoding == "txt";
-  require_room(text ? 2.0 * values - 1.0 : bytes, stored, 1.0, "NRRD", path);  // digit, space
-}
-
-/// All values of a voxel where `layered`, and else one.
-std::vector<Image> read_nrrd(const fs::path& path, VolumeHeader& told, bool layered) {
-  const std::string no_image = std::string("not a NRRD image, or damaged; ") + kFormats;
-  const std::map<std::string, std::string> fields = nrrd_fields(path, no_image);
-  tell_nrrd(fields, path, told);
-  static const std::set<std::string> kEncodings = {"raw",  "gzip", "gz", "ascii",
-                                                   "text", "txt",  "hex"};
-  const auto found = fields.find("encoding");
-  const std::string encoding = found == fields.end() ? "raw" : found->second;
-  if (kEncodings.count(encoding) == 0) {
-    throw Error(path.string() + ": its voxels are packed with \"" + encoding +
-                "\", expected raw or gzip; save it again with gzip, as 3D Slicer does");
-  }
-  require_near(fields, path);
-  const std::string beside = nrrd_data_file(fields, path);
-  const double stored =  // bytes; NrrdIO would wait for a pipe
-      beside.empty() ? static_cast<double>(fs::file_size(path)) : size_beside(path, beside);
-  const double mm = nrrd_unit(fields, path);
-  const itk::NrrdImageIO::Pointer io = itk::NrrdImageIO::New();
-  call_itk(path, no_image, [&] {
-    io->SetFileName(path.string());
-    if (!io->CanReadFile(path.c_str())) throw Error(path.string() + ": " + no_image);
-    io->ReadImageInformation();
-    told.mm_per_unit = mm;
-    tell_header(*io, told);
-  });
-  return call_itk(path, damaged("NRRD"), [&] {
-    require_whole_nrrd(*io, encoding, stored, path);
-    return layered && io->GetNumberOfComponents() > 1 ? read_values(*io, path, mm)
-                                                      : std::vector{read_volume(*io, path, mm)};
-  });
-}
-
 bool ends_with(const fs::path& path, const char* one, const char* other) {
   const std::string name = lower_case(path.filename().string());
   return name.ends_with(one) || name.ends_with(other);
 }
 
 }  // namespace
-
-Image read_volume(itk::ImageIOBase& io, const fs::path& path, double mm_per_unit) {
-  Image image;
-  image.grid = header_grid(io, path, mm_per_unit);
-  require_scalar_volume(io, image.grid, path);
-  append_voxels(io, path, image.values);
-  return image;
-}
 
 Image read_file(const fs::path& path, VolumeHeader& told) {
   if (ends_with(path, ".nii", ".nii.gz")) return read_nifti(path, told);

@@ -22,7 +22,4 @@ Image read_told(const std::filesystem::path& path, const std::string& series, Vo
 /// overlap, a volume for each of them.
 std::vector<Image> read_layers(const std::filesystem::path& path, VolumeHeader& told);
 
-/// Reads header and voxels of a file that holds the whole volume.
-Image read_volume(itk::ImageIOBase& io, const std::filesystem::path& path, double mm_per_unit);
-
 }  // namespace wireplan::preprocess

@@ -5,8 +5,10 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <cctype>
 #include <cmath>
 #include <fstream>
+#include <sstream>
 
 #include "preprocess/volume/dicom_check.h"
 #include "preprocess/volume/image.h"
@@ -42,6 +44,11 @@ std::string gzip(const std::string& bytes, std::size_t member) {
 }
 
 class FieldVolume : public ImageFile {};
+
+std::string lower(std::string text) {
+  for (char& c : text) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+  return text;
+}
 
 // ---- NIfTI --------------------------------------------------------------------------------------
 
@@ -161,9 +168,116 @@ TEST_F(FieldVolume, NrrdUnitsAreHonouredAndAnUnknownPackingNamed) {
   EXPECT_LT((image.grid.origin - Vec3(10, 20, 30)).norm(), 1e-12);
   const std::string mixed =
       read_error(write("mixed.nrrd", nrrd("space units: \"cm\" \"mm\" \"cm\"\n", "raw")));
-  EXPECT_TRUE(has(mixed, "mixed.nrrd: space units \"cm\" \"mm\" \"cm\"")) << mixed;
+  EXPECT_TRUE(has(mixed, "mixed.nrrd: space units is \"cm\" \"mm\" \"cm\"")) << mixed;
   const std::string packed = read_error(write("b.nrrd", nrrd("", "bzip2")));
   EXPECT_TRUE(has(packed, "packed with \"bzip2\"") && !has(packed, "damaged")) << packed;
+}
+
+/// An NRRD of 2 x 2 x 2 values, "abcdefgh", of these lines of placement.
+std::string nrrd_placed(const std::string& lines, int axes = 3) {
+  return "NRRD0005\ntype: uint8\ndimension: " + std::to_string(axes) + "\n" + lines +
+         "sizes: 2 2 2" + (axes == 4 ? " 1" : "") + "\nencoding: raw\n\nabcdefgh";
+}
+
+TEST_F(FieldVolume, NrrdIsPlacedByItsSpaceOrRefusedByName) {
+  // One place in LPS, told in each space: x and y are negated where they run to the other side.
+  const auto told = [](const std::string& space, const Vec3& signs, bool time) {
+    const auto vector = [&](double x, double y, double z, int t) {
+      std::ostringstream text;
+      text << "(" << signs.x() * x << "," << signs.y() * y << "," << z;
+      if (time) text << "," << t;
+      text << ")";
+      return text.str();
+    };
+    return "space: " + space + "\nspace directions: " + vector(0, 2, 0, 0) + " " +
+           vector(3, 0, 0, 0) + " " + vector(0, 0, -4, 0) + (time ? " " + vector(0, 0, 0, 1) : "") +
+           "\nspace origin: " + vector(10, 20, 30, 0) + "\n";
+  };
+  const Vec3 lps(1, 1, 1), ras(-1, -1, 1), las(1, -1, 1);
+  for (const auto& [space, signs] :
+       std::vector<std::pair<std::string, Vec3>>{{"left-posterior-superior", lps},
+                                                 {"LPS", lps},
+                                                 {"right-anterior-superior", ras},
+                                                 {"RAS", ras},
+                                                 {"Left-Anterior-Superior", las},
+                                                 {"LAS", las},
+                                                 {"left-posterior-superior-time", lps},
+                                                 {"LPST", lps},
+                                                 {"right-anterior-superior-time", ras},
+                                                 {"RAST", ras},
+                                                 {"left-anterior-superior-time", las},
+                                                 {"LAST", las}}) {
+    SCOPED_TRACE(space);
+    const bool time = space.ends_with("-time") || space.size() == 4;
+    const Image image =
+        read_image(write("placed.nrrd", nrrd_placed(told(space, signs, time), time ? 4 : 3)));
+    EXPECT_LT((image.grid.lps_from_ijk(Vec3(0, 0, 0)) - Vec3(10, 20, 30)).norm(), 1e-12);
+    EXPECT_LT((image.grid.lps_from_ijk(Vec3(1, 1, 1)) - Vec3(13, 22, 26)).norm(), 1e-12);
+    EXPECT_EQ(image.values[7], static_cast<float>('h'));
+  }
+  for (const char* space : {"scanner-xyz", "3D-left-handed", "3D-right-handed"}) {
+    const std::string error = read_error(write("other.nrrd", nrrd_placed(told(space, lps, false))));
+    EXPECT_TRUE(has(error, "other.nrrd: its space is " + lower(space)) &&
+                has(error, "LPS, RAS, LAS"))
+        << error;
+  }
+  const std::string nowhere = read_error(
+      write("dim.nrrd", nrrd_placed("space dimension: 3\nspace directions: (1,0,0) (0,1,0) "
+                                    "(0,0,1)\nspace origin: (1,2,3)\n")));
+  EXPECT_TRUE(has(nowhere, "dim.nrrd: it has space directions, but its space is not named"))
+      << nowhere;
+  const std::string first = read_error(
+      write("time.nrrd",
+            "NRRD0005\ntype: uint8\ndimension: 4\nspace: LPST\nsizes: 1 2 2 2\nencoding: raw\n"
+            "space directions: (0,0,0,1) (1,0,0,0) (0,1,0,0) (0,0,1,0)\n\nabcdefgh"));
+  EXPECT_TRUE(has(first, "expected the first three axes")) << first;
+}
+
+TEST_F(FieldVolume, NrrdUnitsOfAnyAxisAndSpellingAreHonoured) {
+  const std::string directions =
+      "space: LPS\nspace directions: (1,0,0) (0,2,0) (0,0,3)\nspace origin: (1,2,3)\n";
+  for (const auto& [unit, mm] : std::vector<std::pair<std::string, double>>{{"mm", 1},
+                                                                            {"Millimeters", 1},
+                                                                            {"millimetres", 1},
+                                                                            {"cm", 10},
+                                                                            {"centimeters", 10},
+                                                                            {"m", 1000},
+                                                                            {"meters", 1000},
+                                                                            {"metre", 1000},
+                                                                            {"um", 1e-3},
+                                                                            {"microns", 1e-3},
+                                                                            {"micrometers", 1e-3},
+                                                                            {"\xc2\xb5m", 1e-3},
+                                                                            {"\xce\xbcm", 1e-3}}) {
+    SCOPED_TRACE(unit);
+    const std::string three = "\"" + unit + "\" \"" + unit + "\" \"" + unit + "\"";
+    const Image image =
+        read_image(write("unit.nrrd", nrrd_placed(directions + "space units: " + three + "\n")));
+    EXPECT_LT((image.grid.spacing - mm * Vec3(1, 2, 3)).norm(), 1e-12 * mm);
+    EXPECT_LT((image.grid.origin - mm * Vec3(1, 2, 3)).norm(), 1e-12 * mm);
+    const Image beside =
+        read_image(write("beside.nrrd", nrrd_placed("spacings: 1 2 3\nunits: " + three + "\n")));
+    EXPECT_LT((beside.grid.spacing - mm * Vec3(1, 2, 3)).norm(), 1e-12 * mm);
+  }
+  const std::string time =
+      "space: left-posterior-superior-time\nspace directions: (1,0,0,0) (0,1,0,0) (0,0,1,0) "
+      "(0,0,0,1)\nspace origin: (1,2,3,0)\nspace units: \"cm\" \"cm\" \"cm\" \"s\"\n";
+  EXPECT_EQ(read_image(write("time.nrrd", nrrd_placed(time, 4))).grid.spacing, Vec3(10, 10, 10));
+  for (const char* units : {"\"inch\" \"inch\" \"inch\"", "\"mm\" \"mm\"", "mm mm mm"}) {
+    const std::string error =
+        read_error(write("odd.nrrd", nrrd_placed(directions + "space units: " + units + "\n")));
+    EXPECT_TRUE(has(error, std::string("odd.nrrd: space units is ") + units)) << error;
+  }
+}
+
+TEST_F(FieldVolume, NrrdWithoutEndianIsToldAndWithoutItsLastEmptyLineRead) {
+  const std::string head = "NRRD0004\ntype: short\ndimension: 3\nsizes: 2 2 2\nencoding: raw\n";
+  const std::string error = read_error(write("order.nrrd", head + "\n" + std::string(16, 'a')));
+  EXPECT_TRUE(has(error, "order.nrrd: endian is missing, expected little or big")) << error;
+  write("beside.raw", std::string("\1\0\2\0\3\0\4\0\5\0\6\0\7\0\10\0", 16));
+  EXPECT_EQ(
+      read_image(write("beside.nhdr", head + "endian: little\ndata file: beside.raw\n")).values[7],
+      8.0F);
 }
 
 TEST_F(FieldVolume, MetaImageMayHoldAnyTextAndItsUnitsAreHonoured) {

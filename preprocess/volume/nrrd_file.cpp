@@ -1,0 +1,345 @@
+#include "preprocess/volume/nrrd_file.h"
+
+#include <Eigen/Eigenvalues>  // before ITK, which would bring in its own older copy
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <fstream>
+#include <iomanip>
+#include <map>
+#include <optional>
+#include <set>
+#include <sstream>
+
+#include "itkNrrdImageIO.h"
+#include "preprocess/volume/itk_image.h"
+
+namespace wireplan::preprocess {
+namespace {
+
+namespace fs = std::filesystem;
+
+using Fields = std::map<std::string, std::string>;
+
+/// Empty where the header has no such field.
+std::string value_of(const Fields& fields, const std::string& key) {
+  const auto found = fields.find(key);
+  return found == fields.end() ? std::string() : found->second;
+}
+
+/// The fields of an NRRD's header, "name: value", in small letters but for the name of a file; none
+/// where it is no NRRD. NrrdIO writes a line that it does not understand into 1024 characters of
+/// its stack, so long ones are refused: all but comments, what somebody adds as "key:=value", and
+/// "content", which is taken as it is.
+Fields nrrd_fields(const fs::path& path, const std::string& no_image) {
+  constexpr std::size_t kMost = 10000, kLongest = 500;  // lines, characters
+  Fields fields;
+  std::ifstream file(path, std::ios::binary);
+  std::string line;
+  const auto require = [&](bool sound) {
+    if (!sound) throw Error(path.string() + ": " + no_image);
+  };
+  if (!std::getline(file, line) || !line.starts_with("NRRD")) return fields;
+  require(line.size() <= kLongest);
+  while (std::getline(file, line) && !trimmed(line).empty()) {
+    const std::size_t colon = line.find(": ");
+    const bool added = line.find(":=") < colon;
+    if (line.front() == '#') continue;
+    std::string name = lower_case(trimmed(line.substr(0, colon)));
+    require(fields.size() < kMost && (line.size() <= kLongest || added || name == "content"));
+    if (colon == std::string::npos) continue;
+    if (name == "datafile") name = "data file";
+    const std::string value = trimmed(line.substr(colon + 2));
+    fields[name] = name == "data file" ? value : lower_case(value);
+  }
+  return fields;
+}
+
+/// "cm" of "\"cm\" \"cm\" \"cm\"": the words of a field of units; none where one is not in quotes.
+std::vector<std::string> quoted_words(const std::string& text) {
+  std::vector<std::string> words;
+  std::istringstream rest(text);
+  for (char first = 0; rest >> first;) {
+    if (first != '"') return {};
+    rest.unget();
+    std::string word;
+    rest >> std::quoted(word);
+    words.push_back(trimmed(word));
+  }
+  return words;
+}
+
+/// How many mm a unit of length has; 0 where it is none that is known.
+double mm_of(std::string unit) {
+  static const std::map<std::string, double> kUnits = {{"", 1.0},
+                                                       {"mm", 1.0},
+                                                       {"millimeter", 1.0},
+                                                       {"cm", 10.0},
+                                                       {"centimeter", 10.0},
+                                                       {"m", 1e3},
+                                                       {"meter", 1e3},
+                                                       {"um", 1e-3},
+                                                       {"micron", 1e-3},
+                                                       {"micrometer", 1e-3},
+                                                       {"\xc2\xb5m", 1e-3},
+                                                       {"\xce\xbcm", 1e-3}};
+  if (unit.size() > 3 && unit.back() == 's') unit.pop_back();
+  if (unit.ends_with("metre")) unit.replace(unit.size() - 2, 2, "er");
+  const auto known = kUnits.find(unit);
+  return known == kUnits.end() ? 0.0 : known->second;
+}
+
+/// Of the unit that the axes of space have: by `space units`, else by `units` of those axes that
+/// have a spacing; mm where none is told.
+double nrrd_unit(const Fields& fields, const fs::path& path) {
+  std::string key = "space units", text = value_of(fields, key);
+  if (text.empty()) text = value_of(fields, key = "units");
+  if (text.empty()) return 1.0;
+  std::vector<std::string> units = quoted_words(text);
+  std::istringstream spacings(value_of(fields, "spacings"));
+  std::string spacing;
+  for (std::size_t k = 0; key == "units" && spacings >> spacing;) {
+    if (spacing != "nan") {
+      ++k;
+    } else if (k < units.size()) {
+      units.erase(units.begin() + static_cast<std::ptrdiff_t>(k));
+    }
+  }
+  if (units.size() == 4) units.pop_back();  // of time
+  std::set<double> scales;
+  for (const std::string& unit : units) scales.insert(mm_of(unit));
+  if (units.size() != 3 || scales.size() != 1 || *scales.begin() == 0.0) {
+    throw Error(path.string() + ": " + key + " is " + text +
+                ", expected one of \"mm\", \"cm\", \"m\", \"um\", in quotes, for each of the three "
+                "axes; mend the header");
+  }
+  return *scales.begin();
+}
+
+/// What turns a place of the header's space to LPS. NrrdIO takes what it does not turn as it is.
+Vec3 lps_signs(const Fields& fields, const fs::path& path) {
+  static const std::map<std::string, Vec3> kSpaces = {
+      {"left-posterior-superior", {1, 1, 1}},   {"lps", {1, 1, 1}},
+      {"right-anterior-superior", {-1, -1, 1}}, {"ras", {-1, -1, 1}},
+      {"left-anterior-superior", {1, -1, 1}},   {"las", {1, -1, 1}}};
+  std::string space = value_of(fields, "space");
+  const std::string told = space;
+  if (space.ends_with("-time")) space.resize(space.size() - 5);
+  if (space.size() == 4 && space.back() == 't') space.pop_back();
+  const auto known = kSpaces.find(space);
+  if (known != kSpaces.end()) return known->second;
+  const bool placed = fields.count("space directions") > 0 || fields.count("space origin") > 0;
+  if (told.empty() && !placed) return Vec3::Ones();
+  throw Error(path.string() + ": " +
+              (told.empty() ? "it has space directions, but its space is not named"
+                            : "its space is " + told) +
+              ", which does not tell how the patient lies in it, expected left-posterior-superior, "
+              "right-anterior-superior or left-anterior-superior (LPS, RAS, LAS); write the one "
+              "that holds behind \"space:\"");
+}
+
+/// The vectors "(1,0,0) (0,1,0) none" of a field; empty ones of axes that have none.
+std::vector<std::vector<double>> vectors_of(std::string text) {
+  std::replace(text.begin(), text.end(), ',', ' ');
+  std::vector<std::vector<double>> vectors;
+  std::size_t at = 0;
+  while ((at = text.find_first_of("(n", at)) != std::string::npos) {
+    const std::size_t end = text.find(')', at);
+    std::vector<double>& vector = vectors.emplace_back();
+    if (text[at] == 'n' || end == std::string::npos) {
+      at += 4;  // "none"
+      continue;
+    }
+    std::istringstream numbers(text.substr(at + 1, end - at - 1));
+    for (double number = 0.0; numbers >> number;) vector.push_back(number);
+    at = end;
+  }
+  return vectors;
+}
+
+/// Sizes as ITK has them, placed by the header's own fields: ITK takes LAS for something else, and
+/// RAS with time for LPS.
+Grid nrrd_grid(const itk::ImageIOBase& io, const Fields& fields, const fs::path& path, double mm) {
+  const Vec3 signs = lps_signs(fields, path);
+  Mat3 axes;
+  Eigen::Index count = 0;
+  bool over = false;  // an axis of time, behind which none of space may come
+  for (const std::vector<double>& vector : vectors_of(value_of(fields, "space directions"))) {
+    if (vector.size() < 3) continue;
+    const Vec3 axis = mm * signs.cwiseProduct(Vec3(vector[0], vector[1], vector[2]));
+    if (count < 3 && !over && axis.norm() > 0.0) {
+      axes.col(count++) = axis;
+    } else {
+      over = true;
+      if (axis.norm() > 0.0) count = 4;
+    }
+  }
+  if (count != 0 && count != 3) {
+    throw Error(path.string() + ": space directions is " + value_of(fields, "space directions") +
+                ", expected the first three axes, and no others, to lie in space; save it as a "
+                "3D image");
+  }
+  Grid grid = header_grid(io, path, mm);
+  if (count == 0) return grid;  // upright
+  Vec3 origin = Vec3::Zero();
+  const std::vector<std::vector<double>> origins = vectors_of(value_of(fields, "space origin"));
+  if (!origins.empty() && origins[0].size() >= 3) {
+    origin = mm * signs.cwiseProduct(Vec3(origins[0][0], origins[0][1], origins[0][2]));
+  }
+  grid.spacing = axes.colwise().norm().transpose();
+  grid.origin = origin;
+  require_place(grid.spacing, grid.origin, axes, path);
+  grid.direction = orthonormal_direction(axes * grid.spacing.cwiseInverse().asDiagonal(), path);
+  return grid;
+}
+
+/// NrrdIO asks for the order of bytes where values have several, and says no more than that the
+/// header is wrong.
+void require_endian(const Fields& fields, const std::string& encoding, const fs::path& path) {
+  static const std::set<std::string> kOneByte = {"char",  "signed char",   "int8",  "int8_t",
+                                                 "uchar", "unsigned char", "uint8", "uint8_t"};
+  static const std::set<std::string> kText = {"ascii", "text", "txt"};
+  const std::string type = value_of(fields, "type");
+  if (fields.count("endian") > 0 || kOneByte.count(type) > 0 || kText.count(encoding) > 0) return;
+  throw Error(path.string() + ": endian is missing, expected little or big for values of type " +
+              type + "; add the line \"endian: little\" (what nearly all programs write)");
+}
+
+/// Refuses places beyond any patient's: where an axis is longer than a number can be, ITK says 1
+/// mm.
+void require_near(const Fields& fields, const fs::path& path) {
+  constexpr double kFar = 1e6;  // a kilometre in mm; in m beyond all bounds
+  for (const char* key : {"space directions", "space origin"}) {
+    const auto found = fields.find(key);
+    if (found == fields.end()) continue;
+    std::string text = found->second;
+    std::replace_if(
+        text.begin(), text.end(), [](char c) { return c == '(' || c == ')' || c == ','; }, ' ');
+    std::istringstream words(text);
+    for (std::string word; words >> word;) {
+      if (word == "none" || std::abs(std::strtod(word.c_str(), nullptr)) <= kFar) continue;
+      throw Error(path.string() + ": " + key + " has " + word.substr(0, 40) +
+                  ", expected numbers within a kilometre; mend the header");
+    }
+  }
+}
+
+/// The segments that 3D Slicer names in a header ("Segment0_Name:=aorta").
+std::vector<NamedSegment> nrrd_segments(const fs::path& path) {
+  std::map<int, NamedSegment> segments;
+  std::ifstream file(path, std::ios::binary);
+  constexpr std::size_t kLongest = 100000;  // lines
+  std::string line;
+  for (std::size_t k = 0; k < kLongest && std::getline(file, line) && !trimmed(line).empty(); ++k) {
+    int number = 0, read = 0;
+    if (std::sscanf(line.c_str(), "Segment%6d_%n", &number, &read) != 1 || read == 0) continue;
+    const std::string field = trimmed(line.substr(static_cast<std::size_t>(read)));
+    const auto value_of = [&](const std::string& key) -> std::optional<std::string> {
+      if (!field.starts_with(key + ":=")) return std::nullopt;
+      return field.substr(key.size() + 2);
+    };
+    if (const auto name = value_of("Name")) segments[number].name = *name;
+    if (const auto value = value_of("LabelValue"))
+      segments[number].value = std::atoi(value->c_str());
+    if (const auto layer = value_of("Layer")) segments[number].layer = std::atoi(layer->c_str());
+  }
+  std::vector<NamedSegment> result;
+  for (const auto& [number, segment] : segments) result.push_back(segment);
+  return result;
+}
+
+/// What the fields of a header tell, sound or not, before ITK is asked.
+void tell_nrrd(const Fields& fields, const fs::path& path, VolumeHeader& told) {
+  if (fields.empty()) return;
+  told.format = "NRRD";
+  told.segments = nrrd_segments(path);
+  told.stored_as = value_of(fields, "type");
+  const std::string units = value_of(fields, "space units");
+  std::istringstream words(units.empty() ? value_of(fields, "units") : units);
+  words >> std::quoted(told.length_unit);
+  std::istringstream sizes(value_of(fields, "sizes"));
+  std::array<int, 3> size{};
+  if (sizes >> size[0] >> size[1] >> size[2]) told.size = size;
+}
+
+/// Volumes whose voxels have several values, one for each of these.
+std::vector<Image> read_values(itk::ImageIOBase& io, const fs::path& path, const Grid& grid) {
+  constexpr unsigned kMost = 250;
+  const std::size_t count = io.GetNumberOfComponents();
+  require_volume(grid, path);
+  if (count > kMost) throw several_values(io.GetNumberOfComponents(), path);
+  std::vector<float> values;
+  append_voxels(io, path, values);
+  if (values.size() != count * grid.voxels()) throw Error(path.string() + ": " + damaged("NRRD"));
+  std::vector<Image> layers(count, {.grid = grid, .values = std::vector<float>(grid.voxels())});
+  for (std::size_t n = 0; n < values.size(); ++n) layers[n % count].values[n / count] = values[n];
+  return layers;
+}
+
+/// The file beside the header that holds the voxels; empty where they lie behind the header. Lists
+/// are refused: NrrdIO prints numbers into names as the header tells it to.
+std::string nrrd_data_file(const Fields& fields, const fs::path& path) {
+  const auto found = fields.find("data file");
+  if (found == fields.end()) return {};
+  if (lower_case(found->second).starts_with("list") ||
+      found->second.find('%') != std::string::npos) {
+    throw voxels_in_list(path, ".nrrd");
+  }
+  return found->second;
+}
+
+/// NrrdIO takes the room that a header asks for, however few bytes are stored.
+void require_whole_nrrd(const itk::ImageIOBase& io, const std::string& encoding, double stored,
+                        const fs::path& path) {
+  const double values = count_values(io), bytes = values * io.GetComponentSize();
+  if (encoding.starts_with("gz")) return require_room(bytes, stored, kMostDeflated, "NRRD", path);
+  const bool text = encoding == "ascii" || encoding == "text" || encoding == "txt";
+  require_room(text ? 2.0 * values - 1.0 : bytes, stored, 1.0, "NRRD", path);  // digit, space
+}
+
+}  // namespace
+
+std::vector<Image> read_nrrd(const fs::path& path, VolumeHeader& told, bool layered) {
+  const std::string no_image = std::string("not a NRRD image, or damaged; ") + kFormats;
+  const Fields fields = nrrd_fields(path, no_image);
+  tell_nrrd(fields, path, told);
+  static const std::set<std::string> kEncodings = {"raw",  "gzip", "gz", "ascii",
+                                                   "text", "txt",  "hex"};
+  const std::string told_encoding = value_of(fields, "encoding"),
+                    encoding = told_encoding.empty() ? "raw" : told_encoding;
+  if (kEncodings.count(encoding) == 0) {
+    throw Error(path.string() + ": its voxels are packed with \"" + encoding +
+                "\", expected raw or gzip; save it again with gzip, as 3D Slicer does");
+  }
+  if (!fields.empty()) {
+    require_endian(fields, encoding, path);
+    lps_signs(fields, path);
+  }
+  require_near(fields, path);
+  const std::string beside = nrrd_data_file(fields, path);
+  const double stored =  // bytes; NrrdIO would wait for a pipe
+      beside.empty() ? static_cast<double>(fs::file_size(path)) : size_beside(path, beside);
+  const double mm = nrrd_unit(fields, path);
+  const itk::NrrdImageIO::Pointer io = itk::NrrdImageIO::New();
+  call_itk(path, no_image, [&] {
+    io->SetFileName(path.string());
+    if (!io->CanReadFile(path.c_str())) throw Error(path.string() + ": " + no_image);
+    io->ReadImageInformation();
+    told.mm_per_unit = mm;
+    tell_header(*io, told);
+  });
+  return call_itk(path, damaged("NRRD"), [&] {
+    require_whole_nrrd(*io, encoding, stored, path);
+    const Grid grid = nrrd_grid(*io, fields, path, mm);
+    if (layered && io->GetNumberOfComponents() > 1) return read_values(*io, path, grid);
+    require_scalar_volume(*io, grid, path);
+    std::vector<Image> images(1);
+    images[0].grid = grid;
+    append_voxels(*io, path, images[0].values);
+    return images;
+  });
+}
+
+}  // namespace wireplan::preprocess
