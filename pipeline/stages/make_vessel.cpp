@@ -298,6 +298,7 @@ void make_volume(Workspace& work, const fs::path& folder) {
     figures["warnings"].push_back("volume: its modality is " + image.modality +
                                   ", not CT: values are no Hounsfield units");
   }
+  for (const std::string& line : image.remarks) figures["warnings"].push_back("volume: " + line);
   write_figures(figures, folder);
 }
 

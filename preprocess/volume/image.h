@@ -40,6 +40,7 @@ struct Image {
   Grid grid;
   std::vector<float> values;  // HU (or plain intensity where the file has no HU), grid.index order
   std::string modality = {};  // "CT", "MR", ...: what made it; empty where the file does not tell
+  std::vector<std::string> remarks = {};  // what a person should know of how it was read
 };
 
 struct Mask {

@@ -111,6 +111,18 @@ double mm_per_unit(const Header& header, const fs::path& path) {
   }
 }
 
+bool has_qform(const Header& header) { return header.code(header.layout().qform_code) > 0; }
+
+/// One that is all zeros places nothing, whatever its code says.
+bool has_sform(const Header& header) {
+  if (header.code(header.layout().qform_code, 1) <= 0) return false;
+  bool places = false;
+  for (std::size_t k = 0; k < 12; ++k) {
+    places = places || (k % 4 != 3 && header.real(header.layout().sform, k) != 0.0);
+  }
+  return places;
+}
+
 /// From voxel to place in RAS mm.
 struct Form {
   Mat3 axes;  // columns: a step along i, j, k
@@ -153,12 +165,21 @@ double largest_distance(const Form& a, const Form& b, const std::array<int, 3>& 
 }
 
 /// The transform to go by. Both forms of a file may differ by rounding, not by a place.
-Form choose_form(const Header& header, const Grid& grid, double unit, const fs::path& path) {
-  const bool has_qform = header.code(header.layout().qform_code) > 0;
-  const bool has_sform = header.code(header.layout().qform_code, 1) > 0;
-  if (!has_qform && !has_sform) return {grid.spacing.asDiagonal(), Vec3::Zero()};
+Form choose_form(const Header& header, const Grid& grid, double unit, const fs::path& path,
+                 std::vector<std::string>& remarks) {
+  constexpr double kTold = 0.1;  // mm
+  const bool by_qform = has_qform(header), by_sform = has_sform(header);
+  if (!by_qform && !by_sform) {
+    if (header.code(header.layout().qform_code, 1) <= 0) {
+      return {grid.spacing.asDiagonal(), Vec3::Zero()};
+    }
+    throw Error(path.string() +
+                ": its sform holds zeros, and it has no qform, expected one of them "
+                "to place the volume; save it again from the program that made it, or set both "
+                "codes to 0 if it lies upright at the origin");
+  }
   const Form qform = qform_of(header, grid.spacing, unit), sform = sform_of(header, unit);
-  if (has_qform && has_sform) {
+  if (by_qform && by_sform) {
     const double apart = largest_distance(qform, sform, grid.size);
     if (!(apart <= 0.5 * grid.spacing.minCoeff())) {
       throw Error(path.string() + ": its two transforms place a corner of the volume " +
@@ -169,8 +190,12 @@ Form choose_form(const Header& header, const Grid& grid, double unit, const fs::
                   "program in "
                   "which the points were picked, or set the code of the wrong one to 0");
     }
+    if (apart >= kTold) {
+      remarks.push_back("its two transforms place a corner " + one_decimal(apart) +
+                        " mm apart, less than half a voxel; the sform counts");
+    }
   }
-  return has_sform ? sform : qform;
+  return by_sform ? sform : qform;
 }
 
 /// The name that nifti1.h gives a type of voxel.
@@ -200,12 +225,10 @@ void tell_nifti(const Header& header, VolumeHeader& told) {
     told.spacing[static_cast<Eigen::Index>(axis)] =
         told.mm_per_unit * std::abs(header.real(layout.spacing, axis + 1));
   }
-  told.placed_by = header.code(layout.qform_code, 1) > 0 ? "sform"
-                   : header.code(layout.qform_code) > 0  ? "qform"
-                                                         : "";
+  told.placed_by = has_sform(header) ? "sform" : has_qform(header) ? "qform" : "";
 }
 
-Grid grid_of(const Header& header, const fs::path& path) {
+Grid grid_of(const Header& header, const fs::path& path, std::vector<std::string>& remarks) {
   const double unit = mm_per_unit(header, path);
   Grid grid;
   const std::int64_t axes = header.dimension(0);
@@ -223,7 +246,7 @@ Grid grid_of(const Header& header, const fs::path& path) {
     if (header.dimension(axis) > 1) throw several_volumes(header.dimension(axis), path);
   }
 
-  const Form form = choose_form(header, grid, unit, path);
+  const Form form = choose_form(header, grid, unit, path, remarks);
   constexpr double kFar = 1e6;  // a kilometre
   if (!form.axes.allFinite() || !form.origin.allFinite() || !(grid.spacing.maxCoeff() < kFar) ||
       form.axes.cwiseAbs().maxCoeff() > kFar || form.origin.cwiseAbs().maxCoeff() > kFar ||
@@ -304,7 +327,7 @@ Image read_nifti(const fs::path& path, VolumeHeader& told) {
   const Header header = read_header(file, path);
   tell_nifti(header, told);
   Image image;
-  image.grid = grid_of(header, path);
+  image.grid = grid_of(header, path, image.remarks);
   const double offset = header.layout().wide
                             ? static_cast<double>(header.get<std::int64_t>(header.layout().offset))
                             : static_cast<double>(header.get<float>(header.layout().offset));
@@ -324,13 +347,16 @@ Image read_nifti(const fs::path& path, VolumeHeader& told) {
     throw damaged_nifti(path);
   }
 
-  // A slope of 0 means none.
+  // A slope of 0 means none, and so does one that is no number, as nibabel writes it.
   const double slope = header.real(header.layout().slope),
                shift = header.real(header.layout().slope, 1);
-  if (slope != 0.0 && (slope != 1.0 || shift != 0.0)) {
-    if (!std::isfinite(slope) || !std::isfinite(shift)) throw damaged_nifti(path);
-    scale_values(slope, shift, image.values);
+  if (!std::isfinite(slope) || slope == 0.0) return image;
+  if (!std::isfinite(shift)) {
+    throw Error(path.string() +
+                ": its scl_inter is no number, expected one beside a scl_slope of " +
+                number_text(slope) + "; mend the header");
   }
+  scale_values(slope, shift, image.values);
   return image;
 }
 

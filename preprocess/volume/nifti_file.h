@@ -11,7 +11,7 @@ namespace wireplan::preprocess {
 /// Values times slope plus intercept, where there is a slope; the grid in LPS mm by the sform, else
 /// by the qform, else upright (nifti1.h, methods 3, 2 and 1). Throws `Error` where it is no NIfTI,
 /// damaged or cut short, a colour or 4D image, sheared (with the angle), or where both forms are
-/// given and place a corner more than half a voxel apart.
+/// given and place a corner more than half a voxel apart; from 0.1 mm on the image's remarks tell.
 /// What is read of the header stands in `told` then too.
 Image read_nifti(const std::filesystem::path& path, VolumeHeader& told);
 

@@ -14,6 +14,7 @@
 #include <optional>
 #include <set>
 #include <sstream>
+#include <vector>
 
 #include "itkMetaImageIO.h"
 #include "preprocess/volume/byte_stream.h"
@@ -65,7 +66,7 @@ bool holds_numbers(const std::string& text, int count) {
 /// The header of a MetaImage, line by line.
 struct MetaHeader {
   std::string lines;       // all that MetaIO is to see
-  bool has_more = false;   // lines that it is not to see
+  bool has_more = false;   // whether the file holds them otherwise, or more
   std::string data_file;   // "LOCAL", or where the voxels are
   std::streamoff end = 0;  // where voxels of this file begin
   double packed = 0.0;     // bytes, where the voxels are compressed
@@ -82,59 +83,112 @@ double meta_unit(const std::string& unit, const fs::path& path) {
               ", expected um, mm or cm; mend the header");
 }
 
-/// MetaIO writes past its arrays where a header is not what it expects, and frees what it read
-/// twice where it breaks off, so the lines are looked through first: "Key = value", no key twice,
-/// to ElementDataFile; 2 to 4 dimensions, told before what has as many numbers; as many numbers as
-/// there should be; no list of files. Lines of other keys may hold any text; MetaIO, which keeps
-/// names in 255 characters, sees those of them that are short and plain.
-MetaHeader read_meta_header(const fs::path& path, const std::string& no_image) {
-  static const std::set<std::string> kNeeded = {
+bool is_plain(const std::string& line) {
+  constexpr std::size_t kLongest = 250;
+  return line.size() <= kLongest && std::all_of(line.begin(), line.end(), [](char c) {
+           return (c >= ' ' && c <= '~') || c == '\t';
+         });
+}
+
+/// A line of a MetaImage's header; without a key where it is no "Key = value".
+struct MetaLine {
+  std::string text, key, value;
+};
+
+MetaLine meta_line(std::string text) {
+  if (text.starts_with("\xef\xbb\xbf")) text.erase(0, 3);  // as some editors begin a text
+  MetaLine line{.text = trimmed(text), .key = {}, .value = {}};
+  const std::size_t equals = text.find('=');
+  if (equals == std::string::npos) return line;
+  line.key = trimmed(text.substr(0, equals));
+  line.value = trimmed(text.substr(equals + 1));
+  return line;
+}
+
+/// The lines of keys that MetaIO knows, in their order, to ElementDataFile, each key once; other
+/// lines may hold any text. MetaIO, which keeps names in 255 characters and stumbles over what is
+/// no "Key = value", sees those of them that are plain.
+std::vector<MetaLine> read_meta_lines(std::istream& file, const fs::path& path,
+                                      MetaHeader& header) {
+  static const std::set<std::string> kTexts = {
       "ObjectType",          "BinaryData",     "BinaryDataByteOrderMSB",
       "ElementByteOrderMSB", "CompressedData", "ElementType",
       "ElementDataFile",     "DistanceUnits",  "AnatomicalOrientation"};
-  constexpr std::size_t kLongest = 250;
+  constexpr std::size_t kMost = 100000;  // lines
+  std::vector<MetaLine> known;
+  std::set<std::string> keys;
+  std::string text;
+  for (std::size_t k = 0; k < kMost && std::getline(file, text); ++k) {
+    const MetaLine line = meta_line(text);
+    const bool first = keys.insert(line.key).second;
+    header.has_more = header.has_more || line.text != text;
+    if (count_meta_numbers(line.key, 1) < 0 && kTexts.count(line.key) == 0) {
+      const bool word = line.key.find_first_of(" \t") == std::string::npos;
+      if (first && word && !line.key.empty() && is_plain(line.text)) {
+        header.lines += line.text + "\n";
+      } else {
+        header.has_more = true;
+      }
+      continue;
+    }
+    if (!first) {
+      throw Error(path.string() + ": its header has two lines of " + line.key +
+                  ", expected one; delete the one that does not hold");
+    }
+    known.push_back(line);
+    if (line.key == "ElementDataFile") break;
+  }
+  return known;
+}
+
+/// MetaIO writes past its arrays where a header is not what it expects, and frees what it read
+/// twice where it breaks off, so the lines are looked through first: 2 to 4 dimensions, which it is
+/// told before what has as many numbers; as many numbers as there should be; no list of files. It
+/// is not told the file of the voxels, which it does not read.
+MetaHeader read_meta_header(const fs::path& path, const std::string& no_image) {
   const auto require = [&](bool sound) {
     if (!sound) throw Error(path.string() + ": " + no_image);
   };
   std::ifstream file(path, std::ios::binary);
   MetaHeader header;
+  std::vector<MetaLine> lines = read_meta_lines(file, path, header);
+  const auto told = std::find_if(lines.begin(), lines.end(),
+                                 [](const MetaLine& line) { return line.key == "NDims"; });
+  require(told != lines.end());
+  const int dimensions = std::atoi(told->value.c_str());
+  require(dimensions >= 2 && dimensions <= 4);
+  const auto vector = std::find_if(lines.begin(), told, [&](const MetaLine& line) {
+    return count_meta_numbers(line.key, dimensions) > 1;
+  });
+  if (vector != told) {
+    std::rotate(vector, told, told + 1);
+    header.has_more = true;
+  }
   std::set<std::string> keys;
-  int dimensions = 0;
-  for (std::string line; keys.count("ElementDataFile") == 0 && std::getline(file, line);) {
-    const std::size_t end = line.find_first_of(" ="), equals = line.find('=');
-    const std::string key = line.substr(0, end);
-    const bool plain = std::all_of(line.begin(), line.end(), [](char c) {
-      return (c >= ' ' && c <= '~') || c == '\t' || c == '\r';
-    });
-    require(equals != std::string::npos && equals <= line.find_first_not_of(' ', end));
-    const std::string value = trimmed(line.substr(equals + 1));
-    if (key == "NDims") dimensions = std::atoi(value.c_str());
-    require(dimensions >= 0 && dimensions <= 4);
-    const int numbers = count_meta_numbers(key, dimensions);
-    const bool needed = numbers >= 0 || kNeeded.count(key) > 0;
-    const bool first = keys.insert(key).second;
-    if (!needed && !(plain && first && line.size() <= kLongest)) {
-      header.has_more = true;
-      continue;
-    }
-    require(plain && first && line.size() <= kLongest && numbers != 0 &&
-            (numbers < 0 || holds_numbers(value, numbers)));
-    if (key == "ElementDataFile") {
-      header.data_file = value;
-      if (value.starts_with("LIST") || value.find('%') != std::string::npos) {
+  for (MetaLine& line : lines) {
+    keys.insert(line.key);
+    const int numbers = count_meta_numbers(line.key, dimensions);
+    require(numbers < 0 || holds_numbers(line.value, numbers));
+    if (line.key == "ElementDataFile") {
+      header.data_file = line.value;
+      if (line.value.starts_with("LIST") || line.value.find('%') != std::string::npos) {
         throw voxels_in_list(path, ".mha");
       }
-      const fs::path elsewhere = fs::absolute(path).parent_path() / value;
-      line = key + " = " + (value == "LOCAL" ? value : elsewhere.string());
+      if (!is_plain(line.text) || line.value.find(' ') != std::string::npos) header.has_more = true;
+      line.value = "LOCAL";
     }
-    if (key == "CompressedDataSize") header.packed = std::strtod(value.c_str(), nullptr);
-    if (key == "DistanceUnits") {
-      header.mm = meta_unit(value, path);
-      if (value != "?") header.unit = value;
+    if (line.key == "CompressedDataSize") {
+      header.packed = std::strtod(line.value.c_str(), nullptr);
     }
-    header.lines += line + "\n";
+    if (line.key == "DistanceUnits") {
+      header.mm = meta_unit(line.value, path);
+      if (line.value != "?") header.unit = line.value;
+    }
+    const std::string text = line.key + " = " + line.value;
+    require(is_plain(text));
+    header.has_more = header.has_more || (text != line.text && line.key != "ElementDataFile");
+    header.lines += text + "\n";
   }
-  require(dimensions >= 2);
   for (const char* key : {"DimSize", "ElementType", "ElementDataFile"})
     require(keys.count(key) > 0);
   header.end = static_cast<std::streamoff>(file.tellg());
@@ -223,7 +277,7 @@ Image read_meta(const fs::path& path, VolumeHeader& told) {
   const std::string no_image = std::string("not a MetaImage image, or damaged; ") + kFormats;
   const MetaHeader header =
       call_itk(path, no_image, [&] { return read_meta_header(path, no_image); });
-  std::optional<TemporaryFile> copy;  // of the lines that MetaIO is to see, where there are others
+  std::optional<TemporaryFile> copy;  // of the lines that MetaIO is to see, where it must be
   if (header.has_more) {
     copy.emplace(path.extension().string());
     std::ofstream to(copy->path(), std::ios::binary);

@@ -84,9 +84,36 @@ TEST_F(FieldVolume, NiftiWhoseTwoFormsDifferIsRefusedAndWhoseFormsAgreeIsRead) {
   const std::array<float, 12> rows = {-2, 0, 0, 70, 0, -3, 0, -40, 0, 0, 4, 500};
   NiftiHeader header{.codes = {1, 1}, .quaternion = {0, 0, 1, 70, -40, 500}, .rows = rows};
   EXPECT_EQ(read_image(write("same.nii", nifti(header))).values.size(), 24U);
+  EXPECT_TRUE(read_image(folder_ / "same.nii").remarks.empty());
+  header.quaternion[3] = 70.2F;
+  const std::vector<std::string> told = read_image(write("near.nii", nifti(header))).remarks;
+  ASSERT_EQ(told.size(), 1U);
+  EXPECT_TRUE(has(told[0], "place a corner 0.2 mm apart") && has(told[0], "the sform counts"));
   header.quaternion[3] = 75.0F;
   const std::string error = read_error(write("other.nii", nifti(header)));
   EXPECT_TRUE(has(error, "5.0 mm apart") && has(error, "qform and sform")) << error;
+}
+
+TEST_F(FieldVolume, NiftiOfAnEmptySformGoesByItsQform) {
+  NiftiHeader header{.codes = {1, 1}, .quaternion = {0, 0, 1, 10, 20, 30}, .rows = {}};
+  const Image image = read_image(write("q.nii", nifti(header)));
+  EXPECT_LT((image.grid.lps_from_ijk(Vec3(1, 2, 3)) - Vec3(-10 + 2, -20 + 6, 30 + 12)).norm(),
+            1e-5);
+  header.codes = {0, 1};
+  const std::string error = read_error(write("none.nii", nifti(header)));
+  EXPECT_TRUE(has(error, "none.nii: its sform holds zeros") && !has(error, "damaged")) << error;
+}
+
+TEST_F(FieldVolume, NiftiOfASlopeThatIsNoNumberHasNone) {
+  const float none = std::nanf("");
+  const Image plain = read_image(write("plain.nii", nifti({})));
+  for (const float slope : {none, HUGE_VALF, -HUGE_VALF, 0.0F}) {
+    EXPECT_EQ(read_image(write("s.nii", nifti({.slope = slope, .intercept = none}))).values,
+              plain.values);
+  }
+  const std::string error =
+      read_error(write("inter.nii", nifti({.slope = 2.0F, .intercept = none})));
+  EXPECT_TRUE(has(error, "scl_inter is no number") && !has(error, "damaged")) << error;
 }
 
 TEST_F(FieldVolume, NiftiIsReadBesideATwinOfTheOtherExtension) {
@@ -298,6 +325,41 @@ TEST_F(FieldVolume, MetaImageMayHoldAnyTextAndItsUnitsAreHonoured) {
   EXPECT_EQ(cm.grid.origin, Vec3(40, 50, 60));
   EXPECT_TRUE(
       has(read_error(write("ft.mha", meta("DistanceUnits = ft\n"))), "DistanceUnits is ft"));
+}
+
+TEST_F(FieldVolume, MetaImageMayHoldLinesThatAreNoKeysAndNameAnyFile) {
+  const auto meta = [](const std::string& more, const std::string& file) {
+    return more + "ObjectType = Image\n" + more + "NDims = 3\nDimSize\t=  2 2 2 \n" + more +
+           "ElementSpacing = 1 2 3\r\nOffset = 4 5 6\nElementType = MET_UCHAR\n" + more +
+           "ElementDataFile = " + file + "\n";
+  };
+  for (const char* more : {"", "a line of text\n", "My Key = 5\n", "\n", "   \n", "# a comment\n",
+                           "# two = 2\n", "= 3\n", "Comment: hello\n", "\xef\xbb\xbf"}) {
+    SCOPED_TRACE(more);
+    const Image image = read_image(write("text.mha", meta(more, "LOCAL") + "abcdefgh"));
+    EXPECT_EQ(image.values[7], static_cast<float>('h'));
+    EXPECT_EQ(image.grid.spacing, Vec3(1, 2, 3));
+    EXPECT_EQ(image.grid.origin, Vec3(4, 5, 6));
+  }
+  const std::string deep(120, 'd'), inside = deep + "/" + std::string(130, 'e') + ".raw";
+  fs::create_directories(folder_ / deep);
+  for (const std::string& file :
+       {std::string("gr\xc3\xb6\xc3\x9f"
+                    "e 1.raw"),
+        std::string("\xe4\xbd\x93\xe6\x95\xb0.raw"), std::string("two  blanks.raw"), inside}) {
+    SCOPED_TRACE(file);
+    write(file, "abcdefgh");
+    const Image image = read_image(write("beside.mhd", meta("", file)));
+    EXPECT_EQ(image.values[7], static_cast<float>('h'));
+    EXPECT_EQ(image.grid.spacing, Vec3(1, 2, 3));
+  }
+  // The dimensions may be told behind what has as many numbers; no key twice.
+  const std::string late =
+      "ObjectType = Image\nDimSize = 2 2 2\nElementSpacing = 1 2 3\nNDims = 3\nElementType = "
+      "MET_UCHAR\nElementDataFile = LOCAL\nabcdefgh";
+  EXPECT_EQ(read_image(write("late.mha", late)).grid.spacing, Vec3(1, 2, 3));
+  const std::string twice = read_error(write("twice.mha", "NDims = 3\n" + late));
+  EXPECT_TRUE(has(twice, "twice.mha: its header has two lines of NDims")) << twice;
 }
 
 // ---- DICOM --------------------------------------------------------------------------------------
