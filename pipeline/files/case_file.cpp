@@ -331,8 +331,8 @@ SurfaceInput read_surface_input(JsonReader& reader, const std::filesystem::path&
   std::string extension = surface.path.extension().string();
   std::transform(extension.begin(), extension.end(), extension.begin(),
                  [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  const std::set<std::string> known = {".stl", ".ply", ".obj", ".vtp"};
-  if (!surface.given.empty() && known.count(extension) == 0) {
+  const std::set<std::string> endings = {".stl", ".ply", ".obj", ".vtp"};
+  if (!surface.given.empty() && endings.count(extension) == 0) {
     reader.problems().add(reader.path_of("path"), "\"" + surface.given + "\"",
                           "a name that ends in .stl, .ply, .obj or .vtp");
   }
@@ -342,11 +342,16 @@ SurfaceInput read_surface_input(JsonReader& reader, const std::filesystem::path&
   using Fallback = std::optional<std::string>;
   surface.unit = reader.choice("unit", is_vtp ? Fallback("mm") : std::nullopt, {"mm", "cm", "m"});
   const std::string told = preprocess::told_frame(surface.path);
-  const Fallback fallback = !told.empty() ? Fallback(told)
-                            : is_vtp      ? Fallback("LPS")
-                                          : std::nullopt;
+  const Fallback fallback = told == "RAS" || told == "LPS" ? Fallback(told)
+                            : is_vtp || !told.empty()      ? Fallback("LPS")
+                                                           : std::nullopt;
   surface.frame = reader.choice("frame", fallback, {"LPS", "RAS"});
-  if (!told.empty() && surface.frame != told) {
+  const bool known = told.empty() || told == "LPS" || told == "RAS";
+  if (!known) {
+    reader.problems().add(reader.path_of("path"), "\"" + surface.given + "\"",
+                          "a surface in LPS or RAS; the file itself says " + told,
+                          "turn it in the program that made it, or mend what it says");
+  } else if (!told.empty() && surface.frame != told) {
     reader.problems().add(reader.path_of("frame"), "\"" + surface.frame + "\"",
                           "\"" + told + "\", as the file itself says",
                           "delete the key, or mend the file");

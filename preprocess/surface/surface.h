@@ -50,8 +50,8 @@ Surface surface_from_image(const Image& image, const Mask& mask, const SurfaceOp
                            FitWidth width = FitWidth::kOfImage);
 
 /// "LPS" or "RAS" where the file says in which frame it is, as 3D Slicer writes it: in the header
-/// of an STL, a comment of a PLY or OBJ, the field SPACE of a VTP. Empty where it does not, or is
-/// not there.
+/// of an STL, a comment of a PLY or OBJ, the field SPACE of a VTP, in letters or words of any case.
+/// Another frame as it is told, in capitals ("LPI"). Empty where it tells none, or is not there.
 std::string told_frame(const std::filesystem::path& path);
 
 /// Reads the triangles of an STL, PLY, OBJ or VTP file as they stand there, with two changes:

@@ -14,6 +14,7 @@
 #include <cstdint>
 #include <fstream>
 #include <optional>
+#include <set>
 #include <sstream>
 #include <string_view>
 #include <vector>
@@ -39,13 +40,28 @@ vtkSmartPointer<vtkPolyData> read_with(const std::filesystem::path& path) {
   return reader->GetOutput();
 }
 
+constexpr std::string_view kByteOrderMark = "\xef\xbb\xbf";  // as some editors begin a text
+
+/// The next line, whether lines end in LF, CR or both.
+bool next_line(std::istream& stream, std::string& line) {
+  line.clear();
+  std::streambuf* bytes = stream.rdbuf();
+  for (int c = bytes->sbumpc(); c != EOF; c = bytes->sbumpc()) {
+    if (c == '\r' && bytes->sgetc() == '\n') bytes->sbumpc();
+    if (c == '\r' || c == '\n') return true;
+    line.push_back(static_cast<char>(c));
+  }
+  if (line.empty()) stream.setstate(std::ios::eofbit);
+  return !line.empty();
+}
+
 // ---- STL: VTK tells text from binary by its first 256 bytes, which a name may spoil -------------
 
 enum class StlForm { kText, kBinary };
 
-/// By the number of triangles in the header of a binary file, which its size must fit; what does
-/// not and begins as text is text. VTK takes room for as many as the header promises, whatever the
-/// file holds.
+/// By the number of triangles in the header of a binary file, which fit into it: read as a number,
+/// four letters are more than 10^8. What does not and begins as text is text. VTK takes room for as
+/// many as the header promises, whatever the file holds.
 StlForm stl_form(const std::filesystem::path& path) {
   constexpr std::size_t kHead = 84, kTriangle = 50;
   std::ifstream stream(path, std::ios::binary);
@@ -58,11 +74,10 @@ StlForm stl_form(const std::filesystem::path& path) {
   }
   const std::uintmax_t bytes = std::filesystem::file_size(path),
                        expected = kHead + kTriangle * std::uintmax_t{triangles};
-  const std::size_t first = text.find_first_not_of(" \t\r\n");
+  const std::size_t mark = text.starts_with(kByteOrderMark) ? kByteOrderMark.size() : 0;
+  const std::size_t first = text.find_first_not_of(" \t\r\n", mark);
   const bool solid = first != std::string_view::npos && text.substr(first).starts_with("solid");
-  if (text.size() == kHead && (solid ? expected == bytes : expected <= bytes)) {
-    return StlForm::kBinary;
-  }
+  if (text.size() == kHead && expected <= bytes) return StlForm::kBinary;
   const bool is_text = std::all_of(text.begin(), text.end(), [](char c) {
     return static_cast<unsigned char>(c) >= 0x20 || c == '\n' || c == '\r' || c == '\t';
   });
@@ -87,8 +102,8 @@ vtkSmartPointer<vtkPolyData> read_text_stl(const std::filesystem::path& path) {
   };
   vtkIdType corners = 0;  // of the facet so far
   bool solid = false, ended = false;
-  while (std::getline(stream, line)) {
-    ++number;
+  while (next_line(stream, line)) {
+    if (++number == 1 && line.starts_with(kByteOrderMark)) line.erase(0, kByteOrderMark.size());
     std::istringstream words(line);
     if (!(words >> word)) continue;
     std::transform(word.begin(), word.end(), word.begin(),
@@ -164,8 +179,8 @@ class PlyStream {
   std::vector<PlyElement> read_header() {
     std::vector<PlyElement> elements;
     std::string line, word, type;
-    if (!std::getline(in_, line) || line.substr(0, 3) != "ply") refuse("no PLY header");
-    while (std::getline(in_, line)) {
+    if (!header_line(line) || line.substr(0, 3) != "ply") refuse("no PLY header");
+    while (header_line(line)) {
       std::istringstream words(line);
       words >> word;
       if (word == "end_header") return elements;
@@ -205,6 +220,17 @@ class PlyStream {
 
  private:
   [[noreturn]] void refuse(const std::string& why) const { refuse_ply(path_, why); }
+
+  /// As the first line ends, so do the others: a byte of the data may be a line's end too.
+  bool header_line(std::string& line) {
+    if (line_end_ == 0) {
+      std::getline(in_, line, '\r');
+      line_end_ = line.find('\n') == std::string::npos && in_.peek() != '\n' ? '\r' : '\n';
+      in_.clear();
+      in_.seekg(0);
+    }
+    return static_cast<bool>(std::getline(in_, line, line_end_));
+  }
 
   double read_one(PlyType type) {
     double value = 0.0;
@@ -247,6 +273,7 @@ class PlyStream {
   std::filesystem::path path_;
   std::ifstream in_;
   PlyFormat format_ = PlyFormat::kAscii;
+  char line_end_ = 0;
 };
 
 vtkSmartPointer<vtkPolyData> read_ply(const std::filesystem::path& path) {
@@ -299,9 +326,9 @@ vtkSmartPointer<vtkPolyData> read_obj(const std::filesystem::path& path) {
     throw Error(path.string() + ": cannot be read as a surface (line " + std::to_string(number) +
                 "); expected an OBJ file with vertices \"v x y z\" and faces \"f 1 2 3\"");
   };
-  for (std::string line, more; std::getline(stream, line);) {
+  for (std::string line, more; next_line(stream, line);) {
     ++number;
-    for (; !line.empty() && line.back() == '\\' && std::getline(stream, more); ++number) {
+    for (; !line.empty() && line.back() == '\\' && next_line(stream, more); ++number) {
       line.back() = ' ';
       line += more;
     }
@@ -420,6 +447,44 @@ std::string space_of_vtp(const std::filesystem::path& path, const std::string& b
   return space != nullptr && space->GetNumberOfValues() > 0 ? space->GetValue(0) : std::string();
 }
 
+/// What stands behind "SPACE=", 3D Slicer's mark in the header of an STL or a comment of a PLY or
+/// OBJ, in any case of letters.
+std::string space_of_comment(std::string text) {
+  std::transform(text.begin(), text.end(), text.begin(),
+                 [](unsigned char c) { return static_cast<char>(std::toupper(c)); });
+  const auto is_word = [](char c) {
+    return std::isalnum(static_cast<unsigned char>(c)) != 0 || c == '-' || c == '_';
+  };
+  const std::string key = "SPACE=";
+  std::size_t at = text.find(key);
+  while (at != std::string::npos && at > 0 && is_word(text[at - 1])) at = text.find(key, at + 1);
+  if (at == std::string::npos) return {};
+  const auto first = text.begin() + static_cast<std::ptrdiff_t>(at + key.size());
+  return {first, std::find_if_not(first, text.end(), is_word)};
+}
+
+/// "RAS" of "ras" and "right-anterior-superior"; of other directions what is told, in capitals;
+/// empty of what tells none.
+std::string frame_of_space(std::string space) {
+  std::transform(space.begin(), space.end(), space.begin(),
+                 [](unsigned char c) { return static_cast<char>(std::toupper(c)); });
+  std::string letters = space;
+  if (space.find('-') != std::string::npos) {  // the first ones of its words
+    letters.clear();
+    for (std::size_t k = 0; k < space.size(); ++k) {
+      if (k == 0 || space[k - 1] == '-') letters.push_back(space[k]);
+    }
+  }
+  if (letters == "LPS" || letters == "RAS") return letters;
+  std::set<char> axes;
+  for (const char c : letters) {
+    const std::size_t axis = std::string_view("LRPASI").find(c);
+    axes.insert(axis == std::string_view::npos ? '?' : "xxyyzz"[axis]);
+  }
+  const bool directions = letters.size() == 3 && axes.size() == 3 && axes.count('?') == 0;
+  return directions || space.starts_with("SCANNER-") || space.starts_with("3D-") ? space : "";
+}
+
 }  // namespace
 
 std::string told_frame(const std::filesystem::path& path) try {
@@ -427,13 +492,8 @@ std::string told_frame(const std::filesystem::path& path) try {
   std::string text(std::size_t{1} << 16U, '\0');
   stream.read(text.data(), static_cast<std::streamsize>(text.size()));
   text.resize(static_cast<std::size_t>(std::max<std::streamsize>(0, stream.gcount())));
-  std::string space = space_of_vtp(path, text);
-  if (space.empty()) {
-    // 3D Slicer's mark in the header of an STL or a comment of a PLY or OBJ.
-    const std::size_t mark = text.find("SPACE=");
-    if (mark != std::string::npos) space = text.substr(mark + 6, 3);
-  }
-  return space == "RAS" || space == "LPS" ? space : "";
+  const std::string space = space_of_vtp(path, text);
+  return frame_of_space(space.empty() ? space_of_comment(text) : space);
 } catch (const Error&) {
   return {};  // told where it is read
 }

@@ -274,6 +274,12 @@ TEST_F(CaseFile, TakesTheFrameThatTheSurfaceTellsAndNamesAContradiction) {
   EXPECT_EQ(read(json).surface_input->frame, "RAS");
   json["surface"]["frame"] = "LPS";
   expect_mentions(problem(json), {"surface.frame is \"LPS\"", "\"RAS\", as the file itself says"});
+  // One that is neither is named, whatever the case says.
+  write("lpi.stl", "solid x SPACE=LPI\nendsolid\n");
+  json["surface"]["path"] = "lpi.stl";
+  expect_mentions(problem(json), {"surface.path is \"lpi.stl\"", "the file itself says LPI"});
+  json["surface"].erase("frame");
+  expect_mentions(problem(json), {"surface.path is \"lpi.stl\"", "the file itself says LPI"});
 }
 
 TEST_F(CaseFile, TellsWhereBrokenJsonBreaks) {

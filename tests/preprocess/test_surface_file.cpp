@@ -232,8 +232,15 @@ TEST_F(SurfaceFile, AnStlIsReadWhateverItsHeaderHolds) {
       0, 10,
       "solid \xe5\xb7\xa6\xe9\xa2\x88\xe5\x86\x85\xe5\x8a\xa8\xe8\x84\x89\xe8\xa1\x80\xe7\xae\xa1");
   binary.replace(0, 10, "solid test");
-  for (const fs::path& path : {write("name.stl", text), write("solid.stl", binary),
-                               write("behind.stl", binary_stl(box) + "more")}) {
+  std::string old = text, both = text;  // lines that end as on old Macs and on Windows
+  std::replace(old.begin(), old.end(), '\n', '\r');
+  for (std::size_t at = 0; (at = both.find('\n', at)) != std::string::npos; at += 2) {
+    both.insert(at, "\r");
+  }
+  for (const fs::path& path :
+       {write("name.stl", text), write("solid.stl", binary),
+        write("behind.stl", binary_stl(box) + "more"), write("both.stl", binary + "xy"),
+        write("mark.stl", "\xef\xbb\xbf" + text), write("cr.stl", old), write("crlf.stl", both)}) {
     const Surface read = read_triangles(path, "mm", "LPS");
     EXPECT_EQ(read.triangles.cols(), box.triangles.cols()) << path;
     EXPECT_NEAR(signed_volume(read), 8.0, 1e-12) << path;
@@ -244,7 +251,34 @@ TEST_F(SurfaceFile, AnStlIsReadWhateverItsHeaderHolds) {
       std::string::npos);
 }
 
+TEST_F(SurfaceFile, LinesMayEndAsOnAnySystem) {
+  const Surface box = shapes::box({0, 0, 0}, {1, 2, 4});
+  std::string binary = binary_ply(box);  // with a byte of data that is a line's end behind it
+  const std::size_t head = binary.find("end_header\n") + 11;
+  for (const auto& [name, text] : std::vector<std::pair<std::string, std::string>>{
+           {"a.obj", obj(box)}, {"b.ply", ascii_ply(box)}, {"c.ply", binary}}) {
+    for (const std::string& end : {std::string("\r"), std::string("\r\n")}) {
+      SCOPED_TRACE(name + (end == "\r" ? " CR" : " CRLF"));
+      std::string changed = text;
+      for (std::size_t at = 0; (at = changed.find('\n', at)) != std::string::npos;
+           at += end.size()) {
+        if (name == "c.ply" && at >= head + 20) break;
+        changed.replace(at, 1, end);
+      }
+      EXPECT_NEAR(signed_volume(read_triangles(write(name, changed), "mm", "LPS")), 8.0, 1e-12);
+    }
+  }
+}
+
 TEST_F(SurfaceFile, TheFrameThatAFileTellsIsFound) {
+  for (const char* ras : {"ras", "RAS", "right-anterior-superior", "Right-Anterior-Superior"}) {
+    EXPECT_EQ(told_frame(write("r.obj", std::string("# Space=") + ras + "\nv 0 0 0\n")), "RAS")
+        << ras;
+  }
+  EXPECT_EQ(told_frame(write("l.ply", "ply\ncomment SPACE=LPI\n")), "LPI");
+  EXPECT_EQ(told_frame(write("s.stl", "solid x SPACE=scanner-xyz;\n")), "SCANNER-XYZ");
+  EXPECT_EQ(told_frame(write("n.obj", "# namespace=ras, space=lps\n")), "LPS");
+
   EXPECT_EQ(told_frame(write("a.stl", "solid 3D Slicer output. SPACE=RAS\n")), "RAS");
   EXPECT_EQ(told_frame(write("a.ply", "ply\nformat ascii 1.0\ncomment SPACE=LPS\n")), "LPS");
   for (const std::string& frame : {std::string("RAS"), std::string("LPS")}) {
