@@ -43,12 +43,31 @@ std::string text_under(const Json& object, const char* key) {
   return found->is_number_integer() ? found->dump() : std::string();
 }
 
+/// The one text of an element that may be a list of equal ones, one for each axis; empty where it
+/// is missing.
+std::string one_text_under(const Json& object, const char* key, const std::string& place) {
+  const Json given = object.value(key, Json());
+  const Json list = given.is_array() ? given : Json::array({given});
+  const bool equal =
+      std::all_of(list.begin(), list.end(), [&](const Json& one) { return one == list.front(); });
+  if (given.is_null()) return {};
+  const std::string text =
+      list.empty() ? std::string() : text_under(Json{{key, list.front()}}, key);
+  const bool coded = list.size() == 3 && list[1] == "UCUM";
+  if (text.empty() || !(equal || coded)) {
+    throw Error(place + ": its " + key + " is " + given.dump() +
+                ", expected one text, or a list of equal ones; save it again from 3D Slicer");
+  }
+  return text;
+}
+
 void append_markup(const Json& markup, const std::string& place, std::vector<MarkupPoint>& points) {
-  const std::string frame = text_under(markup, "coordinateSystem");
+  const std::string frame = one_text_under(markup, "coordinateSystem", place);
   const Vec3 signs = signs_of_frame(frame.empty() ? "LPS" : frame, place);  // as the schema has it
-  const std::string unit = text_under(markup, "coordinateUnits");
+  const std::string unit = one_text_under(markup, "coordinateUnits", place);
   if (!unit.empty() && unit != "mm") {
-    throw Error(place + ": its coordinates are in " + unit + ", expected mm");
+    throw Error(place + ": its coordinates are in " + unit +
+                ", expected mm; save it again from 3D Slicer");
   }
   const auto controls = markup.find("controlPoints");
   if (controls == markup.end() || !controls->is_array()) return;
@@ -102,9 +121,10 @@ std::vector<std::string> cells_of(const std::string& line) {
 }
 
 /// id, x, y, z, orientation (4), visible, selected, locked, label, description, node; the frame in
-/// a comment above, RAS where it is not told.
+/// a comment above, RAS where it is not told. 3D Slicer 3 wrote label, x, y, z, selected, visible,
+/// in RAS.
 std::vector<MarkupPoint> read_fcsv(const std::string& text, const std::string& place) {
-  constexpr std::size_t kLabel = 11;
+  std::size_t label_at = 11;
   std::istringstream lines(text);
   std::string frame = "RAS";
   std::vector<MarkupPoint> points;
@@ -112,17 +132,19 @@ std::vector<MarkupPoint> read_fcsv(const std::string& text, const std::string& p
   for (std::string line; std::getline(lines, line);) {
     if (line.empty() || line == "\r") continue;
     if (line.front() == '#') {
-      known = known || line.find("Markups fiducial file") != std::string::npos;
+      const bool old = line.find("Fiducial List file") != std::string::npos;
+      if (old) label_at = 0;
+      known = known || old || line.find("Markups fiducial file") != std::string::npos;
       const std::size_t key = line.find("CoordinateSystem"), equals = line.find('=');
       if (key == std::string::npos || equals == std::string::npos) continue;
       std::istringstream(line.substr(equals + 1)) >> frame;
       continue;
     }
     const std::vector<std::string> cells = cells_of(line);
-    if (!known || cells.size() <= kLabel) {
+    if (!known || cells.size() <= std::max<std::size_t>(label_at, 3)) {
       throw Error(place + ": no table of fiducials, or damaged; " + kExpected);
     }
-    MarkupPoint point{.label = cells[kLabel], .point = Vec3::Constant(NAN)};
+    MarkupPoint point{.label = cells[label_at], .point = Vec3::Constant(NAN)};
     for (std::size_t k = 0; k < 3; ++k) {
       char* end = nullptr;
       const double number = std::strtod(cells[k + 1].c_str(), &end);

@@ -110,6 +110,45 @@ TEST_F(Markups, AnyPointOfASceneMayBeOne) {
             std::string::npos);
 }
 
+TEST_F(Markups, FrameAndUnitMayBeListsAndNothingElse) {
+  const Vec3 target(4.0, -5.0, 6.0);
+  const auto with = [&](const char* key, const Json& value) {
+    Json file = markups("RAS", {{"out", to_json(Vec3(-target.x(), -target.y(), target.z()))}});
+    file["markups"][0][key] = value;
+    write("points.mrk.json", file);
+    return message_of([&] {
+      EXPECT_LT((read_markups(folder_ / "points.mrk.json").at(0).point - target).norm(), 1e-12);
+    });
+  };
+  EXPECT_EQ(with("coordinateSystem", Json::array({"RAS"})), "no error");
+  EXPECT_EQ(with("coordinateUnits", {"mm", "mm", "mm"}), "no error");
+  EXPECT_EQ(with("coordinateUnits", {"mm", "UCUM", "millimeter"}), "no error");
+  EXPECT_EQ(with("coordinateUnits", nullptr), "no error");
+  EXPECT_NE(with("coordinateUnits", {"cm", "UCUM", "centimeter"}).find("in cm, expected mm"),
+            std::string::npos);
+  EXPECT_NE(with("coordinateUnits", {"cm", "cm", "cm"}).find("in cm, expected mm"),
+            std::string::npos);
+  for (const Json& other : {Json::array({"mm", "mm", "cm"}), Json::array(), Json(1.5), Json(true),
+                            Json{{"unit", "mm"}}}) {
+    EXPECT_NE(with("coordinateUnits", other).find("coordinateUnits is " + other.dump()),
+              std::string::npos)
+        << other;
+  }
+  EXPECT_NE(with("coordinateSystem", {"RAS", "LPS"}).find("coordinateSystem is [\"RAS\",\"LPS\"]"),
+            std::string::npos);
+}
+
+TEST_F(Markups, TablesOfSlicer3AreReadAsRas) {
+  write_text(
+      "# Fiducial List file /home/x/F.fcsv\n# version = 2\n# name = F\n"
+      "# columns = label,x,y,z,sel,vis\nin,1,2,3,1,1\nout,-4,5.5,6,1,1\n",
+      folder_ / "old.fcsv");
+  const std::vector<MarkupPoint> points = read_markups(folder_ / "old.fcsv");
+  ASSERT_EQ(points.size(), 2U);
+  EXPECT_EQ(points[1].label, "out");
+  EXPECT_EQ(points[1].point, Vec3(4.0, -5.5, 6.0));
+}
+
 TEST_F(Markups, OldTablesAreReadInTheirFrame) {
   const std::string head = "# Markups fiducial file version = 4.11\n";
   const std::string columns =
