@@ -158,7 +158,6 @@ class CaseMaker {
     labels["path"] = path_from(given_.folder, given_.labels);
     const bool one_file = !fs::is_directory(given_.labels);
     if (listing.classes.size() == 1 && one_file) return;  // it is the lumen, whatever it is called
-    labels["names"] = Json::array();
     for (const preprocess::ListedClass& one : arteries_) labels["names"].push_back(one.name);
     if (!arteries_.empty()) {
       answer_.found.push_back("by their names these are arteries, and labels.names has them: " +
@@ -167,7 +166,7 @@ class CaseMaker {
       answer_.missing.push_back(
           std::string("The classes that are arteries, none of which has an artery's name: as "
                       "labels.names") +
-          (one_file ? ", or by number as labels.values in its place." : "."));
+          (one_file ? ", or by number as labels.values in its place" : "") + ", of " + all + ".");
     }
   }
 

@@ -201,7 +201,11 @@ TEST_F(NewCaseTest, OfLabelsWithoutNamesSaysSo) {
   EXPECT_TRUE(holds(answer.found.front(), "labels label 2 (0.576 ml), label 5 (0.576 ml)"))
       << answer.found.front();
   ASSERT_EQ(answer.missing.size(), 2u);
-  EXPECT_TRUE(holds(answer.missing[0], "labels.values")) << answer.missing[0];
+  EXPECT_TRUE(holds(answer.missing[0], "labels.values") &&
+              holds(answer.missing[0], "of label 2 (0.576 ml), label 5"))
+      << answer.missing[0];
+  const Json labels = read_json(folder_ / "anna/case.json", "wireplan.case/1").at("labels");
+  EXPECT_FALSE(labels.contains("names")) << labels;  // an empty list is refused
 
   write_text("value,name\n2,aorta\n5,liver\n", folder_ / "scan/seg.csv");
   given.folder = folder_ / "berta";
