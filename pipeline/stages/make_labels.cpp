@@ -27,30 +27,35 @@ std::string shown_place(const Vec3& p) {
 
 double voxel_side(const preprocess::Grid& grid) { return std::cbrt(grid.spacing.prod()); }
 
-/// Refuses labels whose edges the volume shows elsewhere; tells where it shows none.
+/// Refuses labels whose edges the volume shows elsewhere, all of them or a class of them; tells
+/// where it shows none.
 void compare_with_volume(const Case& given, const preprocess::Image& image,
                          const preprocess::LabelVolume& labels, Json& figures) {
   constexpr double kHardlySeen = 30.0;
-  double contrast = 0.0;
-  const std::optional<preprocess::FrameChange> better =
-      preprocess::find_better_frame(image, labels.class_of, contrast);
-  figures["edge_contrast_hu"] = contrast;
-  const fs::path& path = given.labels->path;
-  if (better) {
-    throw Error(path.string() +
-                ": the volume does not show the labels' edges where they lie (a mean step of " +
-                format("%.0f", contrast) +
-                " HU), but does with the labels moved, expected labels in the volume's frame "
-                "(they would fit " +
-                preprocess::describe_change(*better) +
-                "; export them again with this volume, or mend their header)");
-  }
-  if (contrast < kHardlySeen) {
-    figures["warnings"].push_back(
-        "segment: the volume hardly shows the labels' edges (a mean step of " +
-        format("%.0f", contrast) +
-        " HU inward): are they of this volume, and is there contrast in the arteries? Look at the "
-        "slices");
+  const std::size_t classes = labels.classes.size();
+  for (std::size_t one = 0; one <= (classes > 1 ? classes : 0); ++one) {  // 0: all together
+    double contrast = 0.0;
+    const std::optional<preprocess::FrameChange> better = preprocess::find_better_frame(
+        image, labels.class_of, contrast, static_cast<std::uint8_t>(one));
+    if (one == 0) figures["edge_contrast_hu"] = contrast;
+    const std::string whose =
+        one == 0 ? "the labels' edges" : "the edges of " + labels.classes[one - 1].name;
+    if (better) {
+      throw Error(given.labels->path.string() + ": the volume does not show " + whose +
+                  " where they lie (a mean step of " + format("%.0f", contrast) +
+                  " HU), but does with " + (one == 0 ? "the labels" : "it") +
+                  " moved, expected labels in the volume's frame (they would fit " +
+                  preprocess::describe_change(*better) +
+                  "; export them again with this volume, or mend their header)");
+    }
+    if (contrast < kHardlySeen) {
+      figures["warnings"].push_back("segment: the volume hardly shows " + whose +
+                                    " (a mean step of " + format("%.0f", contrast) +
+                                    " HU inward): are they of this volume, and is there contrast "
+                                    "in the arteries? Look at the "
+                                    "slices");
+      if (one == 0) return;  // so will it of each
+    }
   }
 }
 

@@ -4,7 +4,9 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <iomanip>
 #include <limits>
+#include <sstream>
 
 #include "preprocess/volume/voxels.h"
 
@@ -18,6 +20,13 @@ bool is_identity(const Mat3& m) { return (m - Mat3::Identity()).cwiseAbs().maxCo
 
 std::string text_of(double value) {
   return number_text(std::abs(value) < 5e-4 ? 0.0 : std::round(value * 1000.0) / 1000.0);
+}
+
+/// To a tenth, however large it is [mm].
+std::string place_of(double value) {
+  std::ostringstream text;
+  text << std::setprecision(10) << std::round(value * 10.0) / 10.0 + 0.0;  // no "-0"
+  return text.str();
 }
 
 /// Grids that hold the same centres, in whatever order of axes and slices.
@@ -42,8 +51,9 @@ struct EdgePair {
   Vec3 inside, outside;
 };
 
-/// At most so many pairs, evenly taken from all of the edge.
-std::vector<EdgePair> edge_pairs(const Grid& grid, const std::vector<std::uint8_t>& classes) {
+/// At most so many pairs, evenly taken from all of the edge; of one class where it is given.
+std::vector<EdgePair> edge_pairs(const Grid& grid, const std::vector<std::uint8_t>& classes,
+                                 std::uint8_t only) {
   constexpr std::size_t kMost = 3000;
   std::vector<EdgePair> all;
   const std::array<std::size_t, 3> stride = {1, grid.index(0, 1, 0), grid.index(0, 0, 1)};
@@ -54,6 +64,7 @@ std::vector<EdgePair> edge_pairs(const Grid& grid, const std::vector<std::uint8_
         for (int axis = 0; axis < 3; ++axis) {
           const bool here = classes[n] != 0, next = classes[n + stride[axis]] != 0;
           if (here == next) continue;
+          if (only != 0 && (here ? classes[n] : classes[n + stride[axis]]) != only) continue;
           Vec3 low(i, j, k), high(i, j, k);
           low[axis] -= 1.0;
           high[axis] += 2.0;
@@ -165,7 +176,7 @@ FrameChange best_shift(const Grid& grid, const Brightness& brightness,
 std::string describe_change(const FrameChange& change) {
   const Vec3& t = change.shift;
   const auto triple = [](const Vec3& v) {
-    return "(" + text_of(v.x()) + ", " + text_of(v.y()) + ", " + text_of(v.z()) + ")";
+    return "(" + place_of(v.x()) + ", " + place_of(v.y()) + ", " + place_of(v.z()) + ")";
   };
   if (is_identity(change.linear)) return "shifted by " + triple(t) + " mm";
   const bool signs = (change.linear.cwiseAbs() - Mat3::Identity()).cwiseAbs().maxCoeff() < 1e-3;
@@ -175,12 +186,12 @@ std::string describe_change(const FrameChange& change) {
     if (signs && change.linear(axis, axis) > 0.0 && std::abs(t[axis]) < 1e-3) continue;
     if (!text.empty()) text += ", ";
     if (signs) {
-      text += name + "' = " + text_of(t[axis]) + (change.linear(axis, axis) < 0.0 ? " - " : " + ") +
-              name;
+      text += name + "' = " + place_of(t[axis]) +
+              (change.linear(axis, axis) < 0.0 ? " - " : " + ") + name;
     } else {
       text += name + "' = (" + text_of(change.linear(axis, 0)) + ", " +
               text_of(change.linear(axis, 1)) + ", " + text_of(change.linear(axis, 2)) +
-              ") . p + " + text_of(t[axis]);
+              ") . p + " + place_of(t[axis]);
     }
   }
   if (!signs) return "turned by " + text + " in LPS mm";
@@ -268,14 +279,16 @@ std::vector<std::uint8_t> onto_grid(const Grid& to, const Grid& from,
 
 std::optional<FrameChange> find_better_frame(const Image& image,
                                              const std::vector<std::uint8_t>& classes,
-                                             double& contrast) {
+                                             double& contrast, std::uint8_t only) {
   expects(classes.size() == image.grid.voxels());
   // Seen well: a mean step of a fifth of the usual contrast. As they lie: less than a third of it.
   constexpr double kSeen = 80.0, kPart = 0.35;
-  const std::vector<EdgePair> pairs = edge_pairs(image.grid, classes);
+  constexpr std::size_t kFewest = 100;  // edges, of which chance may find enough elsewhere
+  const std::vector<EdgePair> pairs = edge_pairs(image.grid, classes, only);
   const Brightness brightness(image);
   contrast = brightness.contrast(pairs, {});
-  if (contrast >= kSeen) return {};
+  if (only != 0 && pairs.size() < kFewest) contrast = std::numeric_limits<double>::quiet_NaN();
+  if (!(contrast < kSeen)) return {};
   std::vector<FrameChange> changes = mirrored(image.grid);
   changes.push_back(best_shift(image.grid, brightness, pairs));
   std::optional<FrameChange> best;

@@ -37,9 +37,11 @@ std::vector<std::uint8_t> onto_grid(const Grid& to, const Grid& from,
 /// which they are seen well where they are not as they lie: mirrored along the grid's axes, x and y
 /// negated (RAS and LPS mixed up), or shifted by up to 20 mm. Empty where they are seen as they lie
 /// and where they are seen nowhere. `contrast` is set to the mean step inward across the edge as
-/// they lie [HU].
+/// they lie [HU]. Of all classes together, or of one (1 + its index) toward what is in none: the
+/// edges of a trunk hide where a small branch lies. One of less than 100 edges is not judged, and
+/// has no contrast (NaN).
 std::optional<FrameChange> find_better_frame(const Image& image,
                                              const std::vector<std::uint8_t>& classes,
-                                             double& contrast);
+                                             double& contrast, std::uint8_t only = 0);
 
 }  // namespace wireplan::preprocess

@@ -4,9 +4,11 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <iomanip>
 #include <limits>
 #include <optional>
 #include <set>
+#include <sstream>
 #include <utility>
 
 #include "preprocess/volume/label_frame.h"
@@ -46,6 +48,13 @@ std::string quoted_list(const std::vector<std::string>& names) {
   return text.empty() ? "none" : text;
 }
 
+/// With all of its digits: what is hardly no whole number must not look like one.
+std::string whole_text(float value) {
+  std::ostringstream text;
+  text << std::setprecision(9) << value;
+  return text.str();
+}
+
 /// The first value that is no label; empty where all are whole numbers from 0.
 std::optional<std::size_t> find_no_label(const std::vector<float>& values) {
   const auto bad = std::find_if(values.begin(), values.end(), [](float value) {
@@ -75,8 +84,7 @@ std::vector<Image> read_checked(const fs::path& path, VolumeHeader& told) {
         grid.lps_from_ijk(Vec3(static_cast<double>(*bad % nx), static_cast<double>(*bad / nx % ny),
                                static_cast<double>(*bad / (nx * ny))));
     throw Error(path.string() + ": its value at " + place_text(at) + " mm is " +
-                number_text(static_cast<double>(layer.values[*bad])) +
-                ", expected labels: whole numbers from 0 (" +
+                whole_text(layer.values[*bad]) + ", expected labels: whole numbers from 0 (" +
                 (count > 0 ? "if these are probabilities, threshold them at 0.5"
                            : "if this is the CT, it belongs under volume") +
                 ")");

@@ -241,6 +241,15 @@ TEST_F(Labels, OfMultiplesOfTheSpacingKeepTheirVolume) {
   EXPECT_NEAR(static_cast<double>(read.classes[0].voxels), voxels, 0.03 * voxels);
 }
 
+TEST_F(Labels, ThatAreHardlyNoWholeNumbersAreToldWithAllDigits) {
+  const Grid grid = grid_of();
+  std::vector<float> values(grid.voxels(), 3.0F);
+  values[7] = 3.000003F;
+  const std::string error = error_of(
+      [&] { read_labels(write("float.nii", label_nifti(grid, values)), {.values = {3}}); });
+  EXPECT_TRUE(has(error, "is 3.000003") || has(error, "is 3.00000310")) << error;
+}
+
 TEST_F(Labels, OfTheVolumesSizeAtOtherPlacesAreRefusedWithWhatWouldFit) {
   const Grid grid = grid_of();
   const auto refused = [&](const Grid& placed) {
@@ -301,6 +310,49 @@ TEST(LabelFrame, IsFoundInTheVolumeWhereTheHeaderLies) {
   std::fill(image.values.begin(), image.values.end(), 40.0F);
   EXPECT_FALSE(find_better_frame(image, right, contrast));
   EXPECT_EQ(contrast, 0.0);
+}
+
+TEST(LabelFrame, OfOneClassIsSeenBesideALargeOneThatLiesRight) {
+  // A straight trunk, and the bent tube as a small class: mirrored, it weighs little in the whole.
+  const Grid grid{.size = {90, 40, 60}, .spacing = Vec3(1, 1, 1), .origin = Vec3(-20, 5, 1300)};
+  const auto draw = [&](bool mirrored) {
+    std::vector<std::uint8_t> classes;
+    for (int k = 0; k < 60; ++k) {
+      for (int j = 0; j < 40; ++j) {
+        for (int i = 0; i < 90; ++i) {
+          const bool trunk = std::hypot(i - 68.0, j - 19.5) < 14.0;
+          const bool bent = in_bent_tube(Vec3(i, mirrored ? 39 - j : j, k));
+          classes.push_back(trunk ? 1 : bent ? 2 : 0);
+        }
+      }
+    }
+    return classes;
+  };
+  const std::vector<std::uint8_t> right = draw(false), wrong = draw(true);
+  Image image{.grid = grid, .values = {}, .modality = "CT"};
+  for (const std::uint8_t one : right) image.values.push_back(one != 0 ? 340.0F : 40.0F);
+  double contrast = 0.0;
+  EXPECT_FALSE(find_better_frame(image, wrong, contrast));  // all together
+  EXPECT_FALSE(find_better_frame(image, wrong, contrast, 1));
+  EXPECT_GT(contrast, 190.0);
+  const auto mirrored = find_better_frame(image, wrong, contrast, 2);
+  ASSERT_TRUE(mirrored);
+  EXPECT_EQ(describe_change(*mirrored), "mirrored in y: y' = 49 - y in LPS mm");
+  EXPECT_FALSE(find_better_frame(image, right, contrast, 2));
+  EXPECT_GT(contrast, 190.0);
+  std::vector<std::uint8_t> few(right.size(), 0);
+  few[grid.index(30, 20, 30)] = 3;
+  EXPECT_FALSE(find_better_frame(image, few, contrast, 3));
+  EXPECT_TRUE(std::isnan(contrast));
+}
+
+TEST(LabelFrame, IsToldToATenthOfAMillimetreHoweverFar) {
+  FrameChange change;
+  change.linear(2, 2) = -1.0;
+  change.shift = Vec3(0, 0, 1324.94);
+  EXPECT_EQ(describe_change(change), "mirrored in z: z' = 1324.9 - z in LPS mm");
+  change = {.linear = Mat3::Identity(), .shift = Vec3(-1234.56, 0.04, -0.04)};
+  EXPECT_EQ(describe_change(change), "shifted by (-1234.6, 0, 0) mm");
 }
 
 // ---- one piece
