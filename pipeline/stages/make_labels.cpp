@@ -87,8 +87,9 @@ void tell_labels(const preprocess::LabelVolume& labels, const preprocess::LabelM
                                   {"place_mm", to_json(bridge.place)},
                                   {"length_mm", bridge.length_mm},
                                   {"radius_mm", bridge.radius_mm}});
-    tell("segment: bridged a gap of " + format("%.1f", bridge.length_mm) + " mm between " +
-         name(bridge.from) + " and " + name(bridge.to) + " at " + shown_place(bridge.place) + ", " +
+    tell("segment: bridged a gap of " + format("%.1f", bridge.length_mm) +
+         " mm (between the nearest voxels' faces) between " + name(bridge.from) + " and " +
+         name(bridge.to) + " at " + shown_place(bridge.place) + ", " +
          format("%.1f", bridge.radius_mm) + " mm in radius; look whether the vessel goes on there");
   }
   for (const preprocess::LabelClass& one : labels.classes) {
@@ -105,7 +106,7 @@ void tell_labels(const preprocess::LabelVolume& labels, const preprocess::LabelM
     tell("segment: a piece of " + name(piece.of) + ", " +
          format("%.2g", piece.volume_mm3 / kMm3PerMl) + " ml at " + shown_place(piece.place) +
          ", is left out: " + format("%.1f", piece.gap_mm) +
-         " mm part it from the rest, and only gaps below 5 mm are bridged");
+         " mm part its nearest voxels from the rest, and only gaps below 5 mm are bridged");
   }
   figures["left_out_specks_mm3"] = made.lost_specks_mm3;
 }

@@ -66,15 +66,22 @@ std::vector<std::size_t> border_of(const Grid& grid, const std::vector<std::size
   return border;
 }
 
-/// How wide the labels are round a point: the largest inscribed radius of `labels` within `reach`
-/// of it, to the faces of the outermost voxels [mm].
-double width_near(const Part& part, const std::vector<float>& depth, const Labels& labels,
-                  const Vec3& point, double reach) {
+/// How wide a piece is round a point of its end: its largest inscribed radius nearby, to the faces
+/// of the outermost voxels [mm]. In a flat end a ball is no larger than how far its middle lies
+/// from the end, so one looks further where that is what holds it.
+double width_near(const Part& part, const std::vector<float>& depth, const Labels& piece,
+                  const Vec3& point) {
+  constexpr double kFurthest = 25.0, kHeld = 0.7;  // mm; of the way
+  const double voxel = part.grid.spacing.mean();
   double widest = 0.0;
-  for (const std::size_t n : voxels_in_ball(part.grid, point, reach)) {
-    if (labels[n] != 0) widest = std::max(widest, static_cast<double>(depth[n]));
+  for (double reach = std::max(3.0, 2.0 * part.grid.spacing.maxCoeff()); reach < kFurthest;
+       reach *= 1.3) {
+    for (const std::size_t n : voxels_in_ball(part.grid, point, reach)) {
+      if (piece[n] != 0) widest = std::max(widest, static_cast<double>(depth[n]));
+    }
+    if (widest < kHeld * reach) break;
   }
-  return std::max(0.5, widest / part.grid.spacing.mean() - 0.5) * part.grid.spacing.mean();
+  return std::max(0.5 * voxel, widest - 0.25 * voxel);
 }
 
 /// From the middle of a piece's end to the nearest point of the joined ones.
@@ -243,10 +250,10 @@ void join_pieces(Part& part, std::vector<PieceOfLabels> pieces, double most_gap,
       return;
     }
     const std::size_t which = gap.piece;
-    const double reach = std::max(3.0, 2.0 * part.grid.spacing.maxCoeff());
+    const Labels other = mark(part, pieces[which].voxels);
     const double radius = std::max(kThroughFaces * part.grid.spacing.maxCoeff(),
-                                   std::min(width_near(part, depth, inside, gap.from, reach),
-                                            width_near(part, depth, inside, gap.to, reach)));
+                                   std::min(width_near(part, depth, marked, gap.from),
+                                            width_near(part, depth, other, gap.to)));
     const std::uint8_t from = part.class_of[gap.from_voxel];
     made.bridges.push_back({static_cast<std::size_t>(from) - 1, pieces[which].of,
                             0.5 * (gap.from + gap.to), gap.free_mm, radius});

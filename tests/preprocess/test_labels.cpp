@@ -396,6 +396,32 @@ TEST(MergeLabels, BridgesAGapWithPlaceAndLength) {
   }
 }
 
+TEST(MergeLabels, BridgesAGapAsWideAsTheEndsOfATube) {
+  // A ball in a flat end is no larger than how far its middle lies from it.
+  for (const double radius : {2.5, 4.0, 7.0}) {
+    LabelVolume labels;
+    labels.grid = {.size = {24, 24, 60}, .spacing = Vec3(1, 1, 1), .origin = Vec3(0, 0, 0)};
+    labels.classes = {{"lower", 1}, {"upper", 2}};
+    std::size_t section = 0;
+    for (int k = 0; k < 60; ++k) {
+      for (int j = 0; j < 24; ++j) {
+        for (int i = 0; i < 24; ++i) {
+          const bool tube = std::hypot(i - 12.0, j - 12.0) < radius;
+          section += tube && k == 0 ? 1 : 0;
+          labels.class_of.push_back(!tube ? 0 : k < 28 ? 1 : k > 31 ? 2 : 0);
+        }
+      }
+    }
+    const LabelMask made = merge_labels(labels);
+    ASSERT_EQ(made.bridges.size(), 1u) << radius;
+    EXPECT_NEAR(made.bridges[0].radius_mm, radius, 0.5) << radius;
+    const auto first = made.mask.labels.begin() + 29 * 576;  // the middle of the gap
+    EXPECT_NEAR(static_cast<double>(std::count(first, first + 576, 1)),
+                static_cast<double>(section), 0.25 * static_cast<double>(section))
+        << radius;
+  }
+}
+
 TEST(MergeLabels, LeavesOutWhatIsFurtherAndSpecks) {
   LabelVolume labels = trunk_and_branch(6.0);
   labels.class_of[labels.grid.index(48, 1, 1)] = 2;  // a single voxel
