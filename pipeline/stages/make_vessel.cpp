@@ -353,7 +353,7 @@ void make_surface(Workspace& work, const fs::path& folder) {
   } else {
     const preprocess::Mask mask =
         preprocess::read_mask(work.artifact("segment").folder / "mask.nrrd");
-    // Who drew the labels also chose how wide the vessel is.
+    // Who drew the labels also chose how wide the vessel is, to half a voxel.
     const auto width =
         given.labels ? preprocess::FitWidth::kOfMask : preprocess::FitWidth::kOfImage;
     surface = given.volume
@@ -386,7 +386,10 @@ void make_surface(Workspace& work, const fs::path& folder) {
     figures["warnings"].push_back(
         "surface: the labels put the wall " + format("%.2f", std::abs(fit.beyond_half_mm)) +
         (fit.beyond_half_mm > 0.0 ? " mm outside" : " mm inside") +
-        " half of the contrast, where a lumen's edge is; the vessel is kept as wide as they say");
+        " half of the contrast, where a lumen's edge is" +
+        (fit.wide_as_image ? ", more than half a voxel; the vessel is made as wide as the volume "
+                             "shows it, look at its outline in the slices"
+                           : "; the vessel is kept as wide as they say"));
   }
   if (given.surface_input) add_mends(mends, figures);
   figures["openings"] = openings_json(preprocess::find_openings(surface));

@@ -44,6 +44,8 @@ constexpr double kMostMoved = 0.15;
 constexpr double kWallHu = 20.0, kLeastHu = 100.0;
 // Who drew a mask voxel by voxel knew the wall as well as this [voxels].
 constexpr double kKnownTo = 0.5;
+// Where it is further off than that in the median, the edge is sought so far [voxels].
+constexpr double kFar = 2.0;
 // Fewer vertices with an edge tell nothing of all; chosen.
 constexpr double kLeastSeen = 0.25;
 
@@ -194,19 +196,30 @@ class Fit {
     move(normals, edges.shift);
   }
 
-  /// Moves the surface back by the median of what it moved where the image shows an edge, and no
-  /// vertex further from where it began than its mask is known; returns that median, outward [mm].
-  double restore_width() {
+  /// Where half of the contrast lies from the given surface in the median, outward; 0 where the
+  /// image hardly shows an edge.                                                           [mm]
+  double usual_shift() const {
     std::vector<double> moved;
     for (Eigen::Index v = 0; v < total_.size(); ++v) {
       if (fixed_[v] == 0 && certainty_(v) == 1.0) moved.push_back(total_(v));
     }
     const bool seen =
         static_cast<double>(moved.size()) >= kLeastSeen * static_cast<double>(total_.size());
-    const double back = seen ? -median(std::move(moved)) : 0.0, most = kKnownTo * voxel_;
-    const Eigen::VectorXd beside = (total_ + back * certainty_).cwiseMin(most).cwiseMax(-most);
+    return seen ? median(std::move(moved)) : 0.0;
+  }
+
+  /// Whether who drew the mask cannot have meant it to be so far off.
+  bool is_far(double shift) const { return std::abs(shift) > kKnownTo * voxel_; }
+
+  /// Lets vertices move by two voxels from here on.
+  void reach_further() { far_ = kFar * voxel_; }
+
+  /// Moves the surface back by what it usually moved, and no vertex further from where it began
+  /// than its mask is known.
+  void restore_width(double shift) {
+    const double most = kKnownTo * voxel_;
+    const Eigen::VectorXd beside = (total_ - shift * certainty_).cwiseMin(most).cwiseMax(-most);
     move(area_weighted_normals(fitted_), beside - total_);
-    return back;
   }
 
   const Surface& surface() const { return fitted_; }
@@ -288,7 +301,7 @@ class Fit {
   void move(const Eigen::Matrix3Xd& normals, const Eigen::VectorXd& shift) {
     for (Eigen::Index v = 0; v < total_.size(); ++v) {
       if (fixed_[v] != 0) continue;
-      const double most = kReach * unit_;
+      const double most = std::max(kReach * unit_, far_);
       const double way = std::clamp(total_(v) + shift(v), -most, most) - total_(v);
       total_(v) += way;
       fitted_.vertices.col(v) += way * normals.col(v);
@@ -299,6 +312,7 @@ class Fit {
   Neighbours neighbours_;
   double voxel_, edge_;  // sizes of the image's voxels and of the surface's edges          [mm]
   double unit_;          // of distances along the normal                                   [mm]
+  double far_ = 0.0;     // how far vertices may move in any case                           [mm]
   Surface fitted_;
   Eigen::VectorXd total_;      // (n) moved so far, outward                                 [mm]
   Eigen::VectorXd certainty_;  // (n) that of the last round's edges
@@ -312,10 +326,19 @@ Surface fit_to_image(const Surface& surface, const Image& image, FitStatistics* 
   expects(image.values.size() == image.grid.voxels() && surface.triangles.cols() > 0);
   Fit fit(surface, image);
   for (int round = 0; round < kRounds; ++round) fit.round(statistics);
-  const double beyond = width == FitWidth::kOfMask ? fit.restore_width() : 0.0;
+  double shift = width == FitWidth::kOfMask ? fit.usual_shift() : 0.0;
+  const bool wide_as_image = fit.is_far(shift);
+  if (wide_as_image) {
+    fit.reach_further();
+    for (int round = 0; round < kRounds; ++round) fit.round(statistics);
+    shift = fit.usual_shift();
+  } else if (width == FitWidth::kOfMask) {
+    fit.restore_width(shift);
+  }
   if (statistics) {
     statistics->mean_shift_mm = fit.mean_shift();
-    statistics->beyond_half_mm = beyond;
+    statistics->beyond_half_mm = -shift;
+    statistics->wide_as_image = wide_as_image;
   }
   return fit.surface();
 }

@@ -9,7 +9,7 @@ namespace wireplan::preprocess {
 enum class FitWidth {
   kOfImage,  // to half of the contrast, where a lumen's edge is
   kOfMask,   // as far beyond or within it as the given surface is in the median: somebody drew it
-             // so, and means it
+             // so, and means it; but that of the image where that is more than half a voxel
 };
 
 /// What the image said about the edge.
@@ -18,7 +18,8 @@ struct FitStatistics {
   double outside_value = 0.0;    // median of the values just outside                   [HU]
   double mean_shift_mm = 0.0;    // how far vertices moved, mean of the absolute value  [mm]
   double fitted_fraction = 0.0;  // of the vertices at which the image shows an edge
-  double beyond_half_mm = 0.0;   // outward from half of the contrast to the surface      [mm]
+  double beyond_half_mm = 0.0;   // outward from half of the contrast to the given surface [mm]
+  bool wide_as_image = false;    // whether the given one was too far off to be as wide as that
 };
 
 /// Moves each vertex along its normal to the edge of the lumen, in three rounds. Lengths are in
@@ -35,7 +36,8 @@ struct FitStatistics {
 ///   4. With `FitWidth::kOfMask` vertices move back along their normals by the median of what those
 ///      with an edge moved (the others by as much as they are held), and end within half a voxel of
 ///      where they began, as well as labels are known: the shape is the image's, the width that of
-///      the given surface. Where fewer than a quarter show an edge, they are not moved back.
+///      the given surface. Where fewer than a quarter show an edge, they are not moved back; nor
+///      where the median is more than half a voxel: then the edge is sought up to two voxels away.
 /// A vertex where the image shows no edge (a vein in contact, the end of what was segmented)
 /// follows its neighbours but is held back. Within a voxel of the volume's border, where the vessel
 /// is capped, vertices stay. Connectivity is kept, but the mesh may cut itself afterwards where

@@ -216,6 +216,34 @@ TEST(SurfaceFromImage, IsAsWideAsAMaskThatSomebodyDrew) {
     EXPECT_NEAR(mean, kRadius + off, 0.08);
     EXPECT_LT(std::sqrt(squares / count - mean * mean), 0.12);  // the mask's own stairs: 0.2
     EXPECT_NEAR(fit.beyond_half_mm, off, 0.08);
+    EXPECT_FALSE(fit.wide_as_image);
+  }
+}
+
+TEST(SurfaceFromImage, IsAsWideAsTheImageWhereAMaskIsFarOff) {
+  // More than half a voxel: nobody means that. Up to one and a half of them.
+  Grid grid;
+  grid.size = {36, 36, 40};
+  grid.spacing = {0.7, 0.7, 0.7};
+  const Vec3 axis = grid.lps_from_ijk({17.3, 17.6, 0.0});
+  constexpr double kRadius = 5.0;
+  const Image image = grey_tube(grid, axis, kRadius);
+  for (const double off : {-1.0, -0.6, 0.6, 1.0}) {
+    SCOPED_TRACE("mask off by " + std::to_string(off));
+    const Mask mask =
+        tube_mask(grid, axis - 10.0 * Vec3::UnitZ(), axis + 50.0 * Vec3::UnitZ(), kRadius + off);
+    FitStatistics fit;
+    const Surface surface =
+        surface_from_image(image, mask, {.edge_length_mm = 1.0}, &fit, FitWidth::kOfMask);
+    double sum = 0.0, count = 0.0;
+    for (const auto& vertex : surface.vertices.colwise()) {
+      if (vertex.z() < 3.0 || vertex.z() > 24.0) continue;  // the caps
+      sum += (Vec3(vertex) - axis).head<2>().norm();
+      count += 1.0;
+    }
+    EXPECT_NEAR(sum / count, kRadius, 0.08);
+    EXPECT_TRUE(fit.wide_as_image);
+    EXPECT_NEAR(fit.beyond_half_mm, off, 0.12);
   }
 }
 
