@@ -405,6 +405,8 @@ std::string exclusion_reason(const Measured& trial, const Study& study, const Li
       return with_reason("stuck " + place, trial);
     case Outcome::kProlapsed:
       return with_reason("folded back " + place, trial);
+    case Outcome::kAnotherWay:
+      return with_reason("came to the target another way " + place, trial);
     case Outcome::kCrossesItself:
       return with_reason("crosses itself " + place, trial);
     case Outcome::kLeftLumen:

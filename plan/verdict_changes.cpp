@@ -98,6 +98,9 @@ void add_ending(Endings& endings, const Measured& trial, const simulate::Wire& w
     case Outcome::kProlapsed:
       ++endings.prolapsed;
       return;
+    case Outcome::kAnotherWay:
+      ++endings.another_way;
+      return;
     case Outcome::kCrossesItself:
       ++endings.crossed;
       return;
@@ -119,6 +122,7 @@ std::string describe_endings(const Endings& endings) {
       {endings.wrong_branch, "took a wrong branch"},
       {endings.stuck, "got stuck"},
       {endings.prolapsed, "folded back on the way"},
+      {endings.another_way, "came to the target another way"},
       {endings.crossed, "crossed themselves in a loop"},
       {endings.left_lumen, "went through the wall"},
       {endings.all_wire_in, "ended with all wire in"},
@@ -166,9 +170,9 @@ std::vector<std::string> changes_by(const Endings& endings, const Known& known,
       "A wire with a softer tip: " + part_of(endings.broke_tip_force, endings, noun) +
           " press the tip on the wall with more than " + four_digits(known.limits.tip_force_fail) +
           " N.");
-  add(endings.broke_path,
-      "Another entry angle or another access: " + part_of(endings.broke_path, endings, noun) +
-          " came to the target another way.");
+  const int detours = endings.broke_path + endings.another_way;
+  add(detours, "Another entry angle or another access: " + part_of(detours, endings, noun) +
+                   " came to the target another way.");
   add(endings.all_wire_in, change_of_wire_length(endings, known, noun));
   add(endings.left_image,
       "A scan that shows more of the vessel: " + part_of(endings.left_image, endings, noun) +

@@ -18,7 +18,8 @@ struct Endings {
   int reached = 0;                                          // also those that broke a limit
   int broke_tip_force = 0, broke_path = 0, broke_wall = 0;  // of these; one may break several
   int passed_by = 0, wrong_branch = 0, left_image = 0, stuck = 0, prolapsed = 0, left_lumen = 0;
-  int crossed = 0;  // ran through themselves: with contact between the loops they may go on
+  int another_way = 0;  // at the target, but not along the way
+  int crossed = 0;      // ran through themselves: with contact between the loops they may go on
   int no_equilibrium = 0, our_fault = 0;
   int all_wire_in = 0;  // of those that missed, with no more wire to push ...
   int missed = 0;       // ... and the others

@@ -29,9 +29,9 @@ constexpr std::string_view kShapesMagic = "wireplan.shapes/1\n",
                            kToolShapesMagic = "wireplan.shapes/2\n";  // and the tools' insertions
 
 constexpr std::array kOutcomes = {
-    Outcome::kReached,       Outcome::kMissed,       Outcome::kPassedBy,  Outcome::kWrongBranch,
-    Outcome::kLeftImage,     Outcome::kStuck,        Outcome::kProlapsed, Outcome::kLeftLumen,
-    Outcome::kCrossesItself, Outcome::kNotConverged, Outcome::kFailed};
+    Outcome::kReached,   Outcome::kMissed,        Outcome::kPassedBy,     Outcome::kWrongBranch,
+    Outcome::kLeftImage, Outcome::kStuck,         Outcome::kProlapsed,    Outcome::kAnotherWay,
+    Outcome::kLeftLumen, Outcome::kCrossesItself, Outcome::kNotConverged, Outcome::kFailed};
 
 // Numbers of a trial that failed may not be finite: null, with the trial's reason beside them.
 Json value_json(double value) { return value; }

@@ -95,10 +95,11 @@ struct Cell {
 
 // Letters for how a trial ended, as on the page.
 const std::vector<std::pair<std::string, std::string>> kLetters = {
-    {"missed", "M"},         {"passed_by", "B"}, {"wrong_branch", "W"}, {"left_image", "E"},
-    {"stuck", "S"},          {"prolapsed", "P"}, {"left_lumen", "L"},   {"not_converged", "N"},
-    {"crosses_itself", "X"}, {"failed", "F"},    {"left_opening", "O"}};  // the last of reports
-                                                                          // before version 2
+    {"missed", "M"},         {"passed_by", "B"},     {"wrong_branch", "W"},
+    {"left_image", "E"},     {"stuck", "S"},         {"prolapsed", "P"},
+    {"left_lumen", "L"},     {"not_converged", "N"}, {"another_way", "A"},
+    {"crosses_itself", "X"}, {"failed", "F"},        {"left_opening", "O"}};  // the last of reports
+                                                                              // before version 2
 
 std::string letter_of(const std::string& outcome) {
   for (const auto& [name, letter] : kLetters) {

@@ -392,8 +392,9 @@ void ToolTrial::check_place() {
       goal_.way->find_arrival(nodes, vessel_.lumen)) {
     const std::optional<std::string> detour = goal_.way->find_detour(nodes);
     if (detour) {
-      return end(Outcome::kProlapsed, "the tip passes the target" + after +
-                                          ", but the tools did not come along the way: " + *detour);
+      return end(Outcome::kAnotherWay,
+                 "the tip passes the target" + after +
+                     ", but the tools did not come along the way: " + *detour);
     }
     const double from_axis = preprocess::find_place(push.tip, goal_.way->path()).from_axis;
     return end(Outcome::kReached, "tip past the target's cross-section, " + in_mm(from_axis) +
@@ -402,9 +403,10 @@ void ToolTrial::check_place() {
   if (const std::optional<int> opening =
           preprocess::left_through(vessel_.lumen.openings(), nodes)) {
     const Vec3& center = vessel_.lumen.openings()[static_cast<std::size_t>(*opening)].center;
-    return end_where_it_is(
-        Outcome::kLeftImage,
-        "a tool left the imaged vessel through its end at " + place_text(center) + " mm" + after);
+    const std::string name = goal_.way ? goal_.way->name_at(center) : std::string();
+    return end_where_it_is(Outcome::kLeftImage, "a tool left the imaged vessel through its end" +
+                                                    (name.empty() ? "" : " in " + name) + " at " +
+                                                    place_text(center) + " mm" + after);
   }
 }
 

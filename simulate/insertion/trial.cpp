@@ -26,6 +26,8 @@ const char* outcome_name(Outcome outcome) {
       return "stuck";
     case Outcome::kProlapsed:
       return "prolapsed";
+    case Outcome::kAnotherWay:
+      return "another_way";
     case Outcome::kCrossesItself:
       return "crosses_itself";
     case Outcome::kLeftLumen:
@@ -137,10 +139,11 @@ bool Trial::step(const Move& move) {
   if (!push) {
     insertion_.take_back();
     if (const std::optional<int> opening = insertion_.slipped_out()) {
-      return end_all(Outcome::kLeftImage,
-                     "the wire springs out of the vessel through the opening at " +
-                         place_of(*opening) + " after " + millimetres(depth) +
-                         " of insertion, from " + place_text(insertion_.tip()) + " mm");
+      return end_all(Outcome::kLeftImage, "the wire springs out of the vessel through the opening" +
+                                              named_end(0, *opening) + " at " + place_of(*opening) +
+                                              " after " + millimetres(depth) +
+                                              " of insertion, from " +
+                                              place_text(insertion_.tip()) + " mm");
     }
     return end_all(Outcome::kNotConverged, "no equilibrium after " + millimetres(depth) +
                                                " of insertion, tip at " +
@@ -195,6 +198,15 @@ std::string Trial::place_of(int opening) const {
   return place_text(vessel_.lumen.openings()[static_cast<std::size_t>(opening)].center) + " mm";
 }
 
+/// " in branch 3"; empty without a tree.
+std::string Trial::named_end(std::size_t goal, int opening) const {
+  const std::string name =
+      goals_[goal].way ? goals_[goal].way->name_at(
+                             vessel_.lumen.openings()[static_cast<std::size_t>(opening)].center)
+                       : std::string();
+  return name.empty() ? "" : " in " + name;
+}
+
 /// Ends the trial where the last step did not leave the tip in the vessel and before the goal.
 void Trial::check_place(std::size_t goal) {
   const Push& push = record_.pushes.back();
@@ -210,15 +222,15 @@ void Trial::check_place(std::size_t goal) {
     if (own.way->find_arrival(wire, vessel_.lumen)) {
       const std::optional<std::string> detour = own.way->find_detour(wire);
       if (!detour) return end(goal, Outcome::kReached, reached_reason(goal));
-      return end(goal, Outcome::kProlapsed,
+      return end(goal, Outcome::kAnotherWay,
                  "the tip passes the target" + after +
                      ", but the wire did not come along the way: " + *detour);
     }
   }
   if (const std::optional<int> opening = insertion_.left_through()) {
-    return end_where_it_is(
-        goal, Outcome::kLeftImage,
-        "the wire left the imaged vessel through its end at " + place_of(*opening) + after);
+    return end_where_it_is(goal, Outcome::kLeftImage,
+                           "the wire left the imaged vessel through its end" +
+                               named_end(goal, *opening) + " at " + place_of(*opening) + after);
   }
   const std::optional<int> image_end =
       own.way ? own.way->find_image_end(tip_at_rest(), vessel_.lumen) : std::nullopt;
@@ -363,7 +375,7 @@ std::string Trial::balance_text() const {
   const double work = std::max(std::abs(last.push_work), last.stored_energy + last.friction_work);
   if (std::abs(last.unbalanced) <= kBalance * work) return "";
   char text[96];
-  std::snprintf(text, sizeof text, "; work and energy differ by %.1f %% of the work",
+  std::snprintf(text, sizeof text, "; its forces are rough: energy is out of balance by %.0f %%",
                 100.0 * std::abs(last.unbalanced) / work);
   return text;
 }

@@ -32,6 +32,7 @@ enum class Outcome {
   kLeftImage,      // the tip came to an end of the imaged vessel, which goes on in the patient
   kStuck,          // pushing no longer advances the tip
   kProlapsed,      // the wire folded back on itself instead of advancing its tip
+  kAnotherWay,     // the tip passed the goal's cross-section, but the wire came another way
   kCrossesItself,  // the wire ran through itself, which it does not feel
   kLeftLumen,      // the wire went further through the wall than contact explains
   kNotConverged,   // a push had no equilibrium to the tolerance, also when cut smaller
@@ -66,7 +67,8 @@ struct ToolTrack {
 struct TrialResult {
   Outcome outcome = Outcome::kFailed;
   std::string reason;                 // one sentence; with the place in mm where it failed, and
-                                      // by how much work and energy differ beyond 1 % of the work
+                                      // how rough its forces are, where work and energy differ
+                                      // by more than 1 % of the work
   std::vector<Push> pushes;           // in the order in which they were made
   std::vector<PushTerms> push_terms;  // one per push, if recorded
   /// Where the tip did not advance, if pushed on: wire in the body from and to [mm].
@@ -168,6 +170,7 @@ class Trial {
   std::string reached_reason(std::size_t goal) const;
   std::string balance_text() const;
   std::string place_of(int opening) const;
+  std::string named_end(std::size_t goal, int opening) const;
   Shape shape_here() const;
 
   std::vector<Goal> goals_;

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
-#include <limits>
 #include <utility>
 
 #include "preprocess/centerline/path_place.h"
@@ -27,8 +26,6 @@ constexpr double kTangentRadii = 1.0;   // of the way before the section ...
 constexpr double kTangentSpan = 2.0;    // ... or so much give its direction              [mm]
 constexpr double kEndRadii = 0.5;       // from the end of a branch is at its end
 constexpr double kEndWidth = 2.0;       // radii beside its axis at most
-constexpr double kForkSpan = 3.0;       // behind a fork, where its vessels are compared  [mm]
-constexpr double kStumpRadii = 4.0;     // a shorter branch is a sac or a stump
 
 std::string whole_millimetres(double value) {
   char text[32];
@@ -56,16 +53,6 @@ bool sees(const Lumen& lumen, const Vec3& a, const Vec3& b) {
   return true;
 }
 
-/// At the point of a line that is so far along it, or at its end.
-double radius_at(const Centerline& line, double arc) {
-  Eigen::Index i = 0;
-  while (i + 1 < line.arc_length.size() && line.arc_length(i) < arc) ++i;
-  return line.radius(i);
-}
-
-/// Where a branch's own vessel begins: beyond the ball in its parent that its line starts in.
-double own_start(const Branch& branch) { return branch.parent < 0 ? 0.0 : branch.line.radius(0); }
-
 }  // namespace
 
 Way::Way(Centerline path, std::vector<Branch> tree)
@@ -79,12 +66,22 @@ Way::Way(Centerline path, std::vector<Branch> tree)
   if (tree_.empty()) return;
 
   // From the target's branch up to the root.
-  Place place = find_branch(section_.center);
+  BranchPlace place = find_branch(tree_, section_.center);
   target_branch_ = place.branch;
   while (place.branch >= 0) {
     leaves_[static_cast<std::size_t>(place.branch)] = place.arc;
     const Branch& branch = tree_[static_cast<std::size_t>(place.branch)];
     place = {.branch = branch.parent, .arc = branch.parent_arc};
+  }
+  double widest = 0.0;
+  for (std::size_t k = 0; k < tree_.size(); ++k) {
+    const int parent = tree_[k].parent;
+    if (parent < 0 || tree_[k].parent_arc > leaves_[static_cast<std::size_t>(parent)]) continue;
+    const Bifurcation fork{parent, static_cast<int>(k), leaves_[k] >= 0.0};
+    double width = 0.0;
+    if (!is_bifurcation(tree_, fork, width) || width <= widest) continue;
+    widest = width;
+    bifurcation_ = fork;
   }
 }
 
@@ -145,18 +142,32 @@ std::optional<std::string> Way::find_detour(const Eigen::Ref<const Eigen::Matrix
          " mm" + (name.empty() ? "" : ", in " + name);
 }
 
-bool Way::is_wider(int branch, const Place& fork) const {
-  const Branch& off = tree_[static_cast<std::size_t>(branch)];
-  const Centerline& on = tree_[static_cast<std::size_t>(fork.branch)].line;
-  const double beyond = own_start(off) + kForkSpan;
-  return radius_at(off.line, beyond) > radius_at(on, fork.arc + beyond);
+bool Way::is_across(const BranchPlace& tip, const BranchPlace& on_way, int left) const {
+  if (!bifurcation_ || on_way.branch != bifurcation_->parent) return false;
+  if (!bifurcation_->takes_child) return left == bifurcation_->child;
+  // The parent itself goes on across it, and what leaves it there.
+  return on_way.arc > tree_[static_cast<std::size_t>(bifurcation_->child)].parent_arc &&
+         tip.branch != bifurcation_->child;
+}
+
+int Way::next_branch(int branch) const {
+  const std::vector<int> along = branches();
+  const auto found = std::find(along.begin(), along.end(), branch);
+  expects(found != along.end() && found + 1 != along.end());
+  return *(found + 1);
 }
 
 std::optional<Astray> Way::find_astray(const Vec3& tip) const {
-  if (tree_.empty() || is_on_path(find_place(tip, path_))) return std::nullopt;
+  if (tree_.empty()) return std::nullopt;
+  const PathPlace on_path = find_place(tip, path_);
+  const BranchPlace here = find_branch(tree_, tip);
+  // Beside the way's balls the lumen may be oval, unless the tip is in another vessel's there.
+  const double here_leaves = leaves_[static_cast<std::size_t>(here.branch)];
+  const bool off_way = here_leaves < 0.0 || here.arc > here_leaves + on_path.radius;
+  const bool in_other = off_way && here.part <= 1.0 && on_path.from_lumen > 0.0;
+  if (is_on_path(on_path) && !in_other) return std::nullopt;
   // Up from the tip's branch to one that the way uses.
-  const Place here = find_branch(tip);
-  Place on_way = here;
+  BranchPlace on_way = here;
   int left = -1;  // the branch by which the tip left the way
   while (leaves_[static_cast<std::size_t>(on_way.branch)] < 0.0) {
     left = on_way.branch;
@@ -165,28 +176,36 @@ std::optional<Astray> Way::find_astray(const Vec3& tip) const {
   }
   const double leaves = leaves_[static_cast<std::size_t>(on_way.branch)];
   const bool in_branch_of_way = on_way.branch == here.branch;
-  const std::string name = name_at(tip);
-  if (on_way.arc > leaves && on_way.branch == target_branch_) {
+  const bool in_targets = on_way.branch == target_branch_;
+  const std::string name = branch_name(tree_, here.branch);
+  if (is_across(here, on_way, left)) {
+    return Astray{false, "it is in " + name + ", across the bifurcation"};
+  }
+  if (on_way.arc > leaves && in_targets) {
     return Astray{true, "it is in " + name + ", beyond the target"};
   }
   if (on_way.arc > leaves) {
+    const int taken = next_branch(on_way.branch);
+    const std::string next = branch_name(tree_, taken);
+    if (goes_on(tree_, taken)) {
+      return Astray{
+          false, "it is in " + name + ", where the way goes on in " + next + ", the wider vessel"};
+    }
     const std::string where =
         in_branch_of_way ? "went on in " + name + ", " : "is in " + name + ", which comes ";
     return Astray{true, "it " + where + whole_millimetres(on_way.arc - leaves) +
-                            " beyond the place where the way leaves " +
-                            branch_name(tree_, on_way.branch)};
+                            " beyond the place where the way turns into " + next};
   }
   if (in_branch_of_way) return std::nullopt;
-  if (is_wider(left, on_way)) {
-    return Astray{true, "it went on in " + name + ", the wider vessel where the way leaves it " +
-                            whole_millimetres(on_way.arc) + " along " +
+  if (goes_on(tree_, left)) {
+    return Astray{true, "it went on in " + name + ", the wider vessel where the way turns into " +
                             branch_name(tree_, on_way.branch)};
   }
   return Astray{false, "it is in " + name + ", which leaves the way " +
                            whole_millimetres(leaves - on_way.arc) + " before " +
-                           (on_way.branch == target_branch_
-                                ? "the target"
-                                : "the way leaves " + branch_name(tree_, on_way.branch))};
+                           (in_targets ? "the target"
+                                       : "the way turns into " +
+                                             branch_name(tree_, next_branch(on_way.branch)))};
 }
 
 std::optional<int> Way::find_image_end(const Vec3& tip, const Lumen& lumen) const {
@@ -196,8 +215,7 @@ std::optional<int> Way::find_image_end(const Vec3& tip, const Lumen& lumen) cons
     const Vec3 end = line.points.col(last), off = tip - end;
     const double radius = line.radius(last);
     if (off.norm() > (kEndRadii + kEndWidth) * radius) continue;
-    const bool stump = line.arc_length(last) - own_start(tree_[k]) < kStumpRadii * radius;
-    if (stump && tree_[k].parent >= 0) continue;
+    if (is_stump(tree_, static_cast<int>(k))) continue;
     const Vec3 ahead = end_tangent(line, std::max(kTangentSpan, radius));
     const double along = ahead.dot(off);
     if (along < -kEndRadii * radius || (off - along * ahead).norm() > kEndWidth * radius) continue;
@@ -210,31 +228,7 @@ std::optional<int> Way::find_image_end(const Vec3& tip, const Lumen& lumen) cons
 }
 
 std::string Way::name_at(const Vec3& point) const {
-  return tree_.empty() ? std::string() : branch_name(tree_, find_branch(point).branch);
-}
-
-Way::Place Way::find_branch(const Vec3& point) const {
-  constexpr double kClearlyNearer = 0.98;  // at a fork the branch that was found first counts
-  Place best;
-  double least = std::numeric_limits<double>::infinity();
-  for (std::size_t k = 0; k < tree_.size(); ++k) {
-    const Centerline& line = tree_[k].line;
-    const double start = own_start(tree_[k]);
-    double own = std::numeric_limits<double>::infinity(), arc = 0.0;
-    for (Eigen::Index i = 0; i < line.points.cols(); ++i) {
-      if (line.arc_length(i) < start) continue;
-      const double part = (point - line.points.col(i)).norm() / std::max(line.radius(i), 1e-3);
-      if (part < own) {
-        own = part;
-        arc = line.arc_length(i);
-      }
-    }
-    if (own < kClearlyNearer * least) {
-      least = own;
-      best = {.branch = static_cast<int>(k), .arc = arc};
-    }
-  }
-  return best;
+  return tree_.empty() ? std::string() : branch_name(tree_, find_branch(tree_, point).branch);
 }
 
 }  // namespace wireplan::simulate

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "preprocess/centerline/centerline.h"
+#include "simulate/insertion/vessel_tree.h"
 #include "simulate/wall/lumen.h"
 
 namespace wireplan::simulate {
@@ -21,8 +22,8 @@ struct CrossSection {
 /// A tip that is in another vessel than the way.
 struct Astray {
   bool passed_by = false;  // it stayed in a vessel that the way leaves, the wider one at a fork, or
-                           // went on from there; else it took a branch before that
-  std::string text;        // which vessel, and how far beyond the place where the way leaves
+                           // went on from there; else it took a branch that the way does not
+  std::string text;        // which vessel, and where that leaves the way
 };
 
 /// Immutable. Branches are called as `preprocess::branch_name` says.
@@ -37,6 +38,9 @@ class Way {
   const std::vector<preprocess::Branch>& tree() const { return tree_; }
   /// The branches that the way goes along, from the root; empty without a tree.
   std::vector<int> branches() const;
+  /// Of the aorta, where the way comes from a leg; where it passes several such forks, that into the
+  /// widest vessel.
+  const std::optional<Bifurcation>& bifurcation() const { return bifurcation_; }
 
   /// Whether a tip is near enough to the cross-section for find_arrival() to find one.
   bool may_have_arrived(const Vec3& tip) const;
@@ -52,7 +56,8 @@ class Way {
   /// radii (20 mm at least).
   std::optional<std::string> find_detour(const Eigen::Ref<const Eigen::Matrix3Xd>& wire) const;
 
-  /// Where a tip is that is not on the way; empty for one that is.
+  /// Where a tip is that is not on the way; empty for one that is. Half a radius beside the way's
+  /// balls counts as on it, unless it is inside another vessel's.
   std::optional<Astray> find_astray(const Vec3& tip) const;
 
   /// The end of the image that a tip has come to: within half a radius of where a branch ends with
@@ -65,14 +70,11 @@ class Way {
   std::string name_at(const Vec3& point) const;
 
  private:
-  struct Place {
-    int branch = 0;
-    double arc = 0.0;  // along its line                                                  [mm]
-  };
-  Place find_branch(const Vec3& point) const;
-  /// Whether a branch that leaves the way is wider than the vessel of the way there: a tree's first
-  /// branch may well end in the smaller one.
-  bool is_wider(int branch, const Place& fork) const;
+  /// The branch of the way that it goes on in from another.
+  int next_branch(int branch) const;
+  /// Whether a tip is on the other side of the bifurcation: where it is, the branch of the way that
+  /// it comes from, and the branch by which it left that, -1 where it is in it.
+  bool is_across(const BranchPlace& tip, const BranchPlace& on_way, int left) const;
 
   Centerline path_;
   CrossSection section_;
@@ -81,6 +83,7 @@ class Way {
   /// branches that the way does not use [mm].
   std::vector<double> leaves_;
   int target_branch_ = -1;
+  std::optional<Bifurcation> bifurcation_;
 };
 
 }  // namespace wireplan::simulate

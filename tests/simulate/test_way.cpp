@@ -191,6 +191,58 @@ TEST(Way, WhatIsPassedByDoesNotDependOnWhichVesselTheTreeFollowsFirst) {
   EXPECT_FALSE(way.find_astray(Vec3(15.0, 1.0, kSecond)));
 }
 
+TEST(Way, ATipInTheMouthOfAnotherBranchIsInThatBranch) {
+  // 1.2 mm beside the trunk's balls, which alone may be an oval lumen.
+  const Way way(into_branch(kSecond, 25.0), tree_of_fork());
+  const auto mouth = way.find_astray(Vec3(6.2, 0.0, kFirst));
+  ASSERT_TRUE(mouth);
+  EXPECT_FALSE(mouth->passed_by);
+  EXPECT_NE(mouth->text.find("in branch 2"), std::string::npos) << mouth->text;
+  EXPECT_FALSE(way.find_astray(Vec3(-6.2, 0.0, kFirst))) << "no vessel is there";
+  EXPECT_FALSE(way.find_astray(Vec3(6.2, 0.0, kSecond))) << "the way's own branch";
+}
+
+TEST(Way, TheOtherLegIsAcrossTheBifurcationWhicheverVesselTheTreeFollows) {
+  // Two legs of 5 mm radius that meet in a vessel of 9 mm; the ball at the fork has 7 mm.
+  const Vec3 foot(-40.0, 0.0, -80.0), other(40.0, 0.0, -80.0), head(0.0, 0.0, 100.0);
+  const auto leg_and_on = [](const Vec3& from, const Vec3& to, double radius) {
+    Centerline line = line_through({from, Vec3::Zero(), to}, radius);
+    for (Eigen::Index i = 0; i < line.points.cols(); ++i) {
+      const double off = line.points.col(i).norm();
+      line.radius(i) = off < 7.0 ? 7.0 : line.points(2, i) < 0.0 ? 5.0 : 9.0;
+    }
+    return line;
+  };
+  const auto out = [](const Vec3& to, double radius) {
+    Centerline line = line_through({Vec3::Zero(), to}, radius);
+    for (Eigen::Index i = 0; line.arc_length(i) < 7.0; ++i) line.radius(i) = 7.0;
+    return line;
+  };
+  const Centerline path = leg_and_on(foot, Vec3(0.0, 0.0, 80.0), 9.0);
+  const double at = foot.norm();
+  const std::vector<std::vector<Branch>> trees = {
+      {{leg_and_on(foot, head, 9.0), -1, 0.0}, {out(other, 5.0), 0, at}},
+      {{leg_and_on(foot, other, 5.0), -1, 0.0}, {out(head, 9.0), 0, at}}};
+  for (std::size_t k = 0; k < trees.size(); ++k) {
+    SCOPED_TRACE(k);
+    const Way way(path, trees[k]);
+    ASSERT_TRUE(way.bifurcation());
+    EXPECT_EQ(way.bifurcation()->child, 1);
+    EXPECT_EQ(way.bifurcation()->takes_child, k == 1);
+    for (const double deep : {0.13, 0.5}) {  // in the mouth, and half way down
+      const auto astray = way.find_astray(deep * other);
+      ASSERT_TRUE(astray) << deep;
+      EXPECT_FALSE(astray->passed_by) << astray->text;
+      EXPECT_EQ(astray->text, std::string("it is in branch ") + (k == 0 ? "2" : "1") +
+                                  ", across the bifurcation");
+    }
+    EXPECT_FALSE(way.find_astray(0.5 * foot));
+    EXPECT_FALSE(way.find_astray(0.5 * head));
+  }
+  // A branch that leaves the vessel sideways is none.
+  EXPECT_FALSE(Way(into_branch(kSecond, 25.0), tree_of_fork()).bifurcation());
+}
+
 TEST(Way, TheEndOfTheImageIsOpenThoughItsModelIsClosed) {
   // A target in a branch; the wire runs to the closed end of the trunk, and is not pressed there.
   const Goal goal = goal_of(into_branch(kFirst, 25.0), tree_of_fork());

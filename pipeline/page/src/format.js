@@ -43,6 +43,7 @@ const kOutcomes = {
   left_image: {word: "came to the end of the imaged vessel", mark: "E"},
   stuck: {word: "got stuck", mark: "S"},
   prolapsed: {word: "folded back on itself", mark: "P"},
+  another_way: {word: "came to the target another way", mark: "A"},
   crosses_itself: {word: "crossed itself in a loop", mark: "X"},
   left_lumen: {word: "left the lumen", mark: "L"},
   not_converged: {word: "no equilibrium found", mark: "N"},

@@ -1,0 +1,47 @@
+#pragma once
+/// Questions to the tree of the vessel's branches: in which of them a point is, where a branch's own
+/// vessel begins, and which one goes on where a vessel forks.
+#include <vector>
+
+#include "preprocess/centerline/centerline.h"
+
+namespace wireplan::simulate {
+
+struct BranchPlace {
+  int branch = 0;
+  double arc = 0.0;   // along its line                                                    [mm]
+  double part = 0.0;  // distance from its middle there, in radii: 1 and less is inside    [-]
+};
+
+/// The branch in whose own vessel a point is deepest. Expects a tree.
+BranchPlace find_branch(const std::vector<preprocess::Branch>& tree, const Vec3& point);
+
+/// Where a branch's own vessel begins: beyond the ball in its parent that its line starts in [mm].
+double own_start(const preprocess::Branch& branch);
+
+/// Whether it ends within two of its diameters: the sac of an aneurysm or a stump, no artery. The
+/// root is none.
+bool is_stump(const std::vector<preprocess::Branch>& tree, int k);
+
+/// How wide a branch is beyond its start over how wide its parent is as far beyond the fork: what is
+/// beyond the fork is compared, since the ball in it belongs to both. Expects a branch with a parent.
+double width_over_parent(const std::vector<preprocess::Branch>& tree, int k);
+
+/// Whether a branch is the vessel that goes on where it leaves its parent, though the tree's line
+/// turns into a smaller one there: wider than the parent beyond the fork and than all others that
+/// leave it within the same ball, and no stump.
+bool goes_on(const std::vector<preprocess::Branch>& tree, int k);
+
+/// A fork of two branches of like width, within a third, that lie side by side and meet in a wider
+/// vessel: to a way from a femoral artery that of the aorta.
+struct Bifurcation {
+  int parent = -1, child = -1;  // of the tree, that part there ...
+  bool takes_child = false;     // ... and which of them a way goes on in
+};
+
+/// Whether `child` leaves its parent at such a fork, where a way along the parent goes on in the one
+/// or the other. `width` is set to the radius of what it goes on in [mm].
+bool is_bifurcation(const std::vector<preprocess::Branch>& tree, const Bifurcation& fork,
+                    double& width);
+
+}  // namespace wireplan::simulate
