@@ -3,6 +3,7 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 #include "preprocess/centerline/path_place.h"
 
@@ -10,6 +11,8 @@ namespace wireplan::plan {
 namespace {
 
 using preprocess::Branch;
+
+constexpr double kStumpRadii = 4.0;  // what is shorter beyond a fork is a stump
 
 double length_of(const Centerline& line) { return line.arc_length(line.arc_length.size() - 1); }
 
@@ -21,7 +24,8 @@ Eigen::Index segment_at(const Centerline& line, double arc) {
 }
 
 double radius_at(const Centerline& line, double arc) {
-  return preprocess::find_place(point_at(line, arc), line).radius;
+  const auto [before, part] = find_part(line, arc);
+  return (1.0 - part) * line.radius(before) + part * line.radius(before + 1);
 }
 
 /// The way up to the point before an arc length, then another line to its end.
@@ -73,20 +77,52 @@ Junction taken_junction(const Centerline& way, double arc, const Centerline& tru
   return junction;
 }
 
-/// The junction at `arc` of the way where `side` leaves the branch that the way stays in.
-Junction side_junction(const Centerline& way, double arc, const Branch& side) {
+/// The junction at `arc` of the way that it passes, where `side` begins at `from` of its line.
+Junction passed_junction(const Centerline& way, double arc, const Centerline& side, double from) {
   const double reach = 2.0 * radius_at(way, arc);
-  const auto width_beyond = [&](const Centerline& line, double from) {
-    return radius_at(line, std::min(from + reach, length_of(line)));
-  };
-  if (width_beyond(side.line, 0.0) > width_beyond(way, arc)) {
-    return taken_junction(way, arc, joined(way, arc, side.line));
-  }
   Junction junction;
   junction.arc = arc;
   junction.point = point_at(way, arc);
   junction.trunk_direction = chord(way, arc - reach, arc + reach);
-  junction.branch_direction = direction_beyond(side.line, find_ostium(side.line, 0.0, way));
+  junction.branch_direction = direction_beyond(side, find_ostium(side, from, way));
+  return junction;
+}
+
+/// At `arc` of the way, where `child` leaves the tree's branch that the way comes along, for the
+/// child where that is what the way takes. None where the other of the two is a stump.
+std::optional<Junction> junction_at(const simulate::Way& of, double arc, int child, bool takes) {
+  constexpr double kClearlyWider = 4.0 / 3.0;
+  const std::vector<Branch>& tree = of.tree();
+  const Centerline& way = of.path();
+  const Branch& branch = tree[static_cast<std::size_t>(child)];
+  const int own = branch.parent;
+  const Centerline& line = tree[static_cast<std::size_t>(own)].line;
+  const bool goes_on =
+      simulate::goes_on(tree, child) && simulate::width_over_parent(tree, child) > kClearlyWider;
+  Junction junction;
+  if (!takes) {
+    if (simulate::is_stump(tree, child)) return {};
+    // The way leaves the child where that is the trunk.
+    junction = goes_on ? taken_junction(way, arc, joined(way, arc, branch.line))
+                       : passed_junction(way, arc, branch.line, 0.0);
+    junction.trunk = goes_on ? child : own;
+    junction.branch = goes_on ? own : child;
+  } else if (goes_on) {
+    // The way stays in the trunk, and what goes on of the tree's branch leaves it.
+    const double left = length_of(line) - branch.parent_arc;
+    if (left - simulate::own_start(branch) < kStumpRadii * line.radius(line.radius.size() - 1)) {
+      return {};
+    }
+    junction = passed_junction(way, arc, line, branch.parent_arc);
+    junction.trunk = child;
+    junction.branch = own;
+  } else {
+    junction = taken_junction(way, arc, line);
+    junction.trunk = own;
+    junction.branch = child;
+  }
+  const std::optional<simulate::Bifurcation>& fork = of.bifurcation();
+  junction.bifurcation = fork && fork->child == child;
   return junction;
 }
 
@@ -163,13 +199,9 @@ std::vector<Junction> find_junctions(const simulate::Way& of) {
     for (std::size_t b = 0; b < tree.size(); ++b) {
       if (tree[b].parent != own || tree[b].parent_arc > left_at) continue;
       const double arc = preprocess::find_place(point_at(line, tree[b].parent_arc), way).arc;
-      const bool changes = static_cast<int>(b) == next;
-      Junction junction =
-          changes ? taken_junction(way, arc, line) : side_junction(way, arc, tree[b]);
-      const bool stays = junction.taken && !changes;  // in the narrower one
-      junction.trunk = stays ? static_cast<int>(b) : own;
-      junction.branch = stays ? own : static_cast<int>(b);
-      junctions.push_back(junction);
+      const int child = static_cast<int>(b);
+      const std::optional<Junction> junction = junction_at(of, arc, child, child == next);
+      if (junction) junctions.push_back(*junction);
     }
   }
   std::stable_sort(junctions.begin(), junctions.end(),

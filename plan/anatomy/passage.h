@@ -49,6 +49,7 @@ struct Junction {
   int trunk = -1;             // branch of the tree that goes on ...
   int branch = -1;            // ... and the one that leaves it there
   bool taken = false;         // the way leaves the trunk for the branch; else it passes the branch
+  bool bifurcation = false;   // of the aorta (simulate::Bifurcation)
   double arc = 0.0;           // of the ostium, along the way                              [mm]
   Vec3 point = Vec3::Zero();  // there                                                     [mm]
   /// Unit vectors from the ostium: where the trunk goes on, and where the branch goes.
@@ -58,13 +59,14 @@ struct Junction {
 /// By how much the branch turns from the trunk [rad].
 double turn_of(const Junction& junction);
 
-/// All along the way, nearest first; none without a tree. It leaves a trunk where it changes from
-/// one branch of the tree to another, and where the branch that it stays in is narrower there than
-/// the one beside it: a tree's first branch may well end in a small artery. Of a branch that the
-/// way takes, the ostium is where the way leaves the trunk's inscribed spheres; of one that it
-/// passes, the nearest point of the way. The trunk's direction is that of a chord of two of its
-/// diameters round the ostium, the branch's that of its first three radii, at least 6 mm, beyond
-/// it. Expects a tree that starts where the way does, as find_tree() makes it.
+/// All along the way, nearest first; none without a tree, and none of stumps. It leaves a trunk
+/// where it changes from one branch of the tree to another, unless that is the trunk, and where the
+/// trunk is another branch than the one that it stays in: the vessel that goes on
+/// (simulate::goes_on) and is wider by a third, since a tree's first branch may well end in a small
+/// artery. Of a branch that the way takes, the ostium is where the way leaves the trunk's inscribed
+/// spheres; of one that it passes, the nearest point of the way. The trunk's direction is that of a
+/// chord of two of its diameters round the ostium, the branch's that of its first three radii, at
+/// least 6 mm, beyond it. Expects a tree that starts where the way does, as find_tree() makes it.
 std::vector<Junction> find_junctions(const simulate::Way& of);
 
 }  // namespace wireplan::plan

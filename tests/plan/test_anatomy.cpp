@@ -134,6 +134,84 @@ TEST(Junctions, TreeWhoseFirstBranchEndsInTheSmallArteryTellsTheSame) {
   EXPECT_NEAR(found[0].branch_direction.dot(Vec3::UnitX()), 1.0, 1e-9);
 }
 
+/// A branch of a trunk of 10 mm radius, sideways from its middle.
+Branch side_branch(double z, double x, double radius, double parent_arc) {
+  Branch branch{.line = line_through({Vec3(0, 0, z), Vec3(x, 0, z)}, radius),
+                .parent = 0,
+                .parent_arc = parent_arc};
+  for (Eigen::Index k = 0; branch.line.arc_length(k) < 10.0; ++k) branch.line.radius(k) = 10.0;
+  return branch;
+}
+
+/// Up a trunk of 10 mm radius to 100 mm, and 50 mm to the right.
+Centerline right_renal_way(double radius) {
+  Centerline way = line_through({Vec3::Zero(), Vec3(0, 0, 100), Vec3(-50, 0, 100)}, radius);
+  for (Eigen::Index k = 0; way.arc_length(k) < 110.0; ++k) way.radius(k) = 10.0;
+  return way;
+}
+
+TEST(Junctions, OppositeRenalsFourMillimetresApartAreOneOstiumOnTheWay) {
+  // The left one is the wider, and lower: the way into the right one passes it.
+  const Branch left = side_branch(96.0, 60.0, 3.0, 96.0);
+  const Branch right = side_branch(100.0, -60.0, 2.5, 100.0);
+  const Branch aorta{.line = line_through({Vec3::Zero(), Vec3(0, 0, 200)}, 10.0)};
+  const auto found = find_junctions(simulate::Way(right_renal_way(2.5), {aorta, left, right}));
+  ASSERT_EQ(found.size(), 2u);
+  EXPECT_FALSE(found[0].taken);
+  EXPECT_EQ(found[0].branch, 1);
+  EXPECT_TRUE(found[1].taken);
+  EXPECT_EQ(found[1].trunk, 0);
+  EXPECT_EQ(found[1].branch, 2);
+
+  // The same where the tree's first line turns into the right one, and the aorta is its branch.
+  const Branch first{.line = right_renal_way(2.5)};
+  const Branch upper{.line = line_through({Vec3(0, 0, 100), Vec3(0, 0, 200)}, 10.0),
+                     .parent = 0,
+                     .parent_arc = 100.0};
+  const auto same = find_junctions(simulate::Way(right_renal_way(2.5), {first, left, upper}));
+  ASSERT_EQ(same.size(), 2u);
+  EXPECT_FALSE(same[0].taken);
+  EXPECT_EQ(same[0].branch, 1);
+  EXPECT_TRUE(same[1].taken);
+  EXPECT_EQ(same[1].trunk, 2);
+  EXPECT_EQ(same[1].branch, 0);
+}
+
+TEST(Junctions, StumpsAreNone) {
+  // A bulge as wide as the trunk that ends 4 mm beyond its wall.
+  const Branch stump{.line = line_through({Vec3(0, 0, 96), Vec3(14, 0, 96)}, 10.0),
+                     .parent = 0,
+                     .parent_arc = 96.0};
+  const Branch aorta{.line = line_through({Vec3::Zero(), Vec3(0, 0, 200)}, 10.0)};
+  const auto found = find_junctions(
+      simulate::Way(right_renal_way(2.5), {aorta, stump, side_branch(100.0, -60.0, 2.5, 100.0)}));
+  ASSERT_EQ(found.size(), 1u);
+  EXPECT_EQ(found[0].branch, 2);
+
+  // The tree's first line ends in the stump, and the trunk is its branch.
+  Branch first{.line = line_through({Vec3::Zero(), Vec3(0, 0, 100), Vec3(14, 0, 100)}, 10.0)};
+  first.line.radius.tail(8).setConstant(4.0);
+  const Branch upper{.line = line_through({Vec3(0, 0, 100), Vec3(0, 0, 200)}, 10.0),
+                     .parent = 0,
+                     .parent_arc = 100.0};
+  const Centerline up = line_through({Vec3::Zero(), Vec3(0, 0, 180)}, 10.0);
+  EXPECT_TRUE(find_junctions(simulate::Way(up, {first, upper})).empty());
+}
+
+TEST(Junctions, WayThatStaysInTheTrunkPassesTheArteryThatTheTreesLineEndsIn) {
+  const Branch first{.line = right_renal_way(3.0)};
+  const Branch upper{.line = line_through({Vec3(0, 0, 100), Vec3(0, 0, 200)}, 10.0),
+                     .parent = 0,
+                     .parent_arc = 100.0};
+  const Centerline up = line_through({Vec3::Zero(), Vec3(0, 0, 180)}, 10.0);
+  const auto found = find_junctions(simulate::Way(up, {first, upper}));
+  ASSERT_EQ(found.size(), 1u);
+  EXPECT_FALSE(found[0].taken);
+  EXPECT_EQ(found[0].branch, 0);
+  EXPECT_NEAR(found[0].arc, 100.0, 0.51);
+  EXPECT_NEAR(found[0].branch_direction.dot(-Vec3::UnitX()), 1.0, 1e-6);
+}
+
 TEST(AccessLimits, GradesBeginAtTheirThresholds) {
   const AccessLimits limits;
   EXPECT_EQ(grade_of(1.11, limits.tortuosity), 0);
