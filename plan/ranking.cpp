@@ -311,24 +311,31 @@ std::vector<WireSummary> summarise_wires(const Study& study,
   return wires;
 }
 
-/// Walks the plans by rising force; one stays if it is nearer to the target than all before it, or
-/// equal in both to the last that stayed.
+/// Walks the plans by rising force; one stays if it is better in the other quantity than all before
+/// it, or equal in both to the last that stayed. Of a sphere that is how near the tip is to its
+/// middle; of a cross-section, which is passed or not, the share that is unsafe.
 std::vector<int> find_pareto_front(const std::vector<RankedPlan>& plans,
-                                   const std::vector<Metrics>& metrics) {
-  const auto key = [&](int trial) {
-    return std::pair(metrics[trial].peak_contact_force, metrics[trial].tip_to_target);
+                                   const std::vector<Metrics>& metrics, bool at_section) {
+  struct Place {
+    double force, other;
+    int trial;
+    auto operator<=>(const Place&) const = default;
   };
-  std::vector<int> order;
-  for (const RankedPlan& plan : plans) order.push_back(plan.trial);
-  std::sort(order.begin(), order.end(),
-            [&](int a, int b) { return std::pair(key(a), a) < std::pair(key(b), b); });
+  std::vector<Place> order;
+  for (const RankedPlan& plan : plans) {
+    const Metrics& own = metrics[plan.trial];
+    order.push_back({own.peak_contact_force,
+                     at_section ? 1.0 - plan.expected_safe : own.tip_to_target, plan.trial});
+  }
+  std::sort(order.begin(), order.end());
 
   std::vector<int> front;
-  for (const int trial : order) {
-    if (front.empty() || key(trial).second < key(front.back()).second ||
-        key(trial) == key(front.back())) {
-      front.push_back(trial);
-    }
+  std::optional<Place> last;
+  for (const Place& place : order) {
+    const bool equal = last && place.force == last->force && place.other == last->other;
+    if (last && place.other >= last->other && !equal) continue;
+    front.push_back(place.trial);
+    last = place;
   }
   return front;
 }
@@ -474,7 +481,7 @@ Ranking rank(const Study& study, const std::vector<Candidate>& candidates,
   find_ties(ranking.plans, findings.repeated, all.between);
   write_sentences(ranking, study, candidates, metrics, limits, weights, findings.repeated);
   ranking.wires = summarise_wires(study, candidates, metrics, ranking.plans, findings.scouted);
-  ranking.pareto = find_pareto_front(ranking.plans, metrics);
+  ranking.pareto = find_pareto_front(ranking.plans, metrics, study.goal.at_section);
   return ranking;
 }
 

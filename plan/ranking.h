@@ -115,8 +115,8 @@ struct Ranking {
   std::vector<RankedPlan> plans;        // best first: safe ones, which reached and broke no limit
   std::vector<ExcludedTrial> excluded;  // the rest, each with its reason, in order of trial
   std::vector<WireSummary> wires;       // in order of the study's wires
-  /// Ranked plans that no other beats in both peak contact force and reach margin (goal radius -
-  /// tip_to_target), by rising force.
+  /// Ranked plans that no other beats in both peak contact force and, of a sphere, tip_to_target
+  /// or, of a cross-section, expected_safe; by rising force.
   std::vector<int> pareto;
 };
 

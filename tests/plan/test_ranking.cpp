@@ -413,6 +413,30 @@ TEST(Rank, ParetoFrontIsWhatNoOtherPlanBeats) {
   EXPECT_EQ(front, expected);
 }
 
+TEST(Rank, ParetoFrontOfACrossSectionIsOfForceAndSafeShare) {
+  Bench bench(1);
+  bench.study.goal.at_section = true;
+  // How far a wire passes from the axis counts for nothing: 3 has the least force and is safe in 8
+  // of 16, 1 has more and is safe in 12, 2 is beaten by 1, 0 is safe in all.
+  bench.add(0, 3.5, 0.4);
+  bench.add(0, 3.0, 0.2);
+  bench.add(0, 0.1, 0.3);
+  bench.add(0, 2.0, 0.1);
+  const int safe[] = {16, 12, 10, 8};
+  Findings findings;
+  for (int k = 0; k < 4; ++k) {
+    RepeatedPlan& own = findings.repeated.emplace_back();
+    own.trial = k;
+    for (int i = 0; i < 16; ++i) {
+      Repeat& repeat = own.repeats.emplace_back();
+      repeat.safe = repeat.reached = i < safe[k];
+    }
+  }
+  const Ranking ranking =
+      rank(bench.study, bench.candidates, bench.trials, bench.limits, bench.weights, findings);
+  EXPECT_EQ(ranking.pareto, (std::vector<int>{3, 1, 0}));
+}
+
 TEST(Rank, IsEmptyWhereNoTrialIsAPlan) {
   Bench bench;
   bench.add(0, 9.0, 0.2, Outcome::kMissed);

@@ -100,19 +100,22 @@ const forceFigure = (page, selection) => {
 
 // ---- Pareto front.
 const paretoFigure = (page, selection) => {
-  const goal = page.targetRadius;
+  // At a cross-section a plan passes or does not: what counts besides force is how often it is safe.
+  const goal = page.targetRadius, section = page.atSection;
+  const title = section ? "safe share" : "reach margin", unit = section ? "%" : "mm";
   const rows = page.trials.filter((t) => t.plan).map((t) => ({
     id: t.id, trial: t,
     x: t.peak_contact_force_n, xError: t.errors.peak_contact_force_error_n ?? null,
-    y: goal - t.tip_to_target_mm, yError: t.errors.position_error_mm ?? null,
+    y: section ? 100 * t.plan.expected_success_rate : goal - t.tip_to_target_mm,
+    yError: section ? null : t.errors.position_error_mm ?? null,
     front: page.report.pareto.includes(t.id),
   }));
   if (!rows.length) return el("p", {}, "Pareto front: no plan is ranked, so there is none.");
   const front = rows.filter((r) => r.front).sort((a, b) => a.x - b.x);
-  const make = (width) => chart("Largest contact force against reach margin of every ranked plan", {
+  const make = (width) => chart(`Largest contact force against ${title} of every ranked plan`, {
     width,
     x: {label: "largest contact [N] \u2192", nice: true, zero: true},
-    y: {label: "\u2191 reach margin [mm]", nice: true, zero: true},
+    y: {label: `\u2191 ${title} [${unit}]`, nice: !section, zero: true, ...(section ? {domain: [0, 100]} : {})},
     marks: [
       gridX(), gridY(),
       line(front, {x: "x", y: "y", stroke: lineColors[1], strokeWidth: 1.5, strokeDasharray: "5 4"}),
@@ -125,10 +128,10 @@ const paretoFigure = (page, selection) => {
     ],
   });
   const shown = figure(
-    el("span", {}, el("b", {}, "Pareto front"), `: filled diamonds are plans that no other beats in both force and reach margin (target radius ${number(goal)} mm less the tip's distance). Bars are numerical errors, where estimated; the ring is the chosen plan.`),
+    el("span", {}, el("b", {}, "Pareto front"), `: filled diamonds are plans that no other beats in both force and ${section ? "safe share (of a plan that was not repeated, what the repeated ones make likely)" : `reach margin (target radius ${number(goal)} mm less the tip's distance)`}. Bars are numerical errors, where estimated; the ring is the chosen plan.`),
     make,
-    numbersOf("Pareto front", ["Plan", "Largest contact [N]", "Reach margin [mm]"],
-      front.map((r) => [`${r.trial.plan.rank}: ${planName(r.trial)}`, withError(r.x, r.xError), withError(r.y, r.yError)])));
+    numbersOf("Pareto front", ["Plan", "Largest contact [N]", `${section ? "Safe share" : "Reach margin"} [${unit}]`],
+      front.map((r) => [`${r.trial.plan.rank}: ${planName(r.trial)}`, withError(r.x, r.xError), section ? number(r.y) : withError(r.y, r.yError)])));
   selection.follow(() => shown.draw());
   return shown.node;
 };

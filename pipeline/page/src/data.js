@@ -99,6 +99,8 @@ export const readPage = () => {
     access: scene.access_mm,
     target: scene.target_mm,
     targetRadius: scene.target_radius_mm,
+    // Without a radius the target is a cross-section of its vessel.
+    atSection: report.provenance.parameters.target?.radius_mm === undefined,
     surface: {
       vertices: points(scene.surface.vertices),
       triangles: indices(scene.surface.triangles),

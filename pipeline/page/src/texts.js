@@ -15,7 +15,7 @@ export const askedSection = (page) => {
       ["Case", name(shown(report.name))],
       ["Input", name(shown(input.name))],
       ["Access", point(page.access)],
-      ["Target", `${point(page.target)}, reached within ${number(page.targetRadius)}\u00a0mm`],
+      ["Target", page.atSection ? `${point(page.target)}, reached where the tip passes the vessel's cross-section there` : `${point(page.target)}, reached within ${number(page.targetRadius)}\u00a0mm`],
       ["Way", `${withError(report.vessel.branches[0].length_mm, null).split("\u00a0")[0]}\u00a0mm along the middle of the lumen, ${number(report.vessel.branches[0].min_diameter_mm)} to ${number(report.vessel.branches[0].max_diameter_mm)}\u00a0mm wide`],
       ["Wires", list(asked.wires, (w) => shown(w.name))],
       ["Entry", `inclination ${list(asked.access.inclination_deg, degrees)}; azimuth ${list(asked.access.azimuth_deg, degrees)}`],
@@ -51,7 +51,7 @@ export const answerSection = (page) => {
     el("p", {class: "answer"},
       "Best of ", plural(report.ranking.length, "safe plan"), `, which reach and break no limit; ${trials.filter((x) => x.reached).length} of ${trials.length} tried reach: `,
       el("strong", {}, el("bdi", {}, planName(t))),
-      `. Its tip ends ${withError(t.tip_to_target_mm, errors.position_error_mm)}\u00a0mm from the target's middle, with at most ` +
+      (page.atSection ? ". Its tip passes the vessel's cross-section at the target, with at most " : `. Its tip ends ${withError(t.tip_to_target_mm, errors.position_error_mm)}\u00a0mm from the target's middle, with at most `) +
       `${withError(t.peak_contact_force_n, errors.peak_contact_force_error_n)}\u00a0N on any 5\u00a0mm of wire and ${withError(t.peak_tip_force_n, errors.peak_tip_force_error_n)}\u00a0N at the tip.`),
     el("p", {}, ties ? `${plural(ties, "other plan")} cannot be told apart from it: ${best.tied_with.map((id) => `plan ${trials[id].plan?.rank ?? "?"}`).join(", ")}. ` : "No other plan is as good within the errors. ", rate),
     el("p", {class: "note"}, "\u00b1 is the estimated numerical error alone, which holds the true value in 95\u00a0% of cases; see what is uncertain below."));
