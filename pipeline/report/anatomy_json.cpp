@@ -124,7 +124,11 @@ Json lengths_json(const Centerline& way, const std::vector<plan::Junction>& junc
                   const Tree& tree, const plan::AccessLimits& limits) {
   Json places = Json::array();
   for (const plan::Junction& junction : junctions) {
-    places.push_back({{"what", junction.taken ? "the way turns into" : "passes"},
+    const char* what = junction.bifurcation
+                           ? (junction.taken ? "the bifurcation, into" : "the bifurcation, past")
+                       : junction.taken ? "the way turns into"
+                                        : "passes";
+    places.push_back({{"what", what},
                       {"branch", branch_name(tree, junction.branch)},
                       {"at_mm", junction.arc},
                       {"place_mm", to_json(junction.point)}});

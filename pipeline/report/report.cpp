@@ -169,8 +169,13 @@ Json vessel_json(const ReportInput& input) {
   const Json& line = input.figures.at("centerline");
   const Json& wall = input.figures.at("wall");
   Json branches = Json::array({branch_json("access to target", line)});
-  for (const Json& branch : line.at("branches")) {
-    branches.push_back(branch_json(branch.at("name"), branch));
+  // Named after targets and accesses as everywhere else; a study without a way has the tree's own.
+  const std::shared_ptr<const simulate::Way>& way = input.study.goal.way;
+  for (std::size_t k = 0; k < line.at("branches").size(); ++k) {
+    const Json& own = line.at("branches")[k];
+    branches.push_back(branch_json(
+        way ? branch_name(way->tree(), static_cast<int>(k)) : own.at("name").get<std::string>(),
+        own));
   }
 
   Row row;

@@ -52,6 +52,18 @@ std::string dotted(const std::string& pointer) {
   return name;
 }
 
+/// What branches are called after beside the target, with where it lies; empty where nothing has a
+/// name.
+std::string named_places(const Case& given) {
+  Json places = Json::array();
+  const auto add = [&](const std::string& name, const Vec3& point) {
+    if (!name.empty()) places.push_back({name, to_json(point)});
+  };
+  for (const AccessInput& access : given.accesses) add(access.name, access.point);
+  for (const TargetInput& target : given.targets) add(target.name, target.point);
+  return places.empty() ? "" : places.dump();
+}
+
 std::string stage_key_text(const Stage& stage, const Workspace& work) {
   std::vector<KeyLine> lines = {{"stage", stage.name}, {"version", std::to_string(stage.version)}};
   if (stage.reads_input) {
@@ -75,6 +87,10 @@ std::string stage_key_text(const Stage& stage, const Workspace& work) {
     Json names;
     for (const plan::MetricField& field : plan::kMetricFields) names.push_back(field.name);
     lines.push_back({"metrics", names.dump()});
+  }
+  if (const std::string places = named_places(work.given());
+      stage.names_branches && !places.empty()) {
+    lines.push_back({"named places", places});
   }
   if (stage.names_program) lines.push_back({"program", build_info().dump()});
   return key_text(lines);
@@ -235,10 +251,11 @@ std::vector<Stage> stages_of(const Case& given) {
   // Names of branches, or the way that was found.
   if (from_labels || from_volume) stages.back().after.emplace_back("segment");
   Stage anatomy{.name = "anatomy",
-                .version = 3,
+                .version = 4,
                 .reads_input = from_volume,
                 .after = {"surface", "centerline"},
                 .parameters = {"/access_limits"},
+                .names_branches = true,
                 .make = make_anatomy};
   if (from_volume) anatomy.after.push_back("segment");
   // The voxels tell how well the lumen is known.
@@ -255,6 +272,7 @@ std::vector<Stage> stages_of(const Case& given) {
                .after = {"surface", "centerline"},
                .parameters = {"/access", "/target", "/wires", "/tip_roll_deg", "/friction",
                               "/friction_factor", "/wall/model", "/insertion"},
+               .names_branches = true,
                .make = make_trials};
   const bool sections_move = given.wall.support.has_value();
   // A rigid wall does not act but in how the vessel moves as a whole.

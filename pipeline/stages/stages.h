@@ -20,6 +20,7 @@ struct Stage {
   bool reads_labels = false;                 // the case's labels, beside a volume or alone
   std::vector<std::string> after = {};       // earlier stages whose artifacts it reads
   std::vector<std::string> parameters = {};  // it reads, as JSON pointers into used_parameters()
+  bool names_branches = false;               // by the names of accesses and targets
   bool names_program = false;                // its artifact tells version and build
   void (*make)(Workspace&, const std::filesystem::path& folder) = nullptr;
 };

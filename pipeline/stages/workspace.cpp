@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "pipeline/report/report.h"
+#include "plan/anatomy/branch_names.h"
 #include "plan/catheter_choice.h"
 #include "preprocess/centerline/centerline.h"
 #include "preprocess/files/vessel_io.h"
@@ -37,6 +38,22 @@ std::vector<preprocess::Branch> read_tree(const Workspace& work) {
          .parent_arc = branches[k].at("parent_arc_mm").get<double>(),
          .name = branches[k].at("name").get<std::string>()});
   }
+  return tree;
+}
+
+// The tree with branches called after the case's accesses and targets, as a section to that target
+// calls them.
+std::vector<preprocess::Branch> named_tree(const Case& given, std::vector<preprocess::Branch> tree,
+                                           std::size_t target) {
+  std::vector<plan::NamedPlace> targets, accesses;
+  for (std::size_t k = 0; k < given.targets.size(); ++k) {
+    if (k != target) targets.push_back({given.targets[k].name, given.targets[k].point});
+  }
+  for (std::size_t k = 0; k < given.accesses.size(); ++k) {
+    if (k != given.access) accesses.push_back({given.accesses[k].name, given.accesses[k].point});
+  }
+  plan::name_branches(tree, {given.targets[target].name, given.targets[target].point}, targets,
+                      accesses);
   return tree;
 }
 
@@ -230,11 +247,11 @@ const plan::Study& Workspace::study() {
   if (study_) return *study_;
   plan::Study study = given_.study;
   const std::vector<preprocess::Branch> tree = read_tree(*this);
-  const auto set_way = [&](simulate::Goal& goal, const Centerline& path) {
-    goal.way = std::make_shared<simulate::Way>(path, tree);
+  const auto set_way = [&](simulate::Goal& goal, const Centerline& path, std::size_t target) {
+    goal.way = std::make_shared<simulate::Way>(path, named_tree(given_, tree, target));
     if (goal.at_section) goal.radius = goal.way->section().radius;
   };
-  set_way(study.goal, path());
+  set_way(study.goal, path(), given_.target);
   study.tangent = preprocess::start_tangent(path(), kTangentSpan);
   const std::vector<std::size_t> served = targets_served(given_);
   for (const std::size_t k : served) {
@@ -243,7 +260,7 @@ const plan::Study& Workspace::study() {
         preprocess::read_centerline(artifact(centerline_toward(k)).folder / "centerline.vtp");
     set_way(study.others.emplace_back(
                 simulate::Goal{.point = given_.targets[k].point, .at_section = true}),
-            other);
+            other, k);
     if (k == served.front()) study.tangent = preprocess::start_tangent(other, kTangentSpan);
   }
   if (study.insertion.length == 0.0) study.insertion.length = choose_insertion(study);

@@ -136,7 +136,7 @@ TEST_F(LabelsRun, EndsInAReportThatFollowsItsSchema) {
   const Json& vessel = report.at("vessel");
   EXPECT_TRUE(vessel.at("image").is_null());
   EXPECT_EQ(vessel.at("segmentation").at("left_out").size(), 1u);
-  EXPECT_EQ(vessel.at("branches").at(1).at("name"), "branch 1: tube");
+  EXPECT_EQ(vessel.at("branches").at(1).at("name"), "the target's branch (branch 1: tube)");
   EXPECT_TRUE(holds(read_text(folder_ / "out/tree.mrk.json"), "\"branch 1: tube\""));
   // On voxels of 1 mm the tube's volume is that of its voxels.
   const double expected =

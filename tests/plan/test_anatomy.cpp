@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "plan/anatomy/access_limits.h"
+#include "plan/anatomy/branch_names.h"
 #include "plan/anatomy/passage.h"
 #include "plan/anatomy/projection.h"
 
@@ -210,6 +211,46 @@ TEST(Junctions, WayThatStaysInTheTrunkPassesTheArteryThatTheTreesLineEndsIn) {
   EXPECT_EQ(found[0].branch, 0);
   EXPECT_NEAR(found[0].arc, 100.0, 0.51);
   EXPECT_NEAR(found[0].branch_direction.dot(-Vec3::UnitX()), 1.0, 1e-6);
+}
+
+TEST(BranchNames, AreThoseOfTheTargetsAndAccessesInThem) {
+  const auto tree = [] {
+    return std::vector<Branch>{{.line = line_through({Vec3::Zero(), Vec3(0, 0, 200)}, 10.0)},
+                               side_branch(96.0, 60.0, 3.0, 96.0),
+                               side_branch(100.0, -60.0, 2.5, 100.0),
+                               side_branch(150.0, 60.0, 3.0, 150.0)};
+  };
+  const Vec3 left(40, 0, 96), right(-40, 0, 100), upper(40, 0, 150), root(0, 0, 2);
+  std::vector<Branch> named = tree();
+  name_branches(named, {"left renal", left}, {{"right renal", right}, {"again", left}},
+                {{"right femoral", root}, {"left arm", upper}});
+  EXPECT_EQ(branch_name(named, 0), "branch 1") << "it goes on far beyond the access";
+  EXPECT_EQ(branch_name(named, 1), "left renal (branch 2)");
+  EXPECT_EQ(branch_name(named, 2), "right renal (branch 3)");
+  EXPECT_EQ(branch_name(named, 3), "left arm (branch 4)");
+
+  named = tree();
+  named[1].name = "branch 2: aorta > renal";  // by labels
+  name_branches(named, {"", left}, {}, {});
+  EXPECT_EQ(branch_name(named, 1), "the target's branch (branch 2: aorta > renal)");
+  EXPECT_EQ(branch_name(named, 2), "branch 3");
+}
+
+TEST(TrunkAxis, IsThatOfTheWideVessels) {
+  const auto aorta = [](const Vec3& end) {
+    return std::vector<Branch>{{.line = line_through({Vec3::Zero(), end}, 10.0)},
+                               {.line = line_through({end, end + Vec3(300, 0, 0)}, 3.0),
+                                .parent = 0,
+                                .parent_arc = end.norm()}};
+  };
+  const auto upright = find_trunk_axis(aorta(Vec3(0, 60, 200)));
+  ASSERT_TRUE(upright);
+  EXPECT_NEAR(std::abs(upright->dot(Vec3(0, 60, 200).normalized())), 1.0, 1e-9);
+  const auto lying = find_trunk_axis(aorta(Vec3(0, 200, 0)));
+  ASSERT_TRUE(lying);
+  EXPECT_NEAR(std::abs(lying->y()), 1.0, 1e-9);
+  EXPECT_FALSE(find_trunk_axis(aorta(Vec3(0, 50, 50)))) << "too short to tell";
+  EXPECT_FALSE(find_trunk_axis({}));
 }
 
 TEST(AccessLimits, GradesBeginAtTheirThresholds) {

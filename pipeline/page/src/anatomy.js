@@ -49,7 +49,7 @@ const viewText = (view) => {
 const armTable = ({ostia}) =>
   table("C-arm angles", ["Ostium", "From the access", "Turn", "Best view", "Second best"],
     ostia.map((row) => [
-      `from ${row.trunk} into ${row.branch}`, mm(row.at_mm), degrees(row.turn_deg), viewText(row.best), viewText(row.second)]));
+      `from ${shown(row.trunk)} into ${shown(row.branch)}`, mm(row.at_mm), degrees(row.turn_deg), viewText(row.best), viewText(row.second)]));
 
 const kFromTheFront = {view: "LAO 0, CRA 0", lao_deg: 0, cranial_deg: 0};
 
@@ -112,7 +112,7 @@ const pictureOf = (panel, ostium) => {
 // ---- Lengths.
 const lengthTable = ({places}) =>
   table("Lengths along the way", ["Place", "From the access"],
-    places.map(({what, branch, at_mm: at}) => [branch ? `${what} ${branch}` : what, mm(at)]));
+    places.map(({what, branch, at_mm: at}) => [branch ? `${what} ${shown(branch)}` : what, mm(at)]));
 
 const wireSentence = (row) =>
   [name(shown(row.wire)), `: ${mm(row.length_mm)}, ${row.long_enough ? `long enough, ${mm(row.spare_mm)} to spare` : `too short by ${mm(-row.spare_mm)}`}`];

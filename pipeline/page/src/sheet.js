@@ -139,7 +139,7 @@ const fetchBlock = ({report}) => {
 const lengthBlock = ({anatomy}) => {
   if (!anatomy) return null;
   const {places} = anatomy.lengths;
-  const told = (row) => [row.branch ? `${row.what === "passes" ? "past" : "into"} ${row.branch}` : "target", along(row.at_mm)];
+  const told = (row) => [row.branch ? (row.what.startsWith("the bifurcation") ? "the bifurcation" : `${row.what === "passes" ? "past" : "into"} ${shown(row.branch)}`) : "target", along(row.at_mm)];
   const last = places.slice(-kPlaces);
   return block("lengths", "Lengths from the access",
     el("dl", {class: "pairs"}, last.map(told).flatMap(([place, at]) => [el("dt", {}, place), el("dd", {}, at)])),

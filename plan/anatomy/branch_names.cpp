@@ -1,0 +1,67 @@
+#include "plan/anatomy/branch_names.h"
+
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+
+#include "simulate/insertion/vessel_tree.h"
+
+namespace wireplan::plan {
+namespace {
+
+using preprocess::Branch;
+
+constexpr double kAortaRadius = 6.0;   //                                                 [mm]
+constexpr double kLeastTrunk = 100.0;  // of it, for a direction                           [mm]
+
+/// Calls branches by places in them, each by the first; keeps what it has called.
+class BranchNames {
+ public:
+  explicit BranchNames(std::vector<Branch>& tree) : tree_(tree), named_(tree.size(), false) {}
+
+  void name(const NamedPlace& place, bool root_too) {
+    if (tree_.empty() || place.name.empty()) return;
+    const int k = simulate::find_branch(tree_, place.point).branch;
+    const auto index = static_cast<std::size_t>(k);
+    if (named_[index] || (!root_too && tree_[index].parent < 0)) return;
+    named_[index] = true;
+    tree_[index].name = place.name + " (" + branch_name(tree_, k) + ")";
+  }
+
+ private:
+  std::vector<Branch>& tree_;
+  std::vector<bool> named_;
+};
+
+}  // namespace
+
+void name_branches(std::vector<Branch>& tree, const NamedPlace& target,
+                   const std::vector<NamedPlace>& other_targets,
+                   const std::vector<NamedPlace>& other_accesses) {
+  BranchNames names(tree);
+  names.name({target.name.empty() ? "the target's branch" : target.name, target.point}, true);
+  for (const NamedPlace& place : other_targets) names.name(place, true);
+  for (const NamedPlace& place : other_accesses) names.name(place, false);
+}
+
+std::optional<Vec3> find_trunk_axis(const std::vector<Branch>& tree) {
+  std::vector<Vec3> wide;
+  for (const Branch& branch : tree) {
+    for (Eigen::Index i = 0; i < branch.line.points.cols(); ++i) {
+      if (branch.line.radius(i) >= kAortaRadius) wide.emplace_back(branch.line.points.col(i));
+    }
+  }
+  if (wide.size() < 2) return {};
+  Vec3 middle = Vec3::Zero();
+  for (const Vec3& p : wide) middle += p / static_cast<double>(wide.size());
+  Eigen::Matrix3d spread = Eigen::Matrix3d::Zero();
+  for (const Vec3& p : wide) spread += (p - middle) * (p - middle).transpose();
+  const Vec3 axis =
+      Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(spread).eigenvectors().rightCols<1>();
+  const auto [least, most] =
+      std::minmax_element(wide.begin(), wide.end(),
+                          [&](const Vec3& a, const Vec3& b) { return a.dot(axis) < b.dot(axis); });
+  if ((*most - *least).dot(axis) < kLeastTrunk) return {};
+  return axis;
+}
+
+}  // namespace wireplan::plan

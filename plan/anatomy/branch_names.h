@@ -1,0 +1,30 @@
+#pragma once
+/// What people call the vessels of the tree, and how the tree lies in the patient.
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "preprocess/centerline/centerline.h"
+
+namespace wireplan::plan {
+
+/// A place of the case in a vessel, by its name.
+struct NamedPlace {
+  std::string name;
+  Vec3 point = Vec3::Zero();  //                                                          [mm]
+};
+
+/// Names branches by what lies in them, with what they were called before in brackets: "left renal
+/// (branch 6)". The target's branch is called after the target, "the target's branch" where that
+/// has no name; others after the other targets and accesses, those that come first before the rest.
+/// The root, from which the tree starts, is called after no access: it goes on far beyond it.
+void name_branches(std::vector<preprocess::Branch>& tree, const NamedPlace& target,
+                   const std::vector<NamedPlace>& other_targets,
+                   const std::vector<NamedPlace>& other_accesses);
+
+/// The axis along which the tree's wide vessels (6 mm in radius and more) lie: that of the aorta,
+/// which runs from head to feet in a patient. Unit, either sign; empty where they are shorter than
+/// 100 mm along it.
+std::optional<Vec3> find_trunk_axis(const std::vector<preprocess::Branch>& tree);
+
+}  // namespace wireplan::plan
