@@ -115,6 +115,7 @@ void read_inputs(JsonReader& root, Case& input) {
     input.surface_input = read_surface_input(surface, folder);
   }
   surface.finish();
+  input.axes_known = root.choice("axes", "patient", {"patient", "unknown"}) == "patient";
 }
 
 void read_segmentation(JsonReader& root, Case& input) {
@@ -276,6 +277,7 @@ Json input_json(const Case& input) {
                        {"frame", input.surface_input->frame}};
   }
   json["surface"]["edge_length_mm"] = input.surface.edge_length_mm;
+  json["axes"] = input.axes_known ? "patient" : "unknown";
   return json;
 }
 

@@ -54,6 +54,7 @@ struct Case {
   std::optional<VolumeInput> volume;          // a surface alone, or one of the others or both:
   std::optional<SurfaceInput> surface_input;  // labels are the lumen of the volume beside them
   std::optional<LabelsInput> labels;
+  bool axes_known = true;  // the input's axes are the patient's: left, posterior, superior
   preprocess::SegmentOptions segmentation;  // of a volume; seeds besides the access point
   preprocess::MaskLimits mask_limits;       // of a volume or labels
   preprocess::SurfaceOptions surface;

@@ -4,6 +4,8 @@
 #include <array>
 #include <cmath>
 
+#include "pipeline/files/text.h"
+#include "plan/anatomy/branch_names.h"
 #include "plan/anatomy/passage.h"
 
 namespace wireplan::pipeline {
@@ -99,25 +101,45 @@ Json projection_json(const plan::Projection& projection) {
           {"branch_foreshortening", projection.branch_foreshortening}};
 }
 
-Json c_arm_json(const std::vector<plan::Junction>& junctions, const Tree& tree,
-                const plan::ArmLimits& arm) {
+/// The two views of trunk and branch under "best" and "second"; null without known axes.
+void put_views(Json& row, const Vec3& trunk, const Vec3& branch, const plan::ArmLimits& arm,
+               bool axes_known) {
+  const plan::Projections found = plan::find_projections(trunk, branch, arm);
+  row["best"] = axes_known ? projection_json(found.best) : Json(nullptr);
+  row["second"] = axes_known && found.second ? projection_json(*found.second) : Json(nullptr);
+}
+
+Json c_arm_json(const simulate::Way& way, const std::vector<plan::Junction>& junctions,
+                const plan::ArmLimits& arm, bool axes_known) {
+  const Tree& tree = way.tree();
+  const std::vector<int> along = way.branches();
   Json rows = Json::array();
   for (const plan::Junction& junction : junctions) {
     if (!junction.taken) continue;
-    const plan::Projections found =
-        plan::find_projections(junction.trunk_direction, junction.branch_direction, arm);
-    rows.push_back({{"trunk", branch_name(tree, junction.trunk)},
-                    {"branch", branch_name(tree, junction.branch)},
-                    {"at_mm", junction.arc},
-                    {"place_mm", to_json(junction.point)},
-                    {"turn_deg", degrees(plan::turn_of(junction))},
-                    {"best", projection_json(found.best)},
-                    {"second", found.second ? projection_json(*found.second) : Json(nullptr)}});
+    Json row = {{"trunk", branch_name(tree, junction.trunk)},
+                {"branch", branch_name(tree, junction.branch)},
+                {"leads_to_target", junction.branch == along.back()},
+                {"at_mm", junction.arc},
+                {"place_mm", to_json(junction.point)},
+                {"turn_deg", degrees(plan::turn_of(junction))}};
+    put_views(row, junction.trunk_direction, junction.branch_direction, arm, axes_known);
+    rows.push_back(std::move(row));
   }
-  return {{"ostia", rows},
-          {"max_rotation_deg", clean(degrees(arm.rotation))},
-          {"max_tilt_deg", clean(degrees(arm.tilt))},
-          {"source", "limits of the case; by default assumed, as fixed arms reach in general"}};
+  const plan::Corner bend = plan::find_sharpest_bend(way.path());
+  Json of_bend = {{"at_mm", bend.arc}, {"place_mm", to_json(bend.point)}};
+  const Vec3 before = plan::point_at(way.path(), bend.arc - bend.arm),
+             behind = plan::point_at(way.path(), bend.arc + bend.arm);
+  put_views(of_bend, (bend.point - before).normalized(), (behind - bend.point).normalized(), arm,
+            axes_known);
+  return {
+      {"ostia", rows},
+      {"bend", of_bend},
+      {"no_views", axes_known ? Json(nullptr)
+                              : Json("the case says that the input's axes are not known to be the "
+                                     "patient's, from which LAO, RAO, cranial and caudal count")},
+      {"max_rotation_deg", clean(degrees(arm.rotation))},
+      {"max_tilt_deg", clean(degrees(arm.tilt))},
+      {"source", "limits of the case; by default assumed, as fixed arms reach in general"}};
 }
 
 Json lengths_json(const Centerline& way, const std::vector<plan::Junction>& junctions,
@@ -167,11 +189,22 @@ Json drawn_line(const Centerline& line) {
 }  // namespace
 
 Json anatomy_figures(const simulate::Way& way, const Eigen::VectorXd& diameters,
-                     const plan::AccessLimits& limits) {
+                     const plan::AccessLimits& limits, bool axes_known) {
   const std::vector<plan::Junction> junctions = plan::find_junctions(way);
   return {{"access", access_json(way.path(), diameters, junctions, way.tree(), limits)},
-          {"c_arm", c_arm_json(junctions, way.tree(), limits.arm)},
+          {"c_arm", c_arm_json(way, junctions, limits.arm, axes_known)},
           {"lengths", lengths_json(way.path(), junctions, way.tree(), limits)}};
+}
+
+std::string doubt_of_axes(const simulate::Way& way) {
+  constexpr double kMostLean = 45.0;  // of an aorta from head to feet                    [deg]
+  const std::optional<Vec3> axis = plan::find_trunk_axis(way.tree());
+  if (!axis) return "";
+  const double lean = degrees(std::acos(std::min(1.0, std::abs(axis->z()))));
+  if (lean <= kMostLean) return "";
+  return format("the widest vessels run %.0f deg off the axis from head to feet", lean) +
+         ": are the input's axes the patient's? If not, C-arm angles and the sides of azimuth and "
+         "roll are not either; say so with \"axes\": \"unknown\"";
 }
 
 int grade_from(const std::string& name) {

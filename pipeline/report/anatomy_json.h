@@ -10,10 +10,14 @@
 namespace wireplan::pipeline {
 
 /// What follows from way, limits and how wide the vessel is at each point of the way [mm]: "access"
-/// without calcium, "c_arm" and "lengths" without wires. Branches are called as the report's,
-/// "branch 1" and so on.
+/// without calcium, "c_arm" and "lengths" without wires. Without axes that are the patient's no
+/// view of a C-arm is told, but why.
 Json anatomy_figures(const simulate::Way& way, const Eigen::VectorXd& diameters,
-                     const plan::AccessLimits& limits);
+                     const plan::AccessLimits& limits, bool axes_known = true);
+
+/// Why the views may be wrong though the case does not say that its axes are unknown; empty where
+/// the aorta runs as it does in a patient, or none is there.
+std::string doubt_of_axes(const simulate::Way& way);
 
 /// The row of calcium: a volume [mm^3], or null with the reason where `unknown` tells one.
 Json calcium_json(double volume, const std::string& unknown, const plan::AccessLimits& limits);

@@ -481,7 +481,9 @@ Json build_report(const ReportInput& input) {
   report["ranking"] = std::move(ranking);
   report["excluded"] = std::move(excluded);
   report["wires"] = std::move(wires);
-  if (!input.study.catheters.empty()) report["catheters"] = catheters_json(input.study, input.plan);
+  if (!input.study.catheters.empty())
+    report["catheters"] = catheters_json(input.study, input.plan,
+                                         input.parameters.value("axes", "patient") == "patient");
   report["pareto"] = input.judgement.ranking.pareto;
   report["robustness"] = input.robustness;
   report["numerics"] = numerics_json(input);

@@ -44,7 +44,7 @@ Json tools_json(const plan::Study& study, const plan::Measured& trial) {
   return json;
 }
 
-Json catheters_json(const plan::Study& study, const plan::Plan& plan) {
+Json catheters_json(const plan::Study& study, const plan::Plan& plan, bool axes_known) {
   Json json = {{"rules", tool_rules_json(study.tool_rules)}};
   for (const plan::Junction& junction : plan::find_junctions(*study.goal.way)) {
     const std::optional<plan::Ostium> ostium = plan::find_ostium(study.goal);
@@ -53,10 +53,11 @@ Json catheters_json(const plan::Study& study, const plan::Plan& plan) {
         plan::find_projections(junction.trunk_direction, junction.branch_direction).best.view;
     json["ostium"] = {{"at_mm", clean(ostium->arc)},
                       {"point_mm", to_json(ostium->point)},
-                      {"trunk_diameter_mm", clean(ostium->trunk_diameter)},
-                      {"view",
-                       {{"lao_deg", clean(view.rotation / kRadPerDeg)},
-                        {"cranial_deg", clean(view.tilt / kRadPerDeg)}}}};
+                      {"trunk_diameter_mm", clean(ostium->trunk_diameter)}};
+    if (axes_known) {
+      json["ostium"]["view"] = {{"lao_deg", clean(view.rotation / kRadPerDeg)},
+                                {"cranial_deg", clean(view.tilt / kRadPerDeg)}};
+    }
   }
   for (std::size_t k = 0; k < study.suggested.size(); ++k) {
     json["suggested"].push_back(

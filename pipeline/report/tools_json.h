@@ -18,8 +18,8 @@ Json told_steps_json(const plan::Candidate& candidate, const plan::Measured& tri
 /// end, and how far the wire is out of it.
 Json tools_json(const plan::Study& study, const plan::Measured& trial);
 
-/// Rules, ostium with the view of the C-arm that shows it, and all pairs: what came of them, or why
-/// they were not tried.
-Json catheters_json(const plan::Study& study, const plan::Plan& plan);
+/// Rules, ostium with the C-arm's view of it where axes are known, and all pairs: what came of
+/// them, or why they were not tried.
+Json catheters_json(const plan::Study& study, const plan::Plan& plan, bool axes_known);
 
 }  // namespace wireplan::pipeline

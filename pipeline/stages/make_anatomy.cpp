@@ -30,8 +30,12 @@ void make_anatomy(Workspace& work, const std::filesystem::path& folder) {
   const plan::AccessLimits& limits = work.given().access_limits;
   Json figures = figures_of("anatomy");
   const simulate::Way& way = *work.study().goal.way;
-  figures.update(
-      anatomy_figures(way, preprocess::section_diameters(work.surface(), way.path()), limits));
+  figures.update(anatomy_figures(way, preprocess::section_diameters(work.surface(), way.path()),
+                                 limits, work.given().axes_known));
+  if (work.given().axes_known) {
+    const std::string doubt = doubt_of_axes(way);
+    if (!doubt.empty()) figures["warnings"].push_back("anatomy: " + doubt);
+  }
 
   const std::string unknown = calcium_unknown(work, limits);
   double volume = 0.0;

@@ -254,7 +254,7 @@ std::vector<Stage> stages_of(const Case& given) {
                 .version = 4,
                 .reads_input = from_volume,
                 .after = {"surface", "centerline"},
-                .parameters = {"/access_limits"},
+                .parameters = {"/access_limits", "/axes"},
                 .names_branches = true,
                 .make = make_anatomy};
   if (from_volume) anatomy.after.push_back("segment");

@@ -210,6 +210,7 @@ inline Json full_case(Json json) {
                        {"residual_tolerance_n", 1e-5},
                        {"max_iterations", 50},
                        {"record_every_mm", 10}};
+  json["axes"] = "unknown";
   json["access_limits"] = {
       {"device_diameter_mm", 2},  {"sheath_diameter_mm", 3}, {"sheath_length_mm", 90},
       {"max_sheath_ratio", 1},    {"tortuosity", {1, 2, 3}}, {"angle_deg", {150, 100, 80}},

@@ -113,6 +113,7 @@ std::map<std::string, std::vector<std::string>> common_table() {
         "arm_rotation_deg", "arm_tilt_deg"}) {
     table[std::string("/access_limits/") + key] = {"anatomy", "report"};
   }
+  table["/axes"] = {"anatomy", "report"};
   // What judges, and simulates nothing.
   for (const char* key :
        {"limits/tip_force_warn_n", "limits/tip_force_fail_n", "limits/penetration_fail_mm",
@@ -144,6 +145,7 @@ void segment_reads_points(std::map<std::string, std::vector<std::string>>& table
 Json common_changes() {
   return {{"/wall/model", "rigid"},
           {"/wall/poisson_ratio", 0.4},
+          {"/axes", "unknown"},
           {"/mask/most_handles", 60},
           {"/mask/most_faces", 300000},
           {"/insertion/residual_tolerance_n", 1e-5},

@@ -53,9 +53,12 @@ const armTable = ({ostia}) =>
 
 const kFromTheFront = {view: "LAO 0, CRA 0", lao_deg: 0, cranial_deg: 0};
 
-/** The view to work in at an ostium: the best that the arm reaches; from the front without one. */
+/** The ostium to work at: that of the target's branch, where the way turns into it. */
+export const workingOstium = ({ostia}) => ostia.findLast((row) => row.leads_to_target ?? row === ostia.at(-1));
+
+/** The view to work in at an ostium: the best that the arm reaches; from the front without one, and where the axes are not the patient's. */
 export const workingView = (ostium) => {
-  if (!ostium) return kFromTheFront;
+  if (!ostium?.best) return kFromTheFront;
   return ostium.best.reachable || !ostium.second ? ostium.best : ostium.second;
 };
 
@@ -106,7 +109,7 @@ const pictureOf = (panel, ostium) => {
   const view = workingView(ostium);
   return el("figure", {},
     drawView(panel, view, {ostium: ostium.place_mm}),
-    el("figcaption", {}, `${view.view}: as the detector sees the way (blue) and the vessels beside it (grey), as wide as their lumen, each branch with its number at its end; the ostium of ${ostium.branch} is circled.`));
+    el("figcaption", {}, `${ostium.best ? view.view : "Against the second axis of the input"}: as the detector sees the way (blue) and the vessels beside it (grey), as wide as their lumen, each branch with its number at its end; the ostium of ${ostium.branch} is circled.`));
 };
 
 // ---- Lengths.
@@ -135,7 +138,7 @@ export const anatomySection = (page) => {
     el("h3", {}, "Access"), accessTable(access),
     el("h3", {}, "C-arm angles"),
     ostia.length
-      ? [el("p", {}, `Views that show a vessel and the branch that the way takes in their length, for a patient who lies straight on the back. LAO turns the detector to the patient's left, RAO to the right, CRA to the head, CAU to the feet. Within reach is ${degrees(arm.max_rotation_deg)} to either side and ${degrees(arm.max_tilt_deg)} up or down (${shown(arm.source)}).`),
+      ? [arm.no_views ? el("p", {}, `No C-arm angles: ${shown(arm.no_views)}.`) : el("p", {}, `Views that show a vessel and the branch that the way takes in their length, for a patient who lies straight on the back. LAO turns the detector to the patient's left, RAO to the right, CRA to the head, CAU to the feet. Within reach is ${degrees(arm.max_rotation_deg)} to either side and ${degrees(arm.max_tilt_deg)} up or down (${shown(arm.source)}).`),
          armTable(arm),
          page.panels.anatomy ? ostia.map((ostium) => pictureOf(page.panels.anatomy, ostium)) : null].flat()
       : el("p", {}, "The way leaves no vessel for a branch, so no ostium asks for a view of its own."),

@@ -2,7 +2,7 @@
 // page on paper also on a screen, so that what fits here fits there.
 import {el, name} from "./dom.js";
 import {degrees, number, plural, shown, valueName} from "./format.js";
-import {drawView, workingView} from "./anatomy.js";
+import {drawView, workingOstium, workingView} from "./anatomy.js";
 
 const kPlans = 3, kReasons = 8, kChanges = 4, kWarnings = 3, kPlaces = 6;
 const kAnswers = {
@@ -195,14 +195,15 @@ const pictureBlock = (page) => {
   if (!anatomy || !panel) {
     return block("picture", "The vessel", el("p", {}, "A picture of the vessel stands below."));
   }
-  const ostium = anatomy.c_arm.ostia.at(-1);
-  const view = workingView(ostium);
+  const ostium = workingOstium(anatomy.c_arm), known = !anatomy.c_arm.no_views;
+  const view = known ? workingView(ostium) : {...workingView(null), view: "along the second axis of the input"};
   const nodes = ranking.length ? page.trials[ranking[0].trial].nodes() : new Float32Array();
   const wire = Array.from({length: nodes.length / 3}, (_, k) => [...nodes.subarray(3 * k, 3 * k + 3)]);
   const drawing = drawView(panel, view, {wire, ostium: ostium?.place_mm, access: page.access, target: page.target});
   const second = ostium?.second && view !== ostium.second ? `Second best: ${ostium.second.view}. ` : "";
-  return block("picture", `Working view: ${view.view}`, drawing,
-    el("p", {class: "note"}, `${ostium ? `Shows the turn into ${ostium.branch} (circled) in its length. ` : "Antero-posterior: the way turns into no branch. "}${second}` +
+  const turn = !ostium ? "Antero-posterior: the way turns into no branch. " : `Shows the turn into ${shown(ostium.branch)} (circled) in its length. `;
+  return block("picture", known ? `Working view: ${view.view}` : "The vessel, no C-arm view", drawing,
+    el("p", {class: "note"}, `${known ? `${turn}${second}` : `No C-arm angles: ${shown(anatomy.c_arm.no_views)}. `}` +
       `Way blue, other vessels grey, ${wire.length ? "wire of plan 1 red, " : ""}A access, T target.`));
 };
 
