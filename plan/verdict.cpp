@@ -12,7 +12,7 @@
 namespace wireplan::plan {
 namespace {
 
-constexpr std::array kGradeWords = {"no", "mild", "moderate", "severe"};
+constexpr std::array kGradeWords = {" below mild", "mild ", "moderate ", "severe "};
 constexpr int kSevere = 3;
 
 std::string percent(double part) { return std::to_string(std::lround(100.0 * part)); }
@@ -21,7 +21,11 @@ std::string whole_degrees(double angle) { return std::to_string(std::lround(angl
 
 std::string whole_millimetres(double length) { return std::to_string(std::lround(length)) + " mm"; }
 
-const char* grade_word(int grade) { return kGradeWords.at(static_cast<std::size_t>(grade)); }
+/// "severe tortuosity", "tortuosity below mild"
+std::string graded(int grade, const std::string& what) {
+  const std::string word = kGradeWords.at(static_cast<std::size_t>(grade));
+  return grade == 0 ? what + word : word + what;
+}
 
 int safe_count(const RepeatedPlan& plan) {
   return static_cast<int>(std::count_if(plan.repeats.begin(), plan.repeats.end(),
@@ -99,7 +103,7 @@ class Weighing {
                     : std::to_string(all.reached) + " of " + count_of(all.trials, "trial") +
                           " reach the target, none of them within the limits.";
     const Answer answer =
-        leaves_open(all, fine, reached_coarsely) ? Answer::kUnsure : Answer::kNotFeasible;
+        leaves_open(all, fine, full, reached_coarsely) ? Answer::kUnsure : Answer::kNotFeasible;
     if (full.reached > 0) {
       find(answer, count_of(full.reached, "trial") +
                        (full.reached == 1 ? " reaches the target but breaks"
@@ -107,11 +111,44 @@ class Weighing {
                        " a limit: " + describe_broken_limits(full, known_.limits) + ".");
     }
     if (all.reached < all.trials) find(answer, how_trials_ended(all, fine));
+    tell_scripts(answer);
+    if (answer == Answer::kNotFeasible) tell_rigid(answer, all, full);
     for (std::string& text : changes_by(all, known_, "trial")) change(std::move(text));
     if (full.trials < all.trials) {
       change("Running all trials in full detail: " + std::to_string(all.trials - full.trials) +
              " of " + std::to_string(all.trials) + " were run against a rigid wall only.");
     }
+  }
+
+  /// What was searched beside straight pushes.
+  void tell_scripts(Answer answer) {
+    const Scripts& scripts = known_.plan.scripts;
+    if (scripts.starts_tried > 0) {
+      const std::string found = scripts.found.empty()
+                                    ? "none of them reached"
+                                    : std::to_string(scripts.found.size()) + " came up to be tried";
+      find(answer, "Turns and pulls of the wire on the way were searched too: " +
+                       std::to_string(scripts.branches) + " pushes from " +
+                       count_of(scripts.starts_tried, "start") + ", " + found + ".");
+    }
+    const auto tried =
+        std::count_if(scripts.pairs.begin(), scripts.pairs.end(),
+                      [](const PairFindings& pair) { return pair.pair.unfit.empty(); });
+    if (tried > 0) {
+      find(answer, "Scripts of a catheter with a wire in it were searched for " +
+                       count_of(static_cast<int>(tried), "pair") + " of them.");
+    }
+  }
+
+  /// Why trials against a rigid wall are enough for that answer.
+  void tell_rigid(Answer answer, const Endings& all, const Endings& full) {
+    if (full.trials > 0) return;
+    find(answer,
+         "All trials were run against a rigid wall only, which is enough here: most ended "
+         "in another vessel or before the target for want of wire, which a wall that gives "
+         "way by tenths of a millimetre does not change (" +
+             std::to_string(all.trials - all.held_by_wall()) + " of " + std::to_string(all.trials) +
+             ").");
   }
 
   static std::string how_trials_ended(const Endings& all, const Endings& fine) {
@@ -127,7 +164,8 @@ class Weighing {
     return text + ".";
   }
 
-  bool leaves_open(const Endings& all, const Endings& fine, int reached_coarsely) {
+  bool leaves_open(const Endings& all, const Endings& fine, const Endings& full,
+                   int reached_coarsely) {
     const std::size_t before = findings_.size();
     if (fine.clear() == 0) {
       find(Answer::kUnsure,
@@ -145,6 +183,12 @@ class Weighing {
            count_of(reached_coarsely, "trial") + (reached_coarsely == 1 ? " reaches" : " reach") +
                " the target against a rigid wall, and " + (reached_coarsely == 1 ? "was" : "were") +
                " not run in full detail.");
+    }
+    if (full.trials == 0 && 2 * all.held_by_wall() > all.trials) {
+      find(Answer::kUnsure,
+           std::to_string(all.held_by_wall()) + " of " + count_of(all.trials, "trial") +
+               " got stuck, folded back or went through the wall, and all were run "
+               "against a rigid wall only: one that gives way may let them pass.");
     }
     return findings_.size() > before;
   }
@@ -194,14 +238,18 @@ class Weighing {
     const auto [low, high] = wilson_interval(safe_count(*repeats), count);
     const auto reached = std::count_if(repeats->repeats.begin(), repeats->repeats.end(),
                                        [](const Repeat& repeat) { return repeat.reached; });
-    const bool too_few = low <= rules_.doubtful_share && high >= rules_.safe_share;
     const bool too_low = safe_share(*repeats) < rules_.safe_share;
+    const bool too_few = (low <= rules_.doubtful_share && high >= rules_.safe_share) ||
+                         (!too_low && low < rules_.sure_share);
     std::string text = "Safe in " + safe_of(*repeats) + " disturbed repeats, which is " +
                        percent(safe_share(*repeats)) + " % (" + percent(low) + " to " +
                        percent(high) + " % with 95 % confidence), where " +
                        percent(rules_.safe_share) + " % is asked for";
     if (reached > safe_count(*repeats)) text += "; it reaches in " + std::to_string(reached);
-    if (too_few) text += "; too few repeats to tell";
+    if (too_few) {
+      text +=
+          "; too few repeats to tell: at least " + percent(rules_.sure_share) + " % are to be sure";
+    }
     find(too_few   ? Answer::kUnsure
          : too_low ? Answer::kFeasibleWithRisk
                    : Answer::kFeasible,
@@ -281,12 +329,14 @@ class Weighing {
   void weigh_sensitivity(const RankedPlan& first) {
     if (!first.sensitive) return;  // its error is not known either, or it stands behind none
     if (!is_sensitive(first)) {
-      find(Answer::kFeasible, "Settings that should not matter do not move the tip by more than " +
-                                  one_decimal(kTipsApart) + " mm.");
+      find(Answer::kFeasible,
+           "Changes far below what a hand can do (0.01 deg of roll, 0.1 % of "
+           "friction, shorter pushes) move the tip by no more than " +
+               one_decimal(kTipsApart) + " mm.");
       return;
     }
     find(Answer::kUnsure, "The end of the plan hangs on how it is computed: " + *first.sensitive +
-                              ". Settings that should not matter decide where the wire goes.");
+                              ". Where the wire goes is as good as chance.");
     doubts_.push_back("where its tip ends hangs on how it is computed");
     change("Another wire, angle or roll whose end does not hang on how it is computed.");
   }
@@ -318,7 +368,7 @@ class Weighing {
       find(severe ? Answer::kFeasibleWithRisk : Answer::kFeasible,
            "The way is " + three_digits(*way.tortuosity) +
                " times as long as the straight line between its ends: " +
-               grade_word(way.tortuosity_grade) + " tortuosity.");
+               graded(way.tortuosity_grade, "tortuosity") + ".");
     }
     const std::string bend = "The sharpest bend leaves " + whole_degrees(way.bend) +
                              " deg between its arms (180 is straight), " +
@@ -326,7 +376,7 @@ class Weighing {
     if (way.bend_ostium.empty()) {
       severe = severe || way.bend_grade >= kSevere;
       find(way.bend_grade >= kSevere ? Answer::kFeasibleWithRisk : Answer::kFeasible,
-           bend + ": " + grade_word(way.bend_grade) + " angulation.");
+           bend + ": " + graded(way.bend_grade, "angulation") + ".");
     } else {
       find(Answer::kFeasible, bend + ", where the way turns into " + way.bend_ostium + ".");
     }
@@ -359,6 +409,12 @@ class Weighing {
 
   void weigh_sheath(const WayFindings& way) {
     const Passage& sheath = way.sheath;
+    if (!way.weighs_sheath) {
+      find(Answer::kFeasible, "No sheath is weighed: the assumed one is " +
+                                  whole_millimetres(way.sheath_length) + " long, the way " +
+                                  whole_millimetres(way.length) + ".");
+      return;
+    }
     const bool too_wide = sheath.device >= sheath.max_ratio * sheath.lumen;
     find(too_wide ? Answer::kFeasibleWithRisk : Answer::kFeasible,
          "The sheath of " + three_digits(sheath.device) +

@@ -32,6 +32,8 @@ struct Passage {
 struct WayFindings {
   Passage device, sheath;
   double sheath_length = 0.0;         // of the way, that the sheath lies in                [mm]
+  bool weighs_sheath = true;          // false: its length is assumed, and longer than the way
+  double length = 0.0;                // of the way                                         [mm]
   std::optional<double> tortuosity;   // empty where the way ends where it starts
   int tortuosity_grade = 0;           // of 3, grade_of()
   double bend = 0.0, bend_at = 0.0;   // sharpest, between its arms [rad]; arc length [mm]
@@ -48,6 +50,10 @@ struct VerdictRules {
   /// A plan that works every other time is none to count on. Where the 95 % interval of the share
   /// holds both this and `safe_share`, the repeats do not tell the two apart: unsure.
   double doubtful_share = 0.5;
+  /// Feasible is said only where with 95 % confidence at least so many attempts are safe; chosen:
+  /// of three failures in ten one would want to hear before. It takes 9 repeats that are all safe,
+  /// or 15 of 16.
+  double sure_share = 0.7;
   /// Of the lumen's radius at a target in a vessel: with a larger error of the tip it is open
   /// whether the tip is in that vessel or before its mouth. Of a sphere, what the tip has left to
   /// its border counts in full.
@@ -73,10 +79,11 @@ struct Known {
 ///                       trial is a plan, and nothing of what follows leaves that open
 ///   unsure              no plan, and: none computed with fine elements came to a clear end (probes
 ///                       count, since what clearly fails in one is not run in full), or more than
-///                       `unclear_part` of all did not, or one reached that was not run in full.
-///                       A plan, but: it was not repeated, its share of safe repeats is not known
-///                       well enough, its tip's error is not known or too large, or its end hangs
-///                       on how it is computed (RankedPlan::sensitive)
+///                       `unclear_part` of all did not, or one reached that was not run in full,
+///                       or none was and most got stuck, folded back or went through a wall that
+///                       was taken for rigid. A plan, but: it was not repeated, its share of safe
+///                       repeats is not known well enough, its tip's error is not known or too
+///                       large, or its end hangs on how it is computed (RankedPlan::sensitive)
 ///   feasible with risk  tip force, also that of 19 in 20 repeats, above the level to warn of;
 ///                       share of safe repeats too low; wall moved beyond linear theory; sheath at
 ///                       its largest ratio to the lumen, or device as wide as the lumen; way or

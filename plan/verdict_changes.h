@@ -26,6 +26,7 @@ struct Endings {
 
   int unclear() const { return left_image + crossed + no_equilibrium + our_fault; }
   int clear() const { return trials - unclear(); }
+  int held_by_wall() const { return stuck + prolapsed + left_lumen; }
 };
 
 /// Adds a trial of that wire.

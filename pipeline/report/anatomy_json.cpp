@@ -63,6 +63,10 @@ Json access_json(const Centerline& way, const Eigen::VectorXd& diameters,
       way, diameters, limits.sheath_length, limits.sheath_diameter, limits.max_sheath_ratio,
       "limits of the case; the ratio by default that of sheath to femoral artery");
   access["sheath"]["length_mm"] = limits.sheath_length;
+  // Nobody would take such a sheath: it is not weighed, see way_findings().
+  const plan::AccessLimits defaults;
+  access["sheath"]["assumed_longer_than_way"] =
+      limits.sheath_length > length && limits.sheath_length == defaults.sheath_length;
 
   const double index = plan::tortuosity(way);
   const bool open = std::isfinite(index);

@@ -29,6 +29,8 @@ plan::WayFindings way_findings(const Json& anatomy) {
   way.device.assumed = way.device.device == defaults.device_diameter;
   way.sheath.assumed = way.sheath.device == defaults.sheath_diameter;
   way.sheath_length = access.at("sheath").at("length_mm");
+  way.weighs_sheath = !access.at("sheath").at("assumed_longer_than_way").get<bool>();
+  way.length = anatomy.at("lengths").at("way_mm");
   if (!tortuosity.at("index").is_null()) way.tortuosity = tortuosity.at("index").get<double>();
   way.tortuosity_grade = grade_from(tortuosity.at("grade"));
   way.bend = bend.at("angle_deg").get<double>() * kRadPerDeg;

@@ -88,7 +88,7 @@ const planTable = ({report, trials}) => {
 };
 
 // ---- Access.
-const gradeText = (grade) => (grade === "none" ? "no finding" : grade);
+const gradeText = (grade) => (grade === "none" ? "below mild" : grade);
 
 const passageRow = (what, row) => [what, `lumen of ${mm(row.lumen_diameter_mm)} at its narrowest (sphere inside ${mm(row.inscribed_diameter_mm)}), ${along(row.at_mm)} in`,
   `${mm(row.device_diameter_mm)}, ratio ${number(Number(row.ratio.toFixed(2)))}`, `below ${number(row.max_ratio)}`, row.fits ? "fits" : "does not fit"];
@@ -99,7 +99,9 @@ const accessTable = ({anatomy}) => {
   const severe = (rows) => rows.at(-1);
   const rows = [
     passageRow("Widest device", device),
-    passageRow(`Sheath, first ${mm(sheath.length_mm)}`, sheath),
+    sheath.assumed_longer_than_way
+      ? [`Sheath of ${mm(sheath.length_mm)}`, "assumed, and longer than the way", "\u2013", "\u2013", "not weighed"]
+      : passageRow(`Sheath, first ${mm(sheath.length_mm)}`, sheath),
     ["Tortuosity", tortuosity.index === null ? "not known" : `way over straight line`, number(tortuosity.index),
      `severe from ${number(severe(tortuosity.thresholds))}`, gradeText(tortuosity.grade)],
     ["Sharpest bend", `${along(bend.at_mm)} in${bend.at_ostium_of ? `, the turn into ${bend.at_ostium_of}` : ""}`, degrees(Math.round(bend.angle_deg)),
