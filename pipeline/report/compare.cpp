@@ -103,7 +103,8 @@ std::vector<std::string> list_wires(const std::vector<Json>& reports) {
   return names;
 }
 
-/// "6/36  0.271  0.12": reached of trials, score of the best plan, median force.
+/// "6/36  4  0.271  0.12": reached of those run in full, safe plans, score of the best, median
+/// force.
 std::string wire_cell(const Json& report, const std::string& name) {
   for (const Json& wire : report.at("wires")) {
     if (wire.at("wire") != name) continue;
@@ -111,8 +112,9 @@ std::string wire_cell(const Json& report, const std::string& name) {
     for (const Json& plan : report.at("ranking")) {
       if (plan.at("trial") == wire.at("best_trial")) score = number(plan.at("score"), "%.3f");
     }
-    return format("%d/%d  ", wire.at("reached").get<int>(), wire.at("trials").get<int>()) + score +
-           "  " + number(wire.at("median_peak_contact_force_n"), "%.3f");
+    return format("%d/%d  ", wire.at("reached").get<int>(), wire.at("trials").get<int>()) +
+           (wire.contains("safe") ? wire.at("safe").dump() : "-") + "  " + score + "  " +
+           number(wire.at("median_peak_contact_force_n"), "%.3f");
   }
   return "not tried";
 }
@@ -179,9 +181,11 @@ std::string compare_reports(const std::vector<std::filesystem::path>& files) {
   }
 
   const bool one_patient = same_patient(reports);
-  std::string text = list_reports(reports) +
-                     "\nWires: reached/trials, score of the best plan, median peak force in N\n" +
-                     list_wire_table(reports);
+  std::string text =
+      list_reports(reports) +
+      "\nWires: reached/run in full (coarse trials do not count), safe plans, score of the "
+      "best plan, median peak force in N\n" +
+      list_wire_table(reports);
   if (one_patient) {
     text += "\nAll reports are of one patient, access and target. Their best plans:\n" +
             list_best_plans(reports);

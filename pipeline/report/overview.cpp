@@ -26,6 +26,7 @@ Json best_plan_json(const Json& report) {
                           "score", "score_error", "mean_score"}) {
     best[key] = plan.at(key);
   }
+  best["sensitive"] = plan.at("sensitive");
   best["repeats_safe"] = nullptr;
   best["repeats"] = nullptr;
   for (const Json& repeated : report.at("robustness").at("plans")) {
@@ -76,15 +77,40 @@ Json row_json(const SectionReport& section) {
   return row;
 }
 
-/// Smaller is better: no safe plan last, then by the share that is not safe, then by score.
-std::tuple<bool, double, double> order_key(const Json& row) {
+/// Of a row's verdict, the best first; of reports from before there were verdicts the last.
+int answer_rank(const Json& row) {
+  constexpr std::array kAnswers = {"feasible", "feasible_with_risk", "unsure", "not_feasible"};
+  const std::string answer = row.value("verdict", Json::object()).value("answer", "");
+  return static_cast<int>(std::find(kAnswers.begin(), kAnswers.end(), answer) - kAnswers.begin());
+}
+
+/// Smaller is better: no safe plan last, then by the verdict, plans whose end hangs on how they are
+/// computed after the others, then by the share that is not safe, then by score.
+std::tuple<bool, int, bool, double, double> order_key(const Json& row) {
   const Json& best = row.at("best_plan");
-  if (best.is_null()) return {true, 1.0, 1.0};
+  if (best.is_null()) return {true, answer_rank(row), false, 1.0, 1.0};
+  const bool sensitive = best.at("sensitive").is_boolean() && best.at("sensitive").get<bool>();
   const bool repeated = !best.at("repeats").is_null() && best.at("repeats") != 0;
   const double unsafe =
       repeated ? 1.0 - best.at("repeats_safe").get<double>() / best.at("repeats").get<double>()
                : 0.0;
-  return {false, unsafe, best.at("score").get<double>()};
+  return {false, answer_rank(row), sensitive, unsafe, best.at("score").get<double>()};
+}
+
+/// What the best access comes to, for a row of the same target with a worse answer; null for
+/// others.
+Json other_access(const Json& row, const Json& first) {
+  const Json& best = first.at("best_plan");
+  if (row == first || best.is_null() || first.at("access").is_null()) return nullptr;
+  if (answer_rank(row) <= answer_rank(first)) return nullptr;
+  std::string answer = first.value("verdict", Json::object()).value("answer", "");
+  std::replace(answer.begin(), answer.end(), '_', ' ');
+  std::string text = "From " + first.at("access").get<std::string>() + " it is " + answer;
+  if (!best.at("repeats").is_null()) {
+    text += ": safe in " + best.at("repeats_safe").dump() + " of " + best.at("repeats").dump() +
+            " disturbed repeats";
+  }
+  return text + ".";
 }
 
 std::string from(const Json& row) {
@@ -140,6 +166,12 @@ Json build_overview(const std::string& name, const std::vector<SectionReport>& s
     std::vector<Json> sorted(rows.begin(), rows.end());
     std::stable_sort(sorted.begin(), sorted.end(),
                      [](const Json& a, const Json& b) { return order_key(a) < order_key(b); });
+    for (Json& row : sorted) {
+      row["other_access"] = other_access(row, sorted.front());
+      if (!row["other_access"].is_null() && row.contains("verdict")) {
+        row["verdict"]["changes"].insert(row["verdict"]["changes"].begin(), row["other_access"]);
+      }
+    }
     rows = sorted;
     target["sentence"] = describe_target(target);
   }
@@ -167,7 +199,7 @@ std::string overview_csv(const Json& overview) {
                                 "peak_contact_force_n"};
   std::string table = "target";
   for (const char* key : kRow) table.append(",").append(key);
-  table += ",verdict";
+  table += ",verdict,other_access";
   for (const char* key : kPlan) table.append(",").append(key);
   const Json& any = overview.at("targets").front().at("sections").front().at("access_table");
   for (const auto& [key, value] : any.items()) table.append(",").append(key);
@@ -178,6 +210,7 @@ std::string overview_csv(const Json& overview) {
       table += csv_field(target.at("target"));
       for (const char* key : kRow) table.append(",").append(csv_field(row.at(key)));
       table.append(",").append(csv_field(verdict.value("answer", Json())));
+      table.append(",").append(csv_field(row.value("other_access", Json())));
       for (const char* key : kPlan) {
         table.append(",").append(csv_field(plan.is_null() ? Json() : plan.at(key)));
       }

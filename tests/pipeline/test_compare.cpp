@@ -36,6 +36,7 @@ Json report_of(const std::string& wire, double score, const std::string& sha = "
   report["wires"] = Json::array({{{"wire", wire},
                                   {"reached", 1},
                                   {"trials", 2},
+                                  {"safe", 1},
                                   {"best_trial", 0},
                                   {"median_peak_contact_force_n", 0.25}}});
   return report;
@@ -101,7 +102,8 @@ TEST_F(Compare, PutsAWireOfManyPatientsInOneRow) {
   const std::string text =
       compared({report_of("soft", 0.4), report_of("soft", 0.6, "b"), report_of("soft", 0.5, "c")});
   EXPECT_TRUE(has(text, "different vessels")) << text;
-  EXPECT_TRUE(has(text, "soft  1/2  0.400  0.250  1/2  0.600  0.250  1/2  0.500  0.250")) << text;
+  EXPECT_TRUE(has(text, "soft  1/2  1  0.400  0.250  1/2  1  0.600  0.250  1/2  1  0.500  0.250"))
+      << text;
 }
 
 TEST_F(Compare, SaysWhereScoresCannotBeCompared) {

@@ -165,8 +165,9 @@ TEST_F(Sections, TellWhatIsWrongWithAllOfThemBeforeAnyIsPushed) {
   }
 }
 
-TEST(Overview, PutsTheAccessWithMoreSafeRepeatsFirst) {
-  const auto report = [](int safe, double score, bool plan = true) {
+TEST(Overview, PutsTheBetterAnswerAndThenMoreSafeRepeatsFirst) {
+  const auto report = [](int safe, double score, bool plan = true, const char* answer = "feasible",
+                         bool sensitive = false) {
     Json trial = {{"reached", true}, {"safe", plan}};
     for (const char* key : {"insertion_mm", "peak_tip_force_n", "peak_contact_force_n"}) {
       trial[key] = 0.1;
@@ -177,6 +178,8 @@ TEST(Overview, PutsTheAccessWithMoreSafeRepeatsFirst) {
       best[key] = 0.0;
     }
     Json json = {{"statement", "Research use only."}, {"trials", Json::array({trial})}};
+    best["sensitive"] = sensitive;
+    json["verdict"] = {{"answer", answer}, {"changes", Json::array()}};
     json["ranking"] = plan ? Json::array({best}) : Json::array();
     json["robustness"]["plans"] =
         Json::array({{{"trial", 0}, {"successes", safe}, {"repeats", 16}}});
@@ -203,6 +206,22 @@ TEST(Overview, PutsTheAccessWithMoreSafeRepeatsFirst) {
   EXPECT_EQ(order({{"a", "t", "a", report(16, 0.3)}, {"b", "t", "b", report(16, 0.2)}}), "ba");
   EXPECT_EQ(order({{"a", "t", "a", report(16, 0.1, false)}, {"b", "t", "b", report(2, 0.9)}}),
             "ba");
+  // The answer counts before the share, and so does an end that hangs on how it is computed.
+  EXPECT_EQ(order({{"a", "t", "a", report(16, 0.1, true, "unsure")},
+                   {"b", "t", "b", report(12, 0.4, true, "feasible_with_risk")}}),
+            "ba");
+  EXPECT_EQ(order({{"a", "t", "a", report(16, 0.1, true, "unsure", true)},
+                   {"b", "t", "b", report(12, 0.4, true, "unsure")}}),
+            "ba");
+  const Json both = build_overview(
+      "case", {{"left", "t", "left", report(0, 0.1, false, "not_feasible")},
+               {"right", "t", "right", report(12, 0.1, true, "feasible_with_risk")}});
+  const Json& rows = both.at("targets")[0].at("sections");
+  const char* told = "From right it is feasible with risk: safe in 12 of 16 disturbed repeats.";
+  EXPECT_TRUE(rows[0].at("other_access").is_null());
+  EXPECT_EQ(rows[1].at("other_access"), told);
+  EXPECT_EQ(rows[1].at("verdict").at("changes"), Json::array({told}));
+  EXPECT_NE(overview_csv(both).find(told), std::string::npos);
   const Json none = build_overview(
       "case", {{"a", "t", "a", report(0, 0.1, false)}, {"b", "t", "b", report(0, 0.1, false)}});
   EXPECT_FALSE(serves_all_targets(none));

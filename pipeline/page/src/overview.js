@@ -23,7 +23,7 @@ const cells = (row) => {
   return [
     link(row, row.access === null ? "report" : shown(row.access)),
     row.verdict ? answerName(row.verdict.answer) : "\u2013",
-    planText(plan),
+    row.other_access ? el("span", {}, planText(plan), ". ", shown(row.other_access)) : planText(plan),
     plan && plan.repeats !== null ? `${plan.repeats_safe} of ${plan.repeats}` : "\u2013",
     plan && plan.peak_contact_force_n !== null ? `${two(plan.peak_contact_force_n)}\u00a0N` : "\u2013",
     mm(Math.round(table.way_mm)),
@@ -54,6 +54,6 @@ export const showOverview = (overview) => {
     el("header", {},
       el("h1", {}, "Guidewire plans: ", el("bdi", {}, shown(overview.name))),
       el("p", {class: "notice"}, el("strong", {}, overview.statement))),
-    el("p", {}, "For each target its accesses, the best first: safe plans, by how many of the best one's disturbed repeats reach the target with no limit broken, then by their forces. Each name leads to the report of that way."),
+    el("p", {}, "For each target its accesses, the best first: by the answer, then by how many of the best plan's disturbed repeats reach the target with no limit broken, then by its forces. Each name leads to the report of that way."),
     ...overview.targets.map(targetSection));
 };
