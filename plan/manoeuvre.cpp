@@ -237,22 +237,32 @@ std::vector<simulate::Move> as_written(std::vector<simulate::Move> moves) {
   return moves;
 }
 
-std::string describe_moves(const std::vector<simulate::Move>& moves, double insertion) {
+std::vector<std::string> describe_each_move(const std::vector<simulate::Move>& moves,
+                                            double insertion) {
   if (moves.empty()) return {};
-  std::string text;
+  std::vector<std::string> told;
   char part[60];
   for (const Move& move : moves) {
     if (move.turn != 0.0) {
-      std::snprintf(part, sizeof part, "turn %.0f deg %s, ", std::abs(move.turn) / kRadPerDeg,
+      std::snprintf(part, sizeof part, "turn %.0f deg %s", std::abs(move.turn) / kRadPerDeg,
                     move.turn > 0.0 ? "clockwise" : "counterclockwise");
     } else {
-      std::snprintf(part, sizeof part, "%s %.1f mm, ", move.push > 0.0 ? "push" : "pull back",
+      std::snprintf(part, sizeof part, "%s %.1f mm", move.push > 0.0 ? "push" : "pull back",
                     std::abs(move.push));
     }
-    text += part;
+    told.emplace_back(part);
   }
   std::snprintf(part, sizeof part, "then push on to %.1f mm", insertion);
-  return text + part;
+  told.emplace_back(part);
+  return told;
+}
+
+std::string describe_moves(const std::vector<simulate::Move>& moves, double insertion) {
+  std::string text;
+  for (const std::string& part : describe_each_move(moves, insertion)) {
+    text += (text.empty() ? "" : ", ") + part;
+  }
+  return text;
 }
 
 }  // namespace wireplan::plan

@@ -42,5 +42,8 @@ std::vector<simulate::Move> as_written(std::vector<simulate::Move> moves);
 /// as the hand makes them, turns as seen from the hub toward the patient. The last push goes to
 /// `insertion`, where the trial ended [mm]. Empty for a straight push.
 std::string describe_moves(const std::vector<simulate::Move>& moves, double insertion);
+/// The same, each by itself.
+std::vector<std::string> describe_each_move(const std::vector<simulate::Move>& moves,
+                                            double insertion);
 
 }  // namespace wireplan::plan

@@ -7,6 +7,7 @@
 
 #include "pipeline/files/trial_file.h"
 #include "pipeline/report/anatomy_json.h"
+#include "pipeline/report/fetch_json.h"
 #include "pipeline/report/page.h"
 #include "pipeline/report/tools_json.h"
 #include "pipeline/report/verdict_json.h"
@@ -320,6 +321,12 @@ Json ranked_json(const ReportInput& input, std::size_t k) {
   }
   row.put("sensitive_reason", plan.sensitive.value_or(""));
   row.put("sentence", plan.sentence);
+  const auto id = static_cast<std::size_t>(plan.trial);
+  const plan::Candidate& candidate = input.plan.candidates[id];
+  if (input.figures.contains("anatomy") && !(candidate.moves.empty() && candidate.steps.empty())) {
+    row.put("step_views",
+            step_views_json(candidate, input.plan.trials[id], input.figures.at("anatomy")));
+  }
   return row.finish();
 }
 
@@ -476,6 +483,7 @@ Json build_report(const ReportInput& input) {
   report["vessel"] = vessel_json(input);
   if (input.figures.contains("anatomy")) {
     report["anatomy"] = anatomy_json(input.figures.at("anatomy"), input.study.wires);
+    report["fetch"] = fetch_json(input, report["anatomy"]);
   }
   if (!input.motion.is_null()) report["vessel_motion"] = input.motion;
   report["ranking"] = std::move(ranking);

@@ -58,15 +58,21 @@ void add_plans(Table& table, const Json& report) {
     table.row("roll of the tip", plan.at("roll_deg"), "deg");
     if (plan.contains("catheter")) {
       table.row("catheter", plan.at("catheter"));
-      int number = 0;
-      for (const Json& step : plan.at("steps")) {
-        table.row("step " + std::to_string(++number), step.at("text"));
+      for (std::size_t n = 0; n < plan.at("steps").size(); ++n) {
+        table.row("step " + std::to_string(n + 1), plan.at("steps")[n].at("text"), "",
+                  plan.contains("step_views") ? plan.at("step_views")[n].at("view") : Json());
       }
       for (const Json& tool : trial.at("tools").at("each")) {
         const std::string name = tool.at("name");
         table.row(name + ": tip force", tool.at("peak_tip_force_n"), "N");
         table.row(name + ": hand", tool.at("peak_push_force_n"), "N");
         table.row(name + ": torque of the hub", tool.at("peak_hub_torque_n_mm"), "N mm");
+      }
+    } else if (plan.contains("step_views")) {
+      int number = 0;
+      for (const Json& step : plan.at("step_views")) {
+        table.row("step " + std::to_string(++number), step.at("text"), "", step.at("view"),
+                  step.at("at"));
       }
     } else if (!plan.at("script").get<std::string>().empty()) {
       table.row("moves", plan.at("script"));
@@ -100,25 +106,39 @@ void add_anatomy(Table& table, const Json& anatomy) {
     const std::string name = key;
     table.row(name + ": narrowest lumen", row.at("lumen_diameter_mm"), "mm",
               row.at("device_diameter_mm"), row.at("fits") ? "fits" : "does not fit");
-    table.row(name + ": over lumen", row.at("ratio"), "", row.at("max_ratio"));
+    table.row(name + ": over lumen", row.at("ratio"), "", row.at("max_ratio"), row.at("source"));
     table.row(name + ": place from the access", row.at("at_mm"), "mm");
   }
-  table.row("tortuosity", access.at("tortuosity").at("index"), "", nullptr,
-            access.at("tortuosity").at("grade"));
-  table.row("sharpest bend", bend.at("angle_deg"), "deg", nullptr, bend.at("grade"));
+  const Json& tortuosity = access.at("tortuosity");
+  table.row("tortuosity", tortuosity.at("index"), "", tortuosity.at("thresholds").dump(),
+            tortuosity.at("grade"));
+  table.row("tortuosity: source", nullptr, "", nullptr, tortuosity.at("source"));
+  table.row("sharpest bend", bend.at("angle_deg"), "deg", bend.at("thresholds_deg").dump(),
+            bend.at("grade"));
+  table.row("sharpest bend: source", nullptr, "", nullptr, bend.at("source"));
   table.row("sharpest bend: place from the access", bend.at("at_mm"), "mm", nullptr,
             bend.at("at_ostium_of"));
-  table.row("calcium beside the lumen", access.at("calcium").at("volume_mm3"), "mm3");
+  const Json& calcium = access.at("calcium");
+  table.row("calcium beside the lumen", calcium.at("volume_mm3"), "mm3", calcium.at("above_hu"),
+            "limit in HU; blur hides most of thin plaque, and metal or bone above it counts too");
 
   table.begin("c-arm");
-  for (const Json& ostium : anatomy.at("c_arm").at("ostia")) {
+  const Json& arm = anatomy.at("c_arm");
+  table.row("reach: rotation", arm.at("max_rotation_deg"), "deg", nullptr, arm.at("source"));
+  table.row("reach: tilt", arm.at("max_tilt_deg"), "deg", nullptr, arm.at("source"));
+  if (!arm.at("no_views").is_null())
+    table.row("no views", nullptr, "", nullptr, arm.at("no_views"));
+  for (const Json& ostium : arm.at("ostia")) {
     for (const auto& [key, title] : {std::pair("best", "best view"), {"second", "second view"}}) {
       const Json& view = ostium.at(key);
       if (view.is_null()) continue;
       std::string which = title;
       which.append(", ostium of ").append(ostium.at("branch").get_ref<const std::string&>());
       table.row(which + ": LAO", view.at("lao_deg"), "deg", nullptr, view.at("view"));
-      table.row(which + ": cranial", view.at("cranial_deg"), "deg");
+      table.row(which + ": cranial", view.at("cranial_deg"), "deg", nullptr,
+                view.at("reachable").get<bool>() ? "within reach" : "out of reach");
+      table.row(which + ": trunk foreshortened by", view.at("trunk_foreshortening"));
+      table.row(which + ": branch foreshortened by", view.at("branch_foreshortening"));
     }
   }
 
@@ -130,7 +150,7 @@ void add_anatomy(Table& table, const Json& anatomy) {
     if (!branch.is_null()) what.append(" ").append(branch.get_ref<const std::string&>());
     table.row(what, place.at("at_mm"), "mm");
   }
-  table.row("wire needed", lengths.at("wire_needed_mm"), "mm");
+  table.row("wire needed", lengths.at("wire_needed_mm"), "mm", nullptr, lengths.at("assumption"));
   for (const Json& wire : lengths.at("wires")) {
     table.row("wire " + wire.at("wire").get<std::string>(), wire.at("length_mm"), "mm",
               lengths.at("wire_needed_mm"));
@@ -144,6 +164,11 @@ std::string sheet_csv(const Json& report) {
   if (report.contains("verdict")) add_verdict(table, report.at("verdict"));
   add_plans(table, report);
   if (report.contains("anatomy")) add_anatomy(table, report.at("anatomy"));
+  table.begin("fetch");
+  for (const Json& item : report.value("fetch", Json::array())) {
+    table.row(item.at("what"), item.at("text"), "", nullptr,
+              item.at("assumed").get<bool>() ? "size assumed" : "");
+  }
   table.begin("uncertain");
   for (const Json& share : report.at("robustness").at("sensitivity").at("shares")) {
     table.row("share of " + share.at("unknown").get<std::string>() + " in what moves the plans",

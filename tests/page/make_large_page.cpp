@@ -235,6 +235,12 @@ std::string make_page(const std::string& name) {
     }
   }
   report.judgement = plan::judge(report.study, plan, {}, {});
+  // A script of nine steps, which are to stand whole on the sheet.
+  const auto best = static_cast<std::size_t>(report.judgement.ranking.plans.front().trial);
+  for (int k = 0; k < 4; ++k) {
+    plan.candidates[best].moves.push_back({.push = 20.0});
+    plan.candidates[best].moves.push_back({.turn = 0.5});
+  }
   report.robustness = robustness(report.judgement.ranking);
   report.verdict = long_verdict();
   for (int k = 0; k < 9; ++k) {

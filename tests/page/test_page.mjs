@@ -264,6 +264,8 @@ if (!given.length) {
     const {page, close} = await open(browser, large);
     assert.equal(pageCount(await page.pdf({preferCSSPageSize: true})), 1);
     assert.deepEqual(await clippedBlocks(page), []);
+    const steps = await page.textContent("#sheet-plans .steps");
+    for (let k = 1; k <= 9; ++k) assert.ok(steps.includes(`${k}. `), `step ${k} of: ${steps}`);
     assert.match(await page.textContent("#sheet-why .more"), /^\d+ more below\.$/);
     assert.equal(await page.locator("#verdict li").count(), 28, "below are all");
     await close();

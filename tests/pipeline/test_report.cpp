@@ -5,6 +5,7 @@
 
 #include "pipeline/files/case_file.h"
 #include "pipeline/files/trial_file.h"
+#include "pipeline/report/fetch_json.h"
 #include "pipeline/report/report.h"
 #include "pipeline/report/verdict_json.h"
 #include "pipeline/stages/stages.h"
@@ -88,7 +89,74 @@ TEST(Report, TellsAccessViewsAndLengthsOfTheTube) {
   EXPECT_NEAR(lengths.at("way_mm"), 22.0, 0.22);
   EXPECT_NEAR(lengths.at("wires").at(0).at("spare_mm"), 200.0 - 192.0, 0.22);
   EXPECT_TRUE(lengths.at("wires").at(0).at("long_enough"));
+  const Json& arm = report.at("anatomy").at("c_arm");
+  EXPECT_TRUE(arm.at("no_views").is_null());
+  EXPECT_TRUE(arm.at("bend").at("best").is_object());
   expect_valid(report, folder.path());
+
+  // Axes that are not the patient's have no front, and no C-arm.
+  const Json unknown = run_to_report(folder / "case.json", folder / "cache", 0, {"axes=unknown"});
+  const Json& none = unknown.at("anatomy").at("c_arm");
+  EXPECT_NE(none.at("no_views").get<std::string>().find("axes are not known"), std::string::npos);
+  EXPECT_TRUE(none.at("bend").at("best").is_null());
+  expect_valid(unknown, folder.path());
+}
+
+TEST(Report, ListsWhatToFetchWithTheCatalogues) {
+  const TemporaryFolder folder;
+  write_finished_tube(folder.path());
+  const Json report = run_to_report(folder / "case.json", folder / "cache");
+  const Json& list = report.at("fetch");
+  const auto row = [&](const std::string& what) {
+    const auto found = std::find_if(list.begin(), list.end(),
+                                    [&](const Json& each) { return each.at("what") == what; });
+    EXPECT_NE(found, list.end()) << what;
+    return *found;
+  };
+  EXPECT_EQ(row("Wire").at("items").at(0), report.at("ranking").at(0).at("wire"));
+  // In a tube of 8 mm all sheaths that take the assumed 5 F, which a 4 F does not.
+  const Json sheath = row("Sheath");
+  EXPECT_TRUE(sheath.at("assumed"));
+  const auto has = [](const Json& items, const char* name) {
+    return std::find(items.begin(), items.end(), name) != items.end();
+  };
+  EXPECT_FALSE(has(sheath.at("items"), "sheath-4f"));
+  EXPECT_TRUE(has(sheath.at("items"), "sheath-6f"));
+  EXPECT_NE(row("Wire length").at("text").get<std::string>().find("from the access point"),
+            std::string::npos);
+  expect_valid(report, folder.path());
+
+  // A sheath that is asked for is not assumed.
+  const Json own = run_to_report(folder / "case.json", folder / "cache", 0,
+                                 {"access_limits.sheath_diameter_mm=3"});
+  for (const Json& each : own.at("fetch")) {
+    if (each.at("what") == "Sheath") {
+      EXPECT_FALSE(each.at("assumed"));
+    }
+  }
+}
+
+TEST(Report, StepsOfAScriptHaveTheViewOfThePlaceNextToTheTip) {
+  const auto view = [](const char* name) { return Json{{"view", name}, {"reachable", true}}; };
+  const Json anatomy = {
+      {"c_arm",
+       {{"ostia", Json::array({Json{{"branch", "left renal"},
+                                    {"leads_to_target", true},
+                                    {"at_mm", 230.0},
+                                    {"best", view("LAO 30, CRA 0")},
+                                    {"second", nullptr}}})},
+        {"bend", {{"at_mm", 40.0}, {"best", view("RAO 10, CRA 5")}, {"second", nullptr}}}}}};
+  const plan::Candidate candidate{.moves = {{.push = 60.0}, {.turn = kPi / 2}, {.push = 140.0}}};
+  plan::Measured trial;
+  trial.metrics.insertion = 250.0;
+  const Json steps = step_views_json(candidate, trial, anatomy);
+  ASSERT_EQ(steps.size(), 4u);
+  EXPECT_EQ(steps[0].at("text"), "push 60.0 mm");
+  EXPECT_EQ(steps[0].at("at"), "bend at 40 mm");
+  EXPECT_EQ(steps[1].at("text"), "turn 90 deg clockwise");
+  EXPECT_EQ(steps[1].at("view"), "RAO 10, CRA 5");
+  EXPECT_EQ(steps[2].at("at"), "ostium of left renal") << "200 mm in";
+  EXPECT_EQ(steps[3].at("view"), "LAO 30, CRA 0");
 }
 
 TEST(Report, ATargetWithoutARadiusIsTheVesselsCrossSection) {

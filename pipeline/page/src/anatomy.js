@@ -34,7 +34,7 @@ const accessTable = ({device, sheath, tortuosity, sharpest_bend: bend, calcium})
     ["Calcium beside the lumen",
      calcium.volume_mm3 === null ? `not known: ${shown(calcium.null_reasons.volume_mm3)}` : `${number(calcium.volume_mm3)}\u00a0mm\u00b3`,
      `voxels above ${number(calcium.above_hu)}\u00a0HU within ${mm(calcium.within_mm)} of the lumen`,
-     calcium.volume_mm3 === null ? "not known" : calcium.volume_mm3 > 0 ? "look at the slices: bone that touches the vessel counts too" : "none found",
+     calcium.volume_mm3 === null ? "not known" : `${calcium.volume_mm3 > 0 ? "look at the slices: bone and metal (stents) beside the lumen count too" : "none found"}; blur hides most of thin plaque`,
      shown(calcium.source)],
   ]);
 

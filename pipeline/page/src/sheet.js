@@ -26,7 +26,6 @@ const kUnknowns = {
   entry: "place of entry",
   lumen: "width of the lumen",
 };
-const kMillimetresPerInch = 25.4;
 
 const two = (value) => number(Number(value.toPrecision(2)));
 const wholePercent = (part) => `${Math.round(100 * part)}\u00a0%`;
@@ -65,24 +64,40 @@ const cutList = (items, most) => {
 };
 
 // ---- Plans.
-const kLong = new Set([1, 5]);  // columns of wires and of moves
+const kLong = new Set([1]);  // the column of wires
 const safeText = (repeats) => (repeats ? `${repeats.successes} of ${repeats.repeats}` : "not repeated");
+
+/** All steps of a script, each with the C-arm's view of the place that its tip is next to. */
+const stepList = (plan, rank) => {
+  const steps = plan.step_views ?? [{text: plan.script, view: null}];
+  const seen = steps.map((step) => (step.view ? `${step.view}, ${shown(step.at)}` : ""));
+  const same = seen.every((view) => view === seen[0]);
+  const text = steps.map((step, k) => `${steps.length > 1 ? `${k + 1}. ` : ""}${shown(step.text)}${same || !seen[k] ? "" : ` [${seen[k]}]`}`);
+  return el("p", {class: "steps"}, el("strong", {}, `Steps of plan ${rank}${same && seen[0] ? ` [${seen[0]}]` : ""}: `), text.join("; "), ".");
+};
 
 const planTable = ({report, trials}) => {
   const {tip_force_warn_n: warn} = report.provenance.parameters.limits ?? {};
+  const plans = report.ranking.slice(0, kPlans);
   const heads = ["", "Wire", "Tilt", "Toward", "Roll", "Moves", "Wire in vessel", "Force at tip", "Largest force on wall", "Safe repeats"];
-  const rows = report.ranking.slice(0, kPlans).map((plan, k) => {
+  const rows = plans.map((plan, k) => {
     const t = trials[plan.trial];
     return [`${k + 1}`, name(shown(t.wire)), degrees(t.inclination_deg), degrees(t.azimuth_deg), degrees(t.roll_deg),
-      t.script ? shown(t.script) : "one push", mm(t.insertion_mm), `${two(t.peak_tip_force_n)}\u00a0N`,
+      t.script ? "steps below" : "one push", mm(t.insertion_mm), `${two(t.peak_tip_force_n)}\u00a0N`,
       `${two(t.peak_contact_force_n)}\u00a0N`, safeText(report.robustness?.plans?.find((row) => row.trial === plan.trial))];
   });
-  const note = `Tilt of the introducer from the vessel's axis, toward the front at 0\u00b0; roll of the wire's tip. Safe: the target is reached and no limit is broken.` +
+  const front = report.anatomy?.c_arm.no_views ? "-y of the input" : "the patient's front";
+  const note = `Tilt of the introducer from the vessel's axis at the access, toward ${front} at 0\u00b0 and on from there right-handed about the axis into the vessel. Roll: how far the hub is turned before the first push, right-handed about the wire (clockwise as the hand sees it); at 0\u00b0 a bent tip points to ${front}. Safe: the target is reached and no limit is broken.` +
     (warn === undefined ? "" : ` Force at the tip: a warning from ${number(warn)}\u00a0N on.`);
-  return block("plans", rows.length ? `The best of ${plural(report.ranking.length, "safe plan")}` : "Plans",
+  const {answer} = report.verdict ?? {};
+  const title = answer === undefined || answer.startsWith("feasible")
+    ? `The best of ${plural(report.ranking.length, "safe plan")}`
+    : `${plural(report.ranking.length, "plan")} within all limits where nothing is disturbed${rows.length < report.ranking.length ? `, the first ${rows.length}` : ""}`;
+  return block("plans", rows.length ? title : "Plans",
     rows.length
       ? [sheetTable("Best plans", heads, rows.map((row) => row.map((cell, k) =>
           kLong.has(k) ? el("td", {}, el("div", {class: "two-lines"}, cell)) : el("td", {class: "short"}, cell)))),
+         ...plans.filter((plan) => plan.script).map((plan) => stepList(plan, plan.rank)),
          el("p", {class: "note"}, note)]
       : el("p", {}, "No plan reaches the target within the limits. The table of all trials below tells each one's end."));
 };
@@ -110,33 +125,18 @@ const accessTable = ({anatomy}) => {
      calcium.volume_mm3 === null ? "\u2013" : `${number(calcium.volume_mm3)}\u00a0mm\u00b3`, "no grade agreed on",
      calcium.volume_mm3 > 0 ? "look at the slices" : calcium.volume_mm3 === null ? "not known" : "none found"],
   ];
+  const note = calcium.volume_mm3 === null ? null : "Calcium: blur hides most of thin plaque, and metal (stents) or bone above the threshold counts too.";
   return block("access", "Access, along the way from the access point to the target",
     sheetTable("Findings of the access", ["What", "Where", "Found", "Held against", "Finding"],
-      rows.map((row) => row.map((cell) => el("td", {}, cell)))));
+      rows.map((row) => row.map((cell) => el("td", {}, cell)))),
+    note ? el("p", {class: "note"}, note) : null);
 };
 
 // ---- What to prepare.
-const wireText = (report, wire, what) => {
-  const given = report.provenance.parameters.wires.find((row) => row.name === wire);
-  const length = report.anatomy?.lengths.wires.find((row) => row.wire === wire);
-  const diameter = given?.diameter_mm?.value ?? given?.diameter_mm;
-  const inches = diameter ? `, ${(diameter / kMillimetresPerInch).toFixed(3)}\u00a0in` : "";
-  const enough = length ? `, ${mm(length.length_mm)} long${length.long_enough ? "" : `: ${mm(-length.spare_mm)} too short`}` : "";
-  return el("span", {class: "two-lines"}, what, name(shown(wire)), inches, enough);
-};
-
-const fetchBlock = ({report}) => {
-  const {anatomy, ranking} = report;
-  const wires = [...new Set(ranking.slice(0, kPlans).map((plan) => plan.wire))];
-  const items = wires.map((wire, k) => wireText(report, wire, k ? "In reserve: " : "Wire: "));
-  if (anatomy) {
-    const {sheath, device} = anatomy.access;
-    items.push(`Sheath of at most ${mm(sheath.max_ratio * sheath.lumen_diameter_mm)} outer diameter; taken here: ${mm(sheath.device_diameter_mm)}`,
-      `Catheter of at most ${mm(device.lumen_diameter_mm)}; taken here: ${mm(device.device_diameter_mm)}, ${mm(anatomy.lengths.catheter_mm)} long`,
-      `Wire needed with both: ${along(anatomy.lengths.wire_needed_mm)}`);
-  }
-  return block("fetch", "To fetch", items.length ? el("ul", {}, items.map((item) => el("li", {}, item))) : el("p", {}, "Nothing: there is no plan."));
-};
+const fetchBlock = ({report: {fetch}}) =>
+  block("fetch", "To fetch", fetch?.length
+    ? el("ul", {}, fetch.map((row) => el("li", {}, `${row.what}: `, name(shown(row.text)), row.assumed ? " (size assumed)" : "")))
+    : el("p", {}, fetch ? "Nothing: there is no plan." : "This report has no list; run the case again for one."));
 
 const lengthBlock = ({anatomy}) => {
   if (!anatomy) return null;
@@ -209,20 +209,21 @@ const pictureBlock = (page) => {
       `Way blue, other vessels grey, ${wire.length ? "wire of plan 1 red, " : ""}A access, T target.`));
 };
 
-/** Cuts lists, the longest first, until nothing of the sheet is beyond its lower border. */
+/** Cuts lists, the longest first, then steps of the later plans, until nothing of the sheet is beyond what holds it. */
 const fit = (sheet) => {
-  const lists = [...sheet.querySelectorAll("ul")].filter((list) => list.cut);
-  const over = () => {
-    const end = sheet.getBoundingClientRect().bottom;
-    return [...sheet.querySelectorAll(".block, .block > *")].some((node) =>
-      node.getBoundingClientRect().bottom > end + 0.5 ||
-      (node.classList.contains("block") && node.parentElement.getBoundingClientRect().bottom + 0.5 < node.getBoundingClientRect().bottom));
+  const lists = [...sheet.querySelectorAll("ul")].filter((list) => list.cut), later = [...sheet.querySelectorAll(".steps")].slice(1);
+  const bottom = (node) => node.getBoundingClientRect().bottom;
+  const over = () => [...sheet.querySelectorAll(".block, .block > *")].some((node) =>
+    bottom(node) > bottom(sheet) + 0.5 || bottom(node) > bottom(node.closest(".columns") ?? sheet) + 0.5);
+  const cut = () => {
+    lists.sort((a, b) => b.scrollHeight - a.scrollHeight);
+    if (lists.some((list) => list.cut())) return true;
+    const steps = later.pop();
+    steps?.replaceChildren(steps.firstChild, "below.");
+    return steps !== undefined;
   };
   sheet.classList.add("on-paper");
-  for (let tries = 0; tries < 30 && over(); ++tries) {
-    lists.sort((a, b) => b.scrollHeight - a.scrollHeight);
-    if (!lists.some((list) => list.cut())) break;
-  }
+  while (over() && cut());
   sheet.classList.remove("on-paper");
 };
 
@@ -240,7 +241,8 @@ export const sheetSection = (page) => {
     el("div", {class: "columns wide-left"}, el("div", {class: "stack"}, why), pictureBlock(page)),
     planTable(page),
     accessTable(report),
-    el("div", {class: "columns"}, uncertainBlock(page), el("div", {class: "stack"}, fetchBlock(page), lengthBlock(report))),
+    el("div", {class: "columns"}, uncertainBlock(page), lengthBlock(report)),
+    fetchBlock(page),
     el("p", {class: "statement"}, el("strong", {}, report.statement), ` ${program.name} ${program.version}.`));
   const node = el("div", {class: "sheet-frame"}, sheet,
     el("p", {class: "sheet-buttons buttons"},

@@ -99,7 +99,7 @@ const spreadRow = (robustness, trial, first) => {
 
 const scoutRow = (scout) => ["Coarse trials that sorted out the rest",
   `${plural(scout.trials, "trial")} with elements of ${number(scout.element_length_mm)}\u00a0mm in a ${scout.moves_as_a_whole ? "rigid wall that moves as a whole" : "rigid wall"}; of them ${scout.probed} run there with fine elements, ${scout.compared} in full`,
-  `score off by ${number(scout.median_score_error)} in the middle; ${plural(scout.missed, "plan")} seen as failing that reach, ${scout.false_reached} the other way`];
+  `of those that were run again: ${plural(scout.missed, "plan")} that the coarse trial took for failing reach, and ${scout.false_reached} that it took for reaching fail`];
 
 export const uncertainSection = (page) => {
   const {report, trials} = page;
@@ -111,7 +111,7 @@ export const uncertainSection = (page) => {
       e.position_error_mm === undefined || e.position_error_mm === null ? "not known" :
       `position \u00b1\u00a0${number(e.position_error_mm)}\u00a0mm, largest contact \u00b1\u00a0${number(e.peak_contact_force_error_n)}\u00a0N; score \u00b1\u00a0${number(first.score_error)}, which ties ${plural(first.tied_with.length, "plan")} with the best`]);
     if (first.sensitive !== undefined) {
-      rows.push(["Length of a push, which should not matter",
+      rows.push(["Length of a push in the computation",
         first.sensitive === null ? "not known" : `best plan run with pushes half as long: its tip ends at most ${number(Math.max(...(e.settings ?? []).map((row) => row.tip_apart_mm)))}\u00a0mm away`,
         first.sensitive ? `sensitive: ${shown(first.sensitive_reason)}` : first.sensitive === null ? "not known" : "within the errors above"]);
     }

@@ -1,0 +1,182 @@
+#include "pipeline/report/fetch_json.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "pipeline/files/catalogue.h"
+#include "pipeline/files/text.h"
+#include "plan/anatomy/access_limits.h"
+#include "plan/catheters.h"
+#include "plan/manoeuvre.h"
+
+namespace wireplan::pipeline {
+namespace {
+
+constexpr std::size_t kPlansTold = 3;  // as many as the sheet has
+constexpr double kMillimetresPerInch = 25.4;
+
+std::string join(const std::vector<std::string>& names) {
+  std::string text;
+  for (const std::string& name : names) text += (text.empty() ? "" : ", ") + name;
+  return text;
+}
+
+Json fetch_row(const char* what, const std::vector<std::string>& items, const std::string& text,
+               bool assumed = false) {
+  return {{"what", what}, {"items", items}, {"text", text}, {"assumed", assumed}};
+}
+
+/// The first few; all are among the row's items.
+std::string of_catalogue(std::vector<std::string> names) {
+  constexpr std::size_t kMostTold = 5;
+  if (names.empty()) return "none of the catalogue";
+  const std::size_t left = names.size() - std::min(names.size(), kMostTold);
+  names.resize(names.size() - left);
+  return "of the catalogue " + join(names) +
+         (left > 0 ? " and " + std::to_string(left) + " more" : "");
+}
+
+Json wire_row(const char* what, const simulate::Wire& wire, double needed) {
+  const double spare = wire.length() - needed;
+  return fetch_row(what, {wire.name},
+                   wire.name +
+                       format(", %.3f in, %.0f mm long", 2.0 * wire.radius / kMillimetresPerInch,
+                              wire.length()) +
+                       (spare < 0.0 ? format(": %.0f mm too short", -spare) : ""));
+}
+
+Json sheath_row(const Json& sheath, double inside) {
+  const double most =
+      sheath.at("max_ratio").get<double>() * sheath.at("lumen_diameter_mm").get<double>();
+  std::vector<std::string> names;
+  for (const Sheath& known : catalogue().sheaths) {
+    if (known.outer_diameter < most && known.inner_diameter >= inside) names.push_back(known.name);
+  }
+  const double taken = sheath.at("device_diameter_mm");
+  return fetch_row("Sheath", names,
+                   format("below %.3g mm outside, for a catheter of %.3g mm: ", most, inside) +
+                       of_catalogue(names) + format("; weighed: %.3g mm", taken),
+                   taken == plan::AccessLimits().sheath_diameter);
+}
+
+/// For a plan of a wire alone: what passes the way over that wire.
+Json catheter_row(const Json& device, const simulate::Wire& wire, double length) {
+  const double most = device.at("lumen_diameter_mm");
+  std::vector<std::string> names;
+  for (const Catheter& known : catalogue().catheters) {
+    const bool passes = 2.0 * known.tube.radius < most && known.inner_diameter > 2.0 * wire.radius;
+    if (passes) names.push_back(known.tube.name);
+  }
+  const double taken = device.at("device_diameter_mm");
+  return fetch_row("Catheter", names,
+                   format("below %.3g mm outside, over the wire: ", most) + of_catalogue(names) +
+                       format("; weighed: %.3g mm, %.0f mm long", taken, length),
+                   taken == plan::AccessLimits().device_diameter);
+}
+
+/// A place that a view shows, and how far along the way it is.
+struct Seen {
+  double arc = 0.0;
+  std::string name;
+  Json view;
+};
+
+Json view_name(const Json& row) {
+  const Json& best = row.at("best");
+  const Json& second = row.at("second");
+  if (best.is_null()) return nullptr;
+  return best.at("reachable").get<bool>() || second.is_null() ? best.at("view") : second.at("view");
+}
+
+std::vector<Seen> places_to_see(const Json& arm) {
+  std::vector<Seen> places;
+  for (const Json& ostium : arm.at("ostia")) {
+    places.push_back({ostium.at("at_mm").get<double>(),
+                      "ostium of " + ostium.at("branch").get<std::string>(), view_name(ostium)});
+  }
+  const Json& bend = arm.at("bend");
+  const double at = bend.at("at_mm");
+  places.push_back({at, format("bend at %.0f mm", at), view_name(bend)});
+  return places;
+}
+
+}  // namespace
+
+Json fetch_json(const ReportInput& input, const Json& anatomy) {
+  Json list = Json::array();
+  const auto& plans = input.judgement.ranking.plans;
+  if (plans.empty()) return list;
+  const Json& access = anatomy.at("access");
+  const Json& lengths = anatomy.at("lengths");
+  const double needed = lengths.at("wire_needed_mm");
+  const auto candidate = [&](std::size_t k) -> const plan::Candidate& {
+    return input.plan.candidates[static_cast<std::size_t>(plans[k].trial)];
+  };
+  std::vector<int> wires;
+  for (std::size_t k = 0; k < std::min(kPlansTold, plans.size()); ++k) {
+    const int wire = candidate(k).wire;
+    if (std::find(wires.begin(), wires.end(), wire) != wires.end()) continue;
+    list.push_back(wire_row(wires.empty() ? "Wire" : "In reserve",
+                            input.study.wires[static_cast<std::size_t>(wire)], needed));
+    wires.push_back(wire);
+  }
+  const simulate::Wire& first = input.study.wires[static_cast<std::size_t>(wires.front())];
+  double inside = access.at("device").at("device_diameter_mm");
+  if (const int own = candidate(0).catheter; own >= 0) {
+    const simulate::Wire& tube = input.study.catheters[static_cast<std::size_t>(own)].tool.wire;
+    inside = 2.0 * tube.radius;
+    list.push_back(fetch_row("Catheter", {tube.name},
+                             tube.name + format(", %.3g mm outside, of plan 1", inside)));
+  } else {
+    list.push_back(
+        catheter_row(access.at("device"), first, lengths.at("catheter_mm").get<double>()));
+  }
+  list.push_back(sheath_row(access.at("sheath"), inside));
+  const plan::AccessLimits defaults;
+  list.push_back(fetch_row(
+      "Wire length", {},
+      format("%.0f mm needed, counted from the access point: %.0f mm of way, %.0f mm of "
+             "catheter that comes off it, %.0f mm to hold; skin to vessel is in the last",
+             needed, lengths.at("way_mm").get<double>(), lengths.at("catheter_mm").get<double>(),
+             lengths.at("working_mm").get<double>()),
+      lengths.at("catheter_mm") == defaults.catheter_length ||
+          lengths.at("working_mm") == defaults.working_length));
+  return list;
+}
+
+Json step_views_json(const plan::Candidate& candidate, const plan::Measured& trial,
+                     const Json& anatomy) {
+  const Json& arm = anatomy.at("c_arm");
+  const std::vector<Seen> places = places_to_see(arm);
+  Json steps = Json::array();
+  const auto add = [&](const std::string& text, const Seen* seen) {
+    steps.push_back({{"text", text},
+                     {"at", seen == nullptr ? Json(nullptr) : Json(seen->name)},
+                     {"view", seen == nullptr ? Json(nullptr) : seen->view}});
+  };
+  if (candidate.catheter >= 0) {
+    const Seen* target = nullptr;
+    for (std::size_t k = 0; k < arm.at("ostia").size(); ++k) {
+      if (arm.at("ostia")[k].at("leads_to_target").get<bool>()) target = &places[k];
+    }
+    for (const std::string& text : plan::describe_steps(candidate.steps, trial.metrics.insertion)) {
+      add(text, target);
+    }
+    return steps;
+  }
+  const std::vector<std::string> texts =
+      plan::describe_each_move(candidate.moves, trial.metrics.insertion);
+  double depth = 0.0;
+  for (std::size_t k = 0; k < texts.size(); ++k) {
+    depth = k < candidate.moves.size() ? depth + candidate.moves[k].push : trial.metrics.insertion;
+    const auto nearest =
+        std::min_element(places.begin(), places.end(), [&](const Seen& a, const Seen& b) {
+          return std::abs(a.arc - depth) < std::abs(b.arc - depth);
+        });
+    add(texts[k], &*nearest);
+  }
+  return steps;
+}
+
+}  // namespace wireplan::pipeline
