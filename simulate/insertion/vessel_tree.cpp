@@ -14,6 +14,7 @@ constexpr double kStumpRadii = 4.0;  // a shorter branch is a sac or a stump
 constexpr double kArm = 10.0;        // of a vessel, for its direction                      [mm]
 constexpr double kLike = 4.0 / 3.0;  // ratio of widths that are alike
 constexpr double kWider = 1.1;       // of what two branches meet in, at least
+constexpr double kAorta = 6.0;       // radius of an aorta, at least                        [mm]
 
 /// The point of a line that is so far along it, or its end.
 Eigen::Index index_at(const Centerline& line, double arc) {
@@ -106,7 +107,7 @@ bool is_bifurcation(const std::vector<Branch>& tree, const Bifurcation& fork, do
   const Vec3 onward = direction(line, at - start - kArm, at - start);
   const double ratio = beside / std::max(before, 1e-3);
   return ratio < kLike && ratio > 1.0 / kLike && width > kWider * std::max(before, beside) &&
-         outward.dot(onward) < 0.0;
+         width >= kAorta && outward.dot(onward) < 0.0;
 }
 
 }  // namespace wireplan::simulate

@@ -1,6 +1,6 @@
 #pragma once
-/// Questions to the tree of the vessel's branches: in which of them a point is, where a branch's own
-/// vessel begins, and which one goes on where a vessel forks.
+/// Questions to the tree of the vessel's branches: in which of them a point is, where a branch's
+/// own vessel begins, and which one goes on where a vessel forks.
 #include <vector>
 
 #include "preprocess/centerline/centerline.h"
@@ -23,8 +23,9 @@ double own_start(const preprocess::Branch& branch);
 /// root is none.
 bool is_stump(const std::vector<preprocess::Branch>& tree, int k);
 
-/// How wide a branch is beyond its start over how wide its parent is as far beyond the fork: what is
-/// beyond the fork is compared, since the ball in it belongs to both. Expects a branch with a parent.
+/// How wide a branch is beyond its start over how wide its parent is as far beyond the fork: what
+/// is beyond the fork is compared, since the ball in it belongs to both. Expects a branch with a
+/// parent.
 double width_over_parent(const std::vector<preprocess::Branch>& tree, int k);
 
 /// Whether a branch is the vessel that goes on where it leaves its parent, though the tree's line
@@ -33,14 +34,14 @@ double width_over_parent(const std::vector<preprocess::Branch>& tree, int k);
 bool goes_on(const std::vector<preprocess::Branch>& tree, int k);
 
 /// A fork of two branches of like width, within a third, that lie side by side and meet in a wider
-/// vessel: to a way from a femoral artery that of the aorta.
+/// vessel of 6 mm radius or more: to a way from a femoral artery that of the aorta.
 struct Bifurcation {
   int parent = -1, child = -1;  // of the tree, that part there ...
   bool takes_child = false;     // ... and which of them a way goes on in
 };
 
-/// Whether `child` leaves its parent at such a fork, where a way along the parent goes on in the one
-/// or the other. `width` is set to the radius of what it goes on in [mm].
+/// Whether `child` leaves its parent at such a fork, where a way along the parent goes on in the
+/// one or the other. `width` is set to the radius of what it goes on in [mm].
 bool is_bifurcation(const std::vector<preprocess::Branch>& tree, const Bifurcation& fork,
                     double& width);
 

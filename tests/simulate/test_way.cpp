@@ -239,7 +239,14 @@ TEST(Way, TheOtherLegIsAcrossTheBifurcationWhicheverVesselTheTreeFollows) {
     EXPECT_FALSE(way.find_astray(0.5 * foot));
     EXPECT_FALSE(way.find_astray(0.5 * head));
   }
-  // A branch that leaves the vessel sideways is none.
+  // Nor is a branch that leaves the vessel sideways one, nor a fork of small arteries.
+  const auto small = [](Centerline line) {
+    line.radius *= 0.5;
+    return line;
+  };
+  EXPECT_FALSE(Way(small(path),
+                   {{small(leg_and_on(foot, head, 9.0)), -1, 0.0}, {small(out(other, 5.0)), 0, at}})
+                   .bifurcation());
   EXPECT_FALSE(Way(into_branch(kSecond, 25.0), tree_of_fork()).bifurcation());
 }
 
