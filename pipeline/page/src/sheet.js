@@ -135,7 +135,7 @@ const accessTable = ({anatomy}) => {
 // ---- What to prepare.
 const fetchBlock = ({report: {fetch}}) =>
   block("fetch", "To fetch", fetch?.length
-    ? el("ul", {}, fetch.map((row) => el("li", {}, `${row.what}: `, name(shown(row.text)), row.assumed ? " (size assumed)" : "")))
+    ? el("ul", {}, fetch.map((row) => el("li", {}, `${row.what}${row.assumed ? " (a size is assumed)" : ""}: `, name(shown(row.text)))))
     : el("p", {}, fetch ? "Nothing: there is no plan." : "This report has no list; run the case again for one."));
 
 const lengthBlock = ({anatomy}) => {
