@@ -24,6 +24,7 @@ struct DicomSlice {
   std::int16_t first_value = 0;  // of 3 columns x 2 rows, each voxel one more than the last
   bool compressed = false;       // run lengths
   std::string description = {};  // of the series
+  std::string modality = "CT";
   /// Instead of these: columns x rows values of a slice with square pixels of 1 mm.
   int columns = 0, rows = 0;
   std::vector<std::int16_t> values = {};
@@ -116,7 +117,7 @@ inline std::string dicom(const DicomSlice& slice) {
   axes << slice.direction.col(0), slice.direction.col(1);
   element(bytes, 0x08, 0x16, "UI", ct);
   element(bytes, 0x08, 0x18, "UI", instance);
-  element(bytes, 0x08, 0x60, "CS", "CT");
+  element(bytes, 0x08, 0x60, "CS", slice.modality);
   element(bytes, 0x08, 0x20, "DA", "20260115");
   element(bytes, 0x08, 0x50, "SH", "ACC-0815");
   element(bytes, 0x08, 0x80, "LO", "ANALYTICAL HOSPITAL");

@@ -325,7 +325,8 @@ void add_new(CLI::App& app, int& code) {
   CLI::App* command = app.add_subcommand("new", "Write the folder of a case for a CT or labels");
   command->add_option("DIR", given->folder, "Folder of the case")->required();
   command->add_option("--volume", given->volume, "Folder of DICOM files, NIfTI, NRRD or MetaImage");
-  command->add_option("--series", given->series, "Of a DICOM folder, by number or description");
+  command->add_option("--series", given->series,
+                      "Of a DICOM folder, by number, description or key");
   command->add_option("--markups", given->markups,
                       "Points of 3D Slicer (.mrk.json, .fcsv), named access and target");
   command->add_option("--labels", given->labels,

@@ -9,7 +9,7 @@ namespace wireplan::pipeline {
 struct NewCase {
   std::filesystem::path folder;   // is made where it is not there
   std::filesystem::path volume;   // as of a case; may be empty where there are labels
-  std::string series;             // of a DICOM folder, by number or description; may be empty
+  std::string series;             // of a DICOM folder: number, description or key; may be empty
   std::filesystem::path markups;  // of 3D Slicer; may be empty
   std::filesystem::path labels;   // somebody's segmentation; may be empty
 };

@@ -25,7 +25,7 @@ namespace wireplan::pipeline {
 struct VolumeInput {
   std::filesystem::path path;
   std::string given;
-  std::string series;  // of a DICOM folder, by number or description; empty: see read_image
+  std::string series;  // of a DICOM folder: number, description or key; empty: see read_image
 };
 
 struct SurfaceInput {

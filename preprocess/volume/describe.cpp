@@ -60,6 +60,27 @@ void describe_values(const Image& image, VolumeDescription& told) {
   }
 }
 
+/// The message with "file 5 of 60" in the place of the names of a folder's files, which may be a
+/// patient's.
+std::string without_file_names(std::string message, const fs::path& folder) {
+  if (message.find(folder.string()) == std::string::npos || !fs::is_directory(folder)) {
+    return message;
+  }
+  std::vector<std::string> names;
+  for (const fs::directory_entry& entry : fs::directory_iterator(folder)) {
+    if (entry.is_regular_file()) names.push_back(entry.path().string());
+  }
+  std::sort(names.begin(), names.end());
+  for (std::size_t k = names.size(); k-- > 0;) {  // "im10" before "im1"
+    const std::string number =
+        "file " + std::to_string(k + 1) + " of " + std::to_string(names.size());
+    for (std::size_t at = 0; (at = message.find(names[k], at)) != std::string::npos;) {
+      message.replace(at, names[k].size(), number);
+    }
+  }
+  return message;
+}
+
 }  // namespace
 
 VolumeDescription describe_volume(const fs::path& path) {
@@ -73,15 +94,17 @@ VolumeDescription describe_volume(const fs::path& path) {
   } catch (const Error& error) {
     refused = error;
   }
-  if (fs::is_directory(path) || (refused && told.header.format.empty() && fs::exists(path) &&
-                                 check_dicom(path) != DicomForm::kNone)) {
-    told.header.format = "DICOM";
+  if (told.header.format == "DICOM") {
     told.series = describe_dicom(path);
+    for (SeriesDescription& series : told.series) {
+      series.problem = without_file_names(series.problem, path);
+    }
   }
   if (refused) {
     const bool told_header = !told.series.empty() || told.header.size[0] > 0;
-    if (!told_header) throw *refused;
-    told.refused = without_path(refused->what(), path);
+    const std::string text = without_file_names(refused->what(), path);
+    if (!told_header) throw Error(text);
+    told.refused = without_path(text, path);
     return told;
   }
   told.grid = image->grid;

@@ -33,12 +33,15 @@ struct VolumeHeader {
 
 /// Images of a DICOM folder that can be slices of one volume.
 struct SeriesDescription {
-  std::string number, modality;
+  std::string number;  // empty where it may be a date, or holds what the description may not
+  std::string key;     // "#1f3a90c2", by which a case can name it too
+  std::string modality;
   std::string description;  // empty where it holds a name, number or date of the patient's tags
   std::string unit;         // of the values, by the rescale type; empty where not told
   std::string syntax, syntax_uid;  // how the first file's pixels are packed
   int files = 0, images = 0;       // as many images, but in files of several frames
   bool placed = false;             // whether the places of its images are known
+  bool spaced = false;             // whether the size of their pixels is
   Grid grid;                       // of them all, where they are; else of the first
   std::string problem;             // why they form no volume; empty where they do
   bool read = false;               // whether it is the one that read_image reads

@@ -7,6 +7,7 @@
 #include <iterator>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 namespace wireplan::preprocess {
@@ -14,59 +15,131 @@ namespace {
 
 constexpr std::uint32_t kUndefinedLength = 0xFFFFFFFF;
 constexpr std::uint32_t kItem = 0xFFFEE000, kItemEnd = 0xFFFEE00D, kSequenceEnd = 0xFFFEE0DD;
-constexpr std::uint32_t kTransferSyntax = 0x00020010, kPixelData = 0x7FE00010;
-constexpr std::size_t kPreamble = 128;
+constexpr std::uint32_t kTransferSyntax = 0x00020010, kRows = 0x00280010;
+constexpr std::uint32_t kClassOfFile = 0x00020002, kClass = 0x00080016;
+constexpr std::uint32_t kPhotometric = 0x00280004, kPixelData = 0x7FE00010;
+constexpr std::uint32_t kFloatPixels = 0x7FE00008, kDoublePixels = 0x7FE00009;
+constexpr std::uint32_t kFirstOfData = 8;  // group
+constexpr std::size_t kPreamble = 128, kMagic = 4;
 constexpr int kDeepest = 16;
 
-// Little endian, tag as group * 65536 + element.
+// Tag as group * 65536 + element.
 class Walker {
  public:
   explicit Walker(std::string_view bytes) : bytes_(bytes) {}
 
-  DicomForm check() {
-    at_ = kPreamble + 4;
-    std::string syntax;
-    while (at_ + 4 <= bytes_.size() && number(at_, 2) == 2) {
-      Element element;
-      if (!read_head(/*explicit_vr=*/true, element) || element.length > left()) {
-        return DicomForm::kDamaged;
-      }
-      if (element.tag == kTransferSyntax) syntax = bytes_.substr(at_, element.length);
-      at_ += element.length;
+  DicomLook look() {
+    const bool headed = bytes_.substr(kPreamble, kMagic) == "DICM";
+    if (!headed && !find_begin()) return {};
+    if (headed) at_ = kPreamble + kMagic;
+    if (!read_meta()) return found(DicomForm::kDamaged);
+    look_.begin = at_;
+    const DicomForm sound = headed && !look_.syntax.empty() ? DicomForm::kSound : DicomForm::kBare;
+    if (look_.syntax == "1.2.840.10008.1.2.1.99") {  // deflated
+      look_.pixels = true;
+      look_.end = bytes_.size();
+      return found(sound);
     }
-    syntax = syntax.substr(0, syntax.find_last_not_of(std::string_view("\0 ", 2)) + 1);
-    if (syntax.empty()) return DicomForm::kDamaged;
-    if (syntax == "1.2.840.10008.1.2.2" || syntax == "1.2.840.10008.1.2.1.99") {
-      return DicomForm::kSound;
+    big_endian_ = look_.syntax == "1.2.840.10008.1.2.2";
+    look_.explicit_vr = look_.syntax.empty()
+                            ? is_explicit(at_)
+                            : look_.syntax != "1.2.840.10008.1.2" && look_.syntax != kImplicitOfGe;
+    look_.patches.clear();
+    const bool whole = walk(look_.explicit_vr, bytes_.size(), 0, 0);
+    // Those of the standard are known here; others may be written in any manner.
+    const bool standard = look_.syntax.empty() || look_.syntax == kImplicitOfGe ||
+                          look_.syntax.starts_with("1.2.840.10008.1.2");
+    if (!whole && look_.end == 0 && !standard) {
+      look_.pixels = true;
+      look_.end = bytes_.size();
+      return found(sound);
     }
-    if (walk(syntax != "1.2.840.10008.1.2", bytes_.size(), 0, 0)) return DicomForm::kSound;
-    return pixels_end_ > 0 ? DicomForm::kPadded : DicomForm::kDamaged;
+    if (!whole && look_.end == 0) return found(DicomForm::kDamaged);
+    if (whole && look_.end == 0) look_.end = bytes_.size();
+    if (whole || sound == DicomForm::kBare) return found(sound);
+    return found(DicomForm::kPadded);
   }
-
-  // Whether it is a data set with pixels without the head of a file, as old archives write them:
-  // group 8 first, little endian, with or without value representations.
-  bool is_bare() {
-    if (bytes_.size() < 8 || number(0, 2) != 8) return false;
-    const auto is_capital = [&](std::size_t at) { return bytes_[at] >= 'A' && bytes_[at] <= 'Z'; };
-    at_ = 0;
-    walk(is_capital(4) && is_capital(5), bytes_.size(), 0, 0);
-    return pixels_end_ > 0;
-  }
-
-  std::size_t pixels_end() const { return pixels_end_; }
 
  private:
+  static constexpr const char* kImplicitOfGe = "1.2.840.113619.5.2";  // but its pixels
+
   struct Element {
     std::uint32_t tag = 0, length = 0;
     std::string_view vr;
   };
 
+  DicomLook found(DicomForm form) {
+    look_.form = form;
+    return std::move(look_);
+  }
+
+  // Where a file without "DICM" begins: at once, or behind a preamble, with or without the room of
+  // those letters.
+  bool find_begin() {
+    for (const std::size_t at : {std::size_t{0}, kPreamble, kPreamble + kMagic}) {
+      if (!looks_like_elements(at)) continue;
+      at_ = at;
+      return true;
+    }
+    return false;
+  }
+
+  // Three elements in the order of their tags, of the groups that come first.
+  bool looks_like_elements(std::size_t at) {
+    constexpr std::uint32_t kMostElement = 0x1000;
+    if (bytes_.size() < at + 8) return false;
+    const std::uint32_t group = number(at, 2);
+    if (group != 2 && group != kFirstOfData) return false;
+    at_ = at;
+    std::uint32_t before = 0;
+    for (int k = 0; k < 3; ++k) {
+      Element element;
+      if (!read_head(is_explicit(at), element) || element.tag <= before) return false;
+      if (k == 0 && (element.tag & 0xFFFFU) > kMostElement) return false;
+      if (element.length > left() && element.length != kUndefinedLength) return false;
+      before = element.tag;
+      if (element.length == kUndefinedLength) break;
+      at_ += element.length;
+    }
+    return true;
+  }
+
+  // The group of the file's own head, where it has one.
+  bool read_meta() {
+    while (left() >= 4 && number(at_, 2) == 2) {
+      Element element;
+      if (!read_head(is_explicit(at_), element) || element.length > left()) return false;
+      const std::string_view value = bytes_.substr(at_, element.length);
+      if (element.tag == kTransferSyntax) look_.syntax = value;
+      if (element.tag == kClassOfFile) look_.image = is_image_class(value);
+      at_ += element.length;
+    }
+    std::string& syntax = look_.syntax;
+    syntax = syntax.substr(0, syntax.find_last_not_of(std::string_view("\0 ", 2)) + 1);
+    return true;
+  }
+
+  // Images of CT and MR, each slice for itself or all in one file (PS3.4 section B.5).
+  static bool is_image_class(std::string_view uid) {
+    uid = uid.substr(0, uid.find_last_not_of(std::string_view("\0 ", 2)) + 1);
+    return uid == "1.2.840.10008.5.1.4.1.1.2" || uid == "1.2.840.10008.5.1.4.1.1.2.1" ||
+           uid == "1.2.840.10008.5.1.4.1.1.4" || uid == "1.2.840.10008.5.1.4.1.1.4.1";
+  }
+
+  bool is_capital(std::size_t at) const { return bytes_[at] >= 'A' && bytes_[at] <= 'Z'; }
+
+  // An element with a value representation has the two letters of it behind its tag.
+  bool is_explicit(std::size_t at) const {
+    return at + 8 <= bytes_.size() && is_capital(at + 4) && is_capital(at + 5);
+  }
+
   std::size_t left() const { return bytes_.size() - at_; }
 
   std::uint32_t number(std::size_t at, std::size_t count) const {
     std::uint32_t value = 0;
-    for (std::size_t k = count; k-- > 0;) {
-      value = value << 8U | static_cast<unsigned char>(bytes_[at + k]);
+    for (std::size_t k = 0; k < count; ++k) {
+      const std::size_t next = big_endian_ ? at + k : at + count - 1 - k;
+      value = value << 8U | static_cast<unsigned char>(bytes_[next]);
     }
     return value;
   }
@@ -87,8 +160,15 @@ class Walker {
     constexpr std::size_t kShort = 21;  // so many have two bytes of length, the rest four
     element.vr = bytes_.substr(at_, 2);
     const auto known = std::find(kKnown.begin(), kKnown.end(), element.vr);
-    if (known == kKnown.end()) return false;
-    if (known - kKnown.begin() < static_cast<std::ptrdiff_t>(kShort)) {
+    bool is_short = known - kKnown.begin() < static_cast<std::ptrdiff_t>(kShort);
+    if (known == kKnown.end()) {
+      const bool is_private = (element.tag >> 16U) % 2 == 1;
+      if (!is_private) return false;
+      is_short = !has_long_length();
+      element.vr = is_short ? "ST" : "UN";
+      look_.patches.push_back({at_, std::string(element.vr)});
+    }
+    if (is_short) {
       element.length = number(at_ + 2, 2);
       at_ += 4;
       return true;
@@ -97,6 +177,15 @@ class Walker {
     element.length = number(at_ + 4, 4);
     at_ += 8;
     return true;
+  }
+
+  // Of a representation that the standard lacks: letters are of a later one, which has four bytes
+  // of length (PS3.5 section 6.2); others have two, but for those that leave them empty.
+  bool has_long_length() const {
+    if (is_capital(at_) && is_capital(at_ + 1)) return true;
+    if (number(at_ + 2, 2) != 0 || left() < 8) return false;
+    const bool next_is_head = is_explicit(at_ + 4) || number(at_ + 4, 2) == kItem >> 16U;
+    return !next_is_head && number(at_ + 4, 4) <= left() - 8;
   }
 
   // The values that GDCM takes for granted: how a pixel is stored (PS3.3 section C.7.6.3).
@@ -124,6 +213,7 @@ class Walker {
       if (!read_head(explicit_vr, element) || at_ > end) return false;
       if (last != 0 && element.tag == last) return element.length == 0;
       if (element.tag >> 16U == kItem >> 16U) return false;
+      const std::size_t start = at_;
       const bool items = element.vr == "SQ" || element.length == kUndefinedLength;
       if (items) {
         // Of unknown representation and undefined length: implicit (PS3.5 section 6.2.2).
@@ -133,9 +223,25 @@ class Walker {
         if (element.length > end - at_ || !is_sound_value(element)) return false;
         at_ += element.length;
       }
-      if (depth == 0 && element.tag == kPixelData) pixels_end_ = at_;
+      if (depth == 0) note(element, start);
     }
     return last == 0 && at_ == end;
+  }
+
+  // What matters of an element of the data set itself, whose value lies from `start` to here.
+  void note(const Element& element, std::size_t start) {
+    const std::string_view value = bytes_.substr(start, at_ - start);
+    if (element.tag == kRows || (element.tag == kClass && is_image_class(value))) {
+      look_.image = true;
+    }
+    if (element.tag == kPixelData || element.tag == kFloatPixels || element.tag == kDoublePixels) {
+      look_.pixels = true;
+      look_.end = at_;
+    }
+    constexpr std::string_view kInverse = "MONOCHROME1";
+    if (element.tag == kPhotometric && value.substr(0, kInverse.size()) == kInverse) {
+      look_.patches.push_back({start + kInverse.size() - 1, "2"});
+    }
   }
 
   bool walk_items(bool explicit_vr, const Element& sequence, std::size_t outer, int depth) {
@@ -163,25 +269,32 @@ class Walker {
   }
 
   std::string_view bytes_;
-  std::size_t at_ = 0, pixels_end_ = 0;  // of the data set's own pixels
+  std::size_t at_ = 0;
+  bool big_endian_ = false;
+  DicomLook look_;
 };
 
 }  // namespace
 
-DicomForm check_dicom(const std::filesystem::path& path, std::size_t* end) {
+DicomLook look_at_dicom(const std::filesystem::path& path) {
+  constexpr std::size_t kLeast = kPreamble + kMagic;
   std::ifstream stream(path, std::ios::binary);
-  std::string head(kPreamble + 4, '\0');
-  if (!stream.read(head.data(), static_cast<std::streamsize>(head.size())) ||
-      (head.substr(kPreamble) != "DICM" && (head[0] != 8 || head[1] != 0))) {
-    return DicomForm::kNone;
+  std::string bytes(kLeast, '\0');
+  if (!stream.read(bytes.data(), static_cast<std::streamsize>(kLeast))) return {};
+  const bool headed = bytes.substr(kPreamble) == "DICM";
+  const auto begins = [&](std::size_t at) {
+    return (bytes[at] == 2 || bytes[at] == 8) && bytes[at + 1] == 0;
+  };
+  // Long files that are something else are not read.
+  if (!headed && !begins(0) && !begins(kPreamble)) {
+    std::string next(2, '\0');
+    if (!stream.read(next.data(), 2) || next[1] != 0 || (next[0] != 2 && next[0] != 8)) return {};
+    bytes += next;
   }
-  const std::string bytes = head + std::string(std::istreambuf_iterator<char>(stream), {});
-  Walker walker(bytes);
-  const DicomForm form = head.substr(kPreamble) == "DICM" ? walker.check()
-                         : walker.is_bare()               ? DicomForm::kBare
-                                                          : DicomForm::kNone;
-  if (end != nullptr) *end = walker.pixels_end();
-  return form;
+  bytes.append(std::istreambuf_iterator<char>(stream), {});
+  return Walker(bytes).look();
 }
+
+DicomForm check_dicom(const std::filesystem::path& path) { return look_at_dicom(path).form; }
 
 }  // namespace wireplan::preprocess

@@ -4,6 +4,8 @@
 /// through first.
 #include <cstddef>
 #include <filesystem>
+#include <string>
+#include <vector>
 
 namespace wireplan::preprocess {
 
@@ -12,12 +14,33 @@ enum class DicomForm {
   kDamaged,  // begins as one, but an element has no sound head or reaches beyond the end
   kSound,
   kPadded,  // sound, but behind the pixels there are bytes that are no element
-  kBare,    // a sound data set with pixels that lacks the head of a file, as old archives write it
+  kBare,    // sound, but without what GDCM looks for first: preamble, "DICM", transfer syntax
 };
 
-/// Walks all elements, those of sequences too, down to the last byte or to that of the pixels. Of
-/// big endian and deflated data sets the head of the file alone is looked at. `end` becomes where
-/// the pixels of a padded or bare one end.
-DicomForm check_dicom(const std::filesystem::path& path, std::size_t* end = nullptr);
+/// Bytes that stand in the place of others, so that a library reads what is meant.
+struct DicomPatch {
+  std::size_t at = 0;
+  std::string bytes;
+};
+
+/// What a walk through all elements, those of sequences too, finds.
+struct DicomLook {
+  DicomForm form = DicomForm::kNone;
+  std::string syntax;  // UID of its transfer syntax; empty where the file does not tell
+  bool explicit_vr = true;
+  bool pixels = false;              // whether it has some of its own; true where it may have
+  bool image = false;               // whether it says that it is one, with pixels or without
+  std::size_t begin = 0, end = 0;   // of the data set, up to its pixels' end
+  std::vector<DicomPatch> patches;  // of an otherwise sound file
+};
+
+/// Walks down to the last byte or to that of the pixels. Of deflated data sets the head of the file
+/// alone is looked at, and of those in a syntax that GDCM does not know as far as it can be.
+/// Patches are for private elements of representations that the standard lacks ("??", blanks,
+/// zeros), as old scanners write them, and for MONOCHROME1, at which ITK turns the values upside
+/// down although it tells how they are shown alone (PS3.3 section C.7.6.3.1.2).
+DicomLook look_at_dicom(const std::filesystem::path& path);
+
+DicomForm check_dicom(const std::filesystem::path& path);
 
 }  // namespace wireplan::preprocess

@@ -5,7 +5,6 @@
 #include <cstdint>
 
 #include "gdcmAttribute.h"
-#include "gdcmReader.h"
 #include "gdcmSequenceOfItems.h"
 
 namespace wireplan::preprocess {
@@ -32,13 +31,6 @@ bool read_numbers(const gdcm::DataSet& data, std::array<double, kCount>& to) {
   const double* values = attribute.GetValues();
   std::copy(values, values + kCount, to.begin());
   return true;
-}
-
-std::string read_text(const gdcm::DataSet& data, const gdcm::Tag& tag) {
-  if (!data.FindDataElement(tag)) return {};
-  const gdcm::ByteValue* bytes = data.GetDataElement(tag).GetByteValue();
-  if (bytes == nullptr) return {};
-  return without_padding({bytes->GetPointer(), bytes->GetLength()});
 }
 
 /// What one functional group, shared or of the frame, tells.
@@ -70,7 +62,7 @@ void read_groups(const gdcm::DataSet& groups, DicomFrame& frame, Told& told) {
     std::array<double, 1> number{};
     if (read_numbers<0x0028, 0x1053>(scale, number)) frame.slope = number[0];
     if (read_numbers<0x0028, 0x1052>(scale, number)) frame.intercept = number[0];
-    frame.unit = read_text(scale, {0x0028, 0x1054});
+    frame.unit = dicom_text(scale, {0x0028, 0x1054});
   });
 }
 
@@ -81,13 +73,16 @@ std::string without_padding(std::string text) {
   return text;
 }
 
-std::vector<DicomFrame> read_dicom_frames(const std::filesystem::path& path) {
-  const gdcm::Tag pixels(0x7fe0, 0x0010), shared(0x5200, 0x9229), each(0x5200, 0x9230);
-  gdcm::Reader reader;
-  reader.SetFileName(path.c_str());
+std::string dicom_text(const gdcm::DataSet& data, const gdcm::Tag& tag) {
+  if (!data.FindDataElement(tag)) return {};
+  const gdcm::ByteValue* bytes = data.GetDataElement(tag).GetByteValue();
+  if (bytes == nullptr) return {};
+  return without_padding({bytes->GetPointer(), bytes->GetLength()});
+}
+
+std::vector<DicomFrame> read_dicom_frames(const gdcm::DataSet& data) {
+  const gdcm::Tag shared(0x5200, 0x9229), each(0x5200, 0x9230);
   std::vector<DicomFrame> frames;
-  if (!reader.ReadUpToTag(pixels, {})) return frames;
-  const gdcm::DataSet& data = reader.GetFile().GetDataSet();
   if (!data.FindDataElement(each)) return frames;
 
   DicomFrame common;
@@ -99,7 +94,12 @@ std::vector<DicomFrame> read_dicom_frames(const std::filesystem::path& path) {
     DicomFrame frame = common;
     Told told = told_of_all;
     read_groups(items->GetItem(k).GetNestedDataSet(), frame, told);
-    frame.placed = told.position && told.orientation && told.spacing;
+    const auto require = [&](bool is_told, const char* what) {
+      if (!is_told) frame.lacks += (frame.lacks.empty() ? "" : ", ") + std::string(what);
+    };
+    require(told.position, kPositionTag);
+    require(told.orientation, kOrientationTag);
+    require(told.spacing, kSpacingTag);
     frames.push_back(frame);
   }
   return frames;

@@ -2,7 +2,6 @@
 
 #include <Eigen/Eigenvalues>  // before ITK, which would bring in its own older copy
 #include <algorithm>
-#include <cctype>
 #include <cmath>
 #include <numeric>
 #include <sstream>
@@ -60,31 +59,6 @@ std::string find_uneven(const std::vector<double>& positions) {
   return text.str();
 }
 
-/// Day, month and year (DA, PS3.5 section 6.2: "19540321") as people order them.
-std::vector<std::string> orders_of_date(const std::string& date) {
-  const std::string year = date.substr(0, 4), month = date.substr(4, 2), day = date.substr(6, 2);
-  std::vector<std::string> orders;
-  for (const std::string& y : {year, year.substr(2)}) {
-    orders.push_back(y + month + day);
-    orders.push_back(day + month + y);
-    orders.push_back(month + day + y);
-  }
-  return orders;
-}
-
-std::string only(const std::string& text, int (*kept)(int), char other) {
-  std::string result;
-  for (const char c : text) {
-    const auto byte = static_cast<unsigned char>(c);
-    if (kept(byte) != 0 || byte >= 0x80) {
-      result += static_cast<char>(std::tolower(byte));
-    } else if (other != '\0') {
-      result += other;
-    }
-  }
-  return result;
-}
-
 }  // namespace
 
 Stack stack(const std::vector<Vec3>& origins, const Grid& first) {
@@ -115,29 +89,6 @@ Stack stack(const std::vector<Vec3>& origins, const Grid& first) {
   grid.size[2] = static_cast<int>(origins.size());
   grid.spacing[2] = along / static_cast<double>(origins.size() - 1);
   return stack;
-}
-
-std::string without_identity(const std::string& description, const std::vector<std::string>& tags) {
-  constexpr std::size_t kDate = 8, kLong = 4, kShort = 2;  // characters
-  const std::string digits = only(description, std::isdigit, '\0');
-  const std::string words = " " + only(description, std::isalnum, ' ') + " ";
-  for (const std::string& tag : tags) {
-    if (tag.size() == kDate && only(tag, std::isdigit, '\0') == tag) {
-      for (const std::string& date : orders_of_date(tag)) {
-        if (digits.find(date) != std::string::npos) return {};
-      }
-    }
-    std::istringstream parts(only(tag, std::isalnum, ' '));
-    for (std::string part; parts >> part;) {
-      // A short part, as the name Li, counts as a word of its own alone; a short number, not at
-      // all.
-      const bool number = only(part, std::isdigit, '\0') == part;
-      if (part.size() < (number ? kLong : kShort)) continue;
-      const std::string sought = part.size() < kLong ? " " + part + " " : part;
-      if (words.find(sought) != std::string::npos) return {};
-    }
-  }
-  return description;
 }
 
 }  // namespace wireplan::preprocess

@@ -78,7 +78,7 @@ Image read_told(const fs::path& path, const std::string& series, VolumeHeader& t
   Image image;
   if (fs::is_directory(path, unknown)) {
     told.format = "DICOM";
-    image = call_itk(path, damaged("DICOM"), [&] { return read_dicom_folder(path, series); });
+    image = call_itk(path, damaged("DICOM"), [&] { return read_dicom(path, series); });
   } else if (!series.empty()) {
     throw Error(path.string() + ": series \"" + series +
                 "\" of a file, expected a folder of DICOM files; a file holds one volume");

@@ -40,6 +40,7 @@ struct Image {
   Grid grid;
   std::vector<float> values;  // HU (or plain intensity where the file has no HU), grid.index order
   std::string modality = {};  // "CT", "MR", ...: what made it; empty where the file does not tell
+  std::string unit = {};      // of the values, by a DICOM file's rescale type; empty the same
   std::vector<std::string> remarks = {};  // what a person should know of how it was read
 };
 
@@ -52,14 +53,14 @@ struct Mask {
 /// (no_imaging.cpp).
 bool reads_volumes();
 
-/// Reads a folder of DICOM files (one series, sorted by position), .nii, .nii.gz, .nrrd, .nhdr,
-/// .mha or .mhd, with the header's direction, spacing, slope and intercept honoured. One value per
-/// voxel, one volume (4D with a single volume is fine). Of several DICOM series that of this number
-/// or description is read; without either the one that alone has a volume's shape. Throws `Error`
-/// for a missing file, one that is no image or cut short, values that are not finite, a sheared
-/// grid, and a folder with several volumes (listed with number, description, slices and spacing),
-/// missing or uneven slices (with the place), slices of one place, or a tilted gantry (with the
-/// angle). Messages never quote a patient's data.
+/// Reads a folder of DICOM files (one series, sorted by position), an enhanced DICOM file, .nii,
+/// .nii.gz, .nrrd, .nhdr, .mha or .mhd, with the header's direction, spacing, slope and intercept
+/// honoured. One value per voxel, one volume (4D with a single volume is fine). Of several DICOM
+/// series that of this number, description or key is read; without either the one that alone has a
+/// volume's shape. Throws `Error` for a missing file, one that is no image or cut short, values
+/// that are not finite, a sheared grid, and a folder with several volumes (listed with number,
+/// description, slices and spacing), missing or uneven slices (with the place), slices of one
+/// place, or a tilted gantry (with the angle). Messages never quote a patient's data.
 Image read_image(const std::filesystem::path& path, const std::string& series = "");
 
 /// Writes NRRD (space LPS, gzip) of 16 bit integers, values rounded and kept in -32768..32767. The

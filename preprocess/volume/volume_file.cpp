@@ -19,6 +19,7 @@
 #include "itkMetaImageIO.h"
 #include "preprocess/volume/byte_stream.h"
 #include "preprocess/volume/dicom_check.h"
+#include "preprocess/volume/dicom_series.h"
 #include "preprocess/volume/nifti_file.h"
 #include "preprocess/volume/nrrd_file.h"
 
@@ -70,6 +71,7 @@ struct MetaHeader {
   std::string data_file;   // "LOCAL", or where the voxels are
   std::streamoff end = 0;  // where voxels of this file begin
   double packed = 0.0;     // bytes, where the voxels are compressed
+  std::string modality;    // as DICOM has it; empty where the header does not tell
   std::string unit;        // of length, as it is told
   double mm = 1.0;         // of a unit of length
 };
@@ -81,6 +83,14 @@ double meta_unit(const std::string& unit, const fs::path& path) {
   if (name == "cm") return 10.0;
   throw Error(path.string() + ": DistanceUnits is " + unit +
               ", expected um, mm or cm; mend the header");
+}
+
+/// "MR" of MET_MOD_MR (metaTypes.h); nothing of MET_MOD_OTHER and MET_MOD_UNKNOWN.
+std::string meta_modality(const std::string& name) {
+  static const std::set<std::string> kTold = {"CT", "MR", "NM", "US"};
+  const std::string start = "MET_MOD_";
+  const std::string modality = name.starts_with(start) ? name.substr(start.size()) : name;
+  return kTold.count(modality) > 0 ? modality : "";
 }
 
 bool is_plain(const std::string& line) {
@@ -122,6 +132,7 @@ std::vector<MetaLine> read_meta_lines(std::istream& file, const fs::path& path,
     const MetaLine line = meta_line(text);
     const bool first = keys.insert(line.key).second;
     header.has_more = header.has_more || line.text != text;
+    if (first && line.key == "Modality") header.modality = meta_modality(line.value);
     if (count_meta_numbers(line.key, 1) < 0 && kTexts.count(line.key) == 0) {
       const bool word = line.key.find_first_of(" \t") == std::string::npos;
       if (first && word && !line.key.empty() && is_plain(line.text)) {
@@ -301,6 +312,7 @@ Image read_meta(const fs::path& path, VolumeHeader& told) {
   require_whole_meta(*io, header, meta, path);
   Image image = call_itk(path, damaged("MetaImage"),
                          [&] { return read_meta_voxels(*io, header, meta, path); });
+  image.modality = header.modality;
   scale_values(meta.ElementToIntensityFunctionSlope(), meta.ElementToIntensityFunctionOffset(),
                image.values);
   return image;
@@ -318,8 +330,8 @@ Image read_file(const fs::path& path, VolumeHeader& told) {
   if (ends_with(path, ".nrrd", ".nhdr")) return std::move(read_nrrd(path, told, false).front());
   if (ends_with(path, ".mha", ".mhd")) return read_meta(path, told);
   if (check_dicom(path) != DicomForm::kNone) {
-    throw Error(path.string() +
-                ": a single DICOM file; give the folder that holds the whole series");
+    told.format = "DICOM";
+    return call_itk(path, damaged("DICOM"), [&] { return read_dicom(path, ""); });
   }
   throw Error(path.string() + ": not an image that wireplan reads; " + kFormats);
 }

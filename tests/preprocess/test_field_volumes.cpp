@@ -10,19 +10,13 @@
 #include <fstream>
 #include <sstream>
 
-#include "preprocess/volume/dicom_check.h"
 #include "preprocess/volume/image.h"
 #include "preprocess/volume/voxels.h"
-#include "tests/dicom.h"
 #include "tests/preprocess/image_file.h"
 #include "tests/preprocess/nifti_bytes.h"
 
 namespace wireplan::preprocess {
 namespace {
-
-using dicom_files::dicom;
-using dicom_files::DicomSlice;
-using dicom_files::element;
 
 /// The same bytes in gzip members of so many bytes each.
 std::string gzip(const std::string& bytes, std::size_t member) {
@@ -362,152 +356,16 @@ TEST_F(FieldVolume, MetaImageMayHoldLinesThatAreNoKeysAndNameAnyFile) {
   EXPECT_TRUE(has(twice, "twice.mha: its header has two lines of NDims")) << twice;
 }
 
-// ---- DICOM --------------------------------------------------------------------------------------
-
-/// A sequence of items, each of whose elements are given as bytes.
-std::string sequence(std::uint16_t group, std::uint16_t number,
-                     const std::vector<std::string>& items) {
-  std::string inside;
-  for (const std::string& item : items) {
-    dicom_files::append(inside, std::uint16_t{0xfffe});
-    dicom_files::append(inside, std::uint16_t{0xe000});
-    dicom_files::append(inside, static_cast<std::uint32_t>(item.size()));
-    inside += item;
+TEST_F(FieldVolume, MetaImageTellsItsModality) {
+  for (const auto& [told, modality] :
+       {std::pair("Modality = MET_MOD_MR\n", "MR"), std::pair("Modality = MET_MOD_CT\n", "CT"),
+        std::pair("Modality = MET_MOD_UNKNOWN\n", ""), std::pair("", "")}) {
+    const Image image = read_image(
+        write("told.mha", std::string("ObjectType = Image\nNDims = 3\n") + told +
+                              "DimSize = 2 2 2\nElementSpacing = 1 2 3\nOffset = 4 5 6\n"
+                              "ElementType = MET_UCHAR\nElementDataFile = LOCAL\nabcdefgh"));
+    EXPECT_EQ(image.modality, modality) << told;
   }
-  std::string bytes;
-  dicom_files::append(bytes, group);
-  dicom_files::append(bytes, number);
-  bytes += "SQ";
-  dicom_files::append(bytes, std::uint16_t{0});
-  dicom_files::append(bytes, static_cast<std::uint32_t>(inside.size()));
-  return bytes + inside;
-}
-
-std::string of(std::uint16_t group, std::uint16_t number, const std::string& vr,
-               const std::string& value) {
-  std::string bytes;
-  element(bytes, group, number, vr, value);
-  return bytes;
-}
-
-struct Frame {
-  double place = 0.0;  // along z                                                          [mm]
-  std::string slope = "1", intercept = "0";
-  std::string unit = "HU";
-};
-
-/// An enhanced CT of frames of 3 x 2 pixels, of values 10 k, 10 k + 1, ... in frame k.
-std::string enhanced(const std::vector<Frame>& frames, bool placed = true,
-                     const std::string& spacing = "0.8\\0.6") {
-  const std::string ct = "1.2.840.10008.5.1.4.1.1.2.1";
-  std::string meta = of(2, 0x01, "OB", std::string("\0\1", 2)) + of(2, 0x02, "UI", ct) +
-                     of(2, 0x03, "UI", "1.2.3.9") + of(2, 0x10, "UI", "1.2.840.10008.1.2.1");
-  std::string length;
-  dicom_files::append(length, static_cast<std::uint32_t>(meta.size()));
-  std::string voxels;
-  std::vector<std::string> groups;
-  for (std::size_t k = 0; k < frames.size(); ++k) {
-    const Frame& frame = frames[k];
-    std::string group;
-    if (placed) {
-      group +=
-          sequence(0x20, 0x9113,
-                   {of(0x20, 0x32, "DS", "5\\6\\" + std::to_string(frame.place).substr(0, 6))});
-    }
-    group += sequence(0x28, 0x9145,
-                      {of(0x28, 0x1052, "DS", frame.intercept) +
-                       of(0x28, 0x1053, "DS", frame.slope) + of(0x28, 0x1054, "LO", frame.unit)});
-    groups.push_back(group);
-    for (int n = 0; n < 6; ++n) {
-      dicom_files::append(voxels, static_cast<std::int16_t>(10 * static_cast<int>(k) + n));
-    }
-  }
-  const std::string shared =
-      sequence(0x20, 0x9116, {of(0x20, 0x37, "DS", "1\\0\\0\\0\\1\\0")}) +
-      sequence(0x28, 0x9110, {of(0x18, 0x50, "DS", "9") + of(0x28, 0x30, "DS", spacing)});
-  using dicom_files::short_value;
-  return std::string(128, '\0') + "DICM" + of(2, 0, "UL", length) + meta +
-         of(0x08, 0x16, "UI", ct) + of(0x08, 0x18, "UI", "1.2.3.9") + of(0x08, 0x60, "CS", "CT") +
-         of(0x20, 0x0d, "UI", "1.2.3") + of(0x20, 0x0e, "UI", "1.2.4") + of(0x20, 0x11, "IS", "7") +
-         of(0x28, 0x02, "US", short_value(1)) + of(0x28, 0x04, "CS", "MONOCHROME2") +
-         of(0x28, 0x08, "IS", std::to_string(frames.size())) +
-         of(0x28, 0x10, "US", short_value(2)) + of(0x28, 0x11, "US", short_value(3)) +
-         of(0x28, 0x100, "US", short_value(16)) + of(0x28, 0x101, "US", short_value(16)) +
-         of(0x28, 0x102, "US", short_value(15)) + of(0x28, 0x103, "US", short_value(1)) +
-         sequence(0x5200, 0x9229, {shared}) + sequence(0x5200, 0x9230, groups) +
-         of(0x7fe0, 0x10, "OW", voxels);
-}
-
-TEST_F(FieldVolume, FramesOfAnEnhancedCtAreSortedAndEachScaledByItsOwnSlope) {
-  write("ct.dcm", enhanced({{.place = 4.5, .slope = "0.5"},
-                            {.place = 0.0, .intercept = "-1000"},
-                            {.place = 1.5},
-                            {.place = 3.0, .slope = "2"}}));
-  const Image image = read_image(folder_);
-  ASSERT_EQ(image.grid.size, (std::array<int, 3>{3, 2, 4}));
-  EXPECT_LT((image.grid.spacing - Vec3(0.6, 0.8, 1.5)).norm(), 1e-6);
-  EXPECT_LT((image.grid.origin - Vec3(5, 6, 0)).norm(), 1e-6);
-  EXPECT_EQ(image.modality, "CT");
-  for (int n = 0; n < 6; ++n) {
-    EXPECT_EQ(image.values[static_cast<std::size_t>(n)], 10.0F + static_cast<float>(n) - 1000.0F);
-    EXPECT_EQ(image.values[static_cast<std::size_t>(6 + n)], 20.0F + static_cast<float>(n));
-    EXPECT_EQ(image.values[static_cast<std::size_t>(12 + n)],
-              2.0F * (30.0F + static_cast<float>(n)));
-    EXPECT_EQ(image.values[static_cast<std::size_t>(18 + n)], 0.5F * static_cast<float>(n));
-  }
-}
-
-TEST_F(FieldVolume, FramesWithoutPlacesUnevenOrNotInHounsfieldUnitsAreRefused) {
-  write("ct.dcm", enhanced({{.place = 0}, {.place = 1}, {.place = 2}}, /*placed=*/false));
-  EXPECT_TRUE(has(read_error(folder_), "3 frames that does not tell where each lies"));
-  write("ct.dcm", enhanced({{.place = 0}, {.place = 1}, {.place = 3}}));
-  EXPECT_TRUE(has(read_error(folder_), "uneven slices")) << read_error(folder_);
-  write("ct.dcm", enhanced({{.place = 0}, {.place = 1, .unit = "Z_EFF"}, {.place = 2}}));
-  EXPECT_TRUE(has(read_error(folder_), "not in HU but, by its rescale type, Z_EFF"));
-  for (const char* spacing : {"-0.8\\-0.6", "0\\0", "1e9\\1e9"}) {
-    write("ct.dcm", enhanced({{.place = 0}, {.place = 1}, {.place = 2}}, true, spacing));
-    EXPECT_TRUE(has(read_error(folder_), "expected positive spacing")) << read_error(folder_);
-  }
-}
-
-TEST_F(FieldVolume, SlicesWithoutTheHeadOfAFileAndWithBytesBehindThePixelsAreRead) {
-  for (int k = 0; k < 4; ++k) {
-    std::string bytes =
-        dicom({.position = Vec3(0, 0, 1.5 * k), .first_value = static_cast<std::int16_t>(10 * k)});
-    // The data set begins with group 8.
-    const std::size_t data_set = bytes.find(std::string("\x08\x00\x16\x00UI", 6));
-    ASSERT_NE(data_set, std::string::npos);
-    if (k % 2 == 1) bytes = bytes.substr(data_set);
-    if (k >= 2) bytes += std::string(37, '\0');
-    write("slice" + std::to_string(k), bytes);
-  }
-  const Image image = read_image(folder_);
-  ASSERT_EQ(image.grid.size, (std::array<int, 3>{3, 2, 4}));
-  for (std::size_t k = 0; k < 4; ++k) {
-    EXPECT_EQ(image.values[6 * k + 5], 10.0F * static_cast<float>(k) + 5.0F);
-  }
-}
-
-TEST_F(FieldVolume, TheSeriesThatAloneIsAVolumeIsReadAmongScouts) {
-  const auto write_slice = [&](const std::string& series, int k, double place) {
-    write(series + "_" + std::to_string(k),
-          dicom({.series = "1.2." + series, .number = series, .position = Vec3(0, 0, place)}));
-  };
-  for (int k = 0; k < 6; ++k) write_slice("3", k, 2.0 * k);
-  for (int k = 0; k < 2; ++k) write_slice("1", k, 100.0 * k);
-  EXPECT_EQ(read_image(folder_).grid.size[2], 6);
-  for (int k = 0; k < 5; ++k) write_slice("4", k, 2.0 * k);
-  const std::string error = read_error(folder_);
-  EXPECT_TRUE(has(error, "3 DICOM series") && has(error, "number 4 has 5 images of 3 x 2 pixels"))
-      << error;
-}
-
-TEST_F(FieldVolume, ManyImagesOfOnePlaceAreNoVolume) {
-  for (int k = 0; k < 5; ++k) {
-    write("slice" + std::to_string(k), dicom({.position = Vec3(0, 0, k == 4 ? 1.0 : 0.0)}));
-  }
-  const std::string error = read_error(folder_);
-  EXPECT_TRUE(has(error, "at the same place (5 images, places: 2;")) << error;
 }
 
 // ---- Voxels between thick slices ----------------------------------------------------------------

@@ -289,8 +289,8 @@ TEST_F(DicomFolder, SeveralSeriesAreListedByNumberOfSlices) {
   const std::string error = read_error(folder_);
   EXPECT_TRUE(
       has(error,
-          "2 DICOM series, expected one: number 2 has 3 images of 3 x 2 pixels, 1.5 mm apart; "
-          "number 1 has 2 images"))
+          "2 DICOM series, expected one: number 2 has 3 images of 3 x 2 pixels of 0.6 x 0.8 mm, "
+          "1.5 mm apart; number 1 has 2 images"))
       << error;
   EXPECT_FALSE(has(error, "LOVELACE") || has(error, "1.2.3.")) << error;
 }
