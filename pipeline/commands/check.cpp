@@ -33,7 +33,9 @@ void check_volume(const Case& given, Problems& problems, std::vector<std::string
   for (std::size_t k = 0; k < given.segmentation.seeds.size(); ++k) {
     expect_inside("segmentation.seeds_mm[" + std::to_string(k) + "]", given.segmentation.seeds[k]);
   }
-  if (given.labels && problems.empty()) told = check_labels(given, &image);
+  for (const std::string& line : warn_of_values(image)) told.push_back("mind: " + line);
+  if (!given.labels || !problems.empty()) return;
+  for (const std::string& line : check_labels(given, &image)) told.push_back(line);
 }
 
 std::vector<std::string> check_surface_file(const Case& given, Problems& problems) {
@@ -49,19 +51,21 @@ std::vector<std::string> check_surface_file(const Case& given, Problems& problem
     }
   };
   for (const auto& [key, point] : end_points(given)) expect_inside(key, point);
-  return preprocess::tell_mends(repaired.mends);
+  std::vector<std::string> told = preprocess::tell_mends(repaired.mends);
+  for (std::string& line : told) line = "mended: " + line;
+  return told;
 }
 
 }  // namespace
 
 std::vector<std::string> check_input(const Case& given) {
   Problems problems(given.file.string());
-  std::vector<std::string> mended;
-  if (given.volume) check_volume(given, problems, mended);
-  if (given.labels && !given.volume) mended = check_labels(given, nullptr);
-  if (given.surface_input) mended = check_surface_file(given, problems);
+  std::vector<std::string> told;
+  if (given.volume) check_volume(given, problems, told);
+  if (given.labels && !given.volume) told = check_labels(given, nullptr);
+  if (given.surface_input) told = check_surface_file(given, problems);
   problems.throw_if_any();
-  return mended;
+  return told;
 }
 
 }  // namespace wireplan::pipeline

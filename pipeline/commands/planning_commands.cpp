@@ -115,6 +115,7 @@ std::string stage_line(const StageOutcome& outcome, bool with_reasons) {
       line += "\n            and " + std::to_string(count - kShown) + " differences more";
     }
   }
+  for (const std::string& warning : outcome.warnings) line += "\n            mind: " + warning;
   return line;
 }
 

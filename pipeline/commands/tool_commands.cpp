@@ -87,7 +87,7 @@ int check_file(const std::string& path, const std::vector<std::string>& override
     const std::vector<std::string> told = check_input(given);
     std::cout << given.file.string() << ": the case is in order, "
               << plan::list_candidates(given.study).size() << " trials\n";
-    print_told(told, given.labels ? "" : "mended: ");  // labels are told as the stage tells them
+    print_told(told, "");
     print_told(given.told, "");
     const simulate::InsertionOptions& insertion = given.study.insertion;
     print_told(tell_friction(given.devices, insertion), "");

@@ -87,6 +87,7 @@ Json placement_json(const preprocess::Grid& grid) {
 Json series_json(const preprocess::SeriesDescription& series) {
   const preprocess::Grid& grid = series.grid;
   Json told = {{"number", told_or_null(series.number)},
+               {"key", series.key},
                {"description", told_or_null(series.description)},
                {"modality", told_or_null(series.modality)},
                {"value_unit", told_or_null(series.unit)},
@@ -95,7 +96,8 @@ Json series_json(const preprocess::SeriesDescription& series) {
                {"images", series.images},
                {"columns", grid.size[0]},
                {"rows", grid.size[1]}};
-  told["pixel_spacing_mm"] = {grid.spacing[0], grid.spacing[1]};
+  told["pixel_spacing_mm"] = nullptr;
+  if (series.spaced) told["pixel_spacing_mm"] = Json::array({grid.spacing[0], grid.spacing[1]});
   told["slice_spacing_mm"] = series.placed ? Json(grid.spacing[2]) : Json(nullptr);
   told["orientation"] = orientation_of(grid.direction);
   told["read"] = series.read;

@@ -41,10 +41,22 @@ std::string text_or(const Json& value, const char* otherwise) {
   return value.is_string() ? value.get<std::string>() : otherwise;
 }
 
-std::string series_text(const Json& series) {
+/// Whether neither its number nor its description tells a series from the others.
+bool needs_key(const Json& series, const Json& all) {
+  if (series["number"].is_null() && series["description"].is_null()) return true;
+  return std::any_of(all.begin(), all.end(), [&](const Json& other) {
+    return other["key"] != series["key"] && other["number"] == series["number"] &&
+           other["description"] == series["description"];
+  });
+}
+
+std::string series_text(const Json& series, const Json& all) {
   std::string text = "  series " + text_or(series["number"], "without number");
   if (series["description"].is_string()) {
     text += " \"" + series["description"].get<std::string>() + "\"";
+  }
+  if (needs_key(series, all)) {
+    text += " (\"" + series["key"].get<std::string>() + "\" in a case)";
   }
   text += ", " + text_or(series["modality"], "modality unknown") +
           (series["read"].get<bool>() ? ": the one that wireplan reads\n" : ": not read\n");
@@ -52,7 +64,9 @@ std::string series_text(const Json& series) {
   text += "    images       " + counted(images, files == images ? "slice" : "frame") + " in " +
           counted(files, "file") + ", " + std::to_string(series["columns"].get<int>()) + kBy +
           std::to_string(series["rows"].get<int>()) + " pixels of " +
-          joined_numbers(series["pixel_spacing_mm"], kBy) + " mm" +
+          (series["pixel_spacing_mm"].is_array()
+               ? joined_numbers(series["pixel_spacing_mm"], kBy) + " mm"
+               : "unknown size") +
           (series["slice_spacing_mm"].is_number()
                ? format(", %.5g mm apart", series["slice_spacing_mm"].get<double>())
                : "") +
@@ -105,12 +119,14 @@ Lines volume_lines(const Json& told) {
   }
   if (volume.contains("values")) {
     const bool image = told["kind"] == "image";
-    const bool ct = text_or(volume["modality"], "") == "CT";
-    lines.emplace_back("values", format("%.6g to %.6g", volume["values"][0].get<double>(),
-                                        volume["values"][1].get<double>()) +
-                                     (ct      ? " HU"
-                                      : image ? ", which a case takes as HU (no modality is told)"
-                                              : ""));
+    const std::string modality = text_or(volume["modality"], "");
+    lines.emplace_back(
+        "values", format("%.6g to %.6g", volume["values"][0].get<double>(),
+                         volume["values"][1].get<double>()) +
+                      (modality == "CT"    ? " HU"
+                       : !modality.empty() ? ", no Hounsfield units: its modality is " + modality
+                       : image             ? ", which a case takes as HU (no modality is told)"
+                                           : ""));
   }
   return lines;
 }
@@ -193,7 +209,7 @@ std::string inspect_text(const Json& told) {
   if (kind == "dicom") {
     const Json series = told.value("series", Json::array());
     text += ", " + std::to_string(series.size()) + " series\n";
-    for (const Json& one : series) text += series_text(one);
+    for (const Json& one : series) text += series_text(one, series);
   } else {
     text += told["format"] == "folder" ? " of labels, one file per class\n"
             : kind == "labels"         ? ", a volume of labels\n"

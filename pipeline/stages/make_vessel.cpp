@@ -276,6 +276,20 @@ void require_inside(const Surface& surface, const fs::path& folder, const std::s
 
 }  // namespace
 
+std::vector<std::string> warn_of_values(const preprocess::Image& image) {
+  std::vector<std::string> warnings;
+  if (!image.modality.empty() && image.modality != "CT") {
+    warnings.push_back("volume: its modality is " + image.modality +
+                       ", not CT: values are no Hounsfield units");
+  } else if (!image.unit.empty() && image.unit != "HU") {
+    warnings.push_back("volume: its values are of rescale type " + image.unit +
+                       (image.unit == "US" ? " (unspecified)" : " (modified)") +
+                       ", taken as Hounsfield units");
+  }
+  for (const std::string& remark : image.remarks) warnings.push_back("volume: " + remark);
+  return warnings;
+}
+
 void make_volume(Workspace& work, const fs::path& folder) {
   const preprocess::Image& image = work.image();
   const preprocess::Grid& grid = image.grid;
@@ -294,11 +308,7 @@ void make_volume(Workspace& work, const fs::path& folder) {
   figures["min_hu"] = *low;
   figures["mean_hu"] = sum / static_cast<double>(image.values.size());
   figures["max_hu"] = *high;
-  if (!image.modality.empty() && image.modality != "CT") {
-    figures["warnings"].push_back("volume: its modality is " + image.modality +
-                                  ", not CT: values are no Hounsfield units");
-  }
-  for (const std::string& line : image.remarks) figures["warnings"].push_back("volume: " + line);
+  for (const std::string& line : warn_of_values(image)) figures["warnings"].push_back(line);
   write_figures(figures, folder);
 }
 

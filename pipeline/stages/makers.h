@@ -27,6 +27,9 @@ void make_manoeuvres(Workspace& work, const std::filesystem::path& folder);
 void make_plans(Workspace& work, const std::filesystem::path& folder);
 void make_report(Workspace& work, const std::filesystem::path& folder);
 
+/// What the values of a volume are, where they are no plain Hounsfield units; for people.
+std::vector<std::string> warn_of_values(const preprocess::Image& image);
+
 /// What stage segment of the case's labels warns of, without a run; throws what it refuses. `image`
 /// is the case's volume, null where it has none.
 std::vector<std::string> check_labels(const Case& given, const preprocess::Image* image);

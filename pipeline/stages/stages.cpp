@@ -402,6 +402,9 @@ RunResult run_stages(const Case& given, const RunOptions& options,
       result.artifacts.push_back(*artifact);
     }
     outcome.seconds = seconds_since(start);
+    if (artifact && stage.name == "volume" && fs::exists(artifact->folder / kFiguresFile)) {
+      outcome.warnings = work.figures(stage.name).at("warnings").get<std::vector<std::string>>();
+    }
     result.stages.push_back(outcome);
     if (options.on_stage) options.on_stage(outcome);
     if (stage.name == options.to) break;

@@ -43,8 +43,9 @@ enum class StageState {
 struct StageOutcome {
   std::string stage;
   StageState state = StageState::kCached;
-  double seconds = 0.0;                   // this time: of the look-up or the run
-  std::vector<std::string> reasons = {};  // why it runs; empty where it does not
+  double seconds = 0.0;                    // this time: of the look-up or the run
+  std::vector<std::string> reasons = {};   // why it runs; empty where it does not
+  std::vector<std::string> warnings = {};  // of the volume, what its values are
 };
 
 struct RunOptions {

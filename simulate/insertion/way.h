@@ -38,8 +38,8 @@ class Way {
   const std::vector<preprocess::Branch>& tree() const { return tree_; }
   /// The branches that the way goes along, from the root; empty without a tree.
   std::vector<int> branches() const;
-  /// Of the aorta, where the way comes from a leg; where it passes several such forks, that into the
-  /// widest vessel.
+  /// Of the aorta, where the way comes from a leg; where it passes several such forks, that into
+  /// the widest vessel.
   const std::optional<Bifurcation>& bifurcation() const { return bifurcation_; }
 
   /// Whether a tip is near enough to the cross-section for find_arrival() to find one.

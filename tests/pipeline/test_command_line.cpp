@@ -10,6 +10,7 @@
 #include "pipeline/files/text.h"
 #include "preprocess/volume/image.h"
 #include "tests/dicom.h"
+#include "tests/messages.h"
 #include "tests/pipeline/finished_case.h"
 #include "tests/pipeline/program.h"
 
@@ -495,19 +496,39 @@ TEST_F(CommandLine, SegmentsAVolumeAndPlansInIt) {
   EXPECT_NEAR(report.at("vessel").at("volume_mm3").get<double>(), 4072.0, 300.0);
 }
 
-TEST_F(CommandLine, NoNameIdentityOrDateOfAPatientEntersAnyFile) {
-  if (!preprocess::reads_volumes()) GTEST_SKIP() << "built without imaging";
-  // a tube of 12 mm in a DICOM series of 40 x 40 x 36 mm
-  fs::create_directories(folder_ / "series");
+/// A tube of 12 mm in a DICOM series of 40 x 40 x 36 mm.
+void write_tube(const fs::path& folder, const std::string& modality) {
+  fs::create_directories(folder);
   for (int k = 0; k < 36; ++k) {
-    dicom_files::DicomSlice slice{.position = Vec3(0, 0, k), .columns = 40, .rows = 40};
+    dicom_files::DicomSlice slice{
+        .position = Vec3(0, 0, k), .modality = modality, .columns = 40, .rows = 40};
     for (int n = 0; n < 1600; ++n) {
       const bool lumen = std::hypot(n % 40 - 10.0, n / 40 - 20.0) < 6.0;
       slice.values.push_back(lumen ? 300 : 40);
     }
     slice.first_value = static_cast<std::int16_t>(k);
-    write_text(dicom_files::dicom(slice), folder_ / "series" / ("IM" + std::to_string(k)));
+    write_text(dicom_files::dicom(slice), folder / ("IM" + std::to_string(k)));
   }
+}
+
+TEST_F(CommandLine, AModalityOtherThanCtIsToldWhereverTheVolumeIsRead) {
+  if (!preprocess::reads_volumes()) GTEST_SKIP() << "built without imaging";
+  write_tube(folder_ / "series", "MR");
+  Json file = volume_case(case_);
+  file["volume"]["path"] = "series";
+  write_json(file, folder_ / "case.json");
+  const std::string told = "its modality is MR, not CT";
+  EXPECT_TRUE(holds(call("check case.json").out, told));
+  for (int k = 0; k < 2; ++k) {  // from the store too
+    const Answer answer = call("run case.json --to volume");
+    EXPECT_TRUE(holds(answer.out + answer.log, told)) << answer.log;
+  }
+  EXPECT_TRUE(holds(call("inspect series").out, "no Hounsfield units: its modality is MR"));
+}
+
+TEST_F(CommandLine, NoNameIdentityOrDateOfAPatientEntersAnyFile) {
+  if (!preprocess::reads_volumes()) GTEST_SKIP() << "built without imaging";
+  write_tube(folder_ / "series", "CT");
   Json file = volume_case(case_);
   file["volume"]["path"] = "series";
   file.erase("segmentation");

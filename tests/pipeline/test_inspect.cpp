@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include "pipeline/report/inspect.h"
+#include "preprocess/volume/image.h"
 #include "tests/dicom.h"
 #include "tests/messages.h"
 #include "tests/pipeline/program.h"
@@ -102,7 +103,9 @@ TEST_F(Inspect, OfSeveralSeriesTheOneThatIsReadIsTold) {
 TEST_F(Inspect, NobodyIsNamed) {
   const std::vector<std::string> telling = {
       "Thorax LOVELACE", "thorax augusta 2", "PATIENT-4711 arch",   "CT 21.03.1954",
-      "from 2026-01-15", "ACC 0815",         "Analytical protocol", "run 15/01/26"};
+      "from 2026-01-15", "ACC 0815",         "Analytical protocol", "run 15/01/26",
+      "15 Jan 2026",     "CTA 21-Mar-54",    "Jan 15, 2026",        "CTA A.L. 1.5",
+      "L. A. thorax"};
   for (std::size_t k = 0; k < telling.size(); ++k) {
     DicomSlice slice{.series = "1.2.3." + std::to_string(10 + k), .number = std::to_string(k)};
     slice.description = telling[k];
@@ -121,6 +124,41 @@ TEST_F(Inspect, NobodyIsNamed) {
     EXPECT_EQ(answer.code, 0) << answer.log;
     expect_nobody(answer.out + answer.log);
   }
+}
+
+TEST_F(Inspect, ANumberThatMayBeADateAndNamesOfFilesAreNotShown) {
+  write_series("ct", {.number = "19540321"}, 6);  // in the names of its files too
+  const Json whole = inspect(folder_ / "ct");
+  EXPECT_TRUE(whole["series"][0]["number"].is_null());
+  const std::string key = whole["series"][0]["key"];
+  EXPECT_TRUE(holds(inspect_text(whole), "series without number (\"" + key + "\" in a case)"));
+  EXPECT_EQ(preprocess::read_image(folder_ / "ct", key).grid.size[2], 6);
+  expect_nobody(inspect_text(whole));
+
+  const std::string slice = dicom_files::dicom({});
+  write("ct/19540321-2", slice.substr(0, slice.size() - 3));
+  const Json cut = inspect(folder_ / "ct");
+  EXPECT_TRUE(holds(cut["refused"], "file 3 of 6: a DICOM file that is damaged")) << cut;
+  expect_nobody(inspect_text(cut));
+  expect_nobody(cut["refused"]);
+}
+
+TEST_F(Inspect, FilesOfSeveralFramesAreNotSaidToBeRead) {
+  for (const char* name : {"frames/a", "frames/b"}) {
+    std::string bytes = dicom_files::dicom({});
+    std::string frames;
+    dicom_files::element(frames, 0x28, 0x08, "IS", "2");
+    const std::size_t rows = bytes.find(std::string("\x28\0\x10\0US", 6));
+    ASSERT_NE(rows, std::string::npos);
+    bytes.insert(rows, frames);
+    const std::size_t pixels = bytes.rfind(std::string("\xe0\x7f\x10\0OW", 6));
+    bytes[pixels + 8] = 24;  // bytes
+    write(name, bytes + bytes.substr(bytes.size() - 12));
+  }
+  const Json told = inspect(folder_ / "frames");
+  EXPECT_FALSE(told["series"][0]["read"].get<bool>());
+  EXPECT_TRUE(holds(told["series"][0]["problem"], "2 files of 2 frames each")) << told;
+  EXPECT_TRUE(holds(told["refused"], "2 files of 2 frames each")) << told;
 }
 
 TEST_F(Inspect, ADamagedFileEndsNotWhatIsToldOfTheOthers) {
