@@ -140,7 +140,7 @@ TEST_F(Markups, FrameAndUnitMayBeListsAndNothingElse) {
 
 TEST_F(Markups, TablesOfSlicer3AreReadAsRas) {
   write_text(
-      "# Fiducial List file /home/x/F.fcsv\n# version = 2\n# name = F\n"
+      "# Fiducial List file F.fcsv\n# version = 2\n# name = F\n"
       "# columns = label,x,y,z,sel,vis\nin,1,2,3,1,1\nout,-4,5.5,6,1,1\n",
       folder_ / "old.fcsv");
   const std::vector<MarkupPoint> points = read_markups(folder_ / "old.fcsv");

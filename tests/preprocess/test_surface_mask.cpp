@@ -190,60 +190,58 @@ TEST(SurfaceFromImage, LiesOnTheEdgeOfTheLumenWhateverTheMasksThresholdWas) {
   }
 }
 
-TEST(SurfaceFromImage, IsAsWideAsAMaskThatSomebodyDrew) {
+constexpr double kDrawnRadius = 5.0;
+
+/// The surface of a tube of that radius by a mask that somebody drew wider or narrower: the radius
+/// of its vertices, and by how much they differ [mm].
+struct DrawnTube {
+  FitStatistics fit;
+  double mean = 0.0, deviation = 0.0;
+};
+
+DrawnTube fit_to_mask(double off) {
   Grid grid;
   grid.size = {36, 36, 40};
   grid.spacing = {0.7, 0.7, 0.7};
   const Vec3 axis = grid.lps_from_ijk({17.3, 17.6, 0.0});
-  constexpr double kRadius = 5.0;
-  const Image image = grey_tube(grid, axis, kRadius);
+  const Image image = grey_tube(grid, axis, kDrawnRadius);
+  const Mask mask =
+      tube_mask(grid, axis - 10.0 * Vec3::UnitZ(), axis + 50.0 * Vec3::UnitZ(), kDrawnRadius + off);
+  DrawnTube tube;
+  const Surface surface =
+      surface_from_image(image, mask, {.edge_length_mm = 1.0}, &tube.fit, FitWidth::kOfMask);
+  double sum = 0.0, squares = 0.0, count = 0.0;
+  for (const auto& vertex : surface.vertices.colwise()) {
+    if (vertex.z() < 3.0 || vertex.z() > 24.0) continue;  // the caps
+    const double radius = (Vec3(vertex) - axis).head<2>().norm();
+    sum += radius;
+    squares += radius * radius;
+    count += 1.0;
+  }
+  tube.mean = sum / count;
+  tube.deviation = std::sqrt(squares / count - tube.mean * tube.mean);
+  return tube;
+}
+
+TEST(SurfaceFromImage, IsAsWideAsAMaskThatSomebodyDrew) {
   for (const double off : {-0.25, 0.0, 0.25}) {
     SCOPED_TRACE("mask off by " + std::to_string(off));
-    const Mask mask =
-        tube_mask(grid, axis - 10.0 * Vec3::UnitZ(), axis + 50.0 * Vec3::UnitZ(), kRadius + off);
-    FitStatistics fit;
-    const Surface surface =
-        surface_from_image(image, mask, {.edge_length_mm = 1.0}, &fit, FitWidth::kOfMask);
-    double sum = 0.0, squares = 0.0, count = 0.0;
-    for (const auto& vertex : surface.vertices.colwise()) {
-      if (vertex.z() < 3.0 || vertex.z() > 24.0) continue;  // the caps
-      const double radius = (Vec3(vertex) - axis).head<2>().norm();
-      sum += radius;
-      squares += radius * radius;
-      count += 1.0;
-    }
-    const double mean = sum / count;
-    EXPECT_NEAR(mean, kRadius + off, 0.08);
-    EXPECT_LT(std::sqrt(squares / count - mean * mean), 0.12);  // the mask's own stairs: 0.2
-    EXPECT_NEAR(fit.beyond_half_mm, off, 0.08);
-    EXPECT_FALSE(fit.wide_as_image);
+    const DrawnTube tube = fit_to_mask(off);
+    EXPECT_NEAR(tube.mean, kDrawnRadius + off, 0.08);
+    EXPECT_LT(tube.deviation, 0.12);  // the mask's own stairs: 0.2
+    EXPECT_NEAR(tube.fit.beyond_half_mm, off, 0.08);
+    EXPECT_FALSE(tube.fit.wide_as_image);
   }
 }
 
 TEST(SurfaceFromImage, IsAsWideAsTheImageWhereAMaskIsFarOff) {
   // More than half a voxel: nobody means that. Up to one and a half of them.
-  Grid grid;
-  grid.size = {36, 36, 40};
-  grid.spacing = {0.7, 0.7, 0.7};
-  const Vec3 axis = grid.lps_from_ijk({17.3, 17.6, 0.0});
-  constexpr double kRadius = 5.0;
-  const Image image = grey_tube(grid, axis, kRadius);
   for (const double off : {-1.0, -0.6, 0.6, 1.0}) {
     SCOPED_TRACE("mask off by " + std::to_string(off));
-    const Mask mask =
-        tube_mask(grid, axis - 10.0 * Vec3::UnitZ(), axis + 50.0 * Vec3::UnitZ(), kRadius + off);
-    FitStatistics fit;
-    const Surface surface =
-        surface_from_image(image, mask, {.edge_length_mm = 1.0}, &fit, FitWidth::kOfMask);
-    double sum = 0.0, count = 0.0;
-    for (const auto& vertex : surface.vertices.colwise()) {
-      if (vertex.z() < 3.0 || vertex.z() > 24.0) continue;  // the caps
-      sum += (Vec3(vertex) - axis).head<2>().norm();
-      count += 1.0;
-    }
-    EXPECT_NEAR(sum / count, kRadius, 0.08);
-    EXPECT_TRUE(fit.wide_as_image);
-    EXPECT_NEAR(fit.beyond_half_mm, off, 0.12);
+    const DrawnTube tube = fit_to_mask(off);
+    EXPECT_NEAR(tube.mean, kDrawnRadius, 0.08);
+    EXPECT_TRUE(tube.fit.wide_as_image);
+    EXPECT_NEAR(tube.fit.beyond_half_mm, off, 0.12);
   }
 }
 
