@@ -10,8 +10,7 @@ namespace {
 
 using preprocess::Branch;
 
-constexpr double kAortaRadius = 6.0;   //                                                 [mm]
-constexpr double kLeastTrunk = 100.0;  // of it, for a direction                           [mm]
+constexpr double kLeastTrunk = 100.0;  // of an aorta, for a direction                     [mm]
 
 /// Calls branches by places in them, each by the first; keeps what it has called.
 class BranchNames {
@@ -47,7 +46,8 @@ std::optional<Vec3> find_trunk_axis(const std::vector<Branch>& tree) {
   std::vector<Vec3> wide;
   for (const Branch& branch : tree) {
     for (Eigen::Index i = 0; i < branch.line.points.cols(); ++i) {
-      if (branch.line.radius(i) >= kAortaRadius) wide.emplace_back(branch.line.points.col(i));
+      if (branch.line.radius(i) >= simulate::kAortaRadius)
+        wide.emplace_back(branch.line.points.col(i));
     }
   }
   if (wide.size() < 2) return {};

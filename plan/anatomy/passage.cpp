@@ -12,8 +12,6 @@ namespace {
 
 using preprocess::Branch;
 
-constexpr double kStumpRadii = 4.0;  // what is shorter beyond a fork is a stump
-
 double length_of(const Centerline& line) { return line.arc_length(line.arc_length.size() - 1); }
 
 /// The index of the last point at or before an arc length, with a point behind it.
@@ -109,10 +107,7 @@ std::optional<Junction> junction_at(const simulate::Way& of, double arc, int chi
     junction.branch = goes_on ? own : child;
   } else if (goes_on) {
     // The way stays in the trunk, and what goes on of the tree's branch leaves it.
-    const double left = length_of(line) - branch.parent_arc;
-    if (left - simulate::own_start(branch) < kStumpRadii * line.radius(line.radius.size() - 1)) {
-      return {};
-    }
+    if (simulate::ends_soon(line, branch.parent_arc + simulate::own_start(branch))) return {};
     junction = passed_junction(way, arc, line, branch.parent_arc);
     junction.trunk = child;
     junction.branch = own;

@@ -14,7 +14,6 @@ constexpr double kStumpRadii = 4.0;  // a shorter branch is a sac or a stump
 constexpr double kArm = 10.0;        // of a vessel, for its direction                      [mm]
 constexpr double kLike = 4.0 / 3.0;  // ratio of widths that are alike
 constexpr double kWider = 1.1;       // of what two branches meet in, at least
-constexpr double kAorta = 6.0;       // radius of an aorta, at least                        [mm]
 
 /// The point of a line that is so far along it, or its end.
 Eigen::Index index_at(const Centerline& line, double arc) {
@@ -61,11 +60,14 @@ BranchPlace find_branch(const std::vector<Branch>& tree, const Vec3& point) {
   return best;
 }
 
+bool ends_soon(const Centerline& line, double beyond) {
+  const Eigen::Index last = line.points.cols() - 1;
+  return line.arc_length(last) - beyond < kStumpRadii * line.radius(last);
+}
+
 bool is_stump(const std::vector<Branch>& tree, int k) {
   const Branch& branch = branch_of(tree, k);
-  const Eigen::Index last = branch.line.points.cols() - 1;
-  return branch.parent >= 0 &&
-         branch.line.arc_length(last) - own_start(branch) < kStumpRadii * branch.line.radius(last);
+  return branch.parent >= 0 && ends_soon(branch.line, own_start(branch));
 }
 
 double width_over_parent(const std::vector<Branch>& tree, int k) {
@@ -89,16 +91,15 @@ bool goes_on(const std::vector<Branch>& tree, int k) {
   return true;
 }
 
-bool is_bifurcation(const std::vector<Branch>& tree, const Bifurcation& fork, double& width) {
-  if (is_stump(tree, fork.child)) return false;
+std::optional<double> bifurcation_width(const std::vector<Branch>& tree, const Bifurcation& fork) {
+  if (is_stump(tree, fork.child)) return {};
   const Branch& child = branch_of(tree, fork.child);
   const Centerline& line = branch_of(tree, fork.parent).line;
   const double at = child.parent_arc, start = own_start(child);
   const double length = line.arc_length(line.arc_length.size() - 1);
-  if (at - start < kForkSpan || at + start + kForkSpan > length) return false;
+  if (at - start < kForkSpan || at + start + kForkSpan > length) return {};
   const double before = radius_at(line, at - start - kForkSpan);
-  double beside = width_beyond(child);
-  width = radius_at(line, at + start + kForkSpan);
+  double beside = width_beyond(child), width = radius_at(line, at + start + kForkSpan);
   Vec3 outward = direction(child.line, start, start + kArm);
   if (fork.takes_child) {
     std::swap(beside, width);
@@ -106,8 +107,10 @@ bool is_bifurcation(const std::vector<Branch>& tree, const Bifurcation& fork, do
   }
   const Vec3 onward = direction(line, at - start - kArm, at - start);
   const double ratio = beside / std::max(before, 1e-3);
-  return ratio < kLike && ratio > 1.0 / kLike && width > kWider * std::max(before, beside) &&
-         width >= kAorta && outward.dot(onward) < 0.0;
+  const bool found = ratio < kLike && ratio > 1.0 / kLike &&
+                     width > kWider * std::max(before, beside) && width >= kAortaRadius &&
+                     outward.dot(onward) < 0.0;
+  return found ? std::optional(width) : std::nullopt;
 }
 
 }  // namespace wireplan::simulate

@@ -1,6 +1,7 @@
 #pragma once
 /// Questions to the tree of the vessel's branches: in which of them a point is, where a branch's
 /// own vessel begins, and which one goes on where a vessel forks.
+#include <optional>
 #include <vector>
 
 #include "preprocess/centerline/centerline.h"
@@ -19,8 +20,13 @@ BranchPlace find_branch(const std::vector<preprocess::Branch>& tree, const Vec3&
 /// Where a branch's own vessel begins: beyond the ball in its parent that its line starts in [mm].
 double own_start(const preprocess::Branch& branch);
 
-/// Whether it ends within two of its diameters: the sac of an aneurysm or a stump, no artery. The
-/// root is none.
+inline constexpr double kAortaRadius = 6.0;  // of what is taken for an aorta, at least    [mm]
+
+/// Whether a vessel ends within two of its diameters beyond that place of its line [mm]: the sac of
+/// an aneurysm or a stump, no artery.
+bool ends_soon(const Centerline& line, double beyond);
+
+/// Whether a branch does so beyond its start. The root does not.
 bool is_stump(const std::vector<preprocess::Branch>& tree, int k);
 
 /// How wide a branch is beyond its start over how wide its parent is as far beyond the fork: what
@@ -40,9 +46,9 @@ struct Bifurcation {
   bool takes_child = false;     // ... and which of them a way goes on in
 };
 
-/// Whether `child` leaves its parent at such a fork, where a way along the parent goes on in the
-/// one or the other. `width` is set to the radius of what it goes on in [mm].
-bool is_bifurcation(const std::vector<preprocess::Branch>& tree, const Bifurcation& fork,
-                    double& width);
+/// Where `child` leaves its parent at such a fork, and a way along the parent goes on in the one or
+/// the other: the radius of what they meet in [mm]. Empty where it is none.
+std::optional<double> bifurcation_width(const std::vector<preprocess::Branch>& tree,
+                                        const Bifurcation& fork);
 
 }  // namespace wireplan::simulate

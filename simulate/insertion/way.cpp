@@ -78,9 +78,9 @@ Way::Way(Centerline path, std::vector<Branch> tree)
     const int parent = tree_[k].parent;
     if (parent < 0 || tree_[k].parent_arc > leaves_[static_cast<std::size_t>(parent)]) continue;
     const Bifurcation fork{parent, static_cast<int>(k), leaves_[k] >= 0.0};
-    double width = 0.0;
-    if (!is_bifurcation(tree_, fork, width) || width <= widest) continue;
-    widest = width;
+    const std::optional<double> width = bifurcation_width(tree_, fork);
+    if (!width || *width <= widest) continue;
+    widest = *width;
     bifurcation_ = fork;
   }
 }
