@@ -439,6 +439,10 @@ void make_report(Workspace& work, const fs::path& folder) {
   const ForceMap& forces = plans.empty() ? all_forces : best_forces;  // where the volume is cut
   page.peak_force = all_forces.values();
 
+  // Alone: a volume of DICOM is read in a copy of this process, in which what others hold at that
+  // moment stays held (apart.h).
+  if (has_slices(work)) page.panels["slices"] = cut_slices_panel(work, page, forces.values());
+
   // The longest first, so that none is left alone at the end.
   std::vector<std::function<void()>> jobs = {
       [&] { write_forces(work, report, all_forces, best_forces, folder); },
@@ -446,9 +450,6 @@ void make_report(Workspace& work, const fs::path& folder) {
         page.picture_png = draw_overview(work, report, page);
         write_whole(page.picture_png, folder / "plans.png");
       }};
-  if (has_slices(work)) {
-    jobs.push_back([&] { page.panels["slices"] = cut_slices_panel(work, page, forces.values()); });
-  }
   const std::vector<int> played =
       plan::choose_played(report.study, report.plan, report.judgement.ranking);
   std::vector<std::optional<PageInsertion>> insertions(played.size());

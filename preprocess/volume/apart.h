@@ -18,7 +18,8 @@ using At = std::function<void(const std::string& place)>;
 ///   - where the child ends before the work is done, or neither sends anything nor names another
 ///     place for `patience` seconds: one that names the last place, followed by `ended`.
 /// The child starts as a copy of this process that has the calling thread alone, so `work` must not
-/// start threads or wait for any.
+/// start threads or wait for any. To be called while no other thread works: a lock that one holds
+/// at that moment stays locked in the child, which then waits in vain until its patience ends.
 void run_apart(const std::function<void(const Send&, const At&)>& work,
                const std::function<void(const Receive&)>& take, const std::string& ended,
                unsigned patience = 300);
