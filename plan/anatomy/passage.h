@@ -40,8 +40,9 @@ struct Corner {
   double arm = 0.0;           // length of both, along the way                             [mm]
 };
 
-/// Where the chords to the points `arm` before and behind make the smallest angle. Of a circle of
-/// radius R that is pi - arm/R. The arm is at most a third of the way.
+/// Where the chords to the points `arm` before and behind make the smallest angle; the angle told
+/// is that between the arms without their first and last 15 %, since a middle line rounds corners.
+/// Of a circle of radius R that is pi - arm/R. The arm is at most a third of the way.
 Corner find_sharpest_bend(const Centerline& way, double arm = 20.0);
 
 /// Where another vessel leaves the way or the way leaves a vessel.

@@ -69,6 +69,23 @@ TEST(Way, SharpestBendIsTheCornerAndItsPlace) {
               1e-6);
 }
 
+TEST(Way, ARoundedCornerHasTheAngleOfItsArms) {
+  // Two straight arms that an arc of radius 4 mm joins, as a middle line takes a corner.
+  for (const double turn : {40.0, 70.0, 103.0}) {
+    SCOPED_TRACE(turn);
+    const double a = turn * kRadPerDeg, cut = 4.0 * std::tan(0.5 * a);
+    std::vector<Vec3> corners = {Vec3(0, 0, -60), Vec3(0, 0, -cut)};
+    for (int k = 1; k <= 40; ++k) {
+      const double t = a * k / 40.0;
+      corners.emplace_back(4.0 * (1.0 - std::cos(t)), 0, -cut + 4.0 * std::sin(t));
+    }
+    corners.emplace_back(50.0 * std::sin(a), 0, 50.0 * std::cos(a));
+    const Corner bend = find_sharpest_bend(line_through(corners, 4.0));
+    EXPECT_NEAR(bend.angle / kRadPerDeg, 180.0 - turn, 2.0);
+    EXPECT_NEAR(bend.arc, 60.0 - cut + 2.0 * a, 1.0);
+  }
+}
+
 TEST(Way, NarrowestIsFoundAwayFromTheEnds) {
   Centerline way = line_through({Vec3::Zero(), Vec3(0, 0, 100)}, 4.0);
   way.radius(1) = way.radius(way.radius.size() - 2) = 0.6;  // spheres against the caps
