@@ -9,6 +9,7 @@
 #include "pipeline/files/trial_file.h"
 #include "pipeline/report/picture.h"
 #include "pipeline/report/report.h"
+#include "pipeline/stages/held_places.h"
 #include "plan/batch.h"
 #include "preprocess/centerline/centerline.h"
 #include "preprocess/files/vessel_io.h"
@@ -111,12 +112,8 @@ LoadedVessel load_vessel(const SceneFile& scene) {
                    : std::make_unique<simulate::VesselModel>(vessel.surface, options);
   if (given.wall.support) {
     const Vec3& entry = scene.insertion->introducer.point;
-    model->sections = std::make_unique<simulate::SectionChain>(
-        preprocess::find_tree(vessel.surface, entry),
-        simulate::SectionChainOptions{.support = *given.wall.support,
-                                      .young_modulus = vessel.wall.young_modulus,
-                                      .thickness = given.wall.extrusion.thickness_mm,
-                                      .pins = {simulate::Pin{.place = entry}}});
+    model->sections = make_section_chain(given.wall, preprocess::find_tree(vessel.surface, entry),
+                                         entry, vessel.wall.young_modulus);
   }
   vessel.model = std::move(model);
   return vessel;

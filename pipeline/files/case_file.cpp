@@ -367,6 +367,39 @@ void refuse(JsonReader& reader, const std::string& key, const std::string& what)
                         what + " not in this version; delete the key");
 }
 
+constexpr std::array kHeldNames = {"access", "ostia", "point"};  // of HeldPlace::At
+
+HeldPlace read_held(JsonReader& reader) {
+  HeldPlace held;
+  const std::string at = reader.choice("at", std::nullopt, {kHeldNames.begin(), kHeldNames.end()});
+  for (std::size_t k = 0; k < kHeldNames.size(); ++k) {
+    if (at == kHeldNames[k]) held.at = static_cast<HeldPlace::At>(k);
+  }
+  if (held.at == HeldPlace::At::kPoint) {
+    held.point = reader.point("point_mm", std::nullopt);
+  } else if (reader.has("point_mm")) {
+    reader.problems().add(reader.path_of("point_mm"), "given", "no point",
+                          "\"at\": \"" + at +
+                              "\" tells where it is; a place of your own is "
+                              "\"at\": \"point\"");
+  }
+  held.radius = reader.number("radius_mm", held.radius, {.min = 0.1, .max = 100.0}, "given in m?");
+  held.factor = reader.number("factor", held.factor, {.min = 1.0, .max = 1e6});
+  reader.finish();
+  return held;
+}
+
+Json held_json(const std::vector<HeldPlace>& places) {
+  Json list = Json::array();
+  for (const HeldPlace& held : places) {
+    list.push_back({{"at", kHeldNames.at(static_cast<std::size_t>(held.at))},
+                    {"radius_mm", held.radius},
+                    {"factor", held.factor}});
+    if (held.at == HeldPlace::At::kPoint) list.back()["point_mm"] = to_json(held.point);
+  }
+  return list;
+}
+
 WallInput read_wall(JsonReader& reader, const std::string& model) {
   WallInput wall;
   wall.elastic = reader.choice("model", model, {"elastic", "rigid"}) == "elastic";
@@ -383,6 +416,14 @@ WallInput read_wall(JsonReader& reader, const std::string& model) {
                                  "given in Pa/m? 1e6 Pa/m are 1 kPa/mm") *
                    kMpaPerKpa;
   }
+  if (!reader.has("held")) return wall;
+  if (!wall.support) {
+    reader.problems().add(
+        reader.path_of("held"), "given", "a support that it makes stiffer",
+        "give " + reader.path_of("support_kpa_per_mm") + " too, or delete the key");
+  }
+  wall.held.clear();
+  for (JsonReader& each : reader.objects("held", false)) wall.held.push_back(read_held(each));
   return wall;
 }
 
@@ -505,6 +546,7 @@ Json case_parameters(const Case& input) {
                   {"poisson_ratio", input.wall.extrusion.poisson_ratio}};
   if (input.wall.support) {
     json["wall"]["support_kpa_per_mm"] = clean(*input.wall.support / kMpaPerKpa);
+    json["wall"]["held"] = held_json(input.wall.held);
   }
   const auto put = [&](const char* one, const char* list, const auto& inputs, auto to_json_of) {
     if (inputs.size() == 1) {

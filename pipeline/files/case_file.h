@@ -35,12 +35,23 @@ struct SurfaceInput {
   std::string frame;  // "LPS", "RAS"
 };
 
+/// Where anatomy holds a vessel that moves as a whole (simulate::Pin).
+struct HeldPlace {
+  enum class At { kAccess, kOstia, kPoint };
+  At at = At::kAccess;        // kOstia: every artery that leaves another, but for stumps, the two
+                              // of a bifurcation and the vessel that goes on at a fork
+  Vec3 point = Vec3::Zero();  // of kPoint                                                [mm]
+  double radius = 10.0;       //                                                          [mm]
+  double factor = 100.0;      // on the support
+};
+
 /// The vessel's wall. A rigid one has the other values too: the wall's files are made of them.
 struct WallInput {
   bool elastic = true;
   preprocess::WallOptions extrusion;  // young_modulus 0: chosen by the wall stage
   std::optional<double> support;      // of cross-sections that move as wholes; empty: they do
                                       // not                                          [N/mm^3]
+  std::vector<HeldPlace> held = {HeldPlace{}};  // where there is a support
 };
 
 /// What a report tells of a vessel whose cross-sections move.

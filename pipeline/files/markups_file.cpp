@@ -280,6 +280,14 @@ class PointFinder {
   std::optional<preprocess::Grid> grid_;
 };
 
+/// Of a wall's places that hold the vessel.
+void resolve_held(PointFinder& finder, Json& wall, const std::string& key) {
+  if (!wall.is_object() || !wall.contains("held") || !wall["held"].is_array()) return;
+  for (std::size_t k = 0; k < wall["held"].size(); ++k) {
+    finder.resolve_end(wall["held"][k], key + ".held[" + std::to_string(k) + "]");
+  }
+}
+
 }  // namespace
 
 std::vector<MarkupPoint> read_markups(const fs::path& path) {
@@ -307,6 +315,9 @@ void resolve_scene_points(Json& file, const fs::path& folder, Problems& problems
   for (const char* one : {"insertion", "introducer", "target"}) {
     if (file.contains(one)) resolve(file[one], one);
   }
+  if (file.contains("vessel") && file["vessel"].is_object() && file["vessel"].contains("wall")) {
+    resolve_held(finder, file["vessel"]["wall"], "vessel.wall");
+  }
   if (!file.contains("supports") || !file["supports"].is_array()) return;
   for (std::size_t k = 0; k < file["supports"].size(); ++k) {
     resolve(file["supports"][k], "supports[" + std::to_string(k) + "]");
@@ -326,6 +337,7 @@ void resolve_points(Json& file, const fs::path& folder, Problems& problems) {
   for (const char* one : {"access", "target"}) {
     if (file.contains(one)) resolve(file[one], one);
   }
+  if (file.contains("wall")) resolve_held(finder, file["wall"], "wall");
   in_list(file, "accesses", resolve);
   in_list(file, "targets", resolve);
   if (!file.contains("segmentation") || !file["segmentation"].is_object()) return;

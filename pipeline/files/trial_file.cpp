@@ -25,8 +25,10 @@ using simulate::TriangleForce;
 using simulate::WireContact;
 
 constexpr const char* kSchema = "wireplan.trial/3";
+constexpr std::size_t kVesselStates = 12;  // of a vessel that moves, about: each is a whole surface
 constexpr std::string_view kShapesMagic = "wireplan.shapes/1\n",
-                           kToolShapesMagic = "wireplan.shapes/2\n";  // and the tools' insertions
+                           kToolShapesMagic = "wireplan.shapes/2\n",  // and tools' insertions
+    kMovedShapesMagic = "wireplan.shapes/3\n";                        // and the vessel's sections
 
 constexpr std::array kOutcomes = {
     Outcome::kReached,   Outcome::kMissed,        Outcome::kPassedBy,     Outcome::kWrongBranch,
@@ -190,8 +192,9 @@ simulate::Outcome outcome_of(const std::string& name) {
 }
 
 std::string shapes_to_bytes(const std::vector<simulate::Shape>& shapes) {
-  const bool tools = !shapes.empty() && !shapes.front().tools.empty();
-  std::string bytes(tools ? kToolShapesMagic : kShapesMagic);
+  const bool moved = !shapes.empty() && shapes.front().sections.size() > 0,
+             tools = moved || (!shapes.empty() && !shapes.front().tools.empty());
+  std::string bytes(moved ? kMovedShapesMagic : tools ? kToolShapesMagic : kShapesMagic);
   const auto add = [&](const void* data, std::size_t count) {
     bytes.append(static_cast<const char*>(data), count);
   };
@@ -215,11 +218,18 @@ std::string shapes_to_bytes(const std::vector<simulate::Shape>& shapes) {
     expects(shape.tools.size() == shapes.front().tools.size());
     add(shape.tools.data(), sizeof(double) * shape.tools.size());
   }
+  if (!moved) return bytes;
+  add_count(shapes.front().sections.cols());
+  for (const simulate::Shape& shape : shapes) {
+    expects(shape.sections.cols() == shapes.front().sections.cols());
+    add(shape.sections.data(), sizeof(double) * static_cast<std::size_t>(shape.sections.size()));
+  }
   return bytes;
 }
 
 std::optional<std::vector<simulate::Shape>> shapes_from_bytes(const std::string& bytes) {
-  const bool tools = bytes.starts_with(kToolShapesMagic);
+  const bool moved = bytes.starts_with(kMovedShapesMagic),
+             tools = moved || bytes.starts_with(kToolShapesMagic);
   if (!tools && !bytes.starts_with(kShapesMagic)) return {};
   std::size_t at = kShapesMagic.size();
   const auto take = [&](void* data, std::size_t count) {
@@ -249,6 +259,14 @@ std::optional<std::vector<simulate::Shape>> shapes_from_bytes(const std::string&
   for (simulate::Shape& shape : shapes) {
     shape.tools.resize(each);
     if (!take(shape.tools.data(), each * sizeof(double))) return {};
+  }
+  std::uint64_t sections = 0;
+  if (moved && (!take(&sections, sizeof sections) || sections > bytes.size() / sizeof(double))) {
+    return {};
+  }
+  for (simulate::Shape& shape : shapes) {
+    shape.sections.resize(3, static_cast<Eigen::Index>(sections));
+    if (!take(shape.sections.data(), 3 * sections * sizeof(double))) return {};
   }
   if (at != bytes.size()) return {};
   return shapes;
@@ -416,6 +434,26 @@ void write_shapes(const TrialResult& trial, const std::string& name,
       continue;
     }
     preprocess::write_polyline(shape.nodes, {{"contact_force_n", force}}, files.back());
+  }
+  preprocess::write_time_series(files, insertions, folder / (name + ".pvd"));
+}
+
+void write_moved_vessel(const std::vector<simulate::Shape>& shapes, const Surface& vessel,
+                        const simulate::SectionChain& chain, const std::string& name,
+                        const std::filesystem::path& folder) {
+  std::filesystem::create_directories(folder / name);
+  std::vector<std::filesystem::path> files;
+  std::vector<double> insertions;
+  // The last, and so many before it at even steps.
+  const std::size_t count = shapes.size(), step = std::max<std::size_t>(1, count / kVesselStates);
+  for (std::size_t k = (count - 1) % step; k < count; k += step) {
+    const simulate::Shape& shape = shapes[k];
+    if (shape.sections.cols() != chain.nodes()) continue;
+    Surface moved = vessel;
+    moved.vertices = chain.carried(vessel.vertices, shape.sections);
+    files.push_back(folder / name / (std::to_string(files.size()) + ".vtp"));
+    preprocess::write_surface(moved, files.back());
+    insertions.push_back(shape.insertion);
   }
   preprocess::write_time_series(files, insertions, folder / (name + ".pvd"));
 }

@@ -8,6 +8,8 @@
 
 #include "pipeline/files/json_reader.h"
 #include "plan/candidates.h"
+#include "preprocess/vessel.h"
+#include "simulate/wall/section_chain.h"
 
 namespace wireplan::pipeline {
 
@@ -47,5 +49,12 @@ std::vector<simulate::ToolStep> steps_of(const Json& list);
 /// as NAME-catheter.
 void write_shapes(const simulate::TrialResult& trial, const std::string& name,
                   const std::filesystem::path& folder);
+
+/// The vessel as such an insertion moves it, at most two dozen times from its start to its end:
+/// FOLDER/NAME/K.vtp and FOLDER/NAME.pvd, over the insertion [mm]. Shapes that do not know how it
+/// moves are left out. Expects a shape.
+void write_moved_vessel(const std::vector<simulate::Shape>& shapes, const Surface& vessel,
+                        const simulate::SectionChain& chain, const std::string& name,
+                        const std::filesystem::path& folder);
 
 }  // namespace wireplan::pipeline

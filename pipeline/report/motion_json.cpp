@@ -17,9 +17,8 @@ namespace {
 Centerline carried(const Centerline& line, const simulate::SectionChain& chain,
                    const Eigen::Matrix3Xd& u) {
   Centerline moved = line;
-  for (Eigen::Index k = 0; k < line.points.cols(); ++k) {
-    moved.points.col(k) += chain.displacement(line.points.col(k), u);
-    if (k == 0) continue;
+  moved.points = chain.carried(line.points, u);
+  for (Eigen::Index k = 1; k < line.points.cols(); ++k) {
     moved.arc_length[k] =
         moved.arc_length[k - 1] + (moved.points.col(k) - moved.points.col(k - 1)).norm();
   }

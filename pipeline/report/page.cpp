@@ -4,6 +4,7 @@
 #include <bit>
 #include <cmath>
 #include <cstdint>
+#include <limits>
 
 #include "pipeline/store/hash.h"
 
@@ -93,6 +94,9 @@ Json trials_json(const PageInput& input, const Quantiser& box) {
     if (trial.tools.cols() > 0) {
       trials.back()["tools"] = encode_floats(trial.tools.reshaped());
     }
+    if (trial.sections.cols() > 0) {
+      trials.back()["sections"] = encode_floats(trial.sections.reshaped());
+    }
   }
   return trials;
 }
@@ -104,6 +108,9 @@ Json insertion_json(const PageInsertion& insertion, const Quantiser& box) {
                       {"nodes", box.encode_points(shape.nodes)},
                       {"force_n", encode_floats(shape.contact_force)}});
     if (!shape.tools.empty()) shapes.back()["tools_mm"] = shape.tools;
+    if (shape.sections.cols() > 0) {
+      shapes.back()["sections"] = encode_floats(shape.sections.reshaped());
+    }
   }
   std::vector<std::uint32_t> triangles;
   std::vector<float> forces;
@@ -115,6 +122,30 @@ Json insertion_json(const PageInsertion& insertion, const Quantiser& box) {
           {"shapes", std::move(shapes)},
           {"wall_triangle", encode(triangles)},
           {"wall_force_n", encode(forces)}};
+}
+
+/// How points follow cross-sections: of each point how many it follows, which and with what
+/// weights. The points are the surface's, the path's, access and target, in this order.
+Json motion_weights_json(const PageInput& input) {
+  std::vector<std::uint8_t> counts;
+  std::vector<std::uint16_t> nodes;
+  std::vector<float> weights;
+  expects(input.chain->nodes() <= std::numeric_limits<std::uint16_t>::max());
+  std::vector<simulate::SectionChain::Weight> found;
+  const auto add = [&](const Vec3& point) {
+    input.chain->find_weights(point, /*with_bend=*/false, found);
+    expects(found.size() <= std::numeric_limits<std::uint8_t>::max());
+    counts.push_back(static_cast<std::uint8_t>(found.size()));
+    for (const simulate::SectionChain::Weight& weight : found) {
+      nodes.push_back(static_cast<std::uint16_t>(weight.node));
+      weights.push_back(static_cast<float>(weight.value));
+    }
+  };
+  for (const auto& vertex : input.surface.vertices.colwise()) add(vertex);
+  for (const auto& point : input.path.points.colwise()) add(point);
+  add(input.access);
+  add(input.target);
+  return {{"counts", encode(counts)}, {"nodes", encode(nodes)}, {"weights", encode(weights)}};
 }
 
 Json scene_json(const PageInput& input) {
@@ -134,6 +165,7 @@ Json scene_json(const PageInput& input) {
   scene["path"] = box.encode_points(input.path.points);
   scene["trials"] = trials_json(input, box);
   scene["insertions"] = std::move(insertions);
+  if (input.chain) scene["motion"] = motion_weights_json(input);
   scene["panels"] = input.panels;
   scene["picture_png"] = base64(input.picture_png.data(), input.picture_png.size());
   return scene;
@@ -167,6 +199,7 @@ PageTrial page_trial(const simulate::TrialResult& trial) {
         static_cast<float>(push.push_force), static_cast<float>(push.tip_force),
         static_cast<float>(push.peak_contact_force), static_cast<float>(push.total_contact_force);
   }
+  kept.sections = trial.sections.cast<float>();
   if (trial.tools.size() != 2) return kept;
   kept.tools.resize(7, static_cast<Eigen::Index>(trial.pushes.size()));
   for (std::size_t k = 0; k < trial.pushes.size(); ++k) {

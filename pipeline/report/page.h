@@ -5,12 +5,14 @@
 /// Outside the one block of timing the page is the same, byte for byte, for the same inputs and
 /// build.
 #include <Eigen/Core>
+#include <memory>
 #include <string>
 #include <vector>
 
 #include "pipeline/files/json_reader.h"
 #include "preprocess/vessel.h"
 #include "simulate/insertion/trial.h"
+#include "simulate/wall/section_chain.h"
 
 namespace wireplan::pipeline {
 
@@ -23,6 +25,7 @@ struct PageTrial {
   /// Of a script of catheter and wire, after each push: the step under way; then of each tool how
   /// far it is in [mm], the hand's force and the tip's [N]. No rows of one wire.
   Eigen::Matrix<float, 7, -1> tools = {};
+  Eigen::Matrix3Xf sections = {};  // how far the vessel's have moved; empty where they do not [mm]
 };
 PageTrial page_trial(const simulate::TrialResult& trial);  // all but the direction
 
@@ -42,6 +45,8 @@ struct PageInput {
   std::vector<double> wire_radius;  // in the order of the report's wires                     [mm]
   std::vector<PageTrial> trials;    // in the order of the report's trials
   std::vector<PageInsertion> insertions;
+  /// How the vessel's points follow its cross-sections; null where these do not move.
+  std::shared_ptr<const simulate::SectionChain> chain = nullptr;
   Json panels = Json::object();  // by name what a panel shows beyond the report, as it reads it
   std::string picture_png;       // the vessel, for browsers without 3D
 };

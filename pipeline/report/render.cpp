@@ -142,6 +142,16 @@ std::optional<Picture> draw_numerics(const Json& report) {
                      legend);
 }
 
+// As the best plan moves it in the end, or at rest.
+Surface best_vessel(const fs::path& beside) {
+  fs::path last = beside / "surface.vtp";
+  const fs::path states = beside / "trials" / "plan-1-vessel";
+  for (int k = 0; fs::exists(states / (std::to_string(k) + ".vtp")); ++k) {
+    last = states / (std::to_string(k) + ".vtp");
+  }
+  return preprocess::read_surface_artifact(last);
+}
+
 }  // namespace
 
 Picture draw_angles(const Json& report) {
@@ -236,7 +246,7 @@ std::vector<std::string> render_report(const fs::path& file, const fs::path& fol
 
   const std::vector<PictureWire> wires = best_wires(report, beside);
   add("vessel.png",
-      draw_picture(vessel, wires,
+      draw_picture(best_vessel(beside), wires,
                    marks_of(report, wires.empty() ? "no plan is ranked" : "best plans")));
   PictureMarks forces = marks_of(report, "largest force of any trial");
   forces.wall_force = preprocess::read_wall_array(beside / "forces.vtu", "peak_force_n");

@@ -429,6 +429,10 @@ Json artifacts_json(const ReportInput& input) {
   for (std::size_t k = 1; k <= std::min(kPlansShown, input.judgement.ranking.plans.size()); ++k) {
     add("trials/plan-" + std::to_string(k) + ".pvd",
         "insertion of a plan, by rank, as a time series");
+    if (!input.motion.is_null()) {
+      add("trials/plan-" + std::to_string(k) + "-vessel.pvd",
+          "the vessel as that plan moves it, as a time series");
+    }
     const auto id = static_cast<std::size_t>(input.judgement.ranking.plans[k - 1].trial);
     if (input.plan.candidates[id].catheter < 0) continue;
     add("trials/plan-" + std::to_string(k) + "-catheter.pvd", "its catheter, as a time series");

@@ -104,9 +104,9 @@ Json find_motion_of_repeats(const ReportInput& report, const simulate::SectionCh
 
 /// What the best plan of each wire, or its closest attempt where it has none, does to the vessel;
 /// null where its cross-sections do not move.
-Json find_motion(Workspace& work, const ReportInput& report) {
-  const std::unique_ptr<const simulate::SectionChain> chain = work.section_chain();
-  if (!chain) return nullptr;
+Json find_motion(const Workspace& work, const ReportInput& report,
+                 const simulate::SectionChain* chain) {
+  if (chain == nullptr) return nullptr;
   Json trials = Json::array();
   for (const int id :
        plan::best_of_each_wire(report.study, report.plan, report.judgement.ranking)) {
@@ -127,7 +127,7 @@ Json find_motion(Workspace& work, const ReportInput& report) {
 }
 
 // All of the report that the stages before it tell.
-ReportInput describe_run(Workspace& work) {
+ReportInput describe_run(Workspace& work, const simulate::SectionChain* chain) {
   const Case& given = work.given();
   ReportInput report;
   report.name = given.name;
@@ -150,7 +150,7 @@ ReportInput describe_run(Workspace& work) {
   const Json of_plans = work.figures("plans");
   for (const Json& told : of_plans.at("warnings")) report.warnings.push_back(told);
 
-  report.motion = find_motion(work, report);
+  report.motion = find_motion(work, report, chain);
   report.verdict = decide(work, report);
 
   // The values that stages chose where the case left them open.
@@ -238,13 +238,10 @@ std::string draw_overview(Workspace& work, const ReportInput& report, const Page
   }
   // As the best plan moves it.
   Surface vessel = work.surface();
-  if (const std::unique_ptr<const simulate::SectionChain> chain = work.section_chain();
-      chain && !report.judgement.ranking.plans.empty()) {
+  if (page.chain && !report.judgement.ranking.plans.empty()) {
     const int best = report.judgement.ranking.plans.front().trial;
     const Eigen::Matrix3Xd u = moved_by(work, report, best);
-    for (Eigen::Index k = 0; k < vessel.vertices.cols(); ++k) {
-      vessel.vertices.col(k) += chain->displacement(vessel.vertices.col(k), u);
-    }
+    vessel.vertices = page.chain->carried(vessel.vertices, u);
     key.push_back({"moved", hash_text(bytes_of(u))});
   }
   return work.piece(key, [&] { return encode_png(draw_picture(vessel, wires, marks)); });
@@ -313,7 +310,8 @@ std::string to_bytes(const ShownTrials& shown) {
       forces.push_back(force);
     }
     rows.push_back({binary(shown.trials[k].nodes), binary(shown.trials[k].push), binary(triangles),
-                    binary(forces), binary(shown.trials[k].tools)});
+                    binary(forces), binary(shown.trials[k].tools),
+                    binary(shown.trials[k].sections)});
   }
   const std::vector<std::uint8_t> bytes = Json::to_cbor(rows);
   return {bytes.begin(), bytes.end()};
@@ -342,6 +340,8 @@ ShownTrials from_bytes(const std::string& bytes) {
     fill(row.at(3), forces);
     trial.tools.resize(7, columns(4, 7 * sizeof(float)));
     fill(row.at(4), trial.tools);
+    trial.sections.resize(3, columns(5, 3 * sizeof(float)));
+    fill(row.at(5), trial.sections);
     std::vector<simulate::TriangleForce>& peaks = shown.peaks.emplace_back();
     for (std::size_t k = 0; k < forces.size(); ++k) peaks.push_back({triangles[k], forces[k]});
   }
@@ -379,11 +379,14 @@ Json cut_slices_panel(Workspace& work, const PageInput& page, const std::vector<
 /// The insertion of a trial that can be played, where it was kept; for viewers too, in a folder of
 /// that name.
 std::optional<PageInsertion> read_insertion(const Workspace& work, const ReportInput& report,
-                                            int id, const std::string& name,
+                                            const PageInput& page, int id, const std::string& name,
                                             const fs::path& folder) {
   std::optional<simulate::TrialResult> trial = find_played(work, id);
   if (!trial) return {};
   if (!name.empty()) write_shapes(*trial, name, folder);
+  if (!name.empty() && page.chain) {
+    write_moved_vessel(trial->shapes, page.surface, *page.chain, name + "-vessel", folder);
+  }
   const auto k = static_cast<std::size_t>(id);
   const plan::Candidate& candidate = report.plan.candidates[k];
   if (!name.empty() && candidate.catheter >= 0) {
@@ -423,9 +426,10 @@ void write_forces(Workspace& work, const ReportInput& report, const ForceMap& al
 
 void make_report(Workspace& work, const fs::path& folder) {
   const auto start = std::chrono::steady_clock::now();
-  ReportInput report = describe_run(work);
-  warn_of_other_first(work.given(), report);
   PageInput page = start_page(work);
+  page.chain = work.section_chain();
+  ReportInput report = describe_run(work, page.chain.get());
+  warn_of_other_first(work.given(), report);
   ShownTrials shown = find_trials(work, report.plan);
   page.trials = std::move(shown.trials);
   for (std::size_t k = 0; k < page.trials.size(); ++k) {
@@ -457,7 +461,7 @@ void make_report(Workspace& work, const fs::path& folder) {
     jobs.push_back([&, k] {
       const bool for_viewers = k < std::min(kPlansShown, plans.size());
       insertions[k] =
-          read_insertion(work, report, played[k],
+          read_insertion(work, report, page, played[k],
                          for_viewers ? "plan-" + std::to_string(k + 1) : "", folder / "trials");
     });
   }

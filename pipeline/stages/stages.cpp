@@ -268,7 +268,7 @@ std::vector<Stage> stages_of(const Case& given) {
        .parameters = {"/wall/thickness_mm", "/wall/young_modulus_kpa", "/wall/poisson_ratio"},
        .make = make_wall});
   Stage trials{.name = "trials",
-               .version = 28,
+               .version = 29,
                .after = {"surface", "centerline"},
                .parameters = {"/access", "/target", "/wires", "/tip_roll_deg", "/friction",
                               "/friction_factor", "/wall/model", "/insertion"},
@@ -277,7 +277,7 @@ std::vector<Stage> stages_of(const Case& given) {
   const bool sections_move = given.wall.support.has_value();
   // A rigid wall does not act but in how the vessel moves as a whole.
   if (given.wall.elastic || sections_move) trials.after.push_back("wall");
-  if (sections_move) read_too(trials, {"/wall/support_kpa_per_mm"});
+  if (sections_move) read_too(trials, {"/wall/support_kpa_per_mm", "/wall/held"});
   if (const std::vector<std::size_t> served = targets_served(given); served.size() > 1) {
     for (const std::size_t k : served) trials.after.push_back(centerline_toward(k));
   }
@@ -285,7 +285,7 @@ std::vector<Stage> stages_of(const Case& given) {
   stages.push_back(trials);
   Stage manoeuvres = trials;
   manoeuvres.name = "manoeuvres";
-  manoeuvres.version = 24;
+  manoeuvres.version = 25;
   manoeuvres.after.push_back("trials");
   read_too(manoeuvres, {"/manoeuvres"});
   const bool tools = !given.catheters.empty();
@@ -302,7 +302,7 @@ std::vector<Stage> stages_of(const Case& given) {
   stages.push_back(manoeuvres);
   Stage plans = trials;
   plans.name = "plans";
-  plans.version = 7;
+  plans.version = 8;
   plans.after.insert(plans.after.end(), {"trials", "manoeuvres"});
   if (voxels != nullptr) plans.after.emplace_back(voxels);
   read_too(plans, {"/manoeuvres", "/robustness"});

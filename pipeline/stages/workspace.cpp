@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "pipeline/report/report.h"
+#include "pipeline/stages/held_places.h"
 #include "plan/anatomy/branch_names.h"
 #include "plan/catheter_choice.h"
 #include "preprocess/centerline/centerline.h"
@@ -209,22 +210,16 @@ std::function<const simulate::VesselModel&()> Workspace::moving_model() {
   };
 }
 
-/// Cross-sections of the tree on the case's support, held where the wire goes in.
 std::unique_ptr<const simulate::SectionChain> Workspace::section_chain() {
   if (!given_.wall.support) return nullptr;
-  return std::make_unique<simulate::SectionChain>(
-      read_tree(*this),
-      simulate::SectionChainOptions{.support = *given_.wall.support,
-                                    .young_modulus = wall().young_modulus,
-                                    .thickness = given_.wall.extrusion.thickness_mm,
-                                    .pins = {simulate::Pin{.place = given_.study.access}}});
+  return make_section_chain(given_.wall, read_tree(*this), given_.study.access,
+                            wall().young_modulus);
 }
 
 void Workspace::let_sections_move(ModelStock& stock) {
   if (!given_.wall.support) return;
-  const Vec3& access = given_.study.access;
   std::string made_from = artifact("centerline").contents() + artifact("wall").contents() +
-                          Json({*given_.wall.support, access[0], access[1], access[2]}).dump();
+                          to_json(given_.study.access).dump() + parameters.at("wall").dump();
   if (stock.sections_made_from != made_from) {
     stock.sections_aside = section_chain();
     stock.sections_made_from = std::move(made_from);

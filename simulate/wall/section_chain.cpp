@@ -244,6 +244,13 @@ Vec3 SectionChain::displacement(const Vec3& rest, const Eigen::Matrix3Xd& u) con
   return sum;
 }
 
+Eigen::Matrix3Xd SectionChain::carried(const Eigen::Matrix3Xd& rest,
+                                       const Eigen::Matrix3Xd& u) const {
+  Eigen::Matrix3Xd moved = rest;
+  for (Eigen::Index k = 0; k < rest.cols(); ++k) moved.col(k) += displacement(rest.col(k), u);
+  return moved;
+}
+
 /// Adds stiffness |direction (sum row_j u_j)|^2 / 2, of a projector.
 void SectionChain::add_square(const Eigen::VectorXd& row, double stiffness, const Mat3& direction,
                               std::vector<Block>& dense) const {
@@ -284,9 +291,12 @@ void SectionChain::add_line(const Centerline& line, double inside,
     const Vec3 place = point_on(line, arc);
     const double radius = radius_on(line, arc);
     double support = kPi * radius * options.support;
+    double held = 1.0;
     for (const Pin& pin : options.pins) {
-      support *= 1.0 + (pin.factor - 1.0) * held_part((place - pin.place).norm(), pin.radius);
+      held = std::max(held,
+                      1.0 + (pin.factor - 1.0) * held_part((place - pin.place).norm(), pin.radius));
     }
+    support *= held;
     weights_at(arc, row);
     const double outside = std::clamp((arc - start + 0.5 * step - inside) / step, 0.0, 1.0);
     if (outside > 0.0) add(row, outside * step * support, Mat3::Identity());

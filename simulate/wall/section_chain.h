@@ -16,7 +16,7 @@
 namespace wireplan::simulate {
 
 /// A place where anatomy holds the vessel: within `radius` the support is `factor` times as stiff,
-/// and falls to what it is elsewhere over as much again.
+/// and falls to what it is elsewhere over as much again. Of several the stiffest counts.
 struct Pin {
   Vec3 place = Vec3::Zero();  //                                                          [mm]
   double radius = 10.0;       //                                                          [mm]
@@ -56,6 +56,9 @@ class SectionChain {
 
   /// u of a place at rest [mm], for displacements (3, nodes).
   Vec3 displacement(const Vec3& rest, const Eigen::Matrix3Xd& u) const;
+
+  /// Places at rest (3, k) as the vessel carries them [mm].
+  Eigen::Matrix3Xd carried(const Eigen::Matrix3Xd& rest, const Eigen::Matrix3Xd& u) const;
 
   /// Energy [N mm] and, added to `gradient` (3, nodes), its derivatives [N].
   double energy(const Eigen::Matrix3Xd& u, Eigen::Ref<Eigen::Matrix3Xd> gradient) const;

@@ -52,6 +52,15 @@ export const runSmallCase = (program, folder) => run(program, folder, smallCase(
   wires: [wire(hostileWire, 50), wire("plain", 5)],
 }));
 
+/** A wire that leans on a soft tube and moves it. */
+export const runSmallMoving = (program, folder) => run(program, folder, smallCase({
+  access: {point_mm: [0, 0, 8], inclination_deg: [25]},
+  target: {point_mm: [0, 0, 45]},
+  wall: {support_kpa_per_mm: 0.05},
+  wires: [wire("stiff", 400)],
+  robustness: {repeats: 0},
+}));
+
 /** From both ends of the tube to two places between. */
 export const runSmallSections = (program, folder) => run(program, folder, smallCase({
   accesses: [

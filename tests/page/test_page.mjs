@@ -9,7 +9,7 @@ import {tmpdir} from "node:os";
 import {basename, dirname, join, resolve} from "node:path";
 import {after, before, describe, test} from "node:test";
 import {chromiumPath, clippedBlocks, column, hasModules, launch, open, pageCount, picture, seriousFindings} from "./browser.mjs";
-import {hostileCase, hostileWire, runSmallCase, runSmallSections} from "./small_case.mjs";
+import {hostileCase, hostileWire, runSmallCase, runSmallMoving, runSmallSections} from "./small_case.mjs";
 
 const kMegabyte = 1e6;
 const kSkipped = 77;
@@ -301,6 +301,26 @@ if (!given.length) {
       assert.deepEqual(faults, []);
       await close();
     }
+  });
+
+  test("shows the vessel where the wire moves it", async () => {
+    const file = runSmallMoving(process.env.WIREPLAN_PROGRAM, join(folder, "moving"));
+    const {page, faults, close} = await open(browser, file);
+    const state = page.locator("#insertion-state"), moves = page.locator("#vessel-moves"), slider = page.locator("#insertion");
+    const [, moved] = (await state.textContent()).match(/the vessel moved by ([\d.]+)/);
+    assert.ok(Number(moved) > 0.3, `moved by ${moved} mm`);
+    assert.ok(await moves.isChecked());
+    const canvas = page.locator("canvas");
+    const shifted = await picture(canvas);
+    await moves.uncheck();
+    const rest = await picture(canvas);
+    assert.notDeepEqual(shifted, rest);
+    await moves.check();
+    assert.deepEqual(await picture(canvas), shifted);
+    await slider.fill("0");
+    assert.match(await state.textContent(), /the vessel moved by 0/);
+    assert.deepEqual(faults, []);
+    await close();
   });
 
   test("shows hostile names as text", async () => {

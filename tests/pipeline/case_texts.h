@@ -184,11 +184,15 @@ inline Json full_case(Json json) {
   if (!json["surface"].contains("path")) {
     json["mask"] = {{"most_handles", 20}, {"most_faces", 100000}};
   }
-  json["wall"] = {{"model", "rigid"},
-                  {"thickness_mm", 2},
-                  {"young_modulus_kpa", 56},
-                  {"poisson_ratio", 0.4},
-                  {"support_kpa_per_mm", 2}};
+  json["wall"] = {
+      {"model", "rigid"},
+      {"thickness_mm", 2},
+      {"young_modulus_kpa", 56},
+      {"poisson_ratio", 0.4},
+      {"support_kpa_per_mm", 2},
+      {"held",
+       Json::array({{{"at", "point"}, {"point_mm", {1, 2, 3}}, {"radius_mm", 8}, {"factor", 30}},
+                    {{"at", "ostia"}}})}};
   json["access"].update(Json{{"inclination_deg", {0, 15}}, {"azimuth_deg", {0, 90}}});
   json["target"]["radius_mm"] = 5;
   json["wires"] = {own_wire(), "amplatz"};
@@ -261,6 +265,9 @@ inline Json listed_case() {
 inline Json voxel_case(bool listed) {
   Json json = full_case(volume_case());
   json["volume"].erase("series");  // of a file there is none
+  Json& held = json["wall"]["held"][0];
+  held["point"] = {{"ijk", held["point_mm"]}};
+  held.erase("point_mm");
   for (const auto& [end, list] :
        {std::pair("access", "accesses"), std::pair("target", "targets")}) {
     json[end]["point"] = {{"ijk", json[end]["point_mm"]}};

@@ -461,7 +461,8 @@ TEST_F(CaseFile, CodeAndSchemaAgreeOnKeysLimitsAndRequirements) {
   std::swap(other_order["targets"][0], other_order["targets"][1]);
   SchemaWalk of_sections(schema, other_order, told);
   Json marked = full_case(surface_case()), marked_lists = listed_case();
-  SchemaWalk of_marked(schema, marked_points(std::move(marked), {"/access", "/target"}), told);
+  SchemaWalk of_marked(
+      schema, marked_points(std::move(marked), {"/access", "/target", "/wall/held/0"}), told);
   of_marked.visit(schema, "", "");
   SchemaWalk of_marked_lists(
       schema, marked_points(std::move(marked_lists), {"/accesses/0", "/targets/0"}), told);

@@ -6,6 +6,7 @@
 #include <functional>
 
 #include "pipeline/report/motion_json.h"
+#include "pipeline/stages/held_places.h"
 
 namespace wireplan::pipeline {
 namespace {
@@ -72,6 +73,33 @@ TEST(VesselMotion, OfATurnAboutTheTrunkTurnsTheArmAsFar) {
                                                       // less well round the fork
   EXPECT_NEAR(std::abs(turn.at("view_moved").at("rotation_deg").get<double>()), 8.0, 0.4);
   EXPECT_NEAR(turn.at("moved_deg"), 90.0, 1.0);
+}
+
+TEST(VesselMotion, ArteriesThatLeaveTheTrunkAreHeldAtTheirOstia) {
+  const LeftBranch vessel;
+  WallInput wall;
+  wall.support = 1e-3;
+  wall.held.clear();
+  const auto moved_at = [&](const Vec3& place) {
+    const auto chain = make_section_chain(wall, vessel.tree, Vec3::Zero(), 0.0);
+    // Energy of a shift of the whole is twice what the support costs: by its part near a place.
+    Eigen::Matrix3Xd u = Eigen::Matrix3Xd::Zero(3, chain->nodes()), gradient = u;
+    for (int k = 0; k < chain->nodes(); ++k) {
+      if ((chain->places().col(k) - place).norm() < 6.0) u.col(k) = Vec3(1, 0, 0);
+    }
+    return chain->energy(u, gradient);
+  };
+  const Vec3 ostium(10, 0, 100), access(0, 0, 0), end(0, 0, 192);
+  const double free_ostium = moved_at(ostium), free_access = moved_at(access),
+               free_end = moved_at(end);
+  wall.held = {{.at = HeldPlace::At::kOstia, .radius = 8.0, .factor = 100.0}};
+  EXPECT_GT(moved_at(ostium), 20.0 * free_ostium);
+  EXPECT_NEAR(moved_at(access), free_access, 1e-9 * free_access);
+  EXPECT_NEAR(moved_at(end), free_end, 1e-9 * free_end);
+  wall.held = {{.at = HeldPlace::At::kPoint, .point = end, .radius = 8.0, .factor = 10.0}};
+  EXPECT_GT(moved_at(end), 5.0 * free_end);
+  EXPECT_LT(moved_at(end), 10.0 * free_end);
+  EXPECT_NEAR(moved_at(ostium), free_ostium, 1e-9 * free_ostium);
 }
 
 TEST(VesselMotion, SpreadIsThatOfTheRepeats) {

@@ -6,8 +6,10 @@
 
 #include "pipeline/files/case_file.h"
 #include "pipeline/report/page.h"
+#include "pipeline/report/render.h"
 #include "pipeline/report/report.h"
 #include "pipeline/stages/stages.h"
+#include "preprocess/files/vessel_io.h"
 #include "tests/pipeline/finished_case.h"
 
 namespace wireplan::pipeline {
@@ -109,6 +111,66 @@ TEST(Page, HoldsTheReportAndTheShapesOfItsTrials) {
   EXPECT_NEAR((tip - Vec3(0.0, 0.0, 28.0)).norm(), trial.at("tip_to_target_mm"), 2e-3)
       << "16 bits over 36 mm are steps of 0.0006 mm";
   EXPECT_FALSE(scene.at("panels").contains("slices")) << "the case starts from a surface";
+}
+
+TEST(Page, HoldsHowTheVesselFollowsItsCrossSections) {
+  if (!page_missing().empty()) GTEST_SKIP() << page_missing();
+  const TemporaryFolder folder;
+  write_finished_tube(folder.path());
+  RunOptions options;
+  options.cache = folder / "cache";
+  const Case given = read_case(
+      folder / "case.json",
+      {"wall.support_kpa_per_mm=0.2", "robustness.repeats=0", "access.inclination_deg=[20]"});
+  const fs::path made = folder / "out";
+  publish(run_stages(given, options).artifacts, made);
+  const Json scene = Json::parse(block(read_text(made / "report.html"), "scene"));
+  const auto counts = numbers<std::uint8_t>(scene.at("motion").at("counts"));
+  const auto nodes = numbers<std::uint16_t>(scene.at("motion").at("nodes"));
+  const auto weights = numbers<float>(scene.at("motion").at("weights"));
+  const std::size_t points = (numbers<std::uint16_t>(scene.at("surface").at("vertices")).size() +
+                              numbers<std::uint16_t>(scene.at("path")).size()) /
+                             3;
+  ASSERT_EQ(counts.size(), points + 2) << "and access and target";
+  ASSERT_EQ(nodes.size(), weights.size());
+  std::size_t at = 0;
+  for (const std::uint8_t count : counts) {
+    double sum = 0.0;
+    for (int k = 0; k < count; ++k) sum += weights.at(at++);
+    EXPECT_NEAR(sum, 1.0, 1e-5);
+  }
+  EXPECT_EQ(at, nodes.size());
+
+  // The last shape's displacements are the trial's; the vessel as the files have it is moved by
+  // them.
+  const Json& insertion = scene.at("insertions")[0];
+  const auto last = numbers<float>(insertion.at("shapes").back().at("sections"));
+  EXPECT_EQ(last,
+            numbers<float>(scene.at("trials")[insertion.at("trial").get<int>()].at("sections")));
+  ASSERT_EQ(last.size() % 3, 0u);
+  const fs::path states = made / "trials" / "plan-1-vessel";
+  int count = 0;
+  while (fs::exists(states / (std::to_string(count) + ".vtp"))) ++count;
+  EXPECT_GE(count, 3);
+  EXPECT_LE(count, 24);
+  EXPECT_TRUE(fs::exists(made / "trials" / "plan-1-vessel.pvd"));
+  const Surface rest = preprocess::read_surface_artifact(made / "surface.vtp"),
+                moved = preprocess::read_surface_artifact(states /
+                                                          (std::to_string(count - 1) + ".vtp"));
+  ASSERT_EQ(rest.vertices.cols(), moved.vertices.cols());
+  at = 0;
+  double most = 0.0;
+  for (Eigen::Index k = 0; k < rest.vertices.cols(); ++k) {
+    Vec3 shift = Vec3::Zero();
+    for (int n = 0; n < counts[static_cast<std::size_t>(k)]; ++n, ++at) {
+      const float* u = last.data() + 3 * nodes[at];
+      shift += weights[at] * Vec3(u[0], u[1], u[2]);
+    }
+    most = std::max(most, shift.norm());
+    EXPECT_LT((rest.vertices.col(k) + shift - moved.vertices.col(k)).norm(), 1e-4);
+  }
+  EXPECT_GT(most, 0.01) << "the wire moved it";
+  EXPECT_FALSE(render_report(made / "report.json", folder / "pictures").empty());
 }
 
 TEST(Page, IsTheSameAtAnyThreadCountOutsideItsTiming) {

@@ -80,6 +80,9 @@ std::map<std::string, std::vector<std::string>> common_table() {
                                         {"/wall/young_modulus_kpa", wall},
                                         {"/wall/poisson_ratio", wall},
                                         {"/wall/support_kpa_per_mm", trials},
+                                        {"/wall/held/0/at", trials},
+                                        {"/wall/held/0/radius_mm", trials},
+                                        {"/wall/held/0/factor", trials},
                                         {"/target/radius_mm", trials},
                                         {"/access/inclination_deg/0", trials},
                                         {"/access/azimuth_deg/0", trials},
@@ -144,6 +147,7 @@ void segment_reads_points(std::map<std::string, std::vector<std::string>>& table
 
 Json common_changes() {
   return {{"/wall/model", "rigid"},
+          {"/wall/held/0/at", "ostia"},
           {"/wall/poisson_ratio", 0.4},
           {"/axes", "unknown"},
           {"/mask/most_handles", 60},

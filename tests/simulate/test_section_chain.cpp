@@ -242,5 +242,21 @@ TEST(SectionChain, PinsHoldWhatIsNearThem) {
   EXPECT_NEAR(chain.displacement(Vec3(0.0, 0.0, 100.0), u)[0], free, 0.02 * free);
 }
 
+TEST(SectionChain, OfSeveralPinsTheStiffestCounts) {
+  const std::vector<Branch> tree = straight_vessel();
+  const Pin soft{.place = Vec3::Zero(), .radius = 10.0, .factor = 5.0};
+  Pin stiff = soft;
+  stiff.factor = 50.0;
+  const auto energy = [&](std::vector<Pin> pins) {
+    const SectionChain chain(tree, {.support = 1e-3, .young_modulus = 0.5, .pins = pins});
+    const Eigen::Matrix3Xd u = Eigen::Matrix3Xd::Ones(3, chain.nodes());
+    Eigen::Matrix3Xd gradient = Eigen::Matrix3Xd::Zero(3, chain.nodes());
+    return chain.energy(u, gradient);
+  };
+  EXPECT_GT(energy({stiff}), 1.5 * energy({soft}));
+  EXPECT_DOUBLE_EQ(energy({soft, stiff}), energy({stiff}));
+  EXPECT_DOUBLE_EQ(energy({stiff, soft, soft}), energy({stiff}));
+}
+
 }  // namespace
 }  // namespace wireplan::simulate

@@ -46,6 +46,8 @@ export const readPage = () => {
     return values;
   };
   const indices = (text) => new Uint32Array(bytes(text));
+  // How far the vessel's cross-sections have moved [mm], where they do.
+  const sections = (stored) => (stored.sections ? floats(stored.sections) : null);
 
   // Errors that refining found, and ranks, by trial.
   const errors = new Map(report.numerics.plans.map((row) => [row.trial, row]));
@@ -61,6 +63,7 @@ export const readPage = () => {
       excluded: excluded.get(row.id) ?? null,
       direction: stored.direction,
       nodes: lazy(() => points(stored.nodes)),
+      sections: lazy(() => sections(stored)),
       pushes: lazy(() => {
         const values = floats(stored.push), tools = stored.tools ? floats(stored.tools) : null;
         return alongWay(Array.from({length: values.length / 5}, (_, i) => {
@@ -82,6 +85,7 @@ export const readPage = () => {
             insertion: shape.insertion_mm,
             nodes: points(shape.nodes),
             force: floats(shape.force_n),
+            sections: sections(shape),
             tools: shape.tools_mm ?? null,
           })), row.shapes[0]?.tools_mm ? 5 : 0),
         ),
@@ -107,6 +111,11 @@ export const readPage = () => {
       peakForce: floats(scene.surface.peak_force_n),
     },
     path: points(scene.path),
+    motion: scene.motion ? {
+      counts: new Uint8Array(bytes(scene.motion.counts)),
+      nodes: new Uint16Array(bytes(scene.motion.nodes)),
+      weights: floats(scene.motion.weights),
+    } : null,
     panels: scene.panels,  // each decodes its own
     picture: `data:image/png;base64,${scene.picture_png}`,
   };

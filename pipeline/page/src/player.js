@@ -2,6 +2,7 @@
 import {gradient} from "./colors.js";
 import {el, section} from "./dom.js";
 import {number, outcomeWord, planName, shown} from "./format.js";
+import {farthest} from "./motion.js";
 import {makeVessel} from "./vessel3d.js";
 
 const kSpeed = 40; // mm of the hand's way per second
@@ -20,7 +21,8 @@ const between = (a, b, part) => {
     const before = k >= missing ? a.force[from] : 0;
     force[k] = before + part * (b.force[k] - before);
   }
-  return {nodes, force};
+  const sections = a.sections && b.sections ? b.sections.map((to, k) => a.sections[k] + part * (to - a.sections[k])) : null;
+  return {nodes, force, sections};
 };
 
 /** The shape at a part, 0 to 1, of the hand's way. */
@@ -77,6 +79,7 @@ export const vesselSection = (page, selection) => {
     el("option", {value: "plan"}, "forces of the chosen plan"),
     el("option", {value: "all"}, "largest force of any trial"),
     el("option", {value: "none"}, "no forces"));
+  const moves = el("input", {type: "checkbox", id: "vessel-moves", checked: "", onchange: () => showWire()});
   const play = el("button", {type: "button", id: "play"}, "Play");
   const slider = el("input", {type: "range", id: "insertion", min: "0"});
   const state = el("output", {for: "insertion", id: "insertion-state"});
@@ -123,7 +126,8 @@ export const vesselSection = (page, selection) => {
     const part = end > 0 ? way / end : 1;
     const push = pushAt(trial.pushes(), part);
     const insertion = part > 0 ? push?.insertion ?? 0 : 0;
-    const shape = shapes ? shapeAt(shapes, part) : {nodes: trial.nodes(), force: null};
+    const shape = shapes ? shapeAt(shapes, part) : {nodes: trial.nodes(), force: null, sections: trial.sections()};
+    vessel?.setSections(moves.checked ? shape.sections : null);
     vessel?.setWire(shape.nodes, shape.force, scale, shape.tools ?? toolsAtEnd(push));
     showStep(push);
     const ofTool = (name, tool) =>
@@ -134,7 +138,8 @@ export const vesselSection = (page, selection) => {
       ? `hand ${number(push.push)}\u00a0N, tip ${number(push.tip)}\u00a0N, largest contact ${number(push.peak)}\u00a0N, all contacts ${number(push.total)}\u00a0N`
       : "never entered the vessel";
     const last = trial.pushes()[trial.pushes().length - 1]?.insertion ?? 0;
-    state.textContent = `${number(insertion)}\u00a0mm of ${number(last)}\u00a0mm inserted: ${forces}`;
+    const moved = page.motion && shape.sections ? `; the vessel moved by ${number(farthest(shape.sections))}\u00a0mm` : "";
+    state.textContent = `${number(insertion)}\u00a0mm of ${number(last)}\u00a0mm inserted: ${forces}${moved}`;
     slider.setAttribute("aria-valuetext", `${number(insertion)} mm inserted`);
   };
   const show = () => {
@@ -183,7 +188,8 @@ export const vesselSection = (page, selection) => {
   const node = section("vessel", "The vessel and the wire",
     el("div", {class: "controls"},
       el("label", {for: "pick-trial"}, "Insertion "), pick,
-      el("label", {for: "pick-wall"}, "Wall shows "), wall),
+      el("label", {for: "pick-wall"}, "Wall shows "), wall,
+      page.motion ? el("label", {}, moves, " vessel as the wire moves it") : null),
     sentence,
     steps,
     frame,

@@ -10,6 +10,7 @@ import {LineGeometry} from "three/addons/lines/LineGeometry.js";
 import {LineMaterial} from "three/addons/lines/LineMaterial.js";
 import {forceRgb} from "./colors.js";
 import {el} from "./dom.js";
+import {makeCarrier} from "./motion.js";
 
 const kPaper = 0x141a24;
 const kEntryLength = 40; // mm at most
@@ -156,6 +157,9 @@ export const makeVessel = (frame, page) => {
   pathGeometry.setAttribute("position", new BufferAttribute(page.path, 3));
   scene.add(new Line(pathGeometry, new LineBasicMaterial({color: 0x8794a8})));
   let wire = null, entry = null;
+  const carry = page.motion
+    ? makeCarrier(page.motion, ...[page.surface.vertices, page.path, page.access, page.target].map((points) => Float32Array.from(points)))
+    : null;
 
   // The camera looks at the middle of the vessel.
   vessel.geometry.computeBoundingBox();
@@ -298,6 +302,19 @@ export const makeVessel = (frame, page) => {
     /** Shows forces per triangle. */
     setWall: (forces, scale) => {
       colorVessel(vessel, forces, scale);
+      redraw();
+    },
+    /** Shows the vessel, its path, access and target where its cross-sections have moved them; null: at
+        rest. */
+    setSections: (sections) => {
+      if (!carry) return;
+      const [vertices, path, access, to] = carry(sections);
+      vessel.geometry.getAttribute("position").copyArray(vertices).needsUpdate = true;
+      vessel.geometry.computeVertexNormals();
+      pathGeometry.getAttribute("position").copyArray(path).needsUpdate = true;
+      marks[0].point.set(...access);
+      marks[1].point.set(...to);
+      target.position.set(...to);
       redraw();
     },
     setEntry: (direction) => {
