@@ -84,6 +84,9 @@ class Planner {
                      : rounds.level() == Level::kProbe ? plan_.probes
                                                        : plan_.full;
       rounds.take(find_or_run(study_, vessel_, runs, log_, options_.batch, spent));
+      if (rounds.level() == Level::kScout && options_.early.scouted) {
+        options_.early.scouted(rounds.first_answer());
+      }
     }
     plan_.trials = rounds.trials();
     plan_.levels = rounds.levels();
@@ -137,7 +140,8 @@ class Planner {
       }
       return;
     }
-    ToolScripts search = find_tool_scripts(study_, vessel_.rigid_model(), options_.batch);
+    ToolScripts search =
+        find_tool_scripts(study_, vessel_.rigid_model(), options_.batch, options_.early.script);
     if (options_.batch.cancelled && options_.batch.cancelled()) throw Interrupted();
     plan_.scripts.branches += search.branches;
     std::vector<Run> runs;

@@ -6,6 +6,7 @@
 ///   4. repeats of the best under disturbances, and refinement again if that puts others first;
 ///   5. attempts: for wires without a plan, the closest trial in full, to be looked at.
 /// What the runs are worth by the case's limits and weights is found in judge.h.
+#include <functional>
 #include <optional>
 #include <vector>
 
@@ -25,6 +26,13 @@ enum class Manoeuvring {
 /// without a plan.
 inline constexpr std::size_t kPlansPlayed = 20;
 
+/// For somebody who waits, each may be empty. Nothing of the plan follows from what they are told.
+struct Early {
+  std::function<void(const FirstAnswer&)> scouted;  // once the scouts are known
+  std::function<void(const Candidate&)> script;     // once the search finds one of catheter and
+                                                    // wire; which, hangs on the threads
+};
+
 struct PlanOptions {
   enum class Until { kTrials, kManoeuvres, kEnd };
 
@@ -33,6 +41,7 @@ struct PlanOptions {
   RobustnessOptions robustness = {};  // ranges are cut to what trials can be run with
   Until until = Until::kEnd;          // the last step that is done
   BatchOptions batch = {};
+  Early early = {};
 };
 
 /// The trials of a plan under the disturbances, in their order.

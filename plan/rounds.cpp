@@ -67,6 +67,25 @@ Sighting Rounds::look(int id, const Measured& trial) const {
   return sighting;
 }
 
+FirstAnswer Rounds::first_answer() const {
+  expects(round_ == 1 && level_ == Level::kScout);
+  FirstAnswer answer;
+  answer.trials = static_cast<int>(candidates_.size());
+  const auto key = [&](std::size_t k) {
+    return std::make_pair(!seen_.scouts[k].plan, seen_.scouts[k].score);
+  };
+  std::optional<std::size_t> best;
+  for (std::size_t k = 0; k < candidates_.size(); ++k) {
+    if (!seen_.scouts[k].reached) continue;
+    ++answer.reached;
+    if (!best || key(k) < key(*best)) best = k;
+  }
+  if (!best) return answer;
+  answer.best = candidates_[*best];
+  answer.trial = trials_[*best];
+  return answer;
+}
+
 std::optional<ScoutSummary> Rounds::scouting() const {
   if (!scouted_) return {};
   const Study scout = study_at(study_, Level::kScout);

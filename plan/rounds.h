@@ -25,6 +25,14 @@ struct ScoutSummary {
   ScoutError error;
 };
 
+/// What the scouts say before anything is run in full, for somebody who waits.
+struct FirstAnswer {
+  int trials = 0, reached = 0;
+  std::optional<Candidate> best;  // of those that reached the first by score, such that break no
+                                  // limit before the others
+  Measured trial;                 // its scout
+};
+
 class Rounds {
  public:
   /// Keeps references.
@@ -40,6 +48,7 @@ class Rounds {
   /// Per candidate the trial of the highest level that ran it, and that level.
   const std::vector<Measured>& trials() const { return trials_; }
   const std::vector<Level>& levels() const { return levels_; }
+  FirstAnswer first_answer() const;              // expects the round of scouts alone
   std::optional<ScoutSummary> scouting() const;  // empty where all run in full
 
  private:

@@ -1,6 +1,7 @@
 #include "plan/tool_search.h"
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <numeric>
 #include <tuple>
@@ -489,7 +490,8 @@ Study tool_scout_study(const Study& study) {
 }
 
 ToolScripts find_tool_scripts(const Study& study, const simulate::VesselModel& vessel,
-                              const BatchOptions& options) {
+                              const BatchOptions& options,
+                              const std::function<void(const Candidate&)>& on_first) {
   ToolScripts all;
   const std::optional<Ostium> ostium = find_ostium(study.goal);
   std::vector<ToolStart> starts;
@@ -509,11 +511,17 @@ ToolScripts find_tool_scripts(const Study& study, const simulate::VesselModel& v
   }
   const Study scout = tool_scout_study(study);
   std::vector<StartFindings> findings(starts.size());
+  std::atomic<bool> told = false;
   for_each_slot(
       static_cast<int>(starts.size()),
       [&](int slot) {
         const auto k = static_cast<std::size_t>(slot);
         findings[k] = ToolSearch(scout, starts[k], *ostium, vessel, options.cancelled).run();
+        if (on_first && !findings[k].found.empty() && !told.exchange(true)) {
+          Candidate candidate = first_candidate(study, starts[k].pair);
+          candidate.steps = as_written(findings[k].found.front().steps);
+          on_first(candidate);
+        }
       },
       options);
   for (std::size_t p = 0; p < all.pairs.size(); ++p) {

@@ -6,6 +6,7 @@
 ///   3. the catheter is turned, and both are pulled down or pushed up, until its tip is in the
 ///   ostium;
 ///   4. the wire goes out into the branch, and where it comes no further, the catheter follows it.
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -47,8 +48,10 @@ Study tool_scout_study(const Study& study);
 /// lies as it did then, and leads the wire out as far into the branch: what a hand sees, which
 /// holds where friction and stiffness are others. Keeps up to six scripts of a pair, which differ
 /// in turn, or in depth, first those of whose neighbours (tool_neighbours.h) most reach too. The
-/// same at any thread count.
+/// same at any thread count. The first script that is found is told to `on_first`, where given, at
+/// once and from any thread.
 ToolScripts find_tool_scripts(const Study& study, const simulate::VesselModel& vessel,
-                              const BatchOptions& options);
+                              const BatchOptions& options,
+                              const std::function<void(const Candidate&)>& on_first = nullptr);
 
 }  // namespace wireplan::plan

@@ -8,6 +8,7 @@
 #include <csignal>
 #include <iostream>
 #include <memory>
+#include <mutex>
 
 #include "pipeline/commands/batch_run.h"
 #include "pipeline/commands/commands.h"
@@ -45,13 +46,22 @@ std::shared_ptr<spdlog::logger> make_log() {
   return log;
 }
 
-// "[#####.....]  12/36  about 40 s to go" on one line of a terminal; nothing elsewhere.
+// "[#####.....]  12/36  about 40 s to go" on one line of a terminal; nothing elsewhere. From any
+// thread.
 class ProgressBar {
  public:
   ~ProgressBar() { clear(); }
 
+  // A line of the log while work goes on.
+  void tell(spdlog::logger& log, const std::string& line) {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    clear();
+    log.info(line);
+  }
+
   void show(int done, int total) {
     if (!terminal_) return;
+    const std::lock_guard<std::mutex> lock(mutex_);
     const auto now = std::chrono::steady_clock::now();
     if (first_ < 0) {
       first_ = done - 1;
@@ -75,6 +85,7 @@ class ProgressBar {
     shown_ = false;
   }
 
+  std::mutex mutex_;
   bool terminal_ = ::isatty(STDERR_FILENO) == 1;
   bool shown_ = false;
   int first_ = -1;  // trials done before the first call
@@ -223,6 +234,7 @@ int run_case(const RunArguments& arguments) {
   ProgressBar bar;
   RunOptions options = run_options(arguments);
   options.work.progress = [&](int done, int total) { bar.show(done, total); };
+  options.work.told = [&](const std::string& line) { bar.tell(*log, line); };
   options.on_stage = [&](const StageOutcome& outcome) {
     log->info(stage_line(outcome, arguments.explain));
   };
@@ -232,9 +244,18 @@ int run_case(const RunArguments& arguments) {
   for_each_section(given, options, [&](const Case& section, const RunOptions& own) {
     const std::string name = section_name(section);
     if (!name.empty()) log->info(name);
-    const RunResult result = run_stages(section, own);
-    const fs::path folder = output / section_folder(section);
+    const fs::path folder = output / section_folder(section), early = folder / "preliminary.html";
+    RunOptions with_page = own;
+    if (page_missing().empty() && (own.to.empty() || own.to == "report")) {
+      with_page.before_plans = [&](Workspace& work) {
+        fs::create_directories(folder);
+        write_whole(make_first_page(work), early);
+        bar.tell(*log, "first page, without errors and disturbances: " + early.string());
+      };
+    }
+    const RunResult result = run_stages(section, with_page);
     publish(result.artifacts, folder);
+    fs::remove(early);
     const fs::path look = folder / "slices.png";
     if (fs::exists(look)) log->info("look first at the outline of the mask: " + look.string());
     const std::string missing = arguments.after_shards ? missing_shards(result) : "";

@@ -9,6 +9,7 @@
 #include "pipeline/stages/makers.h"
 #include "pipeline/stages/plan_artifact.h"
 #include "pipeline/stages/stored_trials.h"
+#include "plan/catheters.h"
 
 namespace wireplan::pipeline {
 namespace {
@@ -31,7 +32,46 @@ double choose_lumen_offset(const Workspace& work) {
   return kVoxelPart * std::cbrt(product);
 }
 
-plan::PlanOptions plan_options(const Workspace& work, Until until) {
+/// What the scouts came to, in a line for who waits.
+std::string first_answer_text(const plan::Study& study, const plan::FirstAnswer& answer) {
+  std::string text =
+      "first answer, of coarse pushes against a rigid wall: " + std::to_string(answer.reached) +
+      " of " + std::to_string(answer.trials) + " reach the target";
+  if (!answer.best) return text + "; what may do so all the same is looked at next";
+  const plan::Metrics& metrics = answer.trial.metrics;
+  return text + ", first " + plan::describe(study, *answer.best) +
+         format(" (%.2g N at the tip, %.2g N on the wall)", metrics.peak_tip_force,
+                metrics.peak_contact_force) +
+         "; not known yet: the wall as it yields, errors, disturbances";
+}
+
+std::string first_script_text(const plan::Study& study, const plan::Candidate& script) {
+  std::string text =
+      "first script, of the search's coarse steps: " + plan::describe(study, script) + ": ";
+  for (const std::string& step : plan::describe_steps(script.steps, study.insertion.length)) {
+    text += step + "; ";
+  }
+  return text + "not known yet: whether it holds in full and under disturbances";
+}
+
+/// A stage tells what it finds first; the later ones find the same in the log.
+plan::Early early_answers(Workspace& work, Until until) {
+  const auto& told = work.options().told;
+  if (!told) return {};
+  const plan::Study& study = work.study();
+  plan::Early early;
+  if (until == Until::kTrials) {
+    early.scouted = [&](const plan::FirstAnswer& answer) {
+      told(first_answer_text(study, answer));
+    };
+  }
+  if (until == Until::kManoeuvres) {
+    early.script = [&](const plan::Candidate& script) { told(first_script_text(study, script)); };
+  }
+  return early;
+}
+
+plan::PlanOptions plan_options(Workspace& work, Until until) {
   const Case& given = work.given();
   plan::PlanOptions options{.exhaustive = given.exhaustive,
                             .manoeuvres = given.manoeuvres,
@@ -39,7 +79,8 @@ plan::PlanOptions plan_options(const Workspace& work, Until until) {
                             .until = until,
                             .batch = {.threads = work.options().threads,
                                       .progress = work.options().progress,
-                                      .cancelled = work.options().cancelled}};
+                                      .cancelled = work.options().cancelled},
+                            .early = early_answers(work, until)};
   double& lumen = options.robustness.unknowns.lumen;
   if (lumen == 0.0) lumen = choose_lumen_offset(work);
   return options;
@@ -178,6 +219,13 @@ void make_plans(Workspace& work, const fs::path& folder) {
   }
   write_figures(figures, folder);
   write_plan(plan, folder);
+}
+
+plan::Plan known_before_plans(Workspace& work) {
+  StoredTrials log(work);
+  plan::Plan plan = plan_until(work, Until::kManoeuvres, log);
+  plan.robustness.repeats = 0;
+  return plan;
 }
 
 ShareOutcome run_share(Workspace& work, const Share& share) {

@@ -126,8 +126,8 @@ Json find_motion(const Workspace& work, const ReportInput& report,
           {"trials", std::move(trials)}};
 }
 
-// All of the report that the stages before it tell.
-ReportInput describe_run(Workspace& work, const simulate::SectionChain* chain) {
+// All of the report that the stages before it tell, of what was simulated.
+ReportInput describe_run(Workspace& work, plan::Plan plan, const simulate::SectionChain* chain) {
   const Case& given = work.given();
   ReportInput report;
   report.name = given.name;
@@ -139,7 +139,7 @@ ReportInput describe_run(Workspace& work, const simulate::SectionChain* chain) {
   for (DeviceWire& device : report.devices) {
     for (NamedValue& each : device.values) each.value.source = cite(known, each.value.source);
   }
-  report.plan = read_plan(work);
+  report.plan = std::move(plan);
   report.judgement = plan::judge(report.study, report.plan, given.limits, given.weights);
   report.robustness = repeats_json(report.study, report.plan, report.judgement.repeated);
   for (const char* stage : kToldStages) {
@@ -147,9 +147,10 @@ ReportInput describe_run(Workspace& work, const simulate::SectionChain* chain) {
     report.stages.push_back(stage);
     report.figures[stage] = work.figures(stage);
   }
-  const Json of_plans = work.figures("plans");
-  for (const Json& told : of_plans.at("warnings")) report.warnings.push_back(told);
-
+  if (work.has("plans")) {
+    const Json of_plans = work.figures("plans");
+    for (const Json& told : of_plans.at("warnings")) report.warnings.push_back(told);
+  }
   report.motion = find_motion(work, report, chain);
   report.verdict = decide(work, report);
 
@@ -191,7 +192,9 @@ void warn_of_other_first(const Case& given, ReportInput& report) {
 
 Json timing_json(const Workspace& work) {
   const int threads = work.options().threads;
-  const Json plans = read_json(work.artifact("plans").folder / kTimingFile, kTimingSchema);
+  const Json plans = work.has("plans")
+                         ? read_json(work.artifact("plans").folder / kTimingFile, kTimingSchema)
+                         : Json{{"numerics", Json::array()}, {"repeats", {{"cpu_s", 0.0}}}};
   Json timing;
   timing["threads"] = threads > 0 ? threads : core_count();
   timing["stages"] = Json::array();
@@ -352,7 +355,7 @@ ShownTrials from_bytes(const std::string& bytes) {
 ShownTrials find_trials(const Workspace& work, const plan::Plan& plan) {
   std::vector<KeyLine> key = {{"piece", "shown trials " + std::to_string(kReportVersion)}};
   for (const char* stage : {"trials", "manoeuvres", "plans"}) {
-    key.push_back({stage, work.artifact(stage).contents()});
+    if (work.has(stage)) key.push_back({stage, work.artifact(stage).contents()});
   }
   return from_bytes(work.piece(key, [&] { return to_bytes(read_trials(work, plan)); }));
 }
@@ -422,14 +425,10 @@ void write_forces(Workspace& work, const ReportInput& report, const ForceMap& al
   preprocess::write_wall(work.surface(), work.wall(), folder / "forces.vtu", forces);
 }
 
-}  // namespace
-
-void make_report(Workspace& work, const fs::path& folder) {
-  const auto start = std::chrono::steady_clock::now();
-  PageInput page = start_page(work);
-  page.chain = work.section_chain();
-  ReportInput report = describe_run(work, page.chain.get());
-  warn_of_other_first(work.given(), report);
+/// Puts all trials on the page, and gives the largest forces on the wall: of all of them, and of
+/// the best plan.
+std::pair<ForceMap, ForceMap> show_trials(const Workspace& work, const ReportInput& report,
+                                          PageInput& page) {
   ShownTrials shown = find_trials(work, report.plan);
   page.trials = std::move(shown.trials);
   for (std::size_t k = 0; k < page.trials.size(); ++k) {
@@ -440,8 +439,42 @@ void make_report(Workspace& work, const fs::path& folder) {
   for (const auto& trial : shown.peaks) all_forces.add(trial);
   const std::vector<plan::RankedPlan>& plans = report.judgement.ranking.plans;
   if (!plans.empty()) best_forces.add(shown.peaks[static_cast<std::size_t>(plans.front().trial)]);
-  const ForceMap& forces = plans.empty() ? all_forces : best_forces;  // where the volume is cut
   page.peak_force = all_forces.values();
+  return {std::move(all_forces), std::move(best_forces)};
+}
+
+}  // namespace
+
+std::string make_first_page(Workspace& work) {
+  PageInput page = start_page(work);
+  page.chain = work.section_chain();
+  ReportInput report = describe_run(work, known_before_plans(work), page.chain.get());
+  report.name += " (preliminary)";
+  report.warnings.insert(report.warnings.begin(),
+                         "preliminary: errors and what disturbances do are not known yet, and "
+                         "other plans may come first; the run goes on, and report.html takes this "
+                         "page's place");
+  show_trials(work, report, page);
+  page.picture_png = draw_overview(work, report, page);
+  for (const int id : plan::choose_played(report.study, report.plan, report.judgement.ranking)) {
+    std::optional<PageInsertion> insertion = read_insertion(work, report, page, id, "", {});
+    if (insertion) page.insertions.push_back(std::move(*insertion));
+  }
+  report.timing = timing_json(work);
+  report.timing["report_s"] = 0.0;
+  return build_page(build_report(report), page);
+}
+
+void make_report(Workspace& work, const fs::path& folder) {
+  const auto start = std::chrono::steady_clock::now();
+  PageInput page = start_page(work);
+  page.chain = work.section_chain();
+  ReportInput report = describe_run(work, read_plan(work), page.chain.get());
+  warn_of_other_first(work.given(), report);
+  const std::pair<ForceMap, ForceMap> of_wall = show_trials(work, report, page);
+  const ForceMap &all_forces = of_wall.first, &best_forces = of_wall.second;
+  const std::vector<plan::RankedPlan>& plans = report.judgement.ranking.plans;
+  const ForceMap& forces = plans.empty() ? all_forces : best_forces;  // where the volume is cut
 
   // Alone: a volume of DICOM is read in a copy of this process, in which what others hold at that
   // moment stays held (apart.h).

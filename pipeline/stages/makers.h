@@ -27,6 +27,10 @@ void make_manoeuvres(Workspace& work, const std::filesystem::path& folder);
 void make_plans(Workspace& work, const std::filesystem::path& folder);
 void make_report(Workspace& work, const std::filesystem::path& folder);
 
+/// The page of a report before stage plans is made: without errors, repeats and slices, which it
+/// says. Expects the stages up to manoeuvres to be done, and page_missing() to be empty.
+std::string make_first_page(Workspace& work);
+
 /// What the values of a volume are, where they are no plain Hounsfield units; for people.
 std::vector<std::string> warn_of_values(const preprocess::Image& image);
 

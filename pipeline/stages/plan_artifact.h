@@ -14,6 +14,9 @@ void write_plan(const plan::Plan& plan, const std::filesystem::path& folder);
 /// Expects the stages up to `plans` to be done. Without shapes, and what was spent.
 plan::Plan read_plan(Workspace& work);
 
+/// The same before stage plans is made: without errors and repeats.
+plan::Plan known_before_plans(Workspace& work);
+
 /// Scripts, and pairs of catheter and wire, as the artifact `manoeuvres` tells them; and back.
 Json scripts_json(const plan::Scripts& scripts);
 Json pairs_json(const plan::Scripts& scripts);

@@ -390,6 +390,7 @@ RunResult run_stages(const Case& given, const RunOptions& options,
       if (!artifact) {
         outcome = {stage.name, StageState::kMade, 0.0,
                    why_it_runs(store, given, stage, text, forced)};
+        if (stage.name == "plans" && options.before_plans) options.before_plans(work);
         artifact = make_artifact(stage, store, text, work);
       }
     } else if (!artifact) {

@@ -59,6 +59,8 @@ struct RunOptions {
   std::vector<std::pair<std::string, Artifact>> beside = {};
   /// Called instead of running `to`, where that is not in the store; may be empty.
   std::function<void(Workspace&)> instead = {};
+  /// Called before stage plans is made, which takes a third of a run and more; may be empty.
+  std::function<void(Workspace&)> before_plans = {};
 };
 
 struct RunResult {

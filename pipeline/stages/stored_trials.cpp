@@ -212,6 +212,7 @@ std::optional<simulate::TrialResult> find_played(const Workspace& work, int id) 
   fs::path trial = in_artifacts(work, trial_file_name(id)),
            shapes = in_artifacts(work, shapes_file(id));
   if (trial.empty() || shapes.empty()) {
+    if (!work.has("plans")) return {};
     const fs::path& folder = work.artifact("plans").folder;
     trial = folder / attempt_file(id);
     shapes = folder / shapes_file(id);

@@ -35,6 +35,7 @@ struct WorkOptions {
   int threads = 0;                                    // of the trials; 0: all cores
   std::function<void(int done, int total)> progress;  // trials; from any thread, one at a time
   std::function<bool()> cancelled;                    // from any thread
+  std::function<void(const std::string&)> told;       // first answers, a line each; from any thread
   std::shared_ptr<ModelStock> models = nullptr;       // null: made anew, and kept for itself
 };
 

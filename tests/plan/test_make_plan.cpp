@@ -76,6 +76,41 @@ TEST(MakePlan, ScoutsAllAndRunsInFullWhatMayBeBest) {
   EXPECT_EQ(plan.scouting->trials, 40);
 }
 
+TEST(MakePlan, TellsWhatTheScoutsSayBeforeAnythingRunsInFull) {
+  const Tube tube(20);
+  // The gentlest breaks a limit, so it is not named; a third of them reach.
+  KnowingLog log([](const plan::Run& run) {
+    if (roll_of(run) > 0.65) return missed(9.0);
+    Measured trial = reached(0.05 + 0.4 * roll_of(run));
+    if (roll_of(run) < 0.05) trial.metrics.max_penetration = 5.0;
+    return trial;
+  });
+  std::vector<FirstAnswer> told;
+  std::size_t asked = 0;
+  PlanOptions options = without_repeats();
+  options.early.scouted = [&](const FirstAnswer& answer) {
+    told.push_back(answer);
+    asked = log.asked.size();
+  };
+  tube.plan(log, options);
+  ASSERT_EQ(told.size(), 1u);
+  EXPECT_EQ(asked, 40u) << "before the first full run";
+  EXPECT_EQ(told[0].trials, 40);
+  EXPECT_EQ(told[0].reached, 14);
+  ASSERT_TRUE(told[0].best);
+  EXPECT_NEAR(told[0].best->roll, 0.1, 1e-12);
+  EXPECT_NEAR(told[0].trial.metrics.peak_contact_force, 0.09, 1e-12);
+
+  KnowingLog none([](const plan::Run&) { return missed(9.0); });
+  tube.plan(none, options);
+  ASSERT_EQ(told.size(), 2u);
+  EXPECT_EQ(told[1].reached, 0);
+  EXPECT_FALSE(told[1].best);
+  options.exhaustive = true;  // no scouts, no first answer
+  tube.plan(none, options);
+  EXPECT_EQ(told.size(), 2u);
+}
+
 TEST(MakePlan, ExhaustiveOrFewCandidatesHaveNoScouts) {
   for (const bool few : {false, true}) {
     const Tube tube(few ? 4 : 20);

@@ -494,7 +494,12 @@ TEST(ToolSearch, MakePlanRanksScriptsOfCatheterAndWire) {
   options.robustness.plans = 1;
   const PlanVessel vessel{
       .path = study.goal.way->path(), .yields = false, .model = model, .rigid_model = model};
+  std::vector<Candidate> told;
+  options.early.script = [&](const Candidate& script) { told.push_back(script); };
   const Plan plan = make_plan(study, vessel, options, log);
+  ASSERT_EQ(told.size(), 1U) << "the first alone, at once";
+  EXPECT_EQ(told[0].catheter, 0);
+  EXPECT_GE(told[0].steps.size(), 4U);
   ASSERT_EQ(plan.scripts.pairs.size(), 1U);
   ASSERT_FALSE(plan.scripts.found.empty()) << plan.scripts.pairs[0].stopped;
   const Judgement judged = judge(study, plan, {}, {});
