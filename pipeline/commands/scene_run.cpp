@@ -224,7 +224,8 @@ SceneAnswer run_bench_scene(const SceneFile& file, const LoadedVessel* vessel,
           format(": tip (%.4f, %.4f, %.4f) mm, residual %.2g N, %d iterations", tip.x(), tip.y(),
                  tip.z(), result.residual, result.iterations) +
           (result.crossing ? "; " + simulate::describe_crossing(*result.crossing, scene.wire.radius)
-                           : "")};
+                           : "") +
+          (result.reason.empty() ? "" : "; " + result.reason)};
 }
 
 /// How the equilibrium lies to the line that the wire started from.

@@ -9,7 +9,7 @@ namespace {
 /// A place is found to within this and then put right to first order, which leaves some 1e-15 mm
 /// and parts of 1e-8 of G [mm].
 constexpr double kNear = 1e-7;
-constexpr int kMostRounds = 40;
+constexpr int kMostCarries = 40;
 
 /// No step of the place is longer: where sections are pushed together G is nearly singular [mm].
 constexpr double kLongest = 4.0;
@@ -47,7 +47,7 @@ void MovingFrame::find(const SectionChain& chain, const Eigen::Matrix3Xd& u, con
     rest_ = point;
     look(chain);
   }
-  for (int round = 0; round < kMostRounds; ++round) {
+  for (int round = 0; round < kMostCarries; ++round) {
     Vec3 moved = Vec3::Zero();
     Mat3 G = Mat3::Identity();
     for (const SectionChain::Weight& weight : weights_) {

@@ -1,13 +1,12 @@
 #include "simulate/equilibrium/newton.h"
 
 #include <Eigen/Geometry>
-#include <Eigen/Jacobi>
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <limits>
 
 #include "simulate/equilibrium/assemble.h"
+#include "simulate/equilibrium/krylov.h"
 #include "simulate/equilibrium/line_search.h"
 
 namespace wireplan::simulate {
@@ -15,7 +14,6 @@ namespace {
 
 constexpr NewtonTuning kTuning;
 constexpr double kEpsilon = std::numeric_limits<double>::epsilon();
-constexpr int kKrylov = kTuning.most_directions;
 
 /// Residual that 64 bit numbers leave in the stiffest element.
 double find_rounding_floor(const Problem& problem, double extent) {
@@ -66,9 +64,16 @@ class Newton {
     start();
     for (;; ++result_.iterations) {
       measure();
-      if (result_.residual <= options_.residual_tolerance) return finish(true);
+      const bool met = result_.residual <= options_.residual_tolerance;
+      const bool leaves = (met || shifted_ == kTuning.most_shifted) && find_way_down();
+      if (met && !leaves) return finish(true);
       if (result_.iterations == options_.max_iterations || !std::isfinite(result_.residual)) {
+        result_.at_saddle = met;
         return finish(false);
+      }
+      if (leaves) {
+        move_on();
+        continue;
       }
       if (!find_step()) return finish(false);
       const bool is_rounding =
@@ -81,6 +86,7 @@ class Newton {
       choose_looks();
       if (!accepted_) search_line();
       if (!accepted_ || has_stalled()) return finish(false);
+      shifted_ = shift_ > 0.0 ? shifted_ + 1 : 0;
       move_on();
     }
   }
@@ -280,8 +286,50 @@ class Newton {
   }
 
   double refine_step();
-  void add_krylov(double start);
   void find_rest(const Eigen::VectorXd& v);
+
+  // ---- away from saddles
+
+  /// Where the Hessian has a direction of negative curvature: goes along it by so much that the
+  /// energy falls, and by more each time. False where it has none, or nothing falls.
+  bool find_way_down() {
+    if (!options_.leave_saddles || contact_ != nullptr) return false;
+    shifted_ = 0;
+    if (factored_.factor(hessian_)) return false;
+    memory_.direction = lowest_mode();
+    const double most = memory_.direction.cwiseAbs().maxCoeff();
+    const double side = gradient_.dot(memory_.direction) > 0.0 ? -1.0 : 1.0;
+    for (nudge_ = std::max(nudge_, kTuning.first_nudge); nudge_ <= kTuning.largest_nudge;) {
+      step_ = side * nudge_ * rod_.radius / most * memory_.direction;
+      nudge_ *= kTuning.nudge_growth;
+      cap_ = D > 3 ? largest_turning_step<D>(problem_, step_)
+                   : std::numeric_limits<double>::infinity();
+      rounding_ = kTuning.rounding * (1.0 + std::abs(energy_));
+      // With edges turned, and straight: between ends that are held no edge turns but by stretch.
+      const double part = std::min(1.0, cap_), enough = kTuning.roundings * rounding_;
+      if (energy_ - go(part) > enough) return true;
+      go_straight(part);
+      if (energy_ - try_trial(part) > enough) return true;
+    }
+    differentiate(state_);
+    return false;
+  }
+
+  /// The direction of least curvature, or one of negative curvature near to it.
+  Eigen::VectorXd lowest_mode() {
+    for (shift_ = kTuning.smallest_shift; !factored_.factor(hessian_, shift_);) {
+      shift_ *= kTuning.shift_growth;
+      if (!(shift_ < kTuning.largest_shift)) break;
+    }
+    Eigen::VectorXd mode(step_.size());
+    for (Eigen::Index k = 0; k < mode.size(); ++k) mode[k] = std::sin(1.0 + 2.4 * double(k));
+    project<D>(problem_, mode);
+    for (int k = 0; k < kTuning.saddle_solves; ++k) {
+      factored_.solve(mode);
+      mode.normalize();
+    }
+    return mode;
+  }
 
   // ---- 2. full step, edges turned rather than lengthened; most steps end here
 
@@ -318,6 +366,14 @@ class Newton {
     turn_edges<D>(problem_, state_, step_, part, trial_);
     move_sections(part);
     return try_trial(part);
+  }
+
+  void go_straight(double part) {
+    for (int k = 0; k < count_; ++k) {
+      trial_.x.col(problem_.first + k) =
+          state_.x.col(problem_.first + k) + part * step_.template segment<3>(D * k);
+    }
+    move_sections(part);
   }
 
   void move_sections(double part) {
@@ -404,11 +460,7 @@ class Newton {
     }
     length_ = lowest_point(along, contact_ != nullptr ? std::min(1.0, cap_) : cap_);
     for (int cut = 0; cut < kTuning.most_cuts; ++cut) {
-      for (int k = 0; k < count_; ++k) {
-        trial_.x.col(problem_.first + k) =
-            state_.x.col(problem_.first + k) + length_ * step_.template segment<3>(D * k);
-      }
-      move_sections(length_);
+      go_straight(length_);
       const double trial_energy = try_trial(length_);
       if (accepted_) return;
       // Lowest point of the parabola through both energies and the slope, within a safe bracket.
@@ -489,6 +541,8 @@ class Newton {
   int eager_until_ = kTuning.eager_refreshes;
   int looks_ = 1;
   int stalled_ = 0;
+  int shifted_ = 0;     // steps in a row
+  double nudge_ = 0.0;  // off a saddle, the next one; of the radius
 };
 
 /// What the banded Hessian H leaves out of the exact one, times a motion: R v.
@@ -505,7 +559,7 @@ void Newton<D>::find_rest(const Eigen::VectorXd& v) {
 template <int D>
 double Newton<D>::refine_step() {
   Eigen::VectorXd& refined = memory_.refined;
-  memory_.krylov.resize(step_.size(), kKrylov + 1);
+  memory_.krylov.resize(step_.size(), kMostDirections + 1);
   memory_.first_step = step_;
   find_rest(step_);
   if (refined.norm() <= kTuning.not_worth * gradient_.norm()) return slope_;
@@ -514,54 +568,16 @@ double Newton<D>::refine_step() {
   if (start <= kTuning.enough * step_.norm()) {
     step_ -= refined;
   } else {
-    add_krylov(start);
+    add_krylov(memory_, start, kTuning.enough, step_, [this](const Eigen::VectorXd& v) {
+      find_rest(v);
+      solve_again(memory_.refined);
+    });
   }
   // The energy falls along the banded Hessian's step; it must do so along the refined one.
   const double refined_slope = gradient_.dot(step_);
   if (refined_slope <= kTuning.kept_slope * slope_) return refined_slope;
   step_.swap(memory_.first_step);
   return slope_;
-}
-
-/// Adds to the step the best combination of directions, the first of which is `refined`, of length
-/// `start`.
-template <int D>
-void Newton<D>::add_krylov(double start) {
-  Eigen::VectorXd &refined = memory_.refined, &direction = memory_.direction;
-  Eigen::MatrixXd& krylov = memory_.krylov;
-  Eigen::Matrix<double, kKrylov + 1, kKrylov> upper;  // the operator on the directions so far
-  Eigen::Matrix<double, kKrylov + 1, 1> right;
-  std::array<Eigen::JacobiRotation<double>, kKrylov> rotations;
-  upper.setZero();
-  right.setZero();
-  right[0] = -start;
-  krylov.col(0) = refined / start;
-  int count = 0;
-  while (count < kKrylov && std::abs(right[count]) > kTuning.enough * start) {
-    const int k = count++;
-    direction = krylov.col(k);
-    find_rest(direction);
-    solve_again(refined);
-    refined += direction;
-    for (int i = 0; i <= k; ++i) {
-      upper(i, k) = krylov.col(i).dot(refined);
-      refined -= upper(i, k) * krylov.col(i);
-    }
-    upper(k + 1, k) = refined.norm();
-    if (upper(k + 1, k) > 0.0) krylov.col(k + 1) = refined / upper(k + 1, k);
-    for (int i = 0; i < k; ++i) {
-      upper.col(k).applyOnTheLeft(i, i + 1, rotations[static_cast<std::size_t>(i)].adjoint());
-    }
-    Eigen::JacobiRotation<double>& rotation = rotations[static_cast<std::size_t>(k)];
-    rotation.makeGivens(upper(k, k), upper(k + 1, k));
-    upper.col(k).applyOnTheLeft(k, k + 1, rotation.adjoint());
-    right.applyOnTheLeft(k, k + 1, rotation.adjoint());
-  }
-  for (int i = count - 1; i >= 0; --i) {
-    for (int j = i + 1; j < count; ++j) right[i] -= upper(i, j) * right[j];
-    right[i] /= upper(i, i);
-    step_ += right[i] * krylov.col(i);
-  }
 }
 
 }  // namespace

@@ -8,6 +8,9 @@ namespace wireplan::simulate {
 struct NewtonOptions {
   double residual_tolerance = 1e-6;  // largest nodal force out of balance           [N]
   int max_iterations = 200;
+  /// A saddle, as a column that is straight under more than Euler's load, is left for an
+  /// equilibrium that is stable. Without a vessel.
+  bool leave_saddles = false;
 };
 
 struct NewtonResult {
@@ -21,6 +24,7 @@ struct NewtonResult {
   /// tolerance below it is met once steps fall below rounding [N].
   double rounding_floor = 0.0;
   int iterations = 0;
+  bool at_saddle = false;  // not converged: in equilibrium, but not in a stable one
 };
 
 /// What tunes the method. Reasons with figures stand in MEASUREMENTS.md; "chosen" means not
@@ -56,6 +60,14 @@ struct NewtonTuning {
   double nearly_there = 0.01;  // fixed: at 1e4 tolerances loose ones took more steps   [N]
   double fell_banded = 0.03;   // where the factor has everything
   double fell_folded = 0.003;  // a wall that yields has kinks
+
+  // Saddles. They are left where the residual is met, or where so many steps in a row were shifted:
+  // the last of them came to a saddle ever more slowly.
+  int most_shifted = 10;        // chosen
+  int saddle_solves = 30;       // inverse iterations for the way down; chosen
+  double first_nudge = 0.01;    // of the wire's radius, the largest motion of a node; chosen
+  double largest_nudge = 10.0;  // beyond it, where the energy does not fall, the saddle is rounding
+  double nudge_growth = 4.0;    // chosen
 
   // Line search.
   double armijo = 1e-4;        // part of the slope; the usual value

@@ -9,6 +9,7 @@
 
 #include "simulate/equilibrium/dynamics.h"
 #include "simulate/insertion/end_path.h"
+#include "simulate/wire/writhe.h"
 
 namespace wireplan::simulate {
 
@@ -47,10 +48,18 @@ Eigen::VectorXd edge_lengths(const Scene& scene) {
                                            static_cast<Eigen::Index>(lengths.size()));
 }
 
-bool twists_the_wire(const std::vector<Support>& supports) {
-  return supports.size() == 2 && supports[0].roll != supports[1].roll &&
+bool hold_both_rolls(const std::vector<Support>& supports) {
+  return supports.size() == 2 &&
          std::all_of(supports.begin(), supports.end(),
                      [](const Support& support) { return support.kind != SupportKind::kPinned; });
+}
+
+bool may_leave_saddles(const Loads& loads, const std::optional<Vec3>& plane) {
+  return loads.tip_moment.isZero(0.0) || plane.has_value();
+}
+
+bool twists_the_wire(const std::vector<Support>& supports) {
+  return hold_both_rolls(supports) && supports[0].roll != supports[1].roll;
 }
 
 namespace {
@@ -68,6 +77,8 @@ std::string format(const char* text, Values... values) {
   std::snprintf(line, sizeof line, text, values...);
   return line;
 }
+
+constexpr const char* kAtSaddle = " and a stable equilibrium";
 
 bool holds_direction(const Support* support) {
   return support != nullptr && support->kind != SupportKind::kPinned;
@@ -119,8 +130,11 @@ void set_up(const Scene& scene, Setup& s) {
   const Support* proximal = find_support(scene, WireEnd::kProximal);
   expects(proximal != nullptr);
   s.distal = find_support(scene, WireEnd::kDistal);
-  const bool twisted = scene.twist == Twist::kCoupled ||
-                       (scene.twist == Twist::kAuto && twists_the_wire(scene.supports));
+  const bool may_leave_plane = scene.solver.method == Method::kNewton && !scene.plane;
+  const bool twisted =
+      scene.twist == Twist::kCoupled ||
+      (scene.twist == Twist::kAuto &&
+       (twists_the_wire(scene.supports) || (may_leave_plane && hold_both_rolls(scene.supports))));
   s.rod = build_rod(scene.wire, edge_lengths(scene), twisted);
   expects(!(s.rod.twisted && scene.twist == Twist::kDecoupled));
   expects(scene.loads.tip_torque == 0.0 || scene.twist == Twist::kDecoupled);
@@ -220,6 +234,17 @@ EndPath end_path(const Scene& scene, const Setup& s) {
            .plane = scene.plane}};
 }
 
+/// Of a converged wire at the path's end: what held rolls lost as frames went along with edges that
+/// turned to and fro.
+template <class Solve>
+NewtonResult correct_rolls(const EndPath& path, Setup& s, NewtonResult found, const Solve& solve) {
+  for (int k = 0; k < kPathTuning.most_corrections && s.rod.twisted && found.converged; ++k) {
+    if (path.correct_rolls(1.0, s.state) <= kPathTuning.same_roll) break;
+    found = solve();
+  }
+  return found;
+}
+
 /// Takes the wire all along the path, in steps that get shorter where they take many iterations.
 NewtonResult follow_path(const Scene& scene, const EndPath& path, Setup& s, SceneResult& result) {
   const SolverOptions& options = scene.solver;
@@ -228,7 +253,8 @@ NewtonResult follow_path(const Scene& scene, const EndPath& path, Setup& s, Scen
     const NewtonResult found =
         statics.solve(s.problem, s.state,
                       {.residual_tolerance = options.residual_tolerance,
-                       .max_iterations = std::min(most_iterations, options.max_iterations)});
+                       .max_iterations = std::min(most_iterations, options.max_iterations),
+                       .leave_saddles = may_leave_saddles(scene.loads, scene.plane)});
     result.iterations += found.iterations;
     result.worst_energy_rise = std::max(result.worst_energy_rise, found.worst_energy_rise);
     return found;
@@ -236,8 +262,9 @@ NewtonResult follow_path(const Scene& scene, const EndPath& path, Setup& s, Scen
   const auto given_up = [&](const NewtonResult& found, double part) {
     result.reason = format(
         "residual %.3g N after %d iterations at %.3g of the way to the distal support, asked for "
-        "%.3g N",
-        found.residual, found.iterations, part, options.residual_tolerance);
+        "%.3g N%s",
+        found.residual, found.iterations, part, options.residual_tolerance,
+        found.at_saddle ? kAtSaddle : "");
     return found;
   };
   const int most_iterations = kPathTuning.most_steps * options.max_iterations;
@@ -260,9 +287,8 @@ NewtonResult follow_path(const Scene& scene, const EndPath& path, Setup& s, Scen
       continue;
     }
     ++result.steps;
-    for (int k = 0; k < kPathTuning.most_corrections && part == 1.0 && s.rod.twisted; ++k) {
-      if (path.correct_rolls(part, s.state) <= kPathTuning.same_roll) break;
-      found = solve(options.max_iterations);
+    if (part == 1.0) {
+      found = correct_rolls(path, s, found, [&] { return solve(options.max_iterations); });
     }
     if (!found.converged) return given_up(found, part);
     if (part == 1.0) return found;
@@ -285,14 +311,21 @@ void run_newton(const Scene& scene, Setup& s, SceneResult& result) {
   if (s.distal != nullptr && scene.vessel == nullptr) path.emplace(end_path(scene, s));
   const bool far = path && path->is_far();
   if (far) solve = follow_path(scene, *path, s, result);
+  const auto solve_now = [&] {
+    const NewtonResult found =
+        statics.solve(s.problem, s.state,
+                      {.residual_tolerance = options.residual_tolerance,
+                       .max_iterations = options.max_iterations,
+                       .leave_saddles = may_leave_saddles(scene.loads, scene.plane)});
+    result.iterations += found.iterations;
+    result.worst_energy_rise = std::max(result.worst_energy_rise, found.worst_energy_rise);
+    return found;
+  };
   for (int step = 1; step <= options.load_steps && !far; ++step) {
     apply_part(scene, static_cast<double>(step) / options.load_steps, s);
-    solve = statics.solve(s.problem, s.state,
-                          {.residual_tolerance = options.residual_tolerance,
-                           .max_iterations = options.max_iterations});
-    result.iterations += solve.iterations;
+    solve = solve_now();
     result.steps = step;
-    result.worst_energy_rise = std::max(result.worst_energy_rise, solve.worst_energy_rise);
+    if (path && step == options.load_steps) solve = correct_rolls(*path, s, solve, solve_now);
     if (!solve.converged) break;
     if (s.contact) result.friction_work += s.contact->settle();
   }
@@ -300,9 +333,9 @@ void run_newton(const Scene& scene, Setup& s, SceneResult& result) {
   result.outcome = solve.converged ? SceneOutcome::kConverged : SceneOutcome::kNotConverged;
   if (!solve.converged && !far) {
     result.reason =
-        format("residual %.3g N after %d iterations of load step %d of %d, asked for %.3g N",
+        format("residual %.3g N after %d iterations of load step %d of %d, asked for %.3g N%s",
                solve.residual, solve.iterations, result.steps, options.load_steps,
-               options.residual_tolerance);
+               options.residual_tolerance, solve.at_saddle ? kAtSaddle : "");
   }
 }
 
@@ -460,6 +493,24 @@ void describe(const Scene& scene, Setup& s, SceneResult& result) {
   if (s.contact) result.contacts = s.contact->touches();
 }
 
+/// Of a wire whose ends' rolls are held: turns of them that are neither in its twist nor in how it
+/// winds round itself have come off it. It passed round its end, or through itself.
+std::string tell_lost_turns(const Scene& scene, const SceneResult& result) {
+  constexpr double kLost = 1.5;  // turns; they come off in pairs
+  if (result.twist.size() == 0 || !hold_both_rolls(scene.supports)) return "";
+  double roll = 0.0;
+  for (const Support& support : scene.supports) {
+    roll += support.at == WireEnd::kDistal ? support.roll : -support.roll;
+  }
+  const double left = result.twist.sum() + find_writhe(result.nodes);
+  const double turns = (roll - left) / (2.0 * kPi);
+  if (std::abs(turns) < kLost) return "";
+  return format(
+      "about %.0f turns of the ends' rolls against each other have come off: the wire passed round "
+      "its end, or through itself",
+      2.0 * std::round(0.5 * std::abs(turns)));
+}
+
 }  // namespace
 
 SceneResult run_scene(const Scene& scene) {
@@ -479,6 +530,7 @@ SceneResult run_scene(const Scene& scene) {
   describe(scene, setup, result);
   if (result.outcome == SceneOutcome::kConverged) {
     result.crossing = CrossingFinder().find(result.nodes, scene.wire.radius);
+    result.reason = tell_lost_turns(scene, result);
   }
   return result;
 }

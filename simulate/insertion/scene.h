@@ -35,13 +35,20 @@ struct Loads {
   double tip_torque = 0.0;         // about the wire's own axis; decoupled twist only   [N mm]
 };
 
-/// Whether they hold both ends' rolls, and not the same: that twists even a straight wire.
+/// Whether saddles may be left for what lies lower: out of a plane a moment about a fixed axis
+/// spins an edge that leans toward the axis, without end.
+bool may_leave_saddles(const Loads& loads, const std::optional<Vec3>& plane);
+
+/// Whether they hold the rolls of both ends, and whether these differ, which twists even a straight
+/// wire in a plane.
+bool hold_both_rolls(const std::vector<Support>& supports);
 bool twists_the_wire(const std::vector<Support>& supports);
 
 /// How the wire's twist is found.
 enum class Twist {
   kAuto,       // coupled where the wire is curved at rest or a strip, or where the rolls of two
-               // held ends differ; else not at all
+               // ends are held and differ or, with Newton, no table holds the wire in a plane, out
+               // of which it would twist; else not at all
   kCoupled,    // with the shape, by material directors
   kDecoupled,  // beside the shape, which it leaves as it is: paper Eq. (14)-(15)
 };
@@ -101,7 +108,7 @@ struct Reaction {
 
 struct SceneResult {
   SceneOutcome outcome = SceneOutcome::kNotConverged;
-  std::string reason;              // why it did not converge; else empty
+  std::string reason;              // why it did not converge, or turns that it lost; else empty
   std::vector<std::string> terms;  // energy terms that were built
   Eigen::Matrix3Xd nodes;          // (3, n) proximal to distal                         [mm]
   Energy energy;

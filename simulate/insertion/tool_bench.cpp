@@ -346,9 +346,10 @@ void ToolBench::carry_contact(const State& from, const Eigen::VectorXd& slides, 
 bool ToolBench::solve(State& at) {
   NewtonResult found;
   for (int k = 0; k < kBench.most_solves && !found.converged; ++k) {
-    found = statics_.solve(
-        problem_of(at), at.state,
-        {.residual_tolerance = scene_.residual_tolerance, .max_iterations = scene_.max_iterations});
+    found = statics_.solve(problem_of(at), at.state,
+                           {.residual_tolerance = scene_.residual_tolerance,
+                            .max_iterations = scene_.max_iterations,
+                            .leave_saddles = may_leave_saddles(scene_.loads, scene_.plane)});
     record_.iterations += found.iterations;
     record_.worst_energy_rise = std::max(record_.worst_energy_rise, found.worst_energy_rise);
     if (found.iterations < scene_.max_iterations) break;
