@@ -33,9 +33,16 @@ double largest_insertion(const std::vector<ToolPlace>& places) {
   return longest;
 }
 
-std::vector<ToolPlace> moved(std::vector<ToolPlace> places, const ToolMove& by, double part) {
+/// Pushes that add up to nothing, or to a whole tool, do so but for rounding.
+std::vector<ToolPlace> moved(const std::vector<Tool>& tools, std::vector<ToolPlace> places,
+                             const ToolMove& by, double part) {
+  constexpr double kSamePlace = 1e-9;  // [mm]
   for (std::size_t i = 0; i < places.size(); ++i) {
-    places[i].insertion += part * by.push[i];
+    double& insertion = places[i].insertion;
+    const double length = tools[i].wire.length();
+    insertion += part * by.push[i];
+    if (std::abs(insertion) < kSamePlace) insertion = 0.0;
+    if (std::abs(insertion - length) < kSamePlace) insertion = length;
     places[i].roll += part * by.turn[i];
   }
   return places;
@@ -46,7 +53,7 @@ int count_elements(const ToolScene& scene) {
   std::vector<ToolPlace> places = scene.places;
   double longest = largest_insertion(places);
   for (const ToolMove& move : scene.moves) {
-    places = moved(places, move, 1.0);
+    places = moved(scene.tools, places, move, 1.0);
     longest = std::max(longest, largest_insertion(places));
   }
   return elements_over(longest, scene.element_length);
@@ -181,9 +188,9 @@ bool ToolBench::move(const ToolMove& by) {
     const double part = 1.0 - done < 1.01 * size ? 1.0 - done : size;
     const bool may_cut = part > 1.01 * parts.shortest;
     State& next = next_;
-    place(moved(start, by, done + part), next);
+    place(moved(scene_.tools, start, by, done + part), next);
     const Shape followed = follow(next);
-    next.state = guess(followed, drift, part);
+    next.state = guess(next, followed, drift, part);
     const Eigen::VectorXd slid = slides(now_, next);
     carry_contact(now_, slid, next);
     touch(next);
@@ -236,7 +243,9 @@ bool ToolBench::move(const ToolMove& by) {
     drift.x = (drift.x - followed.x) / part;
     drift.angles = (drift.angles - followed.angles) / part;
     if (part * std::sqrt(drift.x.colwise().squaredNorm().maxCoeff()) > kBench.snap) drift = {};
-    slope = is_smooth(now_, by.push) ? next_slope : slope_of_move(now_, by, 1.0);
+    done += part;
+    const bool goes_on = done < 1.0 - 1e-12;
+    slope = !goes_on || is_smooth(now_, by.push) ? next_slope : slope_of_move(now_, by, 1.0);
     record_.released += released;
     record_.unbalanced += excess - released;
     record_.heat += rubbed;
@@ -249,7 +258,6 @@ bool ToolBench::move(const ToolMove& by) {
       record_.heat += heat;
       record_.work += heat;
     }
-    done += part;
     size = std::min(parts.longest, 2.0 * part);
   }
   report(by);

@@ -173,7 +173,7 @@ class ToolBench {
   void bring_in();
   Shape follow(const State& to) const;
   Shape shape() const;
-  RodState guess(const Shape& followed, const Shape& drift, double part) const;
+  RodState guess(const State& to, const Shape& followed, const Shape& drift, double part) const;
   ContactMemory spread_contact(const State& from, const State& to) const;
   void bend_to_support(const State& to, Eigen::Matrix3Xd& x) const;
   void set_frames(const Eigen::MatrixXd& angles, RodState& state) const;

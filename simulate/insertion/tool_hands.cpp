@@ -25,12 +25,16 @@ bool level(const ToolPlace& a, const ToolPlace& b) {
 
 }  // namespace
 
-/// Energy of the nodes where they are, with the tools pushed on by so much of `push`. That of
+/// Energy of the nodes where they are, with the tools pushed on by so much of `push`, and no
+/// further than to their ends. That of
 /// contact to first order: the nodes' lengths of tools and how thick these are are all that changes
 /// there, since a wall that yields lies where its energy and that of contact are least.
 double ToolBench::energy_at(const State& at, Pushes push, double by) {
   pushed_ = at.places;
-  for (std::size_t i = 0; i < pushed_.size(); ++i) pushed_[i].insertion += by * push[i];
+  for (std::size_t i = 0; i < pushed_.size(); ++i) {
+    pushed_[i].insertion =
+        std::clamp(pushed_[i].insertion + by * push[i], 0.0, scene_.tools[i].wire.length());
+  }
   build_composite(scene_.tools, pushed_, elements_, other_);
   const Rod& rod = other_.rod;
   Problem problem = problem_of(at);

@@ -13,7 +13,7 @@ bool ToolBench::divide(double longest) {
   if (elements_ == before) return true;
   State next;
   place(now_.places, next);
-  next.state = guess(follow(next), {}, 0.0);
+  next.state = guess(next, follow(next), {}, 0.0);
   if (scene_.vessel != nullptr) next.memory = spread_contact(now_, next);
   touch(next);
   double rubbed = 0.0;

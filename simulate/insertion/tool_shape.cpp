@@ -109,8 +109,10 @@ ToolBench::Shape ToolBench::follow(const State& to) const {
   return next;
 }
 
-/// The shape that was followed, and what the tools came off such shapes before, `drift` per part.
-RodState ToolBench::guess(const Shape& followed, const Shape& drift, double part) const {
+/// The shape that was followed, and what the tools came off such shapes before, `drift` per part;
+/// its end where it is held.
+RodState ToolBench::guess(const State& to, const Shape& followed, const Shape& drift,
+                          double part) const {
   RodState state;
   state.x = followed.x;
   Eigen::MatrixXd turned = followed.angles;
@@ -121,6 +123,7 @@ RodState ToolBench::guess(const Shape& followed, const Shape& drift, double part
       const double length = (followed.x.col(e + 1) - followed.x.col(e)).norm();
       state.x.col(e + 1) = state.x.col(e) + (length / edge.norm()) * edge;
     }
+    bend_to_support(to, state.x);
     turned += part * drift.angles;
   }
   set_frames(turned, state);

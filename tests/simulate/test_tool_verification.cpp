@@ -246,6 +246,55 @@ TEST(ToolVerification, FrictionOfABentWireDoesNotHangOnTheElements) {
   EXPECT_NEAR(coarse, fine, 0.15 * fine);  // the play is bridged by whole elements
 }
 
+TEST(ToolVerification, TipThatIsHeldStaysWhereItIsHeldAsToolsMove) {
+  for (const bool clamped : {true, false}) {
+    SCOPED_TRACE(clamped);
+    ToolScene scene = tools_along_x({uniform_tool(200.0, 100.0), uniform_tool(300.0, 100.0)},
+                                    {{30.0, 0.0}, {50.0, 0.0}});
+    scene.distal = Support{.at = WireEnd::kDistal,
+                           .kind = clamped ? SupportKind::kClamped : SupportKind::kPinned,
+                           .point = Vec3(45.0, 5.0, 0.0)};
+    scene.moves = {push_of({0.0, 20.0}), push_of({10.0, -10.0}), turn_of({1.0, 0.0})};
+    ToolBench bench(scene);
+    ASSERT_TRUE(bench.settled());
+    double work = 0.0;
+    for (const ToolMove& move : scene.moves) {
+      const ToolRecord before = bench.record();
+      ASSERT_TRUE(bench.move(move));
+      EXPECT_LT((bench.record().tools[1].tip - scene.distal->point).norm(), 1e-9);
+      EXPECT_LT((bench.introducer_force() + bench.distal_force()).norm(), 1e-5);
+      work += std::abs(bench.record().work - before.work);
+    }
+    EXPECT_GT(work, 1.0);
+    EXPECT_LT(std::abs(bench.record().unbalanced), 0.01 * work);
+  }
+}
+
+TEST(ToolVerification, ToolsComeOutAndGoInWhole) {
+  // By pushes that add up but for rounding; without the wire the catheter is as it lies unloaded.
+  ToolScene scene = tools_along_x({uniform_tool(60.0, 100.0, 0.05), uniform_tool(80.3, 100.0)},
+                                  {{30.0, 0.0}, {20.3, 0.0}});
+  scene.friction = 0.1;
+  scene.moves = {push_of({0.0, -0.1}), push_of({0.0, -20.1}), push_of({0.0, -0.1}),
+                 turn_of({1.0, 0.0}),  push_of({0.0, 80.3}),  push_of({30.0, 0.0}),
+                 push_of({-60.0, 0.0})};
+  ToolBench bench(scene);
+  ASSERT_TRUE(bench.settled());
+  const double straight = 0.5 * 100.0 * 0.05 * 0.05;  // what the introducer stores per length [N]
+  for (std::size_t k = 0; k < scene.moves.size(); ++k) {
+    SCOPED_TRACE(k);
+    ASSERT_TRUE(bench.move(scene.moves[k]));
+    EXPECT_TRUE(std::isfinite(bench.record().tools[1].push_force));
+    if (k == 2) {
+      EXPECT_EQ(bench.places()[1].insertion, 0.0);
+      EXPECT_NEAR(bench.record().energy.total(), 30.0 * straight, 1e-6);
+    }
+  }
+  EXPECT_EQ(bench.places()[0].insertion, 0.0);
+  EXPECT_EQ(bench.places()[1].insertion, 80.3);
+  EXPECT_NEAR(bench.record().energy.total(), 60.0 * straight, 1e-6);
+}
+
 TEST(ToolVerification, WorkOfTheHandsIsTheEnergyThatTheToolsGain) {
   // A sheath, a curved catheter and a J wire, pushed, pulled and turned one by one and together.
   Tool wire = uniform_tool(300.0, 60.0, 0.0);
