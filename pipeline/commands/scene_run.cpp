@@ -301,7 +301,7 @@ SceneAnswer run_insertion_scene(const SceneFile& file, const InsertionScene& sce
     result.reason = std::string(!scene.moves.empty() ? "all moves were made"
                                 : scene.start ? "the wire went from its start to where it was to go"
                                               : "all of the wire went in") +
-                    "; the scene has no target";
+                    "; the scene has no target" + simulate::describe_balance(result.pushes);
   }
   for (const auto& [from, to] : result.stuck) {
     result.reason +=

@@ -321,6 +321,7 @@ Json result_json(const simulate::ToolSceneResult& result, const simulate::ToolSc
   put_points(json, "introducer_force_n", result.introducer_force);
   if (result.distal_force) put_points(json, "distal_force_n", *result.distal_force);
   json["contacts"] = contacts_json(contacts);
+  json["crosses_itself"] = crossing_json(result.crossing);
   json["moves"] = Json::array();
   for (const simulate::ToolRecord& record : result.history) {
     Json row = Json::object();

@@ -302,14 +302,29 @@ simulate::SolverOptions read_solver(JsonReader& root) {
   return options;
 }
 
+constexpr const char* kGiveMass = "give mass_kg_per_m in wire.sections";
+
+bool is_massless(const simulate::Wire& wire) {
+  return std::all_of(wire.sections.begin(), wire.sections.end(),
+                     [](const simulate::Section& s) { return s.mass_per_length == 0.0; });
+}
+
+/// A distal support that the wire can come to.
+void check_reach(const simulate::Scene& scene, Problems& problems) {
+  const std::vector<simulate::Support>& supports = scene.supports;
+  const double length = scene.wire.length();
+  if (supports.size() < 2 || !is_out_of_reach(length, supports[0], supports[1])) return;
+  const std::size_t distal = supports[1].at == simulate::WireEnd::kDistal ? 1 : 0;
+  problems.add(
+      "supports[" + std::to_string(distal) + "].point_mm",
+      Json((supports[1].point - supports[0].point).norm()).dump() + " mm from the other support's",
+      "no further than the wire is long, " + Json(length).dump() + " mm",
+      "it would be torn; move the support, or make the wire longer");
+}
+
 /// Loads that the wire, its supports and its twist can carry.
 void check_loads(const simulate::Scene& scene, Problems& problems) {
-  const auto massless = [](const simulate::Section& s) { return s.mass_per_length == 0.0; };
-  const std::vector<simulate::Section>& sections = scene.wire.sections;
-  if (!scene.loads.gravity.isZero(0.0) && std::all_of(sections.begin(), sections.end(), massless)) {
-    problems.add("loads.gravity_m_per_s2", "not 0", "a wire with a mass",
-                 "give mass_kg_per_m in wire.sections");
-  }
+  check_gravity(scene.loads, is_massless(scene.wire), kGiveMass, problems);
   const simulate::Support *proximal = nullptr, *distal = nullptr;
   for (const simulate::Support& support : scene.supports) {
     (support.at == simulate::WireEnd::kProximal ? proximal : distal) = &support;
@@ -317,12 +332,11 @@ void check_loads(const simulate::Scene& scene, Problems& problems) {
   const auto directed = [](const simulate::Support* support) {
     return support != nullptr && support->kind != simulate::SupportKind::kPinned;
   };
-  const Vec3& moment = scene.loads.tip_moment;
-  if (scene.wire.straight() && moment.cross(proximal->direction).norm() <= 1e-9 * moment.norm() &&
-      !moment.isZero(0.0)) {
-    problems.add("loads.tip_moment_n_mm", "along the wire", "an axis across it",
-                 "for torsion turn the roll_deg of a support, or give tip_torque_n_mm and "
-                 "\"twist\": \"decoupled\"");
+  if (scene.wire.straight()) {
+    check_tip_moment(scene.loads, proximal->direction,
+                     "for torsion turn the roll_deg of a support, or give tip_torque_n_mm and "
+                     "\"twist\": \"decoupled\"",
+                     problems);
   }
   const bool decoupled = scene.twist == simulate::Twist::kDecoupled;
   if (scene.loads.tip_torque != 0.0 && !decoupled) {
@@ -336,17 +350,7 @@ void check_loads(const simulate::Scene& scene, Problems& problems) {
     problems.add("wire.twist", "\"decoupled\"", "a clamped or guided proximal end",
                  "a pinned one does not hold the roll that the chain starts from");
   }
-
-  // A table that the ends lie on.
-  if (!scene.plane) return;
-  for (const simulate::Support& support : scene.supports) {
-    const bool out = std::abs(scene.plane->dot(support.point - proximal->point)) > 1e-6 ||
-                     (directed(&support) && std::abs(scene.plane->dot(support.direction)) > 1e-6);
-    if (!out) continue;
-    problems.add("plane_normal", to_json(*scene.plane).dump(), "a plane that the supports lie in",
-                 "give a normal square to their directions and to the line between their points");
-    break;
-  }
+  check_table(scene.plane, scene.supports, problems);
 }
 
 /// What methods other than Newton's cannot do.
@@ -410,6 +414,7 @@ simulate::Scene read_bench(JsonReader& root, simulate::Scene scene,
   scene.solver = read_solver(root);
   if (vessel) add_vessel(*vessel, scene, root.problems());
   if (root.problems().empty()) {
+    check_reach(scene, root.problems());
     check_loads(scene, root.problems());
     check_method(scene, root.problems());
   }
@@ -460,16 +465,18 @@ InsertionScene read_insertion_scene(JsonReader& root, const simulate::Scene& wir
     root.problems().add("loads", root.raw("loads").dump(), "none but 0, and gravity",
                         "forces and moments on a wire in a vessel are not in this version");
   }
-  const auto massless = [](const simulate::Section& s) { return s.mass_per_length == 0.0; };
-  const std::vector<simulate::Section>& sections = scene.wire.sections;
-  if (!loads.gravity.isZero(0.0) && std::all_of(sections.begin(), sections.end(), massless)) {
-    root.problems().add("loads.gravity_m_per_s2", "not 0", "a wire with a mass",
-                        "give mass_kg_per_m in wire.sections");
-  }
+  check_gravity(loads, is_massless(scene.wire), kGiveMass, root.problems());
   scene.options.gravity = loads.gravity;
   read_hand(root, scene);
 
   // How finely.
+  const auto elements = static_cast<std::size_t>(simulate::edge_lengths(wire).size());
+  if (root.problems().empty() && elements < simulate::kFewestElements) {
+    root.problems().add(
+        "wire", "of " + std::to_string(elements) + " elements",
+        "at least " + std::to_string(simulate::kFewestElements) + " of a wire that is pushed in",
+        "give more elements, or a smaller element_length_mm");
+  }
   const simulate::SolverOptions solver = read_solver(root);
   if (solver.method != simulate::Method::kNewton) {
     root.problems().add("solver.method", "not \"newton\"", "\"newton\"",

@@ -188,6 +188,14 @@ void check_insertions(const ToolBenchScene& bench, Problems& problems) {
                        mm(length) + " mm");
       return false;
     }
+    const simulate::Support introducer{.point = bench.scene.point};
+    if (bench.scene.distal && is_out_of_reach(foremost, introducer, *bench.scene.distal)) {
+      const double far = (bench.scene.distal->point - introducer.point).norm();
+      problems.add(key_of(0), mm(foremost) + " mm of the foremost tool",
+                   "as much as from the introducer to supports[0], " + mm(far) + " mm",
+                   "the tools would be torn; push one further in, or move the support");
+      return false;
+    }
     if (foremost >= kLeastInsertion) return true;
     problems.add(key_of(0), mm(foremost) + " mm of the foremost tool",
                  "at least " + mm(kLeastInsertion) + " mm of it out of the introducer");
@@ -199,9 +207,12 @@ void check_insertions(const ToolBenchScene& bench, Problems& problems) {
   if (!check(at_start)) return;
   for (std::size_t k = 0; k < bench.scene.moves.size(); ++k) {
     for (std::size_t i = 0; i < places.size(); ++i) {
-      // What adds up to 0 but for rounding is 0.
-      places[i].insertion += bench.scene.moves[k].push[i];
-      if (std::abs(places[i].insertion) < 1e-9) places[i].insertion = 0.0;
+      // What adds up to 0, or to the whole tool, but for rounding is that.
+      double& insertion = places[i].insertion;
+      const double length = bench.scene.tools[i].wire.length();
+      insertion += bench.scene.moves[k].push[i];
+      if (std::abs(insertion) < 1e-9) insertion = 0.0;
+      if (std::abs(insertion - length) < 1e-9) insertion = length;
     }
     if (!check([&](std::size_t) { return "moves[" + std::to_string(k) + "]"; })) return;
   }
@@ -224,7 +235,69 @@ void read_distal(JsonReader& root, simulate::ToolScene& scene) {
   }
 }
 
+/// The tools against what loads and holds them.
+void check_held(const ToolBenchScene& bench, Problems& problems) {
+  const simulate::ToolScene& scene = bench.scene;
+  const auto all = [&](const auto& is) {
+    return std::all_of(scene.tools.begin(), scene.tools.end(),
+                       [&](const simulate::Tool& tool) { return is(tool.wire); });
+  };
+  const auto massless = [](const simulate::Wire& wire) {
+    return std::all_of(wire.sections.begin(), wire.sections.end(),
+                       [](const simulate::Section& s) { return s.mass_per_length == 0.0; });
+  };
+  check_gravity(scene.loads, all(massless), "give mass_kg_per_m in tools[].sections", problems);
+  if (all([](const simulate::Wire& wire) { return wire.straight(); })) {
+    check_tip_moment(scene.loads, scene.direction, "for torsion turn a hub in a move", problems);
+  }
+  std::vector<simulate::Support> supports = {{.at = simulate::WireEnd::kProximal,
+                                              .kind = simulate::SupportKind::kClamped,
+                                              .point = scene.point,
+                                              .direction = scene.direction}};
+  if (scene.distal) supports.push_back(*scene.distal);
+  check_table(scene.plane, supports, problems);
+}
+
 }  // namespace
+
+void check_gravity(const simulate::Loads& loads, bool massless, const std::string& remedy,
+                   Problems& problems) {
+  if (loads.gravity.isZero(0.0) || !massless) return;
+  problems.add("loads.gravity_m_per_s2", "not 0", "a wire with a mass", remedy);
+}
+
+void check_tip_moment(const simulate::Loads& loads, const Vec3& direction,
+                      const std::string& remedy, Problems& problems) {
+  const Vec3& moment = loads.tip_moment;
+  if (moment.isZero(0.0) || moment.cross(direction).norm() > 1e-9 * moment.norm()) return;
+  problems.add("loads.tip_moment_n_mm", "along the wire", "an axis across it", remedy);
+}
+
+void check_table(const std::optional<Vec3>& normal, const std::vector<simulate::Support>& supports,
+                 Problems& problems) {
+  if (!normal) return;
+  const auto proximal = std::find_if(
+      supports.begin(), supports.end(),
+      [](const simulate::Support& one) { return one.at == simulate::WireEnd::kProximal; });
+  const bool out = std::any_of(supports.begin(), supports.end(), [&](const simulate::Support& one) {
+    return std::abs(normal->dot(one.point - proximal->point)) > 1e-6 ||
+           (one.kind != simulate::SupportKind::kPinned &&
+            std::abs(normal->dot(one.direction)) > 1e-6);
+  });
+  if (!out) return;
+  problems.add("plane_normal", to_json(*normal).dump(), "a plane that the supports lie in",
+               "give a normal square to their directions and to the line between their points");
+}
+
+bool is_out_of_reach(double length, const simulate::Support& from, const simulate::Support& to) {
+  constexpr double kMostStretch = 0.1;
+  Vec3 way = to.point - from.point;
+  for (const simulate::Support* one : {&from, &to}) {
+    if (one->kind != simulate::SupportKind::kGuided) continue;
+    way -= way.dot(one->direction) * one->direction;
+  }
+  return way.norm() > (1.0 + kMostStretch) * length;
+}
 
 ToolBenchScene read_tool_bench(JsonReader& root) {
   ToolBenchScene bench;
@@ -256,7 +329,10 @@ ToolBenchScene read_tool_bench(JsonReader& root) {
   refuse(root, "wire", "a wire beside \"tools\", of which the last one is the wire, is");
   refuse(root, "insertion", "insertions of several tools are");
   refuse(root, "target", "targets of several tools are");
-  if (sound && problems.empty()) check_insertions(bench, problems);
+  if (sound && problems.empty()) {
+    check_insertions(bench, problems);
+    check_held(bench, problems);
+  }
   return bench;
 }
 

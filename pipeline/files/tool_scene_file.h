@@ -21,4 +21,17 @@ ToolBenchScene read_tool_bench(JsonReader& root);
 simulate::Support read_support(JsonReader& reader);
 simulate::Loads read_loads(JsonReader& root);
 
+/// Gravity on what has no mass; `remedy` tells where to give one.
+void check_gravity(const simulate::Loads& loads, bool massless, const std::string& remedy,
+                   Problems& problems);
+/// A moment about the axis of what is straight at rest.
+void check_tip_moment(const simulate::Loads& loads, const Vec3& direction,
+                      const std::string& remedy, Problems& problems);
+/// A table that the ends of wire or tools do not lie on. Of the supports one is proximal.
+void check_table(const std::optional<Vec3>& normal, const std::vector<simulate::Support>& supports,
+                 Problems& problems);
+/// Whether so much wire cannot come from one support to the other: it would be torn. Steel yields
+/// at less than a hundredth; chosen.
+bool is_out_of_reach(double length, const simulate::Support& from, const simulate::Support& to);
+
 }  // namespace wireplan::pipeline

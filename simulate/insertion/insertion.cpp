@@ -36,11 +36,12 @@ constexpr double kSmallestCut = 1.0 / 16.0;         // of a push, when one does 
 constexpr int kFollowed = 6;                        // solves more of a wire that jumps
 
 /// Edges of the part of the wire that goes in, proximal to distal, and two more, so that the
-/// innermost free node bends against a straight introducer.
+/// innermost free node bends against a straight introducer; four at least.
 Eigen::VectorXd layout(const Wire& wire, const InsertionOptions& options) {
   std::vector<double> from_tip;
   double sum = 0.0;
   int beyond = 0;
+  const auto lacks = [&] { return beyond < 2 || from_tip.size() < kFewestElements; };
   const auto add = [&](double l) {
     if (sum >= options.length - 1e-9) ++beyond;
     sum += l;
@@ -50,17 +51,17 @@ Eigen::VectorXd layout(const Wire& wire, const InsertionOptions& options) {
   if (asked.empty()) {
     const double h = options.element_length;
     const int available = static_cast<int>(std::floor(wire.length() / h + 1e-9));
-    for (int i = 0; i < available && beyond < 2; ++i) add(h);
+    for (int i = 0; i < available && lacks(); ++i) add(h);
   } else {
     expects(asked.size() == wire.sections.size());
     for (std::size_t k = 0; k < asked.size(); ++k) {
       const double length = wire.sections[k].length;
       const double most = asked[k] > 0.0 ? asked[k] : options.element_length;
       const int count = std::max(1, static_cast<int>(std::ceil(length / most - 1e-9)));
-      for (int i = 0; i < count && beyond < 2; ++i) add(length / count);
+      for (int i = 0; i < count && lacks(); ++i) add(length / count);
     }
   }
-  expects(from_tip.size() >= 4);
+  expects(from_tip.size() >= kFewestElements);
   std::reverse(from_tip.begin(), from_tip.end());
   return Eigen::Map<const Eigen::VectorXd>(from_tip.data(),
                                            static_cast<Eigen::Index>(from_tip.size()));

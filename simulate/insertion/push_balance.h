@@ -9,8 +9,20 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdio>
+#include <string>
 
 namespace wireplan::simulate {
+
+/// Named where forces and energies tell the work differently by more than 1 % of it; else empty.
+inline std::string describe_balance(double unbalanced, double work) {
+  constexpr double kBalance = 0.01;
+  if (std::abs(unbalanced) <= kBalance * work) return "";
+  char text[96];
+  std::snprintf(text, sizeof text, "its forces are rough: energy is out of balance by %.0f %%",
+                100.0 * std::abs(unbalanced) / work);
+  return text;
+}
 
 class PushBalance {
  public:

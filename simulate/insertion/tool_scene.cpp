@@ -1,8 +1,32 @@
 #include "simulate/insertion/tool_scene.h"
 
+#include <algorithm>
+#include <cmath>
 #include <cstdio>
 
+#include "simulate/insertion/push_balance.h"
+
 namespace wireplan::simulate {
+namespace {
+
+/// Where work and energy of the moves differ, beyond what the tolerance and rounding leave open.
+std::string tell_balance(const ToolScene& scene, const std::vector<ToolRecord>& history) {
+  double work = 0.0, unknown = 1e-6;  // [N mm]
+  for (std::size_t k = 0; k + 1 < history.size(); ++k) {
+    work += std::abs(history[k + 1].work - history[k].work);
+    for (const double push : scene.moves[k].push) {
+      unknown += scene.residual_tolerance * std::abs(push);
+    }
+  }
+  const double unbalanced = std::abs(history.back().unbalanced);
+  return describe_balance(std::max(0.0, unbalanced - unknown), work);
+}
+
+void add_to(std::string& reason, const std::string& text) {
+  if (!text.empty()) reason += (reason.empty() ? "" : "; ") + text;
+}
+
+}  // namespace
 
 ToolSceneResult run_tool_scene(const ToolScene& scene) {
   ToolBench bench(scene);
@@ -38,6 +62,14 @@ ToolSceneResult run_tool_scene(const ToolScene& scene) {
   result.introducer_force = bench.introducer_force();
   if (scene.distal) result.distal_force = bench.distal_force();
   result.contacts = bench.touches();
+  for (std::size_t i = 0; i < scene.tools.size() && good && !result.crossing; ++i) {
+    const double radius = scene.tools[i].wire.radius;
+    result.crossing = CrossingFinder().find(result.tool_nodes[i], radius);
+    if (!result.crossing) continue;
+    add_to(result.reason,
+           scene.tools[i].wire.name + ": " + describe_crossing(*result.crossing, radius));
+  }
+  add_to(result.reason, tell_balance(scene, result.history));
   return result;
 }
 

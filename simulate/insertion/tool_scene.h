@@ -10,7 +10,7 @@ namespace wireplan::simulate {
 
 struct ToolSceneResult {
   SceneOutcome outcome = SceneOutcome::kNotConverged;
-  std::string reason;               // why it did not converge; else empty
+  std::string reason;               // why it did not converge, or what is doubtful; else empty
   std::vector<std::string> terms;   // energy terms that were built
   std::vector<ToolRecord> history;  // at the start and after each move
   Eigen::Matrix3Xd nodes;           // of the centreline                                 [mm]
@@ -19,6 +19,8 @@ struct ToolSceneResult {
   Vec3 introducer_force = Vec3::Zero();      // on the tools                               [N]
   std::optional<Vec3> distal_force;          // of the support                             [N]
   std::vector<Touch> contacts;               // with the vessel
+  /// Of the final shape: where a tool runs through itself, which it does not feel.
+  std::optional<SelfCrossing> crossing;
 };
 
 /// All moves of the scene, as far as they have an equilibrium.

@@ -40,6 +40,16 @@ const char* outcome_name(Outcome outcome) {
   return "failed";
 }
 
+std::string describe_balance(const std::vector<Push>& pushes) {
+  if (pushes.empty()) return "";
+  const Push& last = pushes.back();
+  constexpr double kRounding = 1e-6;  // of what forces do on short pushes              [N mm]
+  const std::string text =
+      describe_balance(std::max(0.0, std::abs(last.unbalanced) - kRounding),
+                       std::max(std::abs(last.push_work), last.stored_energy + last.friction_work));
+  return text.empty() ? text : "; " + text;
+}
+
 namespace {
 
 constexpr double kStuckPush = 20.0;    // pushing so far ...                               [mm]
@@ -50,8 +60,6 @@ constexpr double kOutside = 1.0;       // penetration that contact does not expl
 // have reached (plan/MEASUREMENTS.md).
 constexpr double kPatience = 40.0;        //                                               [mm]
 constexpr double kPatienceBeyond = 10.0;  // where the tip is as far as a goal's sphere    [mm]
-
-constexpr double kBalance = 0.01;  // of the work that may be out of balance
 
 constexpr double kTurnStep = 15.0 * kRadPerDeg;      // of the hub between two records
 constexpr double kTurnPerShape = 30.0 * kRadPerDeg;  // of the hub between two shapes
@@ -356,7 +364,7 @@ void Trial::end(std::size_t goal, Outcome outcome, const std::string& reason) {
   pursuit.shapes = record_.shapes.size();
   TrialResult& ended = pursuit.end;
   ended.outcome = outcome;
-  ended.reason = reason + balance_text();
+  ended.reason = reason + describe_balance(record_.pushes);
   ended.crossing = record_.crossing;
   ended.nodes = insertion_.free_nodes();
   ended.sections = insertion_.sections();
@@ -366,18 +374,6 @@ void Trial::end(std::size_t goal, Outcome outcome, const std::string& reason) {
                         record_.shapes.back().insertion == insertion_.depth() &&
                         record_.shapes.back().hub_angle == insertion_.hub_angle();
   if (!recorded) ended.shapes.push_back(shape_here());
-}
-
-/// Named where work and energy are not in balance; else empty.
-std::string Trial::balance_text() const {
-  if (record_.pushes.empty()) return "";
-  const Push& last = record_.pushes.back();
-  const double work = std::max(std::abs(last.push_work), last.stored_energy + last.friction_work);
-  if (std::abs(last.unbalanced) <= kBalance * work) return "";
-  char text[96];
-  std::snprintf(text, sizeof text, "; its forces are rough: energy is out of balance by %.0f %%",
-                100.0 * std::abs(last.unbalanced) / work);
-  return text;
 }
 
 std::string Trial::reached_reason(std::size_t goal) const {

@@ -87,6 +87,10 @@ struct TrialResult {
   double roll = 0.0;               // of the hub before the first move                    [rad]
 };
 
+/// "; its forces are rough: ..." where work and energy of an insertion differ by more than 1 % of
+/// the work, else empty.
+std::string describe_balance(const std::vector<Push>& pushes);
+
 /// What the hand does: pushes the wire in, pulls it back, or turns the hub, or turns it as it
 /// pushes.
 struct Move {
@@ -168,7 +172,6 @@ class Trial {
   bool pushed_on(std::size_t goal, double from, double to);
   bool ends_by_crossing();
   std::string reached_reason(std::size_t goal) const;
-  std::string balance_text() const;
   std::string place_of(int opening) const;
   std::string named_end(std::size_t goal, int opening) const;
   Shape shape_here() const;

@@ -2,8 +2,10 @@
 // comes out.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <fstream>
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -45,6 +47,7 @@ TEST_F(CaseFile, ToolsAreReadInInternalUnits) {
   json["tools"][0]["roll_deg"] = 90;
   json["friction_between_tools"] = 0.1;
   json["element_length_mm"] = 2;
+  json["tools"][1]["sections"][0]["mass_kg_per_m"] = 0.003;
   json["loads"] = {{"gravity_m_per_s2", {0, -9.81, 0}}};
   json["moves"].push_back(
       {{"together", Json::array({{{"tool", "wire"}, {"turn_deg", 180}},
@@ -86,11 +89,24 @@ TEST_F(CaseFile, CathetersAndWiresOfTheCatalogueAreTools) {
   }
 }
 
-TEST_F(CaseFile, MistakesInToolsAreToldByKey) {
+class ToolMistakes : public CaseFile {
+ protected:
   struct Row {
     std::string said;
     std::function<void(Json&)> spoil;
   };
+  void expect_told(const std::vector<Row>& rows) const {
+    for (const Row& row : rows) {
+      Json json = wire_in_catheter();
+      EXPECT_EQ(scene_problem(json), "");
+      row.spoil(json);
+      const std::string said = scene_problem(json);
+      EXPECT_NE(said.find(row.said), std::string::npos) << row.said << "\n  but:\n" << said;
+    }
+  }
+};
+
+TEST_F(ToolMistakes, AreToldByKey) {
   const std::vector<Row> rows = {
       {"tools[1] is 1.2 mm thick, expected less than the inner diameter of \"catheter\" round it, "
        "0.991 mm (tools are listed from the outside in)",
@@ -151,13 +167,7 @@ TEST_F(CaseFile, MistakesInToolsAreToldByKey) {
        }},
       {"introducer is missing", [](Json& json) { json.erase("introducer"); }},
   };
-  for (const Row& row : rows) {
-    Json json = wire_in_catheter();
-    EXPECT_EQ(scene_problem(json), "");
-    row.spoil(json);
-    EXPECT_NE(scene_problem(json).find(row.said), std::string::npos) << row.said << "\n  but:\n"
-                                                                     << scene_problem(json);
-  }
+  expect_told(rows);
   // All of them at once.
   Json json = wire_in_catheter();
   json["tools"][1]["outer_diameter_mm"] = 1.2;
@@ -167,6 +177,33 @@ TEST_F(CaseFile, MistakesInToolsAreToldByKey) {
   for (const char* key : {"tools[1]", "moves[0].tool", "friction_between_tools"}) {
     EXPECT_NE(said.find(key), std::string::npos) << key;
   }
+}
+
+TEST_F(ToolMistakes, InWhatLoadsAndHoldsThemAreTold) {
+  expect_told({
+      {"plane_normal is [0.0,0.0,1.0], expected a plane that the supports lie in",
+       [](Json& json) {
+         json["plane_normal"] = {0, 0, 1};  // square to nothing: the introducer is along z
+       }},
+      {"loads.tip_moment_n_mm is along the wire, expected an axis across it",
+       [](Json& json) {
+         for (Json& tool : json["tools"]) {
+           for (Json& section : tool["sections"]) section.erase("rest_curvature_per_mm");
+         }
+         json["loads"] = {{"tip_moment_n_mm", {0, 0, 1}}};
+       }},
+      {"loads.gravity_m_per_s2 is not 0, expected a wire with a mass (give mass_kg_per_m in "
+       "tools[].sections)",
+       [](Json& json) {
+         json["loads"] = {{"gravity_m_per_s2", {0, -9.81, 0}}};
+       }},
+      {"moves[0] is 60.0 mm of the foremost tool, expected as much as from the introducer to "
+       "supports[0], 75.0 mm",
+       [](Json& json) {
+         json["supports"] =
+             Json::array({{{"at", "distal"}, {"kind", "pinned"}, {"point_mm", {0, 0, 80}}}});
+       }},
+  });
 }
 
 TEST_F(CaseFile, CatheterTakesItsCurveAsTheWireIsWithdrawn) {
@@ -246,6 +283,45 @@ TEST_F(CaseFile, ToolsInAVesselTellWhatEachDoesToTheWall) {
     EXPECT_NE(std::string(error.what()).find("introducer.point_mm is "), std::string::npos)
         << error.what();
   }
+}
+
+TEST_F(CaseFile, InsertionWithoutATargetTellsWhereItsForcesAreRough) {
+  write_stl(shapes::bend_tube(4.0, 20.0, 0.5 * kPi, 30.0, 60.0, 1.5), folder_ / "bend.stl");
+  int rough = 0;
+  for (const double stiffness : {-50.0, 50.0, 1000.0}) {  // below 0: the same, slippery
+    SCOPED_TRACE(stiffness);
+    const double friction = stiffness < 0.0 ? 0.05 : 1.0;
+    Json tip = {{"length_mm", 30},
+                {"radius_mm", 0.4445},
+                {"bending_stiffness_n_mm2", 5},
+                {"element_length_mm", 1}};
+    Json shaft = {{"length_mm", 220},
+                  {"radius_mm", 0.4445},
+                  {"bending_stiffness_n_mm2", std::abs(stiffness)},
+                  {"element_length_mm", 2}};
+    const Json json = {
+        {"schema", "wireplan.scene/1"},
+        {"wire", {{"sections", Json::array({tip, shaft})}}},
+        {"vessel",
+         {{"surface", {{"path", "bend.stl"}, {"unit", "mm"}, {"frame", "LPS"}}},
+          {"friction", friction}}},
+        {"insertion", {{"point_mm", {0, 0, 2}}, {"direction", {0, 0, 1}}, {"length_mm", 80}}},
+        {"check_sensitivity", false}};
+    const SceneFile file = read_scene(write("scene.json", json.dump()));
+    run_scene_file(file, folder_ / "out");
+    std::ifstream stream(folder_ / "out" / "result.json");
+    const Json result = Json::parse(stream);
+    const auto number = [&](const char* key) { return result.at(key).get<double>(); };
+    const double work = std::max(std::abs(number("push_work_n_mm")),
+                                 number("stored_energy_n_mm") + number("friction_work_n_mm"));
+    const bool is_rough = std::abs(number("energy_unbalanced_n_mm")) > 0.01 * work;
+    const std::string reason = result.at("reason");
+    EXPECT_NE(reason.find("the scene has no target"), std::string::npos) << reason;
+    EXPECT_EQ(reason.find("its forces are rough") != std::string::npos, is_rough) << reason;
+    rough += is_rough;
+  }
+  EXPECT_GT(rough, 0);
+  EXPECT_LT(rough, 3);
 }
 
 }  // namespace

@@ -55,6 +55,19 @@ double largest_difference(const TrialResult& a, const TrialResult& b) {
   return (a.nodes - b.nodes).colwise().norm().maxCoeff();
 }
 
+TEST(Moves, MayBeShorterThanAnElement) {
+  for (const double length : {1e-3, 2.0}) {
+    SCOPED_TRACE(length);
+    InsertionOptions some = options();
+    some.length = some.step = length;
+    const TrialResult in = make_moves(curved_wire(), straight(), {{.push = length}}, some);
+    EXPECT_EQ(in.outcome, Outcome::kMissed) << in.reason;
+    const Vec3 tip = in.nodes.rightCols<1>();
+    EXPECT_NEAR(tip.z(), 5.0 + length, 0.05 * length);
+    EXPECT_LT(tip.head<2>().norm(), 0.01 + 0.2 * length);
+  }
+}
+
 TEST(Moves, ComeBeforeTheLastPushOfATrial) {
   InsertionOptions some = options(0.1);
   some.length = 70.0;
