@@ -2,6 +2,7 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdint>
 #include <limits>
@@ -14,6 +15,14 @@ namespace {
 
 constexpr double kMeanOver = 1.5;    // of line to either side                             [mm]
 constexpr double kLeastChord = 1.0;  // to either side, for the direction                  [mm]
+// Round the point, in 5 degrees. A wall that turns away by more than 60 degrees from across a ray
+// runs into a branch (an oval would have to be 3.7 times as long as wide); its rim begins where it
+// turns by 17.
+constexpr std::size_t kRays = 72;
+constexpr double kRay = 2.0 * kPi / kRays;
+constexpr double kSteep = 1.7, kRim = 0.3;  // of the radius, per radian
+constexpr double kBack = 1.1;               // of the radius at one rim: the other has come near
+constexpr std::size_t kWidestMouth = 30;    // rays: more is no mouth of a branch
 
 /// An edge of the surface as a key.
 std::uint64_t key_of(int a, int b) {
@@ -83,6 +92,68 @@ std::pair<double, int> area_and_turns(const std::vector<Vec3>& loop, const Vec3&
   return {std::abs(area), static_cast<int>(std::lround(angle / (2.0 * kPi)))};
 }
 
+/// From the point to the first wall in each direction of the loop's plane; turns as the loop does.
+std::array<double, kRays> ways_out(const std::vector<Vec3>& loop, const Vec3& point,
+                                   const Vec3& normal) {
+  const Vec3 u = normal.unitOrthogonal(), w = normal.cross(u);
+  std::array<double, kRays> ways{};
+  for (std::size_t ray = 0; ray < kRays; ++ray) {
+    const double angle = kRay * static_cast<double>(ray);
+    const Vec3 along = std::cos(angle) * u + std::sin(angle) * w;
+    const Vec3 across = normal.cross(along);
+    double least = std::numeric_limits<double>::infinity();
+    for (std::size_t k = 0; k < loop.size(); ++k) {
+      const Vec3 a = loop[k] - point, b = loop[(k + 1) % loop.size()] - point;
+      const double from = across.dot(a), to = across.dot(b);
+      if ((from < 0.0) == (to < 0.0)) continue;
+      const double way = along.dot(a + from / (from - to) * (b - a));
+      if (way > 0.0) least = std::min(least, way);
+    }
+    ways[ray] = least;
+  }
+  return ways;
+}
+
+/// Replaces what lies in the mouth of a branch by a straight way from rim to rim: from each ray
+/// after which the wall turns away, on to where it comes back. False where there is no mouth.
+bool close_mouths(std::array<double, kRays>& ways) {
+  bool closed = false;
+  const auto rises = [&](std::size_t k) {
+    return (ways[(k + 1) % kRays] - ways[k % kRays]) / (kRay * ways[k % kRays]);
+  };
+  for (std::size_t start = kRays; start < 2 * kRays; ++start) {
+    if (rises(start) <= kSteep) continue;
+    std::size_t rim = start, back = start + 1;
+    while (rim > start - kWidestMouth && rises(rim - 1) > kRim) --rim;
+    const double here = ways[rim % kRays];
+    while (back < rim + kWidestMouth && ways[back % kRays] > kBack * here) ++back;
+    while (back < rim + kWidestMouth && rises(back) < -kRim) ++back;
+    if (back >= rim + kWidestMouth) continue;
+    const double there = ways[back % kRays];
+    for (std::size_t k = rim + 1; k < back; ++k) {
+      const double part = static_cast<double>(k - rim) / static_cast<double>(back - rim);
+      ways[k % kRays] = here + part * (there - here);
+    }
+    closed = true;
+  }
+  return closed;
+}
+
+/// The part of a cut that is the vessel's, without the branches that it runs into.
+double area_without_branches(const std::vector<Vec3>& loop, double whole, const Vec3& point,
+                             const Vec3& normal) {
+  std::array<double, kRays> ways = ways_out(loop, point, normal);
+  bool closed = close_mouths(ways);
+  std::reverse(ways.begin(), ways.end());  // a mouth that is steep on its other side
+  closed = close_mouths(ways) || closed;
+  if (!closed) return whole;
+  double twice = 0.0;
+  for (std::size_t k = 0; k < kRays; ++k) {
+    twice += std::sin(kRay) * ways[k] * ways[(k + 1) % kRays];
+  }
+  return std::min(whole, 0.5 * twice);
+}
+
 /// Of the smallest cut that goes round the point; the sphere's where none does.
 double diameter_at(const Surface& surface, const Centerline& line, Eigen::Index k) {
   const double reach = std::max(kLeastChord, line.radius(k));
@@ -95,7 +166,8 @@ double diameter_at(const Surface& surface, const Centerline& line, Eigen::Index 
   double least = std::numeric_limits<double>::infinity();
   for (const std::vector<Vec3>& loop : PlaneCut(surface, point, normal).loops()) {
     const auto [area, turns] = area_and_turns(loop, point, normal);
-    if (turns != 0) least = std::min(least, area);
+    if (turns == 0 || area >= least) continue;
+    least = area_without_branches(loop, area, point, normal);
   }
   return std::isfinite(least) ? std::sqrt(4.0 * least / kPi) : 2.0 * line.radius(k);
 }

@@ -330,6 +330,35 @@ TEST(SectionWidth, OfAnEllipseIsThatOfTheCircleOfItsArea) {
   EXPECT_NEAR(diameters.mean(), 2.0 * std::sqrt(10.0), 0.1);
 }
 
+TEST(SectionWidth, DoesNotCountTheBranchThatACutRunsInto) {
+  // A branch of 1.5 mm, 20 mm long, at right angles to a tube of 4 mm: its cut is 60 mm^2 more.
+  const Surface tube = shapes::level_set(
+      [](const Vec3& p) {
+        const double trunk = std::min({4.0 - std::hypot(p.x(), p.y()), p.z(), 60.0 - p.z()});
+        const double branch =
+            std::min({1.5 - std::hypot(p.y(), p.z() - 30.0), p.x(), 24.0 - p.x()});
+        return std::max(trunk, branch);
+      },
+      Vec3(-5.0, -5.0, -1.0), Vec3(25.0, 5.0, 61.0), 0.5);
+  for (const double beside : {-1.0, 0.0, 1.5}) {
+    SCOPED_TRACE(beside);
+    const Eigen::VectorXd diameters = section_diameters(tube, line_along_z(beside));
+    EXPECT_NEAR(diameters.minCoeff(), 8.0, 0.15);
+    EXPECT_NEAR(diameters.maxCoeff(), 8.0, 0.15);
+  }
+}
+
+TEST(SectionWidth, OfALongOvalIsWholeFromItsMiddle) {
+  // Three times as long as wide, as a flattened lumen may be: no end of it is a branch.
+  const Surface tube = shapes::level_set(
+      [](const Vec3& p) {
+        const double part = std::hypot(p.x() / 2.0, p.y() / 6.0);
+        return std::min({4.0 * (1.0 - part), p.z(), 60.0 - p.z()});
+      },
+      Vec3(-3.0, -7.0, -1.0), Vec3(3.0, 7.0, 61.0), 0.5);
+  EXPECT_NEAR(section_diameters(tube, line_along_z(0.0)).mean(), 2.0 * std::sqrt(12.0), 0.12);
+}
+
 TEST(SectionWidth, WhereNoCutGoesRoundThePointIsTheSpheres) {
   const Surface tube = shapes::straight_tube(4.0, 60.0, 0.8);
   EXPECT_DOUBLE_EQ(section_diameters(tube, line_along_z(10.0)).maxCoeff(), 4.0);
