@@ -6,6 +6,7 @@
 
 #include "preprocess/centerline/centerline.h"
 #include "preprocess/centerline/path_place.h"
+#include "preprocess/centerline/section_width.h"
 #include "preprocess/surface/surface.h"
 #include "preprocess/volume/phantom_lumen.h"
 #include "preprocess/volume/voxels.h"
@@ -149,10 +150,11 @@ Centerline widened(Centerline way) {
 
 /// The line that was found against the true way. A radius counts where the lumen there is a single
 /// round tube, so neither at mouths of branches nor by plaque, and where it is over two voxels.
-void measure_line(const Centerline& line, const Centerline& way, double voxel_mm,
-                  const preprocess::PhantomLumen& truth, PatientRow& row) {
+void measure_line(const Surface& surface, const Centerline& line, const Centerline& way,
+                  double voxel_mm, const preprocess::PhantomLumen& truth, PatientRow& row) {
   std::vector<double> off;
-  int asked = 0, within = 0;
+  const Eigen::VectorXd section = 0.5 * preprocess::section_diameters(surface, line);
+  int asked = 0, within = 0, ball_within = 0;
   for (Eigen::Index i = 0; i < line.points.cols(); ++i) {
     const Vec3 p = line.points.col(i);
     off.push_back(preprocess::find_place(p, way).from_axis);
@@ -162,12 +164,18 @@ void measure_line(const Centerline& line, const Centerline& way, double voxel_mm
     const double open = -truth.distance(way.points.col(nearest));
     if (radius < kWideEnough * voxel_mm || std::abs(open - radius) > 0.01 * radius) continue;
     ++asked;
-    within += std::abs(line.radius(i) - radius) <= kRadiusTolerance * radius ? 1 : 0;
+    const auto is_near = [&](double r) {
+      return std::abs(r - radius) <= kRadiusTolerance * radius;
+    };
+    within += is_near(section(i)) ? 1 : 0;
+    ball_within += is_near(line.radius(i)) ? 1 : 0;
   }
   row.axis_mean_mm = mean_of(off);
   row.axis_p95_mm = p95_of(off);
   row.way_right = is_way_right(line, way);
-  if (asked > 0) row.radius_within = static_cast<double>(within) / asked;
+  if (asked == 0) return;
+  row.radius_within = static_cast<double>(within) / asked;
+  row.ball_within = static_cast<double>(ball_within) / asked;
 }
 
 /// The steps on which a patient can end. Returns the surface's centerline.
@@ -252,7 +260,7 @@ PatientRow segment_patient(const preprocess::RandomPatient& patient) {
                   row);
   if (row.outcome == PatientOutcome::kNoSurface) return row;
   measure_surface(surface, grid, way, truth, row);
-  if (line) measure_line(*line, way, std::cbrt(grid.spacing.prod()), truth, row);
+  if (line) measure_line(surface, *line, way, std::cbrt(grid.spacing.prod()), truth, row);
   return row;
 }
 

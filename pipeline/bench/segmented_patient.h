@@ -27,7 +27,9 @@ struct PatientRow {
   std::optional<double> dice = {};
   std::optional<double> surface_mean_mm = {}, surface_p95_mm = {};  // there too, caps apart
   std::optional<double> axis_mean_mm = {}, axis_p95_mm = {};
-  std::optional<double> radius_within = {};  // share of the places within 5 % of the true radius
+  // Shares of the places within 5 % of the true radius: of half the section's diameter, which the
+  // report tells, and of the inscribed ball's radius.
+  std::optional<double> radius_within = {}, ball_within = {};
   std::optional<bool> way_right = {};
   std::optional<double> outside = {};         // of the mask, not next to the truth, over the truth
   std::optional<double> outside_silent = {};  // and that no warning names with its place
