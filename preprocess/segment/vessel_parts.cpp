@@ -15,7 +15,10 @@ constexpr double kDarker = 0.12, kBrighter = 0.2;  // by which another vessel's 
 constexpr float kWider = 1.8F, kWiderMm = 1.0F;    // beyond which a wider part is no branch
 constexpr float kWiderAlready = 1.3F;              // beyond which half the difference is enough
 constexpr double kMostSoft = 0.6, kSoft = 0.45;    // of the boundary; of the contrast behind it
+constexpr double kMostSoftOn = 0.75;               // of a part that the vessel goes on in ...
+constexpr float kGoesOn = 0.75F;     // ... through a contact of this part of either's depth
 constexpr double kCorrelated = 1.5;  // noise of a mean, against that of independent voxels
+constexpr double kFewVoxels = 40.0;  // of a core: fewer do not tell its level
 constexpr float kMiddle = 0.6F;      // of the depth: what lies deeper is the middle of a part
 constexpr double kDoubtfulPart = 0.6, kDoubtfulSoft = 0.4;  // of what a part is refused for
 
@@ -102,7 +105,6 @@ double error_of_core(const LumenField& field, const VesselPart& part) {
 /// another.
 PairDepths join_bumps(const LumenField& field, const PairDepths& pairs, VesselParts& found) {
   constexpr float kNoNeck = 0.75F, kNarrower = 0.7F;
-  constexpr double kFewVoxels = 40.0;
   auto& parts = found.parts;
   const PartContacts contacts = contacts_of(pairs, parts.size());
   const auto narrower = [&](std::uint32_t a, std::uint32_t b) {
@@ -218,10 +220,14 @@ bool leads_on(const LumenField& field, const LevelRule& rule, const Entrance& en
               const VesselPart& from, VesselPart& part) {
   const double beside = other_level(field, rule, from.level, part);
   const bool widens = part.depth > kWiderAlready * entrance.contact + static_cast<float>(neck);
-  if (part.soft > kMostSoft * part.faces || part.depth > kWider * entrance.width + kWiderMm ||
-      beside > (widens ? 0.5 : 1.0)) {
+  // Where the ways' vessel goes on, as wide as before, more of what lies beside it may be bright.
+  const bool goes_on =
+      from.on_way && entrance.contact >= kGoesOn * std::max(from.depth, part.depth);
+  if (part.soft > (goes_on ? kMostSoftOn : kMostSoft) * part.faces ||
+      part.depth > kWider * entrance.width + kWiderMm || beside > (widens ? 0.5 : 1.0)) {
     return false;
   }
+  part.on_way = goes_on;
   part.doubtful = from.doubtful || beside > kDoubtfulPart || part.soft > kDoubtfulSoft * part.faces;
   part.level =
       rule.follow(from.level, part.core, rule.seen_raw(part.depth), (part.peak - from.peak).norm());
@@ -267,6 +273,37 @@ void adopt_pieces(const Grid& grid, const PartContacts& contacts, std::vector<Ve
   }
 }
 
+/// The parts that the ways lead through, with their levels: that of the way at the place next to
+/// the part's middle, corrected by the part's own core, which holds more voxels.
+std::vector<std::uint32_t> find_starts(const LumenField& field,
+                                       const std::vector<std::vector<WayLevel>>& ways,
+                                       VesselParts& found) {
+  std::vector<std::uint32_t> starts;
+  std::vector<double> off(found.parts.size(), std::numeric_limits<double>::infinity());
+  for (const auto& way : ways) {
+    for (const WayLevel& place : way) {
+      const std::uint32_t of = found.of[place.voxel];
+      if (of == 0) continue;
+      VesselPart& part = found.parts[of];
+      const double here = (center_of(field.grid, place.voxel) - part.peak).norm();
+      if (!part.on_way) starts.push_back(of);
+      part.on_way = true;
+      if (here >= off[of]) continue;
+      off[of] = here;
+      part.level = place.level;
+    }
+  }
+  const LevelRule rule(field);
+  for (const std::uint32_t start : starts) {
+    VesselPart& part = found.parts[start];
+    if (part.core_voxels < kFewVoxels || off[start] > 0.5 * static_cast<double>(part.depth))
+      continue;
+    constexpr double kWhole = std::numeric_limits<double>::infinity();  // of the difference
+    part.level = rule.follow(part.level, part.core, rule.seen_raw(part.depth), kWhole);
+  }
+  return starts;
+}
+
 }  // namespace
 
 VesselParts divide_vessels(const LumenField& field, const Labels& mask,
@@ -289,15 +326,7 @@ VesselParts divide_vessels(const LumenField& field, const Labels& mask,
   average_cores(contacts, found.parts);
   count_faces(field, level, found);
 
-  std::vector<std::uint32_t> starts;
-  for (const auto& way : ways) {
-    for (const WayLevel& place : way) {
-      const std::uint32_t of = found.of[place.voxel];
-      if (of == 0 || found.parts[of].level != 0.0F) continue;
-      found.parts[of].level = place.level;
-      starts.push_back(of);
-    }
-  }
+  const std::vector<std::uint32_t> starts = find_starts(field, ways, found);
   visit_parts(field, contacts, neck, starts, found.parts);
   adopt_pieces(field.grid, contacts, found.parts);
   for (VesselPart& part : found.parts) {

@@ -17,6 +17,7 @@ struct VesselPart {
   double voxels = 0.0;             // of all of it
   double faces = 0.0, soft = 0.0;  // of its boundary; behind how many the values stay high
   float level = 0.0F;              // followed from the ways; where it is `other` its own [HU]
+  bool on_way = false;             // of the vessel that the ways run in, as far as it goes on
   bool other = false;              // another vessel, or an organ
   bool doubtful = false;           // not other, but nearly so
 };
@@ -34,9 +35,11 @@ struct VesselParts {
 /// - its level is that of another vessel: darker by more than 12 % of the contrast or brighter by
 ///   more than 20 %, and by three standard errors (by half as much, if it is also wider than 1.3
 ///   times the contact); blur is allowed for;
-/// - behind more than 60 % of its boundary the values stay high: it lies in an organ.
+/// - behind more than 60 % of its boundary the values stay high: it lies in an organ (75 % where
+/// the
+///   ways' vessel goes on in it, through a contact of three quarters of both depths).
 /// A part with less volume than the ball that fits in there belongs to what it touches most widely.
-/// The level is followed from part to part over 10 mm.
+/// The level is followed from part to part over 10 mm; parts on the ways have their own.
 VesselParts divide_vessels(const LumenField& field, const Labels& mask,
                            const std::vector<float>& depth, const std::vector<float>& level,
                            const std::vector<std::vector<WayLevel>>& ways, double neck);
