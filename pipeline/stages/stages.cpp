@@ -201,7 +201,7 @@ std::vector<Stage> stages_from_labels(const Case& given) {
   if (!given.labels->choice.names.empty()) read_too(stages.back(), {"/labels/names"});
   read_points(stages.back(), given);
   stages.push_back({.name = "surface",
-                    .version = 8,
+                    .version = 9,
                     .reads_input = in_volume,
                     .after = {"segment"},
                     .parameters = {"/surface/edge_length_mm"},
@@ -223,13 +223,13 @@ std::vector<Stage> stages_to_surface(const Case& given) {
   }
   stages.push_back({.name = "volume", .version = 3, .reads_input = true, .make = make_volume});
   stages.push_back({.name = "segment",
-                    .version = 11,
+                    .version = 12,
                     .reads_input = true,
                     .parameters = {"/segmentation", "/mask"},
                     .make = make_segment});
   read_points(stages.back(), given);
   stages.push_back({.name = "surface",
-                    .version = 7,
+                    .version = 8,
                     .reads_input = true,
                     .after = {"segment"},
                     .parameters = {"/surface/edge_length_mm"},
@@ -251,7 +251,7 @@ std::vector<Stage> stages_of(const Case& given) {
   // Names of branches, or the way that was found.
   if (from_labels || from_volume) stages.back().after.emplace_back("segment");
   Stage anatomy{.name = "anatomy",
-                .version = 5,
+                .version = 6,
                 .reads_input = from_volume,
                 .after = {"surface", "centerline"},
                 .parameters = {"/access_limits", "/axes"},

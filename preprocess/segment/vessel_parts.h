@@ -35,9 +35,8 @@ struct VesselParts {
 /// - its level is that of another vessel: darker by more than 12 % of the contrast or brighter by
 ///   more than 20 %, and by three standard errors (by half as much, if it is also wider than 1.3
 ///   times the contact); blur is allowed for;
-/// - behind more than 60 % of its boundary the values stay high: it lies in an organ (75 % where
-/// the
-///   ways' vessel goes on in it, through a contact of three quarters of both depths).
+/// - behind more than 60 % of its boundary the values stay high: it lies in an organ (of 75 %,
+///   where the ways' vessel goes on in it, through a contact of three quarters of both depths).
 /// A part with less volume than the ball that fits in there belongs to what it touches most widely.
 /// The level is followed from part to part over 10 mm; parts on the ways have their own.
 VesselParts divide_vessels(const LumenField& field, const Labels& mask,
