@@ -51,6 +51,7 @@ class Walker {
                           look_.syntax.starts_with("1.2.840.10008.1.2");
     if (!whole && look_.end == 0 && !standard) {
       look_.pixels = true;
+      look_.followed = false;
       look_.end = bytes_.size();
       return found(sound);
     }

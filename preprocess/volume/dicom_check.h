@@ -28,6 +28,7 @@ struct DicomLook {
   DicomForm form = DicomForm::kNone;
   std::string syntax;  // UID of its transfer syntax; empty where the file does not tell
   bool explicit_vr = true;
+  bool followed = true;             // false: of an unknown syntax, in which elements are not found
   bool pixels = false;              // whether it has some of its own; true where it may have
   bool image = false;               // whether it says that it is one, with pixels or without
   std::size_t begin = 0, end = 0;   // of the data set, up to its pixels' end

@@ -274,6 +274,10 @@ bool read_slice_header(Slice& slice) {
                 ": an image without its pixels; copy or export the series again, or take the file "
                 "out if it is no slice");
   }
+  if (!look.followed) {  // GDCM would take any four bytes for a length, and ask for as much memory
+    slice.refused = not_read(look.syntax);
+    return true;
+  }
   const auto copy = copy_of(slice);
   const std::string path = path_of(slice, copy);
   const gdcm::Tag pixels(0x7fe0, 0x0010);

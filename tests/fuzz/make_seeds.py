@@ -241,6 +241,7 @@ def dicom_folders():
         "two-series": slices[:2] + [dicom(z, series="1.2.5", description="Thorax") for z in (0.0, 2.0)],
         "one-cut": slices[:2] + [slices[2][:-3]],
         "run-lengths": [dicom(z, syntax="1.2.840.10008.1.2.5") for z in (0.0, 1.5)],
+        "in-an-unknown-syntax": [dicom(0.0, syntax="1.4.840.10008.1.2.1").replace(b"PN\x08\x00", b"P\x9c\x9c\x9c\x9c\x9c")],
         "two-energies": [dicom(z, unit="Z_EFF") for z in (0.0, 1.5)],
         "a-note": [slices[0], b"no image", slices[1]],
         "turned": [dicom(z, axes="0\\1\\0\\0\\0\\-1", modality="MR") for z in (0.0, 1.5)],

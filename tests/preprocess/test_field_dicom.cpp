@@ -282,6 +282,18 @@ TEST_F(FieldDicom, ImagesOfASyntaxThatTheLibraryDoesNotKnowAreToldWithIt) {
   }
 }
 
+TEST_F(FieldDicom, AnUnknownSyntaxWhoseElementsAreNotFoundIsNotGivenToTheLibrary) {
+  // It took the letters behind the tag for a length, and asked for 2.6 GB.
+  write_slices([](const std::string& bytes, int) {
+    std::string other = with_head(bytes, head_of("1.2.3.4.5.6.7"));
+    const std::size_t name = other.find("PN");
+    EXPECT_NE(name, std::string::npos);
+    return other.replace(name, 8, "P" + std::string(7, '\x9c'));
+  });
+  const std::string error = read_error(folder_);
+  EXPECT_TRUE(has(error, "GDCM does not read (transfer syntax 1.2.3.4.5.6.7)")) << error;
+}
+
 TEST_F(FieldDicom, AScoutInAnUnknownSyntaxDoesNotKeepAnotherSeriesFromBeingRead) {
   write_slices([](const std::string& bytes, int) { return bytes; });
   write_slices([](const std::string& bytes,
