@@ -123,6 +123,13 @@ inline Json volume_case(const Json& tube) {
   return file;
 }
 
+/// The text of one of the blocks of data of a report.html.
+inline std::string page_block(const std::string& page, const std::string& name) {
+  const std::string start = "<script type=\"application/json\" id=\"data-" + name + "\">";
+  const std::size_t first = page.find(start) + start.size();
+  return page.substr(first, page.find("</script>", first) - first);
+}
+
 /// Holds every JSON file below the folder that names a schema of ours against pipeline/schemas, by
 /// python3-jsonschema. Where that is not installed the test is marked as skipped.
 inline void expect_follows_schemas(const std::filesystem::path& folder) {

@@ -44,12 +44,9 @@ TEST(FirstAnswer, HasAPageBeforeErrorsAndRepeatsAreKnown) {
   };
   const RunResult result = run_stages(given, options);
   ASSERT_FALSE(page.empty());
-  const auto block = [](const std::string& text, const std::string& name) {
-    const std::string start = "id=\"data-" + name + "\">";
-    const std::size_t first = text.find(start) + start.size();
-    return Json::parse(text.substr(first, text.find("</script>", first) - first));
+  const auto report_of = [](const std::string& text) {
+    return Json::parse(page_block(text, "report"));
   };
-  const auto report_of = [&](const std::string& text) { return block(text, "report"); };
   Json early = report_of(page);
   const fs::path made = result.artifacts.back().folder;
   const Json last = report_of(read_text(made / "report.html"));
@@ -63,7 +60,7 @@ TEST(FirstAnswer, HasAPageBeforeErrorsAndRepeatsAreKnown) {
   EXPECT_FALSE(last.at("numerics").at("plans").empty());
 
   // It has all that a page reads.
-  early["timing"] = block(page, "timing");
+  early["timing"] = Json::parse(page_block(page, "timing"));
   fs::create_directories(folder / "early");
   write_json(early, folder / "early" / "report.json");
   expect_follows_schemas(folder / "early");

@@ -82,7 +82,7 @@ TEST(VesselMotion, ArteriesThatLeaveTheTrunkAreHeldAtTheirOstia) {
   wall.held.clear();
   const auto moved_at = [&](const Vec3& place) {
     const auto chain = make_section_chain(wall, vessel.tree, Vec3::Zero(), 0.0);
-    // Energy of a shift of the whole is twice what the support costs: by its part near a place.
+    // What it costs to shift the sections near the place by 1 mm, which the support alone resists.
     Eigen::Matrix3Xd u = Eigen::Matrix3Xd::Zero(3, chain->nodes()), gradient = u;
     for (int k = 0; k < chain->nodes(); ++k) {
       if ((chain->places().col(k) - place).norm() < 6.0) u.col(k) = Vec3(1, 0, 0);

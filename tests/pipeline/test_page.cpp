@@ -17,13 +17,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// The text of one of the page's blocks of data.
-std::string block(const std::string& page, const std::string& name) {
-  const std::string start = "<script type=\"application/json\" id=\"data-" + name + "\">";
-  const std::size_t first = page.find(start) + start.size();
-  return page.substr(first, page.find("</script>", first) - first);
-}
-
 std::string decoded(const std::string& text) {
   const std::string digits = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
   std::string bytes;
@@ -78,13 +71,13 @@ TEST(Page, HoldsTheReportAndTheShapesOfItsTrials) {
   const fs::path made = run_tube(folder.path(), "cache", 2);
   const std::string page = read_text(made / "report.html");
   Json report = read_json(made / "report.json", kReportSchema);
-  EXPECT_EQ(Json::parse(block(page, "timing")), report.at("timing"));
+  EXPECT_EQ(Json::parse(page_block(page, "timing")), report.at("timing"));
   report.erase("timing");
-  EXPECT_EQ(Json::parse(block(page, "report")), report);
+  EXPECT_EQ(Json::parse(page_block(page, "report")), report);
   EXPECT_EQ(page.find("%WIREPLAN_"), std::string::npos);
 
   // A point of the surface, to the 16 bits over the box; the tube has a radius of 4 mm.
-  const Json scene = Json::parse(block(page, "scene"));
+  const Json scene = Json::parse(page_block(page, "scene"));
   const std::vector<std::uint16_t> steps =
       numbers<std::uint16_t>(scene.at("surface").at("vertices"));
   const Json low = scene.at("box").at("low_mm"), size = scene.at("box").at("size_mm");
@@ -124,7 +117,7 @@ TEST(Page, HoldsHowTheVesselFollowsItsCrossSections) {
       {"wall.support_kpa_per_mm=0.2", "robustness.repeats=0", "access.inclination_deg=[20]"});
   const fs::path made = folder / "out";
   publish(run_stages(given, options).artifacts, made);
-  const Json scene = Json::parse(block(read_text(made / "report.html"), "scene"));
+  const Json scene = Json::parse(page_block(read_text(made / "report.html"), "scene"));
   const auto counts = numbers<std::uint8_t>(scene.at("motion").at("counts"));
   const auto nodes = numbers<std::uint16_t>(scene.at("motion").at("nodes"));
   const auto weights = numbers<float>(scene.at("motion").at("weights"));
@@ -181,7 +174,7 @@ TEST(Page, IsTheSameAtAnyThreadCountOutsideItsTiming) {
   for (const int threads : {1, 3}) {  // report.json is tested at more
     std::string page = read_text(
         run_tube(folder.path(), "cache-" + std::to_string(threads), threads) / "report.html");
-    const std::string timing = block(page, "timing");
+    const std::string timing = page_block(page, "timing");
     EXPECT_GT(timing.size(), 100u);
     page.erase(page.find(timing), timing.size());
     pages.insert(page);

@@ -310,6 +310,16 @@ Centerline line_along_z(double beside) {
   return line;
 }
 
+/// A tube along z of 60 mm whose section is an ellipse of these half axes along x and y [mm].
+Surface oval_tube(double half_x, double half_y) {
+  return shapes::level_set(
+      [=](const Vec3& p) {
+        const double part = std::hypot(p.x() / half_x, p.y() / half_y);
+        return std::min({4.0 * (1.0 - part), p.z(), 60.0 - p.z()});
+      },
+      Vec3(-half_x - 1.0, -half_y - 1.0, -1.0), Vec3(half_x + 1.0, half_y + 1.0, 61.0), 0.5);
+}
+
 TEST(SectionWidth, OfATubeIsItsDiameterWhereverTheLineRuns) {
   const Surface tube = shapes::straight_tube(4.0, 60.0, 0.8);
   for (const double beside : {0.0, 2.5}) {
@@ -320,13 +330,7 @@ TEST(SectionWidth, OfATubeIsItsDiameterWhereverTheLineRuns) {
 }
 
 TEST(SectionWidth, OfAnEllipseIsThatOfTheCircleOfItsArea) {
-  const Surface tube = shapes::level_set(
-      [](const Vec3& p) {
-        const double part = std::hypot(p.x() / 2.0, p.y() / 5.0);
-        return std::min({4.0 * (1.0 - part), p.z(), 60.0 - p.z()});
-      },
-      Vec3(-3.0, -6.0, -1.0), Vec3(3.0, 6.0, 61.0), 0.5);
-  const Eigen::VectorXd diameters = section_diameters(tube, line_along_z(0.0));
+  const Eigen::VectorXd diameters = section_diameters(oval_tube(2.0, 5.0), line_along_z(0.0));
   EXPECT_NEAR(diameters.mean(), 2.0 * std::sqrt(10.0), 0.1);
 }
 
@@ -350,13 +354,8 @@ TEST(SectionWidth, DoesNotCountTheBranchThatACutRunsInto) {
 
 TEST(SectionWidth, OfALongOvalIsWholeFromItsMiddle) {
   // Three times as long as wide, as a flattened lumen may be: no end of it is a branch.
-  const Surface tube = shapes::level_set(
-      [](const Vec3& p) {
-        const double part = std::hypot(p.x() / 2.0, p.y() / 6.0);
-        return std::min({4.0 * (1.0 - part), p.z(), 60.0 - p.z()});
-      },
-      Vec3(-3.0, -7.0, -1.0), Vec3(3.0, 7.0, 61.0), 0.5);
-  EXPECT_NEAR(section_diameters(tube, line_along_z(0.0)).mean(), 2.0 * std::sqrt(12.0), 0.12);
+  EXPECT_NEAR(section_diameters(oval_tube(2.0, 6.0), line_along_z(0.0)).mean(),
+              2.0 * std::sqrt(12.0), 0.12);
 }
 
 TEST(SectionWidth, WhereNoCutGoesRoundThePointIsTheSpheres) {
