@@ -223,6 +223,8 @@ int print_overview(const Case& given, const std::vector<Case>& sections, const f
   return serves_all_targets(overview) ? kDone : kNoPlan;
 }
 
+constexpr const char* kFirstPage = "preliminary.html";
+
 int run_case(const RunArguments& arguments) {
   if (arguments.dry_run) return print_status(arguments);
   const Case given = read_case(arguments.case_path, arguments.overrides);
@@ -238,24 +240,24 @@ int run_case(const RunArguments& arguments) {
   options.on_stage = [&](const StageOutcome& outcome) {
     log->info(stage_line(outcome, arguments.explain));
   };
+  if (page_missing().empty() && (options.to.empty() || options.to == "report")) {
+    options.before_plans = [&](Workspace& work) {
+      const fs::path page = output / section_folder(work.given()) / kFirstPage;
+      fs::create_directories(page.parent_path());
+      write_whole(make_first_page(work), page);
+      bar.tell(*log, "first page, without errors and disturbances: " + page.string());
+    };
+  }
   std::signal(SIGINT, ask_to_stop);
   std::vector<Case> done;
   std::string last;
   for_each_section(given, options, [&](const Case& section, const RunOptions& own) {
     const std::string name = section_name(section);
     if (!name.empty()) log->info(name);
-    const fs::path folder = output / section_folder(section), early = folder / "preliminary.html";
-    RunOptions with_page = own;
-    if (page_missing().empty() && (own.to.empty() || own.to == "report")) {
-      with_page.before_plans = [&](Workspace& work) {
-        fs::create_directories(folder);
-        write_whole(make_first_page(work), early);
-        bar.tell(*log, "first page, without errors and disturbances: " + early.string());
-      };
-    }
-    const RunResult result = run_stages(section, with_page);
+    const RunResult result = run_stages(section, own);
+    const fs::path folder = output / section_folder(section);
     publish(result.artifacts, folder);
-    fs::remove(early);
+    fs::remove(folder / kFirstPage);
     const fs::path look = folder / "slices.png";
     if (fs::exists(look)) log->info("look first at the outline of the mask: " + look.string());
     const std::string missing = arguments.after_shards ? missing_shards(result) : "";

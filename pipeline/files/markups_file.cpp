@@ -280,11 +280,13 @@ class PointFinder {
   std::optional<preprocess::Grid> grid_;
 };
 
-/// Of a wall's places that hold the vessel.
-void resolve_held(PointFinder& finder, Json& wall, const std::string& key) {
-  if (!wall.is_object() || !wall.contains("held") || !wall["held"].is_array()) return;
-  for (std::size_t k = 0; k < wall["held"].size(); ++k) {
-    finder.resolve_end(wall["held"][k], key + ".held[" + std::to_string(k) + "]");
+/// Calls `resolve` with each entry of a list, where there is one, and its key behind `prefix`.
+template <typename Resolve>
+void for_each_in(Json& owner, const std::string& list, const std::string& prefix,
+                 const Resolve& resolve) {
+  if (!owner.is_object() || !owner.contains(list) || !owner[list].is_array()) return;
+  for (std::size_t k = 0; k < owner[list].size(); ++k) {
+    resolve(owner[list][k], prefix + list + "[" + std::to_string(k) + "]");
   }
 }
 
@@ -315,35 +317,28 @@ void resolve_scene_points(Json& file, const fs::path& folder, Problems& problems
   for (const char* one : {"insertion", "introducer", "target"}) {
     if (file.contains(one)) resolve(file[one], one);
   }
-  if (file.contains("vessel") && file["vessel"].is_object() && file["vessel"].contains("wall")) {
-    resolve_held(finder, file["vessel"]["wall"], "vessel.wall");
-  }
-  if (!file.contains("supports") || !file["supports"].is_array()) return;
-  for (std::size_t k = 0; k < file["supports"].size(); ++k) {
-    resolve(file["supports"][k], "supports[" + std::to_string(k) + "]");
+  for_each_in(file, "supports", "", resolve);
+  if (!file.contains("vessel") || !file["vessel"].is_object()) return;
+  if (file["vessel"].contains("wall")) {
+    for_each_in(file["vessel"]["wall"], "held", "vessel.wall.", resolve);
   }
 }
 
 void resolve_points(Json& file, const fs::path& folder, Problems& problems) {
   if (!file.is_object()) return;
   PointFinder finder(file, folder, problems);
-  const auto in_list = [](Json& owner, const char* list, const auto& resolve) {
-    if (!owner.contains(list) || !owner[list].is_array()) return;
-    for (std::size_t k = 0; k < owner[list].size(); ++k) {
-      resolve(owner[list][k], list + ("[" + std::to_string(k) + "]"));
-    }
-  };
   const auto resolve = [&](Json& end, const std::string& key) { finder.resolve_end(end, key); };
   for (const char* one : {"access", "target"}) {
     if (file.contains(one)) resolve(file[one], one);
   }
-  if (file.contains("wall")) resolve_held(finder, file["wall"], "wall");
-  in_list(file, "accesses", resolve);
-  in_list(file, "targets", resolve);
-  if (!file.contains("segmentation") || !file["segmentation"].is_object()) return;
-  in_list(file["segmentation"], "seeds_mm", [&](Json& seed, const std::string& key) {
-    if (seed.is_object()) seed = finder.find(seed, "segmentation." + key);
-  });
+  if (file.contains("wall")) for_each_in(file["wall"], "held", "wall.", resolve);
+  for_each_in(file, "accesses", "", resolve);
+  for_each_in(file, "targets", "", resolve);
+  if (!file.contains("segmentation")) return;
+  for_each_in(file["segmentation"], "seeds_mm", "segmentation.",
+              [&](Json& seed, const std::string& key) {
+                if (seed.is_object()) seed = finder.find(seed, key);
+              });
 }
 
 }  // namespace wireplan::pipeline

@@ -304,11 +304,6 @@ simulate::SolverOptions read_solver(JsonReader& root) {
 
 constexpr const char* kGiveMass = "give mass_kg_per_m in wire.sections";
 
-bool is_massless(const simulate::Wire& wire) {
-  return std::all_of(wire.sections.begin(), wire.sections.end(),
-                     [](const simulate::Section& s) { return s.mass_per_length == 0.0; });
-}
-
 /// A distal support that the wire can come to.
 void check_reach(const simulate::Scene& scene, Problems& problems) {
   const std::vector<simulate::Support>& supports = scene.supports;

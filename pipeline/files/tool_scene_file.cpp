@@ -206,14 +206,7 @@ void check_insertions(const ToolBenchScene& bench, Problems& problems) {
   };
   if (!check(at_start)) return;
   for (std::size_t k = 0; k < bench.scene.moves.size(); ++k) {
-    for (std::size_t i = 0; i < places.size(); ++i) {
-      // What adds up to 0, or to the whole tool, but for rounding is that.
-      double& insertion = places[i].insertion;
-      const double length = bench.scene.tools[i].wire.length();
-      insertion += bench.scene.moves[k].push[i];
-      if (std::abs(insertion) < 1e-9) insertion = 0.0;
-      if (std::abs(insertion - length) < 1e-9) insertion = length;
-    }
+    places = simulate::moved(bench.scene.tools, std::move(places), bench.scene.moves[k]);
     if (!check([&](std::size_t) { return "moves[" + std::to_string(k) + "]"; })) return;
   }
 }
@@ -242,11 +235,7 @@ void check_held(const ToolBenchScene& bench, Problems& problems) {
     return std::all_of(scene.tools.begin(), scene.tools.end(),
                        [&](const simulate::Tool& tool) { return is(tool.wire); });
   };
-  const auto massless = [](const simulate::Wire& wire) {
-    return std::all_of(wire.sections.begin(), wire.sections.end(),
-                       [](const simulate::Section& s) { return s.mass_per_length == 0.0; });
-  };
-  check_gravity(scene.loads, all(massless), "give mass_kg_per_m in tools[].sections", problems);
+  check_gravity(scene.loads, all(is_massless), "give mass_kg_per_m in tools[].sections", problems);
   if (all([](const simulate::Wire& wire) { return wire.straight(); })) {
     check_tip_moment(scene.loads, scene.direction, "for torsion turn a hub in a move", problems);
   }
@@ -259,6 +248,11 @@ void check_held(const ToolBenchScene& bench, Problems& problems) {
 }
 
 }  // namespace
+
+bool is_massless(const simulate::Wire& wire) {
+  return std::all_of(wire.sections.begin(), wire.sections.end(),
+                     [](const simulate::Section& s) { return s.mass_per_length == 0.0; });
+}
 
 void check_gravity(const simulate::Loads& loads, bool massless, const std::string& remedy,
                    Problems& problems) {

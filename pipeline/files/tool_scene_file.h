@@ -21,6 +21,7 @@ ToolBenchScene read_tool_bench(JsonReader& root);
 simulate::Support read_support(JsonReader& reader);
 simulate::Loads read_loads(JsonReader& root);
 
+bool is_massless(const simulate::Wire& wire);
 /// Gravity on what has no mass; `remedy` tells where to give one.
 void check_gravity(const simulate::Loads& loads, bool massless, const std::string& remedy,
                    Problems& problems);

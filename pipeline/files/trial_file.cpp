@@ -26,9 +26,9 @@ using simulate::WireContact;
 
 constexpr const char* kSchema = "wireplan.trial/3";
 constexpr std::size_t kVesselStates = 12;  // of a vessel that moves, about: each is a whole surface
-constexpr std::string_view kShapesMagic = "wireplan.shapes/1\n",
-                           kToolShapesMagic = "wireplan.shapes/2\n",  // and tools' insertions
-    kMovedShapesMagic = "wireplan.shapes/3\n";                        // and the vessel's sections
+constexpr std::string_view kShapesMagic = "wireplan.shapes/1\n";
+constexpr std::string_view kToolShapesMagic = "wireplan.shapes/2\n";   // and tools' insertions
+constexpr std::string_view kMovedShapesMagic = "wireplan.shapes/3\n";  // and the vessel's sections
 
 constexpr std::array kOutcomes = {
     Outcome::kReached,   Outcome::kMissed,        Outcome::kPassedBy,     Outcome::kWrongBranch,

@@ -354,8 +354,8 @@ ShownTrials from_bytes(const std::string& bytes) {
 /// Reads it from the trials' files once: it does not depend on how they are judged.
 ShownTrials find_trials(const Workspace& work, const plan::Plan& plan) {
   std::vector<KeyLine> key = {{"piece", "shown trials " + std::to_string(kReportVersion)}};
-  for (const char* stage : {"trials", "manoeuvres", "plans"}) {
-    if (work.has(stage)) key.push_back({stage, work.artifact(stage).contents()});
+  for (const char* stage : {"trials", "manoeuvres"}) {
+    key.push_back({stage, work.artifact(stage).contents()});
   }
   return from_bytes(work.piece(key, [&] { return to_bytes(read_trials(work, plan)); }));
 }

@@ -160,9 +160,6 @@ double tortuosity(const Centerline& way) {
   return std::max(1.0, length_of(way) / (end - start).norm());  // rounding of a straight line
 }
 
-// Of an arm, the part at either end that its direction leaves out.
-constexpr double kRounded = 0.15;
-
 Corner find_sharpest_bend(const Centerline& way, double arm) {
   const double length = length_of(way);
   Corner sharpest{.angle = kPi, .arm = std::min(arm, length / 3.0)};
@@ -177,13 +174,13 @@ Corner find_sharpest_bend(const Centerline& way, double arm) {
     sharpest.arc = arc;
     sharpest.point = way.points.col(k);
   }
+  if (sharpest.angle == kPi) return sharpest;
   // A middle line rounds a corner: the arms there would take several degrees off.
+  constexpr double kRounded = 0.15;
   const double near = kRounded * sharpest.arm, far = sharpest.arm - near;
-  const Vec3 before = point_at(way, sharpest.arc - far) - point_at(way, sharpest.arc - near),
-             behind = point_at(way, sharpest.arc + far) - point_at(way, sharpest.arc + near);
-  if (sharpest.angle < kPi) {
-    sharpest.angle = std::atan2(before.cross(behind).norm(), before.dot(behind));
-  }
+  const Vec3 before = chord(way, sharpest.arc - near, sharpest.arc - far),
+             behind = chord(way, sharpest.arc + near, sharpest.arc + far);
+  sharpest.angle = std::atan2(before.cross(behind).norm(), before.dot(behind));
   return sharpest;
 }
 

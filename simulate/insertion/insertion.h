@@ -15,9 +15,9 @@
 
 namespace wireplan::simulate {
 
-/// How finely and how far to push; the same for all trials of a study.
 inline constexpr std::size_t kFewestElements = 4;  // of a wire that is pushed in
 
+/// How finely and how far to push; the same for all trials of a study.
 struct InsertionOptions {
   double length = 250.0;        // most wire to bring into the body                      [mm]
   double step = 1.0;            // of one push                                           [mm]

@@ -245,19 +245,26 @@ NewtonResult correct_rolls(const EndPath& path, Setup& s, NewtonResult found, co
   return found;
 }
 
+/// One solve, counted in the result.
+NewtonResult solve_counted(const Scene& scene, Statics& statics, Setup& s, int most_iterations,
+                           SceneResult& result) {
+  const NewtonResult found =
+      statics.solve(s.problem, s.state,
+                    {.residual_tolerance = scene.solver.residual_tolerance,
+                     .max_iterations = most_iterations,
+                     .leave_saddles = may_leave_saddles(scene.loads, scene.plane)});
+  result.iterations += found.iterations;
+  result.worst_energy_rise = std::max(result.worst_energy_rise, found.worst_energy_rise);
+  return found;
+}
+
 /// Takes the wire all along the path, in steps that get shorter where they take many iterations.
 NewtonResult follow_path(const Scene& scene, const EndPath& path, Setup& s, SceneResult& result) {
   const SolverOptions& options = scene.solver;
   Statics statics;
   const auto solve = [&](int most_iterations) {
-    const NewtonResult found =
-        statics.solve(s.problem, s.state,
-                      {.residual_tolerance = options.residual_tolerance,
-                       .max_iterations = std::min(most_iterations, options.max_iterations),
-                       .leave_saddles = may_leave_saddles(scene.loads, scene.plane)});
-    result.iterations += found.iterations;
-    result.worst_energy_rise = std::max(result.worst_energy_rise, found.worst_energy_rise);
-    return found;
+    return solve_counted(scene, statics, s, std::min(most_iterations, options.max_iterations),
+                         result);
   };
   const auto given_up = [&](const NewtonResult& found, double part) {
     result.reason = format(
@@ -312,14 +319,7 @@ void run_newton(const Scene& scene, Setup& s, SceneResult& result) {
   const bool far = path && path->is_far();
   if (far) solve = follow_path(scene, *path, s, result);
   const auto solve_now = [&] {
-    const NewtonResult found =
-        statics.solve(s.problem, s.state,
-                      {.residual_tolerance = options.residual_tolerance,
-                       .max_iterations = options.max_iterations,
-                       .leave_saddles = may_leave_saddles(scene.loads, scene.plane)});
-    result.iterations += found.iterations;
-    result.worst_energy_rise = std::max(result.worst_energy_rise, found.worst_energy_rise);
-    return found;
+    return solve_counted(scene, statics, s, options.max_iterations, result);
   };
   for (int step = 1; step <= options.load_steps && !far; ++step) {
     apply_part(scene, static_cast<double>(step) / options.load_steps, s);

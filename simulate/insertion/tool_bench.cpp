@@ -33,27 +33,12 @@ double largest_insertion(const std::vector<ToolPlace>& places) {
   return longest;
 }
 
-/// Pushes that add up to nothing, or to a whole tool, do so but for rounding.
-std::vector<ToolPlace> moved(const std::vector<Tool>& tools, std::vector<ToolPlace> places,
-                             const ToolMove& by, double part) {
-  constexpr double kSamePlace = 1e-9;  // [mm]
-  for (std::size_t i = 0; i < places.size(); ++i) {
-    double& insertion = places[i].insertion;
-    const double length = tools[i].wire.length();
-    insertion += part * by.push[i];
-    if (std::abs(insertion) < kSamePlace) insertion = 0.0;
-    if (std::abs(insertion - length) < kSamePlace) insertion = length;
-    places[i].roll += part * by.turn[i];
-  }
-  return places;
-}
-
 /// Elements as short as asked for even where the tools are furthest in.
 int count_elements(const ToolScene& scene) {
   std::vector<ToolPlace> places = scene.places;
   double longest = largest_insertion(places);
   for (const ToolMove& move : scene.moves) {
-    places = moved(scene.tools, places, move, 1.0);
+    places = moved(scene.tools, std::move(places), move);
     longest = std::max(longest, largest_insertion(places));
   }
   return elements_over(longest, scene.element_length);
@@ -84,6 +69,20 @@ Parts parts_of(const ToolScene& scene, const ToolMove& by) {
 }
 
 }  // namespace
+
+std::vector<ToolPlace> moved(const std::vector<Tool>& tools, std::vector<ToolPlace> places,
+                             const ToolMove& by, double part) {
+  constexpr double kSamePlace = 1e-9;  // [mm]
+  for (std::size_t i = 0; i < places.size(); ++i) {
+    double& insertion = places[i].insertion;
+    const double length = tools[i].wire.length();
+    insertion += part * by.push[i];
+    if (std::abs(insertion) < kSamePlace) insertion = 0.0;
+    if (std::abs(insertion - length) < kSamePlace) insertion = length;
+    places[i].roll += part * by.turn[i];
+  }
+  return places;
+}
 
 int elements_over(double length, double element_length) {
   return std::max(4, static_cast<int>(std::ceil(length / element_length - 1e-9)));

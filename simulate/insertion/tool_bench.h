@@ -35,6 +35,11 @@ struct ToolMove {
   std::vector<double> turn;  // of the hubs, right-handed about the introducer's direction [rad]
 };
 
+/// Where tools are after that part of a move. Pushes that add up to nothing, or to a whole tool, do
+/// so but for rounding.
+std::vector<ToolPlace> moved(const std::vector<Tool>& tools, std::vector<ToolPlace> places,
+                             const ToolMove& by, double part = 1.0);
+
 struct ToolScene {
   std::vector<Tool> tools;        // from the outside in
   std::vector<ToolPlace> places;  // where they start
