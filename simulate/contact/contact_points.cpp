@@ -154,6 +154,8 @@ void ContactPoints::forget() {
   known_position_.setConstant(std::numeric_limits<double>::infinity());
   known_distance_.setZero();
   touched_.assign(points_.size(), 0);
+  std::fill(frames_.begin(), frames_.end(), MovingFrame());
+  std::fill(framed_in_.begin(), framed_in_.end(), -1);
 }
 
 void ContactPoints::take(const Rod& rod) {

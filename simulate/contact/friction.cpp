@@ -120,13 +120,14 @@ void Friction::find_rubbed(const ContactPoints& points, const ContactMemory& mem
   const auto add = [&](int k, double limit_now) {
     const Vec3 normal = lag_.normal.col(k), anchor = anchor_of(k, points, memory);
     const auto along = [&](const Vec3& off) { return Vec3(off - off.dot(normal) * normal); };
-    const Vec3 before = along(points[k].at(memory.x) - anchor);
+    const Vec3 before = along(points.position_in(k, memory.x, memory.sections) - anchor);
     const Vec3 now = along(points.position(k) - anchor), way = now - before;
     const double limit = 0.5 * (coefficient(k) * memory.normal_force[k] + limit_now);
     const double work = limit * (rub(now.norm(), slip_).energy - rub(before.norm(), slip_).energy);
     const double length = way.norm();
     const bool went = length > 1e-3 * slip_;
-    rubbed.push_back({k, went ? Vec3((-work / (length * length)) * way) : Vec3::Zero(), work});
+    const Vec3 force = went ? Vec3((-work / (length * length)) * way) : Vec3::Zero();
+    rubbed.push_back({k, points.on_wire(k, force), work});
   };
   for (const int k : lag_.points) add(k, rubbing(k).limit);
   for (int k = points.first_free(); k < points.size(); ++k) {  // those that lost the wall

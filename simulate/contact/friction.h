@@ -21,7 +21,7 @@ struct Rubbing {
 /// What friction did to a point from one equilibrium to the next.
 struct RubbedPoint {
   int point;
-  Vec3 force;   // its mean on the point                                                  [N]
+  Vec3 force;   // its mean on the wire                                                   [N]
   double work;  // of the point against it                                             [N mm]
 };
 

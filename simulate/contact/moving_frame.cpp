@@ -88,4 +88,15 @@ void MovingFrame::find_bend(const Eigen::Matrix3Xd& u, const Vec3& force, Mat3& 
   }
 }
 
+Eigen::Matrix3Xd places_at_rest(const SectionChain* chain, const Eigen::Matrix3Xd& u,
+                                Eigen::Matrix3Xd points) {
+  if (chain == nullptr) return points;
+  MovingFrame frame;  // each from where the one before was
+  for (Eigen::Index i = 0; i < points.cols(); ++i) {
+    frame.find(*chain, u, points.col(i));
+    points.col(i) = frame.rest();
+  }
+  return points;
+}
+
 }  // namespace wireplan::simulate

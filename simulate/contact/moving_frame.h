@@ -37,4 +37,9 @@ class MovingFrame {
   std::vector<SectionChain::Weight> known_ = {};  // empty: nowhere yet
 };
 
+/// The places at rest (3, k) of points, on sections that have moved by u; the points themselves
+/// where there is no chain [mm].
+Eigen::Matrix3Xd places_at_rest(const SectionChain* chain, const Eigen::Matrix3Xd& u,
+                                Eigen::Matrix3Xd points);
+
 }  // namespace wireplan::simulate

@@ -402,21 +402,11 @@ double Insertion::length_outside(int i) const {
 }
 
 Vec3 Insertion::at_rest(const Vec3& place) const {
-  if (vessel_.sections == nullptr) return place;
-  MovingFrame frame;
-  frame.find(*vessel_.sections, state_.sections, place);
-  return frame.rest();
+  return places_at_rest(vessel_.sections.get(), state_.sections, place);
 }
 
 Eigen::Matrix3Xd Insertion::free_nodes_at_rest() const {
-  Eigen::Matrix3Xd nodes = free_nodes();
-  if (vessel_.sections == nullptr) return nodes;
-  MovingFrame frame;  // each from where the one before was
-  for (Eigen::Index i = 0; i < nodes.cols(); ++i) {
-    frame.find(*vessel_.sections, state_.sections, nodes.col(i));
-    nodes.col(i) = frame.rest();
-  }
-  return nodes;
+  return places_at_rest(vessel_.sections.get(), state_.sections, free_nodes());
 }
 
 /// Point of the present shape `distance` further along the wire than node i, which is that far from

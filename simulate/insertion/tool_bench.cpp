@@ -344,8 +344,13 @@ void ToolBench::carry_contact(const State& from, const Eigen::VectorXd& slides, 
   const Eigen::Index n = from.state.x.cols();
   expects(to.memory.anchor.cols() == n);
   for (Eigen::Index i = 0; i < n; ++i) {
-    const Vec3 along = slides[i] * edge_tangent(from.state, std::min(i, n - 2));
+    Vec3 along = slides[i] * edge_tangent(from.state, std::min(i, n - 2));
     to.memory.x.col(i) -= along;
+    if (chain() != nullptr && from.memory.normal_force[i] > 0.0) {  // anchors are places at rest
+      MovingFrame frame;
+      frame.find(*chain(), from.state.sections, from.state.x.col(i));
+      along = frame.inverse() * along;
+    }
     to.memory.anchor.col(i) -= along;
   }
 }

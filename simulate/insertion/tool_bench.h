@@ -23,6 +23,7 @@
 #include <span>
 #include <vector>
 
+#include "simulate/contact/moving_frame.h"
 #include "simulate/equilibrium/solver.h"
 #include "simulate/insertion/scene.h"
 #include "simulate/wire/tool_stack.h"
@@ -134,6 +135,10 @@ class ToolBench {
   Eigen::VectorXd angles(int tool) const;
   /// The centreline up to a tool's tip, (3, m) [mm].
   Eigen::Matrix3Xd nodes_of(int tool) const;
+  /// The places in the vessel at rest of points (3, k), where its cross-sections move [mm].
+  Eigen::Matrix3Xd at_rest(const Eigen::Matrix3Xd& points) const {
+    return places_at_rest(chain(), now_.state.sections, points);
+  }
   /// Force of the introducer, and of a distal support, on the tools [N].
   Vec3 introducer_force() const;
   Vec3 distal_force() const;
@@ -168,6 +173,9 @@ class ToolBench {
     Eigen::MatrixXd angles;
   };
 
+  const SectionChain* chain() const {
+    return scene_.vessel != nullptr ? scene_.vessel->sections.get() : nullptr;
+  }
   Problem problem_of(const State& at) const;
   void place(const std::vector<ToolPlace>& places, State& at) const;
   void set_load(const Rod& rod, Eigen::Matrix3Xd& load) const;

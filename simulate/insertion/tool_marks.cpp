@@ -69,14 +69,15 @@ ContactMemory ToolBench::spread_contact(const State& from, const State& to) cons
   ContactMemory memory{.x = to.state.x,
                        .sections = known.sections,
                        .normal_force = Eigen::VectorXd::Zero(n),
-                       .anchor = to.state.x,
+                       .anchor = at_rest(to.state.x),
                        .triangle = {}};
   if (!known.triangle.empty()) memory.triangle.assign(static_cast<std::size_t>(n), -1);
+  const Eigen::Matrix3Xd known_at_rest = at_rest(known.x);
   for (Eigen::Index i = 0; i < n; ++i) {
     const Eigen::Index nearest =
         std::min(last, static_cast<Eigen::Index>(std::lround(static_cast<double>(i) * h_new / h)));
     memory.normal_force[i] = known.normal_force[nearest] * h_new / h;
-    memory.anchor.col(i) += known.anchor.col(nearest) - known.x.col(nearest);
+    memory.anchor.col(i) += known.anchor.col(nearest) - known_at_rest.col(nearest);
     if (known.triangle.empty()) continue;
     memory.triangle[static_cast<std::size_t>(i)] =
         known.triangle[static_cast<std::size_t>(nearest)];

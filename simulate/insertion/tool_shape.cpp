@@ -54,6 +54,7 @@ RodState ToolBench::unloaded(const State& at) const {
   const Rod& rod = at.composite.rod;
   const ToolTerms& terms = at.composite.terms;
   RodState state = straight_state(rod, scene_.point, scene_.direction, 0.0);
+  if (chain() != nullptr) state.sections.setZero(3, chain()->nodes());
   Vec3 t = scene_.direction, d = reference_normal(t);
   for (int i = 0; i + 1 < rod.nodes(); ++i) {
     Vec3 turn = Vec3::Zero();
@@ -115,6 +116,7 @@ RodState ToolBench::guess(const State& to, const Shape& followed, const Shape& d
                           double part) const {
   RodState state;
   state.x = followed.x;
+  state.sections = now_.state.sections;
   Eigen::MatrixXd turned = followed.angles;
   if (drift.x.cols() > 0) {
     const Eigen::Matrix3Xd x = followed.x + part * drift.x;

@@ -50,6 +50,7 @@ ToolScene scene_of(const std::vector<Tool>& tools, const Introducer& introducer,
   scene.vessel = &vessel;
   scene.contact.law = options.insertion.contact_law;
   scene.contact.friction = options.insertion.friction;
+  scene.contact.support_factor = options.insertion.support_factor;
   scene.friction = options.friction_between;
   scene.element_length = options.insertion.element_length;
   scene.loads.gravity = options.insertion.gravity;
@@ -93,13 +94,18 @@ double ToolTrial::foremost_of(int tool) const {
   return tool == kBothTools ? foremost() : insertion(tool);
 }
 
-Vec3 ToolTrial::tip(int tool) const { return bench_->nodes_of(tool).rightCols<1>(); }
+Vec3 ToolTrial::tip(int tool) const {
+  return bench_->at_rest(bench_->nodes_of(tool).rightCols<1>());
+}
+
+Vec3 ToolTrial::foremost_tip() const { return bench_->at_rest(bench_->state().x.rightCols<1>()); }
 
 Vec3 ToolTrial::tip_direction(int tool) const {
-  const Eigen::Matrix3Xd nodes = bench_->nodes_of(tool);
-  const Eigen::Index last = nodes.cols() - 1;
-  if (last < 1) return bench_->state().x.col(1) - bench_->state().x.col(0);
-  return (nodes.col(last) - nodes.col(std::max<Eigen::Index>(0, last - 2))).normalized();
+  const Eigen::Matrix3Xd all = bench_->nodes_of(tool);
+  if (all.cols() < 2) return bench_->state().x.col(1) - bench_->state().x.col(0);
+  const Eigen::Matrix3Xd nodes =
+      bench_->at_rest(all.rightCols(std::min<Eigen::Index>(3, all.cols())));
+  return (nodes.rightCols<1>() - nodes.leftCols<1>()).normalized();
 }
 
 double ToolTrial::measure(Until until, int tool) const {
@@ -364,6 +370,7 @@ Shape ToolTrial::shape_here() const {
   Shape shape{.insertion = foremost(),
               .hub_angle = bench_->places().front().roll - start_roll_,
               .nodes = state.x,
+              .sections = state.sections,
               .contact_force = Eigen::VectorXd::Zero(state.x.cols())};
   for (const Touch& touch : bench_->touches()) {
     const double force = force_on_wire(touch).norm();
@@ -382,13 +389,14 @@ void ToolTrial::check_place() {
     return end(Outcome::kLeftLumen, in_mm(push.max_penetration) + " through the wall" + after +
                                         ", tip at " + place_text(push.tip) + " mm");
   }
-  const Eigen::Matrix3Xd& nodes = bench_->state().x;
-  const double to_goal = (push.tip - goal_.point).norm();
+  const Vec3 here = foremost_tip();
+  const double to_goal = (here - goal_.point).norm();
   if (!goal_.at_section && best_distance_ <= goal_.radius && to_goal >= best_distance_) {
     return end(Outcome::kReached, "tip " + in_mm(best_distance_) + " from the target" + after);
   }
   best_distance_ = to_goal;
-  if (goal_.at_section && goal_.way->may_have_arrived(push.tip) &&
+  const Eigen::Matrix3Xd nodes = bench_->at_rest(bench_->state().x);
+  if (goal_.at_section && goal_.way->may_have_arrived(here) &&
       goal_.way->find_arrival(nodes, vessel_.lumen)) {
     const std::optional<std::string> detour = goal_.way->find_detour(nodes);
     if (detour) {
@@ -396,7 +404,7 @@ void ToolTrial::check_place() {
                  "the tip passes the target" + after +
                      ", but the tools did not come along the way: " + *detour);
     }
-    const double from_axis = preprocess::find_place(push.tip, goal_.way->path()).from_axis;
+    const double from_axis = preprocess::find_place(here, goal_.way->path()).from_axis;
     return end(Outcome::kReached, "tip past the target's cross-section, " + in_mm(from_axis) +
                                       " from the vessel's axis," + after);
   }
@@ -414,7 +422,7 @@ void ToolTrial::check_place() {
 bool ToolTrial::check_advance(double pushed) {
   if (!goal_.way || ended()) return !ended();
   const Push& push = record_.pushes.back();
-  const double progress = preprocess::find_progress(push.tip, goal_.way->path());
+  const double progress = preprocess::find_progress(foremost_tip(), goal_.way->path());
   if (progress > furthest_) {
     furthest_ = progress;
     since_furthest_ = 0.0;
@@ -432,7 +440,7 @@ bool ToolTrial::check_advance(double pushed) {
 /// As `outcome`, unless the tip is in another vessel: then that is the outcome.
 void ToolTrial::end_where_it_is(Outcome outcome, const std::string& reason) {
   const std::optional<Astray> astray =
-      goal_.way ? goal_.way->find_astray(record_.pushes.back().tip) : std::nullopt;
+      goal_.way ? goal_.way->find_astray(foremost_tip()) : std::nullopt;
   if (!astray) return end(outcome, reason);
   end(astray->passed_by ? Outcome::kPassedBy : Outcome::kWrongBranch,
       "the tip is not on the way: " + astray->text + "; " + reason);
@@ -451,13 +459,15 @@ TrialResult ToolTrial::finish() {
                                in_mm(foremost()) + " of insertion");
   }
   if (!ended()) {
-    const Vec3 tip_here = bench_->state().x.rightCols<1>();
-    const std::string reason = "the script ends with the tip at " + place_text(tip_here) + " mm, " +
+    const Vec3 tip_here = foremost_tip();
+    const std::string reason = "the script ends with the tip at " +
+                               place_text(bench_->state().x.rightCols<1>()) + " mm, " +
                                in_mm((tip_here - goal_.point).norm()) + " from the target";
     record_.pushes.empty() ? end(Outcome::kMissed, reason)
                            : end_where_it_is(Outcome::kMissed, reason);
   }
   record_.nodes = bench_->state().x;
+  record_.sections = bench_->state().sections;
   for (const Touch& touch : bench_->touches()) {
     record_.contacts.push_back(
         contact_of(touch, bench_->composite().rod.radius - touch.thinner, vessel_.locator));

@@ -5,7 +5,8 @@
 ///
 /// What a push records is of all tools together: `insertion` is that of the foremost tip, hub angle
 /// and torque are the catheter's, the hand's force is that on what it moves, work and energy
-/// are those of both. What each tool feels is in ToolTrack. The wall is taken for rigid.
+/// are those of both. What each tool feels is in ToolTrack. Tips and goals are looked for in the
+/// vessel at rest.
 #include <memory>
 #include <optional>
 #include <string>
@@ -79,7 +80,8 @@ class ToolTrial {
   const std::string& reason() const { return record_.reason; }  // why it has ended
   const ToolBench& bench() const { return *bench_; }
   double insertion(int tool) const;
-  Vec3 tip(int tool) const;
+  Vec3 tip(int tool) const;  // in the vessel at rest                                      [mm]
+  Vec3 foremost_tip() const;
   Vec3 tip_direction(int tool) const;  // unit, onward
   /// What `until` measures of the tip: less in magnitude than `at` comes first. NaN where it cannot
   /// be told, as without a take-off.

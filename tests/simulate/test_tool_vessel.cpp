@@ -4,7 +4,9 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
+#include <memory>
 #include <random>
+#include <string>
 #include <utility>
 #include <vector>
 
@@ -110,6 +112,57 @@ TEST(ToolVessel, OneStraightToolIsTheWireThatAnInsertionPushes) {
   }
 }
 
+/// The bend, cross-sections of which move as wholes on a support [N/mm^3].
+std::unique_ptr<const SectionChain> sections_of_the_bend(double support) {
+  Centerline line;
+  line.points = shapes::bend_axis(40.0, 0.5 * kPi, 40.0, 60.0, 1.0);
+  line.radius.setConstant(line.points.cols(), 4.0);
+  line.arc_length.setZero(line.points.cols());
+  for (Eigen::Index k = 1; k < line.points.cols(); ++k) {
+    line.arc_length[k] =
+        line.arc_length[k - 1] + (line.points.col(k) - line.points.col(k - 1)).norm();
+  }
+  return std::make_unique<SectionChain>(
+      std::vector<preprocess::Branch>{{.line = line}},
+      SectionChainOptions{.support = support, .young_modulus = 0.3, .spacing = 8.0});
+}
+
+VesselModel moving_bend(double support) {
+  VesselModel vessel(shapes::bend_tube(4.0, 40.0, 0.5 * kPi, 40.0, 60.0, 1.5),
+                     {.grid_spacing = 0.6});
+  vessel.sections = sections_of_the_bend(support);
+  return vessel;
+}
+
+TEST(ToolVessel, OneToolMovesAVesselAsTheWireThatAnInsertionPushes) {
+  const Wire wire{
+      .name = "wire", .radius = 0.445, .sections = {{.length = 300.0, .bending_stiffness = 600.0}}};
+  const VesselModel vessel = moving_bend(1e-3);
+  for (const double friction : {0.0, 0.15}) {
+    SCOPED_TRACE(friction);
+    Insertion insertion(wire, {.point = Vec3(0.0, 0.0, 20.0), .direction = Vec3::UnitZ()}, vessel,
+                        {.length = 120.0, .friction = friction});
+    double work = 0.0;
+    for (int k = 0; k < 110; ++k) {
+      const auto push = insertion.push(1.0);
+      ASSERT_TRUE(push);
+      work = push->push_work;
+    }
+    ToolScene scene = near_the_bend({{.wire = wire}}, {{5.0, 0.0}});
+    scene.vessel = &vessel;
+    scene.contact.friction = friction;
+    scene.moves = {push_of({105.0})};
+    ToolBench bench(scene);
+    ASSERT_TRUE(bench.settled() && bench.move(scene.moves[0]));
+    const double moved = insertion.sections().colwise().norm().maxCoeff();
+    EXPECT_GT(moved, 0.5);
+    EXPECT_LT((bench.state().sections - insertion.sections()).colwise().norm().maxCoeff(),
+              0.03 * moved);
+    EXPECT_LT((bench.record().tools[0].tip - insertion.tip()).norm(), 0.2);
+    EXPECT_NEAR(bench.record().work, work, 0.05 * work);
+  }
+}
+
 TEST(ToolVessel, EachToolRubsByItsOwnFriction) {
   const auto heat = [](double of_sheath, double of_wire) {
     Tool sheath = uniform_tool(300.0, 40.0), wire = uniform_tool(300.0, 30.0);
@@ -180,13 +233,17 @@ void expect_balance(const ToolScene& scene, double part) {
 }
 
 TEST(ToolVessel, WorkOfTheHandsIsWhatIsStoredAndRubbedAway) {
-  const VesselModel yielding = yielding_bend(0.4);
+  VesselModel yielding = yielding_bend(0.4), yielding_and_moving = yielding_bend(0.4);
+  yielding_and_moving.sections = sections_of_the_bend(2e-3);
+  const VesselModel moving = moving_bend(2e-3);
   for (const double friction : {0.0, 0.15}) {
-    for (const VesselModel* vessel : {&tool_bend(), &yielding}) {
-      SCOPED_TRACE(friction + (vessel == &yielding));
+    for (const VesselModel* vessel : std::initializer_list<const VesselModel*>{
+             &tool_bend(), &yielding, &moving, &yielding_and_moving}) {
+      SCOPED_TRACE(std::to_string(friction) + (vessel->compliance ? " yields" : "") +
+                   (vessel->sections ? " moves" : ""));
       ToolScene scene = curved_round_the_bend(friction);
       scene.vessel = vessel;
-      const double part = vessel == &yielding ? 0.015 : 0.01;  // yielding has kinks
+      const double part = vessel->compliance ? 0.015 : 0.01;  // yielding has kinks
       expect_balance(scene, part);
       // Tools whose tips are level, pushed together and back.
       const Tool half = uniform_tool(300.0, 30.0);
@@ -235,6 +292,38 @@ TEST(ToolVessel, StifferWallsLeadToTheRigidOne) {
     last = off;
   }
   EXPECT_GT(last, 1e-5);
+}
+
+TEST(ToolVessel, GoesOnFromAMarkInAMovingVesselAsItDidBefore) {
+  ToolScene scene = curved_round_the_bend(0.15);
+  const VesselModel vessel = moving_bend(2e-3);
+  scene.vessel = &vessel;
+  ToolBench bench(scene);
+  ASSERT_TRUE(bench.settled() && bench.move(scene.moves[0]));
+  const ToolBench::Mark mark = bench.save();
+  ASSERT_TRUE(bench.move(scene.moves[1]));
+  const RodState once = bench.state();
+  bench.restore(mark);
+  ASSERT_TRUE(bench.move(scene.moves[2]));
+  bench.restore(mark);
+  ASSERT_TRUE(bench.move(scene.moves[1]));
+  EXPECT_EQ(bench.state().x, once.x);
+  EXPECT_EQ(bench.state().sections, once.sections);
+  EXPECT_GT(once.sections.colwise().norm().maxCoeff(), 0.05);
+}
+
+TEST(ToolVessel, AnEndlesslyStiffSupportIsTheVesselAtRest) {
+  ToolScene scene = curved_round_the_bend(0.15);
+  const VesselModel held = moving_bend(1e4);
+  ToolBench at_rest(scene);
+  scene.vessel = &held;
+  ToolBench bench(scene);
+  for (const ToolMove& move : scene.moves) {
+    ASSERT_TRUE(at_rest.move(move) && bench.move(move));
+    EXPECT_LT((bench.state().x - at_rest.state().x).colwise().norm().maxCoeff(), 1e-4);
+  }
+  EXPECT_GT(bench.record().heat, 0.1);
+  EXPECT_NEAR(bench.record().heat, at_rest.record().heat, 1e-4);
 }
 
 // ---------------------------------------------------------------- catheters that take their curves
