@@ -141,7 +141,7 @@ class Planner {
       return;
     }
     ToolScripts search =
-        find_tool_scripts(study_, vessel_.rigid_model(), options_.batch, options_.early.script);
+        find_tool_scripts(study_, vessel_.scout_model(), options_.batch, options_.early.script);
     if (options_.batch.cancelled && options_.batch.cancelled()) throw Interrupted();
     plan_.scripts.branches += search.branches;
     std::vector<Run> runs;

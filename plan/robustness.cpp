@@ -68,6 +68,12 @@ void multiply_forces(simulate::TrialResult& trial, double factor) {
     contact.friction_force *= factor;
   }
   for (simulate::Shape& shape : trial.shapes) shape.contact_force *= factor;
+  for (simulate::ToolTrack& track : trial.tools) {
+    for (auto* loads :
+         {&track.push_force, &track.hub_torque, &track.tip_force, &track.wall_force}) {
+      for (double& load : *loads) load *= factor;
+    }
+  }
 }
 
 /// An unknown as the regression sees it: one column per direction; none where it never changes.
@@ -162,6 +168,13 @@ std::vector<Disturbance> draw_disturbances(const RobustnessOptions& options,
     support = draw_stratified(options.repeats, own);
   }
 
+  // The catheters' own, where the wall's factor acts.
+  std::vector<double> tubes = u[1];
+  if (unknowns.wall_low < unknowns.wall_high) {
+    std::mt19937_64 own(seed_of(options.seed, "catheters"));
+    tubes = draw_stratified(options.repeats, own);
+  }
+
   std::vector<Disturbance> disturbances;
   for (std::size_t k = 0; k < static_cast<std::size_t>(options.repeats); ++k) {
     Disturbance& drawn = disturbances.emplace_back();
@@ -174,7 +187,7 @@ std::vector<Disturbance> draw_disturbances(const RobustnessOptions& options,
     drawn.tilt = on_disc(unknowns.angle, u[2][k], u[3][k]);
     drawn.shift = on_disc(unknowns.entry, u[4][k], u[5][k]);
     drawn.inward = unknowns.lumen * (2.0 * u[6][k] - 1.0);
-    drawn.tube = u[1][k];  // the wall's factor does not act on catheters
+    drawn.tube = tubes[k];
   }
   return disturbances;
 }
@@ -218,10 +231,13 @@ simulate::TrialResult run_disturbed(const Study& study, const Candidate& candida
                                     const Disturbance& disturbance) {
   // The wire, its friction and its contact radius.
   const bool tools = candidate.catheter >= 0;
-  const double factor = vessel.compliance && !tools ? disturbance.wall_factor : 1.0;
-  simulate::Wire wire = softened(disturbed_wire(study, candidate.wire, disturbance), factor,
-                                 /*fix_axial=*/disturbance.inward != 0.0);
-  wire.radius += disturbance.inward;
+  const double factor = vessel.compliance ? disturbance.wall_factor : 1.0;
+  const auto own_of = [&](const simulate::Wire& disturbed) {
+    simulate::Wire own = softened(disturbed, factor, /*fix_axial=*/disturbance.inward != 0.0);
+    own.radius += disturbance.inward;
+    return own;
+  };
+  const simulate::Wire wire = own_of(disturbed_wire(study, candidate.wire, disturbance));
   simulate::InsertionOptions insertion = study.insertion;
   insertion.residual_tolerance *= kRepeatTolerance / factor;
   insertion.support_factor *= disturbance.support_factor / factor;
@@ -245,8 +261,7 @@ simulate::TrialResult run_disturbed(const Study& study, const Candidate& candida
       Study own = study;
       own.insertion = insertion;
       std::vector<simulate::Tool> both = tools_of(study, candidate);
-      both[0].wire = disturbed_tube(study, candidate.catheter, disturbance);
-      both[0].wire.radius += disturbance.inward;
+      both[0].wire = own_of(disturbed_tube(study, candidate.catheter, disturbance));
       both[1].wire = wire;
       return simulate::run_tool_trial(both, introducer, study.goal, vessel, tool_options(own),
                                       candidate.steps);

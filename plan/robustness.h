@@ -49,8 +49,7 @@ struct Disturbance {
   Eigen::Vector2d tilt = Eigen::Vector2d::Zero();   //                                     [rad]
   Eigen::Vector2d shift = Eigen::Vector2d::Zero();  //                                     [mm]
   double inward = 0.0;                              //                                     [mm]
-  double tube = 0.5;  // where every catheter's EI lies in its spread; of the draw of the wall's
-                      // factor, which does not act on them
+  double tube = 0.5;                                // where every catheter's EI lies in its spread
 };
 
 /// A Latin hypercube: every unknown takes each of `repeats` equal parts of its range once, in an

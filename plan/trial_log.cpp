@@ -70,17 +70,9 @@ std::vector<Measured> find_or_run(const Study& study, const PlanVessel& vessel,
   }
   if (missing.empty()) return all;
 
-  // Catheters meet a rigid wall. Models are not used side by side.
-  const auto of_tools = [&](std::size_t k) { return runs[k].candidate.catheter >= 0; };
-  const bool tools = of_tools(missing.front());
-  const auto others = std::stable_partition(missing.begin(), missing.end(),
-                                            [&](std::size_t k) { return of_tools(k) == tools; });
-  const std::vector<std::size_t> later(others, missing.end());
-  missing.erase(others, missing.end());
   const Level level = runs[missing.front()].level;
-  const simulate::VesselModel& model = tools                   ? vessel.rigid_model()
-                                       : level == Level::kFull ? vessel.model()
-                                                               : vessel.scout_model();
+  const simulate::VesselModel& model =
+      level == Level::kFull ? vessel.model() : vessel.scout_model();
   const Study own = study_at(study, level);
   const int found = static_cast<int>(runs.size() - missing.size());
   BatchOptions options{.threads = batch.threads, .cancelled = batch.cancelled};
@@ -102,11 +94,6 @@ std::vector<Measured> find_or_run(const Study& study, const PlanVessel& vessel,
   if (std::find(finished.begin(), finished.end(), false) != finished.end()) throw Interrupted();
   spent.runs += static_cast<int>(missing.size());
   for (const std::size_t k : missing) spent.cpu_seconds += all[k].cpu_seconds;
-  if (later.empty()) return all;
-  std::vector<Run> rest;
-  for (const std::size_t k : later) rest.push_back(runs[k]);
-  std::vector<Measured> measured = find_or_run(study, vessel, rest, log, batch, spent);
-  for (std::size_t k = 0; k < later.size(); ++k) all[later[k]] = std::move(measured[k]);
   return all;
 }
 

@@ -111,7 +111,7 @@ LoadedVessel load_vessel(const SceneFile& scene) {
                    ? std::make_unique<simulate::VesselModel>(vessel.surface, vessel.wall, options)
                    : std::make_unique<simulate::VesselModel>(vessel.surface, options);
   if (given.wall.support) {
-    const Vec3& entry = scene.insertion->introducer.point;
+    const Vec3& entry = scene.tools ? scene.tools->scene.point : scene.insertion->introducer.point;
     model->sections = make_section_chain(given.wall, preprocess::find_tree(vessel.surface, entry),
                                          entry, vessel.wall.young_modulus);
   }

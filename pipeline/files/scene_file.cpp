@@ -507,12 +507,14 @@ double bending_stiffness_from_paper(double bend_coefficient, double edge_length)
 
 namespace {
 
-/// Of a scene in which no wire is pushed in.
+/// Of a bench with one wire.
 void refuse_support(const SceneVessel& vessel, Problems& problems) {
   if (!vessel.wall.support) return;
-  problems.add("vessel.wall.support_kpa_per_mm", number_text(*vessel.wall.support / kMpaPerKpa),
-               "null, where no wire is pushed in",
-               "cross-sections move under a wire with \"insertion\"; delete the key, or give one");
+  problems.add(
+      "vessel.wall.support_kpa_per_mm", number_text(*vessel.wall.support / kMpaPerKpa),
+      "null, where no wire is pushed in",
+      "cross-sections move under a wire with \"insertion\", or under \"tools\"; delete the key, or "
+      "give one of them");
 }
 
 }  // namespace
@@ -533,7 +535,6 @@ SceneFile read_scene(const std::filesystem::path& path) {
       simulate::ContactOptions& contact = scene.tools->scene.contact;
       contact.friction = scene.vessel->friction;
       contact.law = scene.vessel->contact_law;
-      refuse_support(*scene.vessel, problems);
     }
     root.finish();
     problems.throw_if_any();

@@ -198,8 +198,6 @@ void make_manoeuvres(Workspace& work, const fs::path& folder) {
   }
   if (!work.given().catheters.empty()) {
     figures["pairs"] = pairs_json(scripts);
-    figures["warnings"].push_back(
-        "manoeuvres: catheters meet a rigid wall, so their contact forces are upper bounds");
   }
   write_figures(figures, folder);
 }

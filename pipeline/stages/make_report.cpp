@@ -244,8 +244,10 @@ std::string draw_overview(Workspace& work, const ReportInput& report, const Page
   if (page.chain && !report.judgement.ranking.plans.empty()) {
     const int best = report.judgement.ranking.plans.front().trial;
     const Eigen::Matrix3Xd u = moved_by(work, report, best);
-    vessel.vertices = page.chain->carried(vessel.vertices, u);
-    key.push_back({"moved", hash_text(bytes_of(u))});
+    if (u.cols() == page.chain->nodes()) {  // as find_motion()
+      vessel.vertices = page.chain->carried(vessel.vertices, u);
+      key.push_back({"moved", hash_text(bytes_of(u))});
+    }
   }
   return work.piece(key, [&] { return encode_png(draw_picture(vessel, wires, marks)); });
 }

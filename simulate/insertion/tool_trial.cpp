@@ -307,6 +307,11 @@ void ToolTrial::note(const ToolStep& step) {
     push.total_contact_force += touch.normal_force;
     push.friction_force += touch.friction.norm();
     push.max_penetration = std::max(push.max_penetration, touch.penetration);
+    if (touch.wall_displacement > push.wall_displacement) {
+      push.wall_displacement = touch.wall_displacement;
+      const double radius = bench_->composite().rod.radius - touch.thinner;
+      push.wall_displacement_point = touch.position - radius * touch.normal;
+    }
   }
   for (std::size_t i = 0; i < record_.tools.size(); ++i) {
     // Of the wall on its last 2 mm, as far as it is the outermost there.

@@ -52,7 +52,8 @@ TEST(Disturbances, CoverEachRangeEvenlyAndStayWithinIt) {
   options.repeats = 64;
   const std::vector<Disturbance> drawn = draw_disturbances(options, {});
   ASSERT_EQ(drawn.size(), 64u);
-  std::set<int> friction, wall, tilt, shift, lumen;
+  std::set<int> friction, wall, tilt, shift, lumen, tube;
+  int stiff_with_stiff = 0;
   for (const Disturbance& d : drawn) {
     // The part of the range, by the inverse of how it is spread.
     const auto cell = [](double part) { return static_cast<int>(std::floor(64.0 * part)); };
@@ -61,13 +62,16 @@ TEST(Disturbances, CoverEachRangeEvenlyAndStayWithinIt) {
     tilt.insert(cell(std::pow(d.tilt.norm() / options.unknowns.angle, 2)));
     shift.insert(cell(std::pow(d.shift.norm() / options.unknowns.entry, 2)));
     lumen.insert(cell(0.5 * (d.inward / options.unknowns.lumen + 1.0)));
+    tube.insert(cell(d.tube));
+    stiff_with_stiff += (d.tube > 0.5) == (d.wall_factor > 1.0) ? 1 : 0;
   }
   // Each cell once. Rounding could move a draw over the edge of its cell; it is that near in 1e-13.
-  for (const auto* cells : {&friction, &wall, &tilt, &shift, &lumen}) {
+  for (const auto* cells : {&friction, &wall, &tilt, &shift, &lumen, &tube}) {
     EXPECT_EQ(cells->size(), 64u);
     EXPECT_EQ(*cells->begin(), 0);
     EXPECT_EQ(*cells->rbegin(), 63);
   }
+  EXPECT_NEAR(stiff_with_stiff, 32, 14) << "a stiff wall tells nothing of a catheter";
 }
 
 TEST(Disturbances, LeanToAllSides) {
@@ -224,6 +228,37 @@ TEST(RunDisturbed, AWallFactorIsAWallOfThatStiffness) {
     EXPECT_NEAR(a.push_work, b.push_work, 0.05 * std::abs(b.push_work));
     EXPECT_LT((scaled.nodes - direct.nodes).colwise().norm().maxCoeff(), 0.05);  // mm
   }
+}
+
+TEST(RunDisturbed, AWallFactorIsAWallOfThatStiffnessUnderCatheterAndWire) {
+  TubeStudy tube;
+  tube.study.catheters.push_back(
+      {.tool = {.wire = {.name = "catheter",
+                         .radius = 0.8,
+                         .sections = {{.length = 200.0, .bending_stiffness = 300.0}}},
+                .inner_radius = 0.5},
+       .spread = {}});
+  tube.candidate.catheter = 0;
+  tube.candidate.steps = {{.tool = 1, .push = 25.0}, {.tool = 0, .push = 20.0}};
+  const simulate::TrialResult direct =
+      run_candidate(tube.study, tube.candidate, tube.vessel(0.056 * 2.0));
+  Disturbance disturbance;
+  disturbance.wall_factor = 2.0;
+  const simulate::TrialResult scaled =
+      run_disturbed(tube.study, tube.candidate, tube.vessel(0.056), disturbance);
+  ASSERT_EQ(scaled.tools.size(), 2U);
+  ASSERT_EQ(scaled.pushes.size(), direct.pushes.size());
+  EXPECT_GT(direct.pushes.back().total_contact_force, 0.01);
+  EXPECT_GT(direct.pushes.back().wall_displacement, 0.01);
+  EXPECT_NEAR(scaled.pushes.back().total_contact_force, direct.pushes.back().total_contact_force,
+              0.03 * direct.pushes.back().total_contact_force);
+  for (std::size_t k = 0; k < 2; ++k) {
+    EXPECT_NEAR(scaled.tools[k].wall_force.back(), direct.tools[k].wall_force.back(),
+                0.03 * direct.pushes.back().total_contact_force);
+    EXPECT_NEAR(scaled.tools[k].push_force.back(), direct.tools[k].push_force.back(),
+                0.03 * direct.pushes.back().total_contact_force);
+  }
+  EXPECT_LT((scaled.nodes - direct.nodes).colwise().norm().maxCoeff(), 0.05);  // mm
 }
 
 TEST(RunDisturbed, AnInwardWallIsANarrowerTube) {

@@ -517,6 +517,14 @@ TEST(ToolSearch, MakePlanRanksScriptsOfCatheterAndWire) {
   EXPECT_EQ(again.full.runs + again.repeats.runs + again.scouts.runs, 0);
   EXPECT_EQ(again.candidates.size(), plan.candidates.size());
 
+  // In full they meet the wall that the study has.
+  MemoryLog empty;
+  Spent spent;
+  const PlanVessel walled{.path = vessel.path, .yields = true, .model = model, .rigid_model = {}};
+  const std::vector<Measured> in_full = find_or_run(
+      study, walled, {{.candidate = plan.candidates[first]}}, empty, options.batch, spent);
+  EXPECT_EQ(in_full.at(0).outcome, plan.trials[first].outcome);
+
   options.manoeuvres = Manoeuvring::kNever;
   MemoryLog other;
   const Plan none = make_plan(study, vessel, options, other);
