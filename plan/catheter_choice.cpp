@@ -13,6 +13,12 @@ constexpr double kShapeStep = 0.25;  // along a shape [mm]
 
 double in_degrees(double angle) { return angle / kRadPerDeg; }
 
+double take_off_of(const Ostium& ostium) {
+  return std::acos(std::clamp(ostium.trunk.dot(ostium.branch), -1.0, 1.0));
+}
+
+}  // namespace
+
 const char* kind_name(CurveKind kind) {
   switch (kind) {
     case CurveKind::kStraight:
@@ -28,12 +34,6 @@ const char* kind_name(CurveKind kind) {
   }
   return "";
 }
-
-double take_off_of(const Ostium& ostium) {
-  return std::acos(std::clamp(ostium.trunk.dot(ostium.branch), -1.0, 1.0));
-}
-
-}  // namespace
 
 CurveShape find_shape(const simulate::Wire& tube) {
   // Sections are listed from the tip; the shape is laid out from the shaft on, along x.
@@ -66,6 +66,17 @@ CurveShape find_shape(const simulate::Wire& tube) {
                : turn < 300.0 ? CurveKind::kReversed
                               : CurveKind::kRing;
   return shape;
+}
+
+double curved_length(const simulate::Wire& tube, bool first) {
+  double length = 0.0, end = 0.0;
+  for (const simulate::Section& section : tube.sections) {
+    length += section.length;
+    if (section.rest_curvature == 0.0) continue;
+    end = length;
+    if (first) break;
+  }
+  return end;
 }
 
 CurveKind asked_for(double take_off) {

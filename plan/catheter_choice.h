@@ -9,6 +9,7 @@ namespace wireplan::plan {
 
 /// What a catheter's curves do to its tip.
 enum class CurveKind { kStraight, kSimple, kHooked, kReversed, kRing };
+const char* kind_name(CurveKind kind);  // "hooked curve"
 
 /// The plane shape of a catheter without load.
 struct CurveShape {
@@ -21,6 +22,9 @@ struct CurveShape {
 /// (Cobra, renal double curve), reversed below 300 (Simmons, Sos, RIM), else a ring (pigtail),
 /// which hooks nothing. Limits chosen between the shapes of the catalogue.
 CurveShape find_shape(const simulate::Wire& tube);
+
+/// Length from the tip to the end of a catheter's first or last curve [mm].
+double curved_length(const simulate::Wire& tube, bool first);
 
 /// The kind that a branch asks for which turns so far from its trunk: simple below 60 degrees,
 /// hooked to 120, reversed beyond, where it leaves back down (references-2 L; limits assumed).

@@ -112,8 +112,7 @@ ToolScript with_change(ToolScript script, std::size_t step, double by) {
 
 std::vector<ToolScript> list_neighbours(const ToolScript& script) {
   std::vector<ToolScript> all = {script};
-  const auto add = [&](const auto& is_it, double by) {
-    const auto found = std::find_if(script.begin(), script.end(), is_it);
+  const auto add = [&](ToolScript::const_iterator found, double by) {
     if (found == script.end() || found + 1 == script.end()) return;
     const auto step = static_cast<std::size_t>(found - script.begin());
     const double size = std::abs(found->push) + std::abs(found->turn);
@@ -121,14 +120,18 @@ std::vector<ToolScript> list_neighbours(const ToolScript& script) {
       if (size + change > kSamePart) all.push_back(with_change(script, step, change));
     }
   };
-  const auto is_pull = [](const ToolStep& s) {
-    return s.tool == simulate::kBothTools && s.push < 0.0;
+  const auto last = [&](const auto& is_it) {
+    const auto found = std::find_if(script.rbegin(), script.rend(), is_it);
+    return found == script.rend() ? script.end() : found.base() - 1;
   };
-  add(is_pull, kNeighbourDepth);
-  add([](const ToolStep& s) { return s.turn != 0.0; }, kNeighbourTurn);
+  add(last([](const ToolStep& s) { return s.tool == simulate::kBothTools && s.push < 0.0; }),
+      kNeighbourDepth);
+  add(last([](const ToolStep& s) { return s.turn != 0.0; }), kNeighbourTurn);
   // The first advance of the catheter is over the wire, in the trunk.
   int advances = 0;
-  add([&](const ToolStep& s) { return s.tool == 0 && s.push > 0.0 && ++advances == 2; },
+  add(std::find_if(
+          script.begin(), script.end(),
+          [&](const ToolStep& s) { return s.tool == 0 && s.push > 0.0 && ++advances == 2; }),
       kNeighbourDepth);
   return all;
 }

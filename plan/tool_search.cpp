@@ -7,6 +7,7 @@
 #include <tuple>
 #include <utility>
 
+#include "plan/catheter_choice.h"
 #include "plan/tool_neighbours.h"
 #include "preprocess/centerline/path_place.h"
 
@@ -24,8 +25,10 @@ struct Template {
   double before_end = 10.0;  // of it short of where the image ends                           [mm]
   double leads = 12.0;       // of the wire ahead of the catheter, at least                   [mm]
   double above[2] = {35.0, 12.0};  // of the catheter's tip past the ostium                    [mm]
-  double below = 15.0;  // ... and before it, in pulls                                   [mm]
-  double cover = 6.0;   // of a curve behind its end, where the wire is withdrawn to     [mm]
+  double depths_apart = 10.0;      // of these two, where the vessel is not seen that far      [mm]
+  double below = 15.0;             // ... and before it, in pulls                               [mm]
+  double most_pull = 60.0;         // of a tip that lies in a branch beyond                     [mm]
+  double cover = 6.0;  // of a curve behind its end, where the wire is withdrawn to     [mm]
   double turn = 30.0 * kRadPerDeg;
   int turns = 12;
   double pull = 2.0;       //                                                               [mm]
@@ -72,18 +75,6 @@ std::vector<ToolStep> with(std::vector<ToolStep> steps, const ToolStep& next) {
   }
   steps.push_back(next);
   return steps;
-}
-
-/// Length from the tip to the end of a catheter's first or last curve [mm].
-double curved_length(const simulate::Wire& tube, bool first) {
-  double length = 0.0, end = 0.0;
-  for (const simulate::Section& section : tube.sections) {
-    length += section.length;
-    if (section.rest_curvature == 0.0) continue;
-    end = length;
-    if (first) break;
-  }
-  return end;
 }
 
 /// A script on its way.
@@ -199,8 +190,7 @@ class ToolSearch {
 
   double insertion(int tool) const { return trial_.insertion(tool); }
   double progress() const {
-    return trial_.pushes().empty() ? 0.0
-                                   : preprocess::find_progress(trial_.pushes().back().tip, path_);
+    return trial_.pushes().empty() ? 0.0 : preprocess::find_progress(trial_.foremost_tip(), path_);
   }
   State here(double off = 0.0) const {
     return {steps_, trial_.save(), off, trial_.measure(Until::kLevel, kCatheter),
@@ -313,13 +303,19 @@ class ToolSearch {
       const double slack = std::min(kTemplate.before_end, insertion(kWire) - 5.0);
       if (slack > 0.0) go({.tool = kWire, .push = -slack});
     }
-    return insertion(kWire) > ostium_.arc && findings_.found.empty();
+    // A wire cuts bends short: it may lie beyond with less of it in than the way is long.
+    const bool far =
+        std::max(insertion(kWire) - ostium_.arc, trial_.measure(Until::kLevel, kWire)) > 0.0;
+    if (far) findings_.stopped.clear();
+    return far && findings_.found.empty();
   }
 
   /// Over the wire, which is then withdrawn.
   bool catheter_up() {
-    const double to =
-        std::min(std::floor(ostium_.arc + start_.above), insertion(kWire) - kTemplate.leads);
+    const double deepest =
+        std::min(std::floor(ostium_.arc + kTemplate.above[0]), insertion(kWire) - kTemplate.leads);
+    const double less = start_.above < kTemplate.above[0] ? kTemplate.depths_apart : 0.0;
+    const double to = std::min(std::floor(ostium_.arc + start_.above), deepest - less);
     if (to < 2.0 * kTemplate.pull || !go({.tool = kCatheter, .push = to})) return false;
     const double back = insertion(kWire) - std::max(5.0, to - start_.withdrawn);
     return back < 1e-9 || go({.tool = kWire, .push = -std::ceil(back)});
@@ -341,34 +337,66 @@ class ToolSearch {
   }
 
   /// Whether the catheter's tip looks away from the branch, so that pulling it past is in vain.
-  bool looks_away() const {
-    return trial_.tip_direction(kCatheter).dot(ostium_.branch) < kTemplate.toward;
+  bool looks_away() {
+    const double along = trial_.tip_direction(kCatheter).dot(ostium_.branch);
+    least_aside_ = std::min(least_aside_, std::acos(std::clamp(along, -1.0, 1.0)));
+    return along < kTemplate.toward;
   }
 
-  /// Of each turn the state that lies best while both tools are pulled past the ostium.
+  /// Of each turn the states that lie best while both tools are pulled past the ostium. Where bends
+  /// hold the twist and the tip looks away from the branch at all turns, the hub is turned on,
+  /// after a short pull, which lets the twist through.
   std::vector<State> turn_and_pull() {
     std::vector<State> hooks;
+    bool made = true;  // all that was to be tried
     const State start = here();
     for (const double side : {1.0, -1.0}) {
       back_to(start);
       const int turns = side > 0.0 ? kTemplate.turns / 2 : (kTemplate.turns - 1) / 2;
-      for (int k = side > 0.0 ? 0 : 1; k <= turns && !stop(); ++k) {
-        if (k > 0 && !go({.tool = kCatheter, .turn = side * kTemplate.turn})) break;
-        if (looks_away()) continue;
-        const State turned = here();
-        std::vector<State> own = {here(off())};
-        const double whole = start_.above + kTemplate.below;
-        const int pulls = static_cast<int>(std::ceil(whole / kTemplate.pull));
-        for (int pull = 0; pull < pulls && !stop(); ++pull) {
-          if (!go({.tool = kBothTools, .push = -kTemplate.pull})) break;
-          own.push_back(here(off()));
-          own.back().facing = turned.facing;
-        }
-        keep_best(std::move(own), hooks);
-        back_to(turned);
-      }
+      if (side > 0.0) pull_past(hooks);
+      made = turn_on(side, turns, hooks) && made;
+    }
+    const bool none = hooks.empty();
+    for (const double side : {1.0, -1.0}) {
+      if (!none || stop()) break;
+      back_to(start);
+      const double whole = 0.5 * kTemplate.turns * kTemplate.turn;
+      made = go({.tool = kCatheter, .turn = side * whole}) &&
+             go({.tool = kBothTools, .push = -kTemplate.pull}) &&
+             turn_on(side, kTemplate.turns / 2, hooks) && made;
+    }
+    if (hooks.empty() && made && !stop()) {
+      findings_.stopped =
+          "at all turns of its hub, by up to a whole one to either side, the "
+          "catheter's tip looks at least " +
+          std::to_string(std::lround(least_aside_ / kRadPerDeg)) + " degrees away from the branch";
     }
     return hooks;
+  }
+
+  /// So many turns to one side from here, each with its pull; false where one cannot be made.
+  bool turn_on(double side, int turns, std::vector<State>& hooks) {
+    for (int k = 0; k < turns && !stop(); ++k) {
+      if (!go({.tool = kCatheter, .turn = side * kTemplate.turn})) return false;
+      pull_past(hooks);
+    }
+    return true;
+  }
+
+  /// Adds the best states of a pull from here, and comes back here.
+  void pull_past(std::vector<State>& hooks) {
+    if (looks_away()) return;
+    const State turned = here();
+    std::vector<State> own = {here(off())};
+    const int pulls = static_cast<int>(std::ceil(kTemplate.most_pull / kTemplate.pull));
+    for (int pull = 0; pull < pulls && !stop(); ++pull) {
+      if (own.back().level < -kTemplate.below) break;
+      if (!go({.tool = kBothTools, .push = -kTemplate.pull})) break;
+      own.push_back(here(off()));
+      own.back().facing = turned.facing;
+    }
+    keep_best(std::move(own), hooks);
+    back_to(turned);
   }
 
   /// Of the states along a pull those that lie best, and not next to each other.
@@ -430,20 +458,23 @@ class ToolSearch {
     }
   }
 
-  /// The turn and the pull of a hook end where they brought the tip to, not by their length.
+  /// The last turn of a hook and the pull after it end where they brought the tip to, not by their
+  /// length.
   void end_by_sight(const State& hook) {
-    for (ToolStep& step : steps_) {
-      if (step.turn != 0.0 && std::isfinite(hook.facing)) {
-        const double side = step.turn > 0.0 ? 1.0 : -1.0;
-        const double most = std::min(std::abs(step.turn) + kTemplate.turn_slack,
-                                     std::max(std::abs(step.turn), study_.tool_rules.most_turn));
-        step.turn = side * most;
-        end_at(step, Until::kFacing, hook.facing);
-      }
-      if (step.tool == kBothTools && std::isfinite(hook.level)) {
-        step.push -= kTemplate.slack;
-        end_at(step, Until::kLevel, hook.level);
-      }
+    const auto turn = std::find_if(steps_.rbegin(), steps_.rend(),
+                                   [](const ToolStep& step) { return step.turn != 0.0; });
+    if (turn != steps_.rend() && std::isfinite(hook.facing)) {
+      const double side = turn->turn > 0.0 ? 1.0 : -1.0;
+      const double most = std::min(std::abs(turn->turn) + kTemplate.turn_slack,
+                                   std::max(std::abs(turn->turn), study_.tool_rules.most_turn));
+      turn->turn = side * most;
+      end_at(*turn, Until::kFacing, hook.facing);
+    }
+    const auto pull = std::find_if(steps_.rbegin(), turn,
+                                   [](const ToolStep& step) { return step.tool == kBothTools; });
+    if (pull != turn && std::isfinite(hook.level)) {
+      pull->push -= kTemplate.slack;
+      end_at(*pull, Until::kLevel, hook.level);
     }
   }
 
@@ -459,6 +490,7 @@ class ToolSearch {
   ToolTrial trial_;
   std::vector<ToolStep> steps_;
   StartFindings findings_;
+  double least_aside_ = kPi;  // of the catheter's tip and the branch, turned              [rad]
 };
 
 }  // namespace

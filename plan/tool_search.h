@@ -3,8 +3,8 @@
 /// hands follow (references-2 L):
 ///   1. the wire goes up beyond the ostium, and the catheter over it;
 ///   2. the wire is withdrawn, so that the catheter's curve forms;
-///   3. the catheter is turned, and both are pulled down or pushed up, until its tip is in the
-///   ostium;
+///   3. the catheter is turned, by more than half a turn only with a short pull between, and both
+///   are pulled back, until its tip is in the ostium;
 ///   4. the wire goes out into the branch, and where it comes no further, the catheter follows it.
 #include <functional>
 #include <string>
@@ -28,6 +28,8 @@ struct PairFindings {
   double nearest_hook = -1.0;  // of the catheter's tip to the ostium at best; -1: not tried    [mm]
   double furthest = 0.0;       // of a tip along the way                                      [mm]
   std::string stopped;         // what stopped the best script, where none reached; else empty
+
+  bool tried() const { return nearest_hook >= 0.0 || furthest > 0.0; }
 };
 
 struct ToolScripts {

@@ -281,6 +281,18 @@ TEST(ToolNeighbours, DifferInOneStepByWhatAHandDoesNotFeel) {
   EXPECT_EQ(all[6][5].push, 14.0);
   EXPECT_EQ(all[6][1], script[1]) << "the catheter's way up the aorta is the same";
   EXPECT_EQ(list_neighbours({{.tool = 1, .push = 20.0}}).size(), 1U);
+
+  // Of a hub that is turned on after a short pull the last turn and the last pull.
+  ToolScript wound = script;
+  wound.insert(wound.begin() + 2, {{.tool = 0, .turn = -kPi}, {.tool = kBothTools, .push = -2.0}});
+  const std::vector<ToolScript> others = list_neighbours(wound);
+  ASSERT_EQ(others.size(), 7U);
+  for (const ToolScript& other : others) {
+    EXPECT_EQ(other[2], wound[2]);
+    EXPECT_EQ(other[3], wound[3]);
+  }
+  EXPECT_EQ(others[1][5].at, 7.0);
+  EXPECT_NEAR(others[3][4].at, 0.2 + kNeighbourTurn, 1e-12);
 }
 
 // An aorta of 9 mm radius along z from 0 to 130 mm, with branches of 3 mm radius toward +x and -x
