@@ -159,6 +159,7 @@ class Planner {
         own.push_back(k);
         if (trials[k].outcome == simulate::Outcome::kReached) reached.push_back(k);
       }
+      if (!reached.empty()) pair.stopped.clear();
       if (reached.empty() && !own.empty()) {
         const auto further = [&](std::size_t a, std::size_t b) {
           return trials[a].progress < trials[b].progress;

@@ -29,7 +29,7 @@ struct PairFindings {
   double furthest = 0.0;       // of a tip along the way                                      [mm]
   std::string stopped;         // what stopped the best script, where none reached; else empty
 
-  bool tried() const { return nearest_hook >= 0.0 || furthest > 0.0; }
+  bool tried() const { return nearest_hook >= 0.0 || furthest > 0.0 || !stopped.empty(); }
 };
 
 struct ToolScripts {

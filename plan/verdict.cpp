@@ -131,13 +131,13 @@ class Weighing {
                        std::to_string(scripts.branches) + " pushes from " +
                        count_of(scripts.starts_tried, "start") + ", " + found + ".");
     }
-    const auto tried =
-        std::count_if(scripts.pairs.begin(), scripts.pairs.end(),
-                      [](const PairFindings& pair) { return pair.pair.unfit.empty(); });
+    const auto tried = std::count_if(scripts.pairs.begin(), scripts.pairs.end(),
+                                     [](const PairFindings& pair) { return pair.tried(); });
     if (tried > 0) {
       find(answer, "Scripts of a catheter with a wire in it were searched for " +
-                       count_of(static_cast<int>(tried), "pair") + " of them.");
+                       count_of(static_cast<int>(tried), "pair") + ".");
     }
+    for (std::string& text : describe_pairs(known_)) find(answer, std::move(text));
   }
 
   /// Why trials against a rigid wall are enough for that answer.

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "plan/catheter_choice.h"
 #include "plan/number_text.h"
 
 namespace wireplan::plan {
@@ -27,9 +28,53 @@ bool tried_moves(const Plan& plan) {
                      [](const Candidate& candidate) { return !candidate.moves.empty(); });
 }
 
+std::string catheter_name(const Known& known, const PairFindings& pair) {
+  return known.study.catheters[static_cast<std::size_t>(pair.pair.catheter)].tool.wire.name;
+}
+
+/// Of a case that names catheters: `went` is how many went past the branch.
+std::string change_of_catheters(const std::string& went, const Known& known) {
+  const std::vector<PairFindings>& pairs = known.plan.scripts.pairs;
+  std::vector<std::string> names;
+  std::vector<CurveKind> kinds;
+  const PairFindings* unfit = nullptr;
+  for (const PairFindings& pair : pairs) {
+    if (!pair.pair.unfit.empty() && unfit == nullptr) unfit = &pair;
+    if (!pair.tried()) continue;
+    const auto& tube = known.study.catheters[static_cast<std::size_t>(pair.pair.catheter)].tool;
+    kinds.push_back(find_shape(tube.wire).kind);
+    const std::string name = catheter_name(known, pair);
+    if (std::find(names.begin(), names.end(), name) == names.end()) names.push_back(name);
+  }
+  const bool none_fits = std::all_of(pairs.begin(), pairs.end(), [](const PairFindings& pair) {
+    return !pair.pair.unfit.empty();
+  });
+  if (names.empty() && none_fits && unfit != nullptr) {
+    return "A catheter and a wire that fit: " + went + ", and " + catheter_name(known, *unfit) +
+           " could not be tried (" + unfit->pair.unfit + ").";
+  }
+  if (names.empty()) {
+    return "The catheters of the case: " + went +
+           ", and scripts of catheter and wire were not searched for.";
+  }
+  std::vector<std::string> others;
+  for (const CurveKind kind : {CurveKind::kSimple, CurveKind::kHooked, CurveKind::kReversed}) {
+    const bool tried = std::find(kinds.begin(), kinds.end(), kind) != kinds.end();
+    if (!tried) others.push_back(std::string("a ") + kind_name(kind));
+  }
+  const std::string was = names.size() == 1 ? " was tried" : " were tried";
+  if (others.empty()) {
+    return "Another access, or a catheter of another width: " + went + ", though " +
+           list_words(names) + was + ".";
+  }
+  return "A catheter of another shape: " + went + ", though " + list_words(names) + was + "; " +
+         list_words(others) + (others.size() == 1 ? " was not." : " were not.");
+}
+
 std::string change_at_branch(const Endings& endings, const Known& known, const std::string& noun) {
   const std::string went = part_of(endings.passed_by + endings.wrong_branch, endings, noun) +
                            " went past the branch or into another one";
+  if (!known.study.catheters.empty()) return change_of_catheters(went, known);
   if (!tried_angled(known.study)) {
     std::string text = "A wire with an angled tip: " + went + ", and no such wire was tried";
     if (!known.angled_wires.empty()) {
@@ -151,6 +196,26 @@ std::string describe_broken_limits(const Endings& endings, const Limits& limits)
       "wire more than " + four_digits(limits.penetration_fail) + " mm past the wall");
   expects(!parts.empty());
   return list_words(parts);
+}
+
+std::vector<std::string> describe_pairs(const Known& known, std::size_t most) {
+  std::vector<std::string> texts;
+  for (const PairFindings& pair : known.plan.scripts.pairs) {
+    if (texts.size() == most) break;
+    const std::string name = catheter_name(known, pair) + " with " +
+                             known.study.wires[static_cast<std::size_t>(pair.pair.wire)].name;
+    if (!pair.pair.unfit.empty()) {
+      texts.push_back("Not tried was " + name + ": " + pair.pair.unfit + ".");
+    } else if (pair.tried() && !pair.stopped.empty()) {
+      std::string text = "No script of " + name + " reaches: " + pair.stopped;
+      if (pair.nearest_hook >= 0.0) {
+        text += "; the catheter's tip came no nearer to the ostium than " +
+                one_decimal(pair.nearest_hook) + " mm";
+      }
+      texts.push_back(text + ".");
+    }
+  }
+  return texts;
 }
 
 std::vector<std::string> changes_by(const Endings& endings, const Known& known,

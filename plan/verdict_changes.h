@@ -39,6 +39,10 @@ std::string describe_endings(const Endings& endings);
 /// Which limits those that reached break; expects that there are some.
 std::string describe_broken_limits(const Endings& endings, const Limits& limits);
 
+/// Of catheters and wires, where none of their scripts is a plan: what stopped each pair, or why it
+/// was not tried; at most so many sentences.
+std::vector<std::string> describe_pairs(const Known& known, std::size_t most = 4);
+
 /// What would change how these end, the most frequent first; from what at least one in ten of them
 /// ended by. `noun` is what they are: "trial", "repeat".
 std::vector<std::string> changes_by(const Endings& endings, const Known& known,

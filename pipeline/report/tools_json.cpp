@@ -66,7 +66,7 @@ Json catheters_json(const plan::Study& study, const plan::Plan& plan, bool axes_
   json["pairs"] = Json::array();
   for (const plan::PairFindings& pair : plan.scripts.pairs) {
     const auto& [catheter, wire, unfit] = pair.pair;
-    const bool tried = pair.nearest_hook >= 0.0 || pair.furthest > 0.0;
+    const bool tried = pair.tried();
     Json row = {{"catheter", study.catheters[static_cast<std::size_t>(catheter)].tool.wire.name},
                 {"wire", study.wires[static_cast<std::size_t>(wire)].name},
                 {"tried", tried},
