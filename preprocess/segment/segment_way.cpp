@@ -22,6 +22,8 @@ constexpr double kMostChange = 0.12;     // of the contrast, that a single place
 constexpr double kPartSteps = 200.0;     // of the expected contrast: resolution of brightness
 constexpr int kLeastBottleneck = 60;     // of these: 30 %, less joins nothing
 constexpr int kSlack = 4;                // of these: ways a little darker than the brightest
+constexpr double kSlackNoises = 1.5;     // by which noise alone makes a way's worst place darker
+constexpr double kNoiseLeft = 1.5;       // noise that smoothing leaves, against independent voxels
 constexpr double kWideningMm = 40.0;     // that a way may be longer to widen by a factor e less
 constexpr float kWideningFrom = 0.9F;    // of the widest place so far: no more is widening again
 
@@ -67,6 +69,20 @@ std::vector<std::uint8_t> bright_parts(const LumenField& field, const Candidates
     parts[n] = static_cast<std::uint8_t>(std::clamp(kPartSteps * part, 1.0, 250.0));
   }
   return parts;
+}
+
+/// How much darker than the brightest connection a way may be in its worst place, in steps of the
+/// expected contrast at the darkest point. Of two ways of one level noise decides which has the
+/// darker place, and a thin one has more such places: that alone is not to shut it out.
+int find_slack(const LumenField& field, const std::vector<WayLevel>& points) {
+  double contrast = std::numeric_limits<double>::infinity();
+  for (const WayLevel& point : points) {
+    contrast = std::min(contrast, static_cast<double>(point.level) - field.surroundings);
+  }
+  const double left =
+      field.smoothing_mm > 0.0 ? smoothed_noise(field.grid, field.smoothing_mm) : 1.0;
+  const double noise = kNoiseLeft * left * field.noise;
+  return std::max(kSlack, static_cast<int>(kSlackNoises * noise / contrast * kPartSteps));
 }
 
 /// The largest part such that voxels of it or more join `start` and `end`; 0 where none do.
@@ -296,12 +312,13 @@ std::vector<std::vector<WayLevel>> find_level_ways(const LumenField& field,
                                                    const std::vector<WayLevel>& points) {
   expects(!points.empty());
   const std::vector<std::uint8_t> parts = bright_parts(field, candidates, points);
+  const int slack = find_slack(field, points);
   std::vector<std::vector<WayLevel>> ways;
   for (const WayLevel& end : points) {
     const int most = find_bottleneck(field.grid, parts, points.front().voxel, end.voxel);
     ways.emplace_back();
     if (most < kLeastBottleneck) continue;
-    const int least = std::max(1, most - kSlack);
+    const int least = std::max(kLeastBottleneck, most - slack);
     ways.back() = find_way(field, candidates, parts, least, kWideningMm, points.front(), end.voxel);
     std::vector<std::uint8_t> vessels = parts;
     keep_vessels(field.grid, candidates.depth, ways.back(), vessels);

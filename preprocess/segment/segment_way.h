@@ -59,8 +59,8 @@ struct WayLevel {
 /// From the first of the points to each (to itself: that point alone); empty where there is none.
 ///   1. Each candidate counts as the least of its own and its nearest neighbours' values, as part
 ///      of the contrast that is expected there: that of the points, by 1 / distance^2. The way
-///      leads over voxels that have as much of it as any connection has in its worst place; less
-///      than 30 % joins nothing.
+///      leads over voxels that have as much of it as any connection has in its worst place, less
+///      what noise makes of it (1.5 sigma of the smoothed values); less than 30 % joins nothing.
 ///   2. Of these ways the cheapest is taken. A millimetre costs more where values fall short of the
 ///      level that the way has had over the last 10 mm, or exceed it, by more than 12 %, and in
 ///      narrow places; blur is allowed for. So does a way that has become narrower and widens

@@ -11,7 +11,8 @@
 namespace wireplan::preprocess {
 namespace {
 
-constexpr double kBranchPart = 0.45;   // of the artery's contrast
+// Of the artery's contrast: what touches a branch, or its mouth, at less of it may not at more.
+constexpr double kBranchParts[] = {0.65, 0.55, 0.45};
 constexpr double kNoises = 5.0;        // that a voxel of it stands out by
 constexpr double kMostBrighter = 0.2;  // of the artery's contrast
 constexpr double kLeastMm = 12.0, kLeastRadii = 6.0, kMostMm = 80.0;  // of its length
@@ -21,6 +22,7 @@ constexpr double kSteady = 2.2;    // by which sections may differ from those be
 constexpr double kOstium = 0.3;    // least contact with the artery, of the cross-section
 constexpr double kLeavesMm = 5.0;  // from the contact, behind which the artery is far
 constexpr double kOfArtery = 0.7, kAlwaysMm = 2.0;  // of the artery's radius; what always is
+constexpr int kMostRounds = 3;                      // of branches that leave branches
 constexpr double kSectionVoxels = 2.0;              // how long a section is, at least
 constexpr double kOwnPart = 0.5;                    // of its own contrast, where a branch ends
 
@@ -50,17 +52,18 @@ double least_contrast(const LumenField& field) {
   return kNoises * field.noise * left;
 }
 
-/// What a branch of an artery of this level has at least [HU].
-double least_value(const LumenField& field, double contrast, double level) {
-  return field.surroundings + std::max(kBranchPart * (level - field.surroundings), contrast);
+/// What a branch with this part of the contrast of an artery of this level has at least [HU].
+double least_value(const LumenField& field, double part, double contrast, double level) {
+  return field.surroundings + std::max(part * (level - field.surroundings), contrast);
 }
 
 /// Looks for a branch at one contact after the other.
 class BranchSearch {
  public:
-  BranchSearch(const LumenField& field, const Labels& artery)
+  BranchSearch(const LumenField& field, const Labels& artery, double part)
       : field_(field),
         artery_(artery),
+        part_(part),
         voxel_(std::cbrt(field.grid.spacing.prod())),
         section_mm_(section_length(field.grid)),
         least_contrast_(least_contrast(field)),
@@ -97,7 +100,7 @@ class BranchSearch {
   }
 
   std::vector<Section> follow_steady(const Contact& contact) {
-    const double least = least_value(field_, least_contrast_, contact.level);
+    const double least = least_value(field_, part_, least_contrast_, contact.level);
     std::priority_queue<Visit, std::vector<Visit>, std::greater<>> visits;
     const auto reach = [&](std::size_t n, double distance) {
       if (distance >= distance_[n]) return;
@@ -175,6 +178,7 @@ class BranchSearch {
 
   const LumenField& field_;
   const Labels& artery_;
+  double part_;                   // of the artery's contrast, that a branch has
   double voxel_, section_mm_;     //                                                       [mm]
   double least_contrast_;         //                                                       [HU]
   std::vector<double> distance_;  // in the branch, from the contact                       [mm]
@@ -195,9 +199,9 @@ double radius_beside(const Grid& grid, const std::vector<float>& depth, std::siz
   return static_cast<double>(depth[n]);
 }
 
-/// All contacts, those of the lower voxels first.
+/// All contacts with what has this part of the contrast, those of the lower voxels first.
 std::vector<Contact> find_contacts(const LumenField& field, const std::vector<float>& level,
-                                   const Labels& artery) {
+                                   const Labels& artery, double part) {
   const Grid& grid = field.grid;
   std::vector<float> beside(artery.size(), 0.0F);  // level of the artery that a voxel touches
   for (std::size_t n = 0; n < artery.size(); ++n) {
@@ -210,7 +214,7 @@ std::vector<Contact> find_contacts(const LumenField& field, const std::vector<fl
   for (std::size_t n = 0; n < artery.size(); ++n) {
     if (beside[n] == 0.0F) continue;
     const auto value = static_cast<double>(field.values[n]);
-    if (value < least_value(field, contrast, static_cast<double>(beside[n])) ||
+    if (value < least_value(field, part, contrast, static_cast<double>(beside[n])) ||
         value > field.upper) {
       beside[n] = 0.0F;
     }
@@ -274,19 +278,31 @@ Leak add_branch(const LumenField& field, const Contact& contact,
   return added;
 }
 
-}  // namespace
-
-std::vector<Leak> add_side_branches(const LumenField& field, std::vector<float>& level,
-                                    Labels& artery, Labels& other) {
-  std::vector<Leak> added;
-  BranchSearch search(field, artery);
-  for (const Contact& contact : find_contacts(field, level, artery)) {
+/// One round at this part of the contrast; those that leave what it adds are for the next.
+void add_branches(const LumenField& field, double part, std::vector<float>& level, Labels& artery,
+                  Labels& other, std::vector<Leak>& added) {
+  BranchSearch search(field, artery, part);
+  for (const Contact& contact : find_contacts(field, level, artery, part)) {
     const bool taken = std::any_of(contact.voxels.begin(), contact.voxels.end(),
                                    [&](std::size_t n) { return artery[n] != 0; });
     if (taken) continue;
     const std::vector<Section> sections = search.follow(contact);
     if (sections.empty()) continue;
     added.push_back(add_branch(field, contact, sections, level, artery, other));
+  }
+}
+
+}  // namespace
+
+std::vector<Leak> add_side_branches(const LumenField& field, std::vector<float>& level,
+                                    Labels& artery, Labels& other) {
+  std::vector<Leak> added;
+  for (const double part : kBranchParts) {
+    for (int round = 0; round < kMostRounds; ++round) {
+      const std::size_t before = added.size();
+      add_branches(field, part, level, artery, other, added);
+      if (added.size() == before) break;
+    }
   }
   std::stable_sort(added.begin(), added.end(),
                    [](const Leak& a, const Leak& b) { return a.volume_mm3 > b.volume_mm3; });

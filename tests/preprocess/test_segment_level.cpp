@@ -134,6 +134,22 @@ TEST(SegmentLevel, ABranchThatFillsLessIsKeptAndTold) {
   EXPECT_NEAR(told.mean_hu, 180.0, 15.0);
 }
 
+TEST(SegmentLevel, ABranchWhoseMouthTouchesAnOrganIsKept) {
+  // At 45 % of the artery's contrast branch and organ are one, at 55 % they are not.
+  const auto branch = [](const Vec3& p) {
+    return p.x() > 0.0 && std::hypot(p.y(), p.z() - 45.0 - 0.3 * p.x()) < 2.5;
+  };
+  const auto organ = [](const Vec3& p) { return p.x() > 3.0 && p.y() < -2.0; };
+  const Image image = scanned(6.0, [&](const Vec3& p) {
+    return off_axis(p, 0) < 5.0 ? 300.0 : branch(p) ? 208.0 : organ(p) ? 172.0 : kAround;
+  });
+  const Segmentation found = segment(image, {.seeds = {kBottom}, .target = kTop});
+  EXPECT_TRUE(contains(found.mask, Vec3(18, 0, 50.4)));
+  EXPECT_FALSE(contains(found.mask, Vec3(12, -8, 45)));
+  EXPECT_GT(dice(found.mask, [&](const Vec3& p) { return off_axis(p, 0) < 5.0 || branch(p); }),
+            0.95);
+}
+
 TEST(SegmentLevel, AVeinThatPassesByOrAnOrganIsNoBranch) {
   const auto vein = [](const Vec3& p) { return std::hypot(p.x() - 6.5, p.z() - 45.0) < 2.0; };
   const auto organ = [](const Vec3& p) { return (p - Vec3(14, 0, 45)).norm() < 10.0; };
@@ -204,6 +220,38 @@ TEST(SegmentLevel, APointInMetalIsToldAsOne) {
   });
   const std::string error = error_of(image, {.seeds = {kBottom}, .target = kTop});
   EXPECT_TRUE(has(error, "HU round (0.0, 0.0, 85.0) mm, expected at most 800 HU")) << error;
+}
+
+TEST(SegmentLevel, AWayIsNotGivenUpForAPlaceThatNoiseMakesDark) {
+  // The straight vessel has 80 % of the contrast at one place; a longer one round it 90 % all
+  // along.
+  const auto near_line = [](const Vec3& p, double x) { return std::hypot(p.x() - x, p.y()) < 3.0; };
+  LumenField field;
+  field.grid = upright_grid();
+  field.surroundings = 50.0;
+  field.upper = 800.0;
+  field.noise = 10.0;
+  for (std::size_t n = 0; n < field.grid.voxels(); ++n) {
+    const Vec3 p = preprocess::center_of(field.grid, n);
+    const auto across = [&](double z) {
+      return p.x() > 0.0 && p.x() < 15.0 && std::hypot(p.y(), p.z() - z) < 3.0;
+    };
+    const bool round =
+        (near_line(p, 15.0) && p.z() > 25.0 && p.z() < 65.0) || across(25) || across(65);
+    const double straight = std::abs(p.z() - 45.0) < 1.5 ? 170.0 : 200.0;
+    field.values.push_back(static_cast<float>(near_line(p, 0.0) ? straight
+                                              : round           ? 185.0
+                                                                : kAround));
+  }
+  field.raw = field.values;
+  const std::size_t start = field.grid.index(29, 29, 5), end = field.grid.index(29, 29, 85);
+  const auto ways = find_level_ways(field, find_candidates(field, {start}, 150.0),
+                                    {{start, 200.0F}, {end, 200.0F}});
+  ASSERT_EQ(ways.size(), 2U);
+  ASSERT_FALSE(ways[1].empty());
+  for (const WayLevel& place : ways[1]) {
+    EXPECT_TRUE(near_line(preprocess::center_of(field.grid, place.voxel), 0.0));
+  }
 }
 
 // ---- tunnels ------------------------------------------------------------------------------------
