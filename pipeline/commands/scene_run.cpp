@@ -30,12 +30,17 @@ struct LoadedVessel {
   std::unique_ptr<const simulate::VesselModel> model;
 };
 
+/// Where tools or a wire that are pushed in become free.
+const Vec3& entry_of(const SceneFile& scene) {
+  return scene.tools ? scene.tools->scene.point : scene.insertion->introducer.point;
+}
+
 /// Refuses an entry outside the vessel. Returns a sentence where the wire touches the wall already
 /// as it enters, else nothing.
 std::vector<std::string> look_at_entry(const SceneFile& scene, const Surface& surface) {
   if (!scene.insertion && !scene.tools) return {};
   const std::string key = scene.tools ? "introducer.point_mm" : "insertion.point_mm";
-  const Vec3& entry = scene.tools ? scene.tools->scene.point : scene.insertion->introducer.point;
+  const Vec3& entry = entry_of(scene);
   const preprocess::InsideAnswer answer = preprocess::locate_point(surface, entry);
   const double radius =
       scene.tools ? scene.tools->scene.tools.front().wire.radius : scene.insertion->wire.radius;
@@ -111,7 +116,7 @@ LoadedVessel load_vessel(const SceneFile& scene) {
                    ? std::make_unique<simulate::VesselModel>(vessel.surface, vessel.wall, options)
                    : std::make_unique<simulate::VesselModel>(vessel.surface, options);
   if (given.wall.support) {
-    const Vec3& entry = scene.tools ? scene.tools->scene.point : scene.insertion->introducer.point;
+    const Vec3& entry = entry_of(scene);
     model->sections = make_section_chain(given.wall, preprocess::find_tree(vessel.surface, entry),
                                          entry, vessel.wall.young_modulus);
   }

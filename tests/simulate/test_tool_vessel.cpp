@@ -4,6 +4,7 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
+#include <initializer_list>
 #include <memory>
 #include <random>
 #include <string>
@@ -76,6 +77,15 @@ TEST(ToolVessel, GradientAgreesWithDifferencesWhereTheThicknessChanges) {
   }
 }
 
+/// Pushes of 1 mm; finds the hand's work.
+void push_on(Insertion& insertion, int pushes, double& work) {
+  for (int k = 0; k < pushes; ++k) {
+    const auto push = insertion.push(1.0);
+    ASSERT_TRUE(push);
+    work = push->push_work;
+  }
+}
+
 TEST(ToolVessel, OneStraightToolIsTheWireThatAnInsertionPushes) {
   const Wire wire{
       .name = "wire", .radius = 0.445, .sections = {{.length = 300.0, .bending_stiffness = 60.0}}};
@@ -84,11 +94,7 @@ TEST(ToolVessel, OneStraightToolIsTheWireThatAnInsertionPushes) {
     Insertion insertion(wire, {.point = Vec3(0.0, 0.0, 20.0), .direction = Vec3::UnitZ()},
                         tool_bend(), {.length = 100.0, .friction = friction});
     double work = 0.0;
-    for (int k = 0; k < 90; ++k) {
-      const auto push = insertion.push(1.0);
-      ASSERT_TRUE(push);
-      work = push->push_work;
-    }
+    ASSERT_NO_FATAL_FAILURE(push_on(insertion, 90, work));
     ToolScene scene = near_the_bend({{.wire = wire}}, {{5.0, 0.0}});
     scene.contact.friction = friction;
     scene.moves = {push_of({85.0})};
@@ -143,11 +149,7 @@ TEST(ToolVessel, OneToolMovesAVesselAsTheWireThatAnInsertionPushes) {
     Insertion insertion(wire, {.point = Vec3(0.0, 0.0, 20.0), .direction = Vec3::UnitZ()}, vessel,
                         {.length = 120.0, .friction = friction});
     double work = 0.0;
-    for (int k = 0; k < 110; ++k) {
-      const auto push = insertion.push(1.0);
-      ASSERT_TRUE(push);
-      work = push->push_work;
-    }
+    ASSERT_NO_FATAL_FAILURE(push_on(insertion, 110, work));
     ToolScene scene = near_the_bend({{.wire = wire}}, {{5.0, 0.0}});
     scene.vessel = &vessel;
     scene.contact.friction = friction;
