@@ -46,14 +46,33 @@ const countControls = (page) =>
 
 const checkPage = (title, file) => {
   describe(title, () => {
-    const use = (name, body, viewport) =>
+    // A page takes seconds to open, so the tests of one follow each other on it; after one that fails it is opened anew.
+    let opened;
+    const leave = async () => {
+      await opened?.close();
+      opened = undefined;
+    };
+    after(leave);
+    const use = (name, body) =>
       test(name, async () => {
-        const opened = await open(browser, file(), viewport);
+        opened ??= await open(browser, file());
+        let passed = false;
         try {
           await body(opened.page);
           assert.deepEqual(opened.faults, []);
+          passed = true;
         } finally {
-          await opened.close();
+          if (!passed) await leave();
+        }
+      });
+    const useAlone = (name, body, viewport) =>
+      test(name, async () => {
+        const own = await open(browser, file(), viewport);
+        try {
+          await body(own.page);
+          assert.deepEqual(own.faults, []);
+        } finally {
+          await own.close();
         }
       });
 
@@ -65,6 +84,7 @@ const checkPage = (title, file) => {
     });
 
     use("shows the plan that is picked", async (page) => {
+      const first = await page.inputValue("#pick-trial");
       await page.selectOption("#filter-rank", "all");
       const pick = page.locator("#plans tbody button").nth(1);
       const trial = await pick.getAttribute("data-trial");
@@ -73,6 +93,7 @@ const checkPage = (title, file) => {
       assert.equal(await page.inputValue("#pick-trial"), trial);
       assert.notEqual(await page.textContent(".chosen[role=status]"), before);
       assert.equal(await pick.getAttribute("aria-pressed"), "true");
+      await page.selectOption("#pick-trial", first);
     });
 
     use("moves the wire along its insertion", async (page) => {
@@ -87,6 +108,8 @@ const checkPage = (title, file) => {
       assert.equal(await picture(page), atEnd, "and comes back");
       await page.click("#play");
       await page.waitForFunction(() => Number(document.getElementById("insertion").value) > 0);
+      await page.focus("#insertion");
+      await page.keyboard.press("End");  // which stops it
     });
 
     use("colors the wall by the forces that are asked for", async (page) => {
@@ -185,7 +208,7 @@ const checkPage = (title, file) => {
       assert.deepEqual(await seriousFindings(page), []);
     });
 
-    use("fits a phone, also there without a serious finding", async (page) => {
+    useAlone("fits a phone, also there without a serious finding", async (page) => {
       const [wide, screen] = await page.evaluate(() => [document.documentElement.scrollWidth, window.innerWidth]);
       assert.ok(wide <= screen, `${wide} px on a screen of ${screen} px`);
       assert.deepEqual(await seriousFindings(page), []);
@@ -206,7 +229,7 @@ const checkPage = (title, file) => {
       assert.ok(shot.length > 20000, `a picture of ${shot.length} bytes is not blank`);
     });
 
-    use("prints the sheet on one page, with no block cut off", async (page) => {
+    useAlone("prints the sheet on one page, with no block cut off", async (page) => {
       assert.equal(pageCount(await page.pdf({preferCSSPageSize: true})), 1);
       assert.equal(pageCount(await page.pdf({format: "A4"})), 1);
       await page.emulateMedia({media: "print"});
@@ -216,7 +239,7 @@ const checkPage = (title, file) => {
       assert.ok(await page.isHidden("#answer"), "the rest of the page is not printed");
     });
 
-    use("prints the whole page on request, with nothing cut off at the side", async (page) => {
+    useAlone("prints the whole page on request, with nothing cut off at the side", async (page) => {
       await page.evaluate(() => (window.print = () => {}));
       await page.click("text=Print the whole page");
       await page.emulateMedia({media: "print"});
@@ -238,7 +261,7 @@ const checkPage = (title, file) => {
 
     if (process.env.WIREPLAN_SCREENSHOTS) {
       for (const width of [1280, 375]) {
-        use(`is photographed ${width} px wide`, async (page) => {
+        useAlone(`is photographed ${width} px wide`, async (page) => {
           await page.waitForTimeout(500);
           await page.screenshot({
             path: join(process.env.WIREPLAN_SCREENSHOTS, `${basename(dirname(file()))}-${width}.png`), fullPage: true});

@@ -53,9 +53,12 @@ export const outcomeWord = (outcome) => kOutcomes[outcome]?.word ?? shown(outcom
 export const outcomeMark = (outcome) => kOutcomes[outcome]?.mark ?? "?";
 export const outcomes = Object.keys(kOutcomes);
 
+/** "bentson", or "bentson in cobra-c2". */
+export const toolsName = (trial) => `${shown(trial.wire)}${trial.catheter ? ` in ${shown(trial.catheter)}` : ""}`;
+
 /** "amplatz-stiff, inclination 10\u00b0, azimuth 90\u00b0, roll 0\u00b0", and the moves where it is no straight push. */
 export const planName = (trial) =>
-  `${shown(trial.wire)}${trial.catheter ? ` in ${shown(trial.catheter)}` : ""}, inclination ${degrees(trial.inclination_deg)}, azimuth ` +
+  `${toolsName(trial)}, inclination ${degrees(trial.inclination_deg)}, azimuth ` +
   `${degrees(trial.azimuth_deg)}, roll ${degrees(trial.roll_deg)}` +
   (trial.script ? `; ${shown(trial.script)}` : "");
 

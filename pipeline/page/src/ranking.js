@@ -1,6 +1,6 @@
 // The ranked plans, and on request every trial, as a table to sort and filter.
 import {el, section} from "./dom.js";
-import {degrees, number, outcomeWord, percent, plural, shown, withError} from "./format.js";
+import {degrees, number, outcomeWord, percent, plural, shown, toolsName, withError} from "./format.js";
 
 const success = ({plan}) => {
   if (!plan || plan.success_rate === null || plan.success_rate === undefined) return "not repeated";
@@ -15,7 +15,7 @@ const told = (trial, value, error) =>
 // Title, what to sort by, what to show.
 const kColumns = [
   ["Rank", (t) => t.plan?.rank ?? Infinity, (t) => t.plan?.rank ?? "\u2013"],
-  ["Wire", (t) => t.wire, (t) => el("bdi", {}, `${shown(t.wire)}${t.catheter ? ` in ${shown(t.catheter)}` : ""}`)],
+  ["Wire", toolsName, (t) => el("bdi", {}, toolsName(t))],
   ["Inclination", (t) => t.inclination_deg, (t) => degrees(t.inclination_deg)],
   ["Azimuth", (t) => t.azimuth_deg, (t) => degrees(t.azimuth_deg)],
   ["Roll", (t) => t.roll_deg, (t) => degrees(t.roll_deg)],
@@ -39,10 +39,10 @@ export const rankingSection = (page, selection) => {
   const {trials} = page;
   let column = 0, falling = false;
 
-  const wires = [...new Set(trials.map((t) => t.wire))];
+  const tools = [...new Set(trials.map(toolsName))];
   const wire = el("select", {id: "filter-wire", onchange: () => fill()},
     el("option", {value: ""}, "all wires"),
-    wires.map((name, k) => el("option", {value: k}, shown(name))));
+    tools.map((name, k) => el("option", {value: k}, name)));
   const which = el("select", {id: "filter-rank", onchange: () => fill()},
     el("option", {value: "ranked"}, "ranked plans"),
     el("option", {value: "all"}, "all trials"));
@@ -59,7 +59,7 @@ export const rankingSection = (page, selection) => {
 
   const fill = () => {
     const shownTrials = trials.filter(
-      (t) => (wire.value === "" || t.wire === wires[Number(wire.value)]) && (which.value === "all" || t.plan));
+      (t) => (wire.value === "" || toolsName(t) === tools[Number(wire.value)]) && (which.value === "all" || t.plan));
     const [, key] = kColumns[column];
     // Ties keep the order of ranks, then of trials.
     shownTrials.sort((a, b) =>
