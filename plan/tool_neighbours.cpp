@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 #include <iterator>
+#include <numeric>
+#include <tuple>
 #include <utility>
 
 namespace wireplan::plan {
@@ -108,6 +110,10 @@ ToolScript with_change(ToolScript script, std::size_t step, double by) {
   return script;
 }
 
+bool alike(const FoundScript& a, const FoundScript& b, double turn, double depth) {
+  return std::abs(a.turned - b.turned) < turn && std::abs(a.depth - b.depth) < depth;
+}
+
 }  // namespace
 
 std::vector<ToolScript> list_neighbours(const ToolScript& script) {
@@ -145,6 +151,32 @@ std::vector<bool> try_scripts(ToolTrial& trial, const std::vector<ToolScript>& s
   SharedTrials shared(trial, scripts.size(), cancelled);
   shared.go_on(std::move(rests));
   return shared.reached();
+}
+
+std::vector<FoundScript> choose_different(const std::vector<FoundScript>& from, std::size_t most) {
+  constexpr double kNearTurn = 45.0 * kRadPerDeg, kNearDepth = 9.0;    // [rad], [mm]
+  constexpr double kOtherTurn = 20.0 * kRadPerDeg, kOtherDepth = 3.0;  // [rad], [mm]
+  std::vector<int> neighbours;
+  for (const FoundScript& script : from) {
+    neighbours.push_back(
+        static_cast<int>(std::count_if(from.begin(), from.end(), [&](const FoundScript& other) {
+          return alike(script, other, kNearTurn, kNearDepth);
+        })));
+  }
+  std::vector<std::size_t> order(from.size());
+  std::iota(order.begin(), order.end(), 0U);
+  std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
+    return std::tuple(-from[a].share, -neighbours[a], from[a].steps.size(), from[a].peak_force) <
+           std::tuple(-from[b].share, -neighbours[b], from[b].steps.size(), from[b].peak_force);
+  });
+  std::vector<FoundScript> kept;
+  for (const std::size_t k : order) {
+    const bool same = std::any_of(kept.begin(), kept.end(), [&](const FoundScript& other) {
+      return alike(from[k], other, kOtherTurn, kOtherDepth);
+    });
+    if (!same && kept.size() < most) kept.push_back(from[k]);
+  }
+  return kept;
 }
 
 }  // namespace wireplan::plan

@@ -1,6 +1,7 @@
 #pragma once
 /// How a script of catheter and wire does where the hand does it a little otherwise. Scripts that
-/// begin alike are made once as far as they do.
+/// begin alike are made once as far as they do. Of many that reach, which are kept.
+#include <cstddef>
 #include <functional>
 #include <vector>
 
@@ -22,5 +23,18 @@ std::vector<ToolScript> list_neighbours(const ToolScript& script);
 /// Of each script whether it reaches. The trial is where all begin, and is brought back there.
 std::vector<bool> try_scripts(simulate::ToolTrial& trial, const std::vector<ToolScript>& scripts,
                               const std::function<bool()>& cancelled);
+
+struct FoundScript {
+  ToolScript steps;
+  double peak_force = 0.0;  // in the scout                                                   [N]
+  double turned = 0.0, depth = 0.0;     // of the hub, of the catheter                    [rad, mm]
+  double share = 0.0;                   // of it and its neighbours that reach
+  std::vector<ToolScript> spares = {};  // neighbours that do
+};
+
+/// At most so many that differ in turn or depth. First those whose neighbours reach, as far as that
+/// was tried, and with most others round them: a hand and a patient that are not quite as assumed
+/// end there. Then the fewest steps and the least force first.
+std::vector<FoundScript> choose_different(const std::vector<FoundScript>& from, std::size_t most);
 
 }  // namespace wireplan::plan

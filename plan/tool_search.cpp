@@ -3,8 +3,6 @@
 #include <algorithm>
 #include <atomic>
 #include <cmath>
-#include <numeric>
-#include <tuple>
 #include <utility>
 
 #include "plan/catheter_choice.h"
@@ -31,6 +29,7 @@ struct Template {
   double cover = 6.0;  // of a curve behind its end, where the wire is withdrawn to     [mm]
   double turn = 30.0 * kRadPerDeg;
   int turns = 12;
+  double least_turn = 5.0 * kRadPerDeg;  // a hub that may be turned by less is left as it is
   double pull = 2.0;       //                                                               [mm]
   double toward = 0.0;     // the branch, of the tip's direction: less looks away
   double far = 0.2;        // what a millimetre between tip and ostium counts as             [mm]
@@ -86,14 +85,6 @@ struct State {
   double facing = 0.0;  // where it looked after the turn, NaN: nowhere                    [rad]
 };
 
-struct FoundScript {
-  std::vector<ToolStep> steps;
-  double peak_force = 0.0;  // in the scout                                                   [N]
-  double turned = 0.0, depth = 0.0;
-  double share = 0.0;                   // of it and its neighbours that reach
-  std::vector<ToolScript> spares = {};  // neighbours that do
-};
-
 /// What the hand does until it sees that: rounded as it is told.
 void end_at(ToolStep& step, Until until, double at) {
   step.until = until;
@@ -115,39 +106,6 @@ struct StartFindings {
   std::string stopped;
   long branches = 0;
 };
-
-bool alike(const FoundScript& a, const FoundScript& b, double turn, double depth) {
-  return std::abs(a.turned - b.turned) < turn && std::abs(a.depth - b.depth) < depth;
-}
-
-/// At most so many that differ in turn or depth. First those whose neighbours reach, as far as that
-/// was tried, and with most others round them: a hand and a patient that are not quite as assumed
-/// end there. Then the fewest steps and the least force first.
-std::vector<FoundScript> choose_different(const std::vector<FoundScript>& from, std::size_t most) {
-  constexpr double kNearTurn = 45.0 * kRadPerDeg, kNearDepth = 9.0;    // [rad], [mm]
-  constexpr double kOtherTurn = 20.0 * kRadPerDeg, kOtherDepth = 3.0;  // [rad], [mm]
-  std::vector<int> neighbours;
-  for (const FoundScript& script : from) {
-    neighbours.push_back(
-        static_cast<int>(std::count_if(from.begin(), from.end(), [&](const FoundScript& other) {
-          return alike(script, other, kNearTurn, kNearDepth);
-        })));
-  }
-  std::vector<std::size_t> order(from.size());
-  std::iota(order.begin(), order.end(), 0U);
-  std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
-    return std::tuple(-from[a].share, -neighbours[a], from[a].steps.size(), from[a].peak_force) <
-           std::tuple(-from[b].share, -neighbours[b], from[b].steps.size(), from[b].peak_force);
-  });
-  std::vector<FoundScript> kept;
-  for (const std::size_t k : order) {
-    const bool same = std::any_of(kept.begin(), kept.end(), [&](const FoundScript& other) {
-      return alike(from[k], other, kOtherTurn, kOtherDepth);
-    });
-    if (!same && kept.size() < most) kept.push_back(from[k]);
-  }
-  return kept;
-}
 
 class ToolSearch {
  public:
@@ -181,6 +139,9 @@ class ToolSearch {
       }
     }
     trial_.restore(start);
+    if (findings_.found.empty() && !broken_.empty()) {
+      findings_.stopped = "its scripts break a rule of the case: " + broken_;
+    }
     weigh_found();
     return std::move(findings_);
   }
@@ -238,14 +199,16 @@ class ToolSearch {
     for (const simulate::Push& push : trial_.pushes()) {
       found.peak_force = std::max(found.peak_force, push.peak_contact_force);
     }
-    if (find_broken_rule(found.steps, catheter_, wire_, study_.tool_rules).empty()) {
-      findings_.found.push_back(std::move(found));
-    }
+    broken_ = find_broken(found.steps);
+    if (broken_.empty()) findings_.found.push_back(std::move(found));
   }
 
   /// A wire that passes the ostium by is withdrawn and led out again with the catheter turned a
   /// little, first the way that it was turned before.
-  static void let_try_again(std::vector<ToolStep>& steps) {
+  void let_try_again(std::vector<ToolStep>& steps) const {
+    const ToolRules& rules = study_.tool_rules;  // from twice to one side to twice to the other
+    const double most = std::min(rules.most_turn, rules.turn_per_length * kTemplate.again_pull);
+    if (4.0 * kTemplate.again_turn > most) return;
     double side = 1.0;
     ToolStep* out = nullptr;
     for (ToolStep& step : steps) {
@@ -282,7 +245,7 @@ class ToolSearch {
         ++tried;
         if (!reached[n]) continue;
         ++held;
-        if (!own && find_broken_rule(all[n], catheter_, wire_, study_.tool_rules).empty()) {
+        if (!own && find_broken(all[n]).empty()) {
           chosen[k].spares.push_back(all[n]);
         }
       }
@@ -356,19 +319,24 @@ class ToolSearch {
       if (side > 0.0) pull_past(hooks);
       made = turn_on(side, turns, hooks) && made;
     }
-    const bool none = hooks.empty();
+    const bool none = hooks.empty(), turns = may_turn();
     for (const double side : {1.0, -1.0}) {
-      if (!none || stop()) break;
+      if (!none || !turns || stop()) break;
       back_to(start);
-      const double whole = 0.5 * kTemplate.turns * kTemplate.turn;
-      made = go({.tool = kCatheter, .turn = side * whole}) &&
-             go({.tool = kBothTools, .push = -kTemplate.pull}) &&
-             turn_on(side, kTemplate.turns / 2, hooks) && made;
+      bool turned = true;
+      for (double left = 0.5 * kTemplate.turns * kTemplate.turn;
+           turned && left > 1e-9 && !stop();) {
+        const double by = std::min(left, study_.tool_rules.most_turn);
+        turned = turn_hub(side * by);
+        left -= by;
+      }
+      made = turned && let_twist_through() && turn_on(side, kTemplate.turns / 2, hooks) && made;
     }
     if (hooks.empty() && made && !stop()) {
       findings_.stopped =
-          "at all turns of its hub, by up to a whole one to either side, the "
-          "catheter's tip looks at least " +
+          std::string(turns ? "at all turns of its hub, by up to a whole one to either side"
+                            : "with its hub as it is, since tool_rules let it not be turned") +
+          ", the catheter's tip looks at least " +
           std::to_string(std::lround(least_aside_ / kRadPerDeg)) + " degrees away from the branch";
     }
     return hooks;
@@ -376,11 +344,43 @@ class ToolSearch {
 
   /// So many turns to one side from here, each with its pull; false where one cannot be made.
   bool turn_on(double side, int turns, std::vector<State>& hooks) {
-    for (int k = 0; k < turns && !stop(); ++k) {
-      if (!go({.tool = kCatheter, .turn = side * kTemplate.turn})) return false;
+    if (!may_turn()) return true;
+    const double by = std::min(kTemplate.turn, study_.tool_rules.most_turn);
+    for (double left = turns * kTemplate.turn; left > 1e-9 && !stop(); left -= by) {
+      if (!turn_hub(side * std::min(by, left))) return false;
       pull_past(hooks);
     }
     return true;
+  }
+
+  bool may_turn() const { return study_.tool_rules.most_turn >= kTemplate.least_turn; }
+
+  /// Of the hub since the catheter was pushed or pulled.
+  double turned_in_place() const {
+    double turned = 0.0;
+    for (auto step = steps_.rbegin(); step != steps_.rend(); ++step) {
+      if (step->tool == kWire) continue;
+      if (step->push != 0.0) break;
+      turned += step->turn;
+    }
+    return turned;
+  }
+
+  /// Turns the catheter's hub, where it has been turned as far as the rules let after a pull.
+  bool turn_hub(double by) {
+    const double most = study_.tool_rules.most_turn + 1e-9;
+    return (std::abs(turned_in_place() + by) <= most || let_twist_through()) &&
+           go({.tool = kCatheter, .turn = by});
+  }
+
+  /// A pull, as long as the rules ask for after the turn.
+  bool let_twist_through() {
+    const double least = std::abs(turned_in_place()) / study_.tool_rules.turn_per_length;
+    return go({.tool = kBothTools, .push = -std::max(kTemplate.pull, std::ceil(least - 1e-9))});
+  }
+
+  std::string find_broken(const std::vector<ToolStep>& steps) const {
+    return find_broken_rule(steps, catheter_, wire_, study_.tool_rules);
   }
 
   /// Adds the best states of a pull from here, and comes back here.
@@ -392,7 +392,8 @@ class ToolSearch {
     for (int pull = 0; pull < pulls && !stop(); ++pull) {
       if (own.back().level < -kTemplate.below) break;
       if (!go({.tool = kBothTools, .push = -kTemplate.pull})) break;
-      own.push_back(here(off()));
+      broken_ = find_broken(steps_);  // a longer pull may not
+      own.push_back(here(broken_.empty() ? off() : HUGE_VAL));
       own.back().facing = turned.facing;
     }
     keep_best(std::move(own), hooks);
@@ -410,8 +411,8 @@ class ToolSearch {
           return std::abs(other - k) < apart;
         });
         const auto slot = static_cast<std::size_t>(k);
-        if (!near && (best < 0 || own[slot].off < own[static_cast<std::size_t>(best)].off))
-          best = k;
+        if (near || !std::isfinite(own[slot].off)) continue;
+        if (best < 0 || own[slot].off < own[static_cast<std::size_t>(best)].off) best = k;
       }
       if (best < 0) break;
       kept.push_back(best);
@@ -490,6 +491,7 @@ class ToolSearch {
   ToolTrial trial_;
   std::vector<ToolStep> steps_;
   StartFindings findings_;
+  std::string broken_;        // rule, by the longest pull or the last that reached
   double least_aside_ = kPi;  // of the catheter's tip and the branch, turned              [rad]
 };
 

@@ -435,6 +435,44 @@ TEST(ToolSearch, TargetsOnEitherSideHaveMirroredScripts) {
   EXPECT_NEAR(there, -back, 31.0) << "turns are tried by 30 degrees";
 }
 
+TEST(ToolSearch, KeepsToStricterRulesFromTheFirstTurnOn) {
+  Study study = toward(1.0);
+  study.tool_rules.most_turn = 50.0 * kRadPerDeg;
+  study.tool_rules.turn_per_length = 12.0 * kRadPerDeg;  // a pull of 5 mm after each such turn
+  const ToolScripts found = find_tool_scripts(study, aorta(), {.threads = 2});
+  ASSERT_GT(found.pairs.at(0).found, 0) << found.pairs.at(0).stopped;
+  for (const Candidate& candidate : found.found) {
+    EXPECT_EQ(
+        find_broken_rule(candidate.steps, study.catheters[0], study.wires[0], study.tool_rules),
+        "");
+  }
+  EXPECT_GT(std::abs(turned(found.found[0])), 50.0) << "in more than one place";
+}
+
+TEST(ToolSearch, LeavesAHubThatMayNotBeTurnedAsItIs) {
+  Study study = toward(1.0);
+  study.tool_rules.most_turn = 0.0;
+  const ToolScripts found = find_tool_scripts(study, aorta(), {.threads = 2});
+  if (found.pairs.at(0).found == 0) {
+    EXPECT_FALSE(found.pairs[0].stopped.empty());
+  }
+  for (const Candidate& candidate : found.found) {
+    EXPECT_EQ(turned(candidate), 0.0);
+    for (const ToolStep& step : candidate.steps) EXPECT_EQ(step.tries, 0) << "they turn it";
+  }
+}
+
+TEST(ToolSearch, TellsWhichRuleNoScriptKeeps) {
+  Study study = toward(1.0);
+  study.catheters[0].tool.wire.sections[0].bending_stiffness = 101.0;
+  study.tool_rules.turn_per_length = 0.2 * kRadPerDeg;  // 30 degrees ask for 150 mm
+  const ToolScripts found = find_tool_scripts(study, aorta(), {.threads = 2});
+  EXPECT_EQ(found.pairs.at(0).found, 0);
+  EXPECT_NE(found.pairs.at(0).stopped.find("its scripts break a rule of the case: step"),
+            std::string::npos)
+      << found.pairs.at(0).stopped;
+}
+
 TEST(ToolSearch, AWireThatPassesTheBranchByIsLedOutAnew) {
   const Study study = toward(1.0);
   const ToolScripts found = find_tool_scripts(study, aorta(), {.threads = 2});
