@@ -65,16 +65,29 @@ bool ends_soon(const Centerline& line, double beyond) {
   return line.arc_length(last) - beyond < kStumpRadii * line.radius(last);
 }
 
-bool is_stump(const std::vector<Branch>& tree, int k) {
-  const Branch& branch = branch_of(tree, k);
-  return branch.parent >= 0 && ends_soon(branch.line, own_start(branch));
-}
-
 double width_over_parent(const std::vector<Branch>& tree, int k) {
   const Branch& branch = branch_of(tree, k);
   const double beyond = own_start(branch) + kForkSpan;
   const double parent = radius_at(branch_of(tree, branch.parent).line, branch.parent_arc + beyond);
   return radius_at(branch.line, beyond) / std::max(parent, 1e-3);
+}
+
+bool is_stump(const std::vector<Branch>& tree, int k) {
+  const Branch& branch = branch_of(tree, k);
+  return branch.parent >= 0 && ends_soon(branch.line, own_start(branch)) && !is_cut_off(tree, k);
+}
+
+bool is_cut_off(const std::vector<Branch>& tree, int k) {
+  const Branch& branch = branch_of(tree, k);
+  if (branch.parent < 0) return false;
+  const double start = own_start(branch), width = width_beyond(branch);
+  const Eigen::Index last = branch.line.points.cols() - 1;
+  const Centerline& line = branch_of(tree, branch.parent).line;
+  const double span = start + kForkSpan, length = line.arc_length(line.arc_length.size() - 1);
+  if (branch.parent_arc < span || branch.parent_arc + span > length) return false;
+  const double before = radius_at(line, branch.parent_arc - span);
+  return width >= kAortaRadius && width_over_parent(tree, k) > kLike && kLike * width > before &&
+         kLike * branch.line.radius(last) > width && branch.line.arc_length(last) - start > width;
 }
 
 bool goes_on(const std::vector<Branch>& tree, int k) {

@@ -26,8 +26,14 @@ inline constexpr double kAortaRadius = 6.0;  // of what is taken for an aorta, a
 /// an aneurysm or a stump, no artery.
 bool ends_soon(const Centerline& line, double beyond);
 
-/// Whether a branch does so beyond its start. The root does not.
+/// Whether a branch does so beyond its start, and is no vessel that was cut off. The root does not.
 bool is_stump(const std::vector<preprocess::Branch>& tree, int k);
+
+/// Whether a branch is a great vessel that the image cuts off, as a CT of the neck does the
+/// ascending aorta: of 6 mm radius beyond its start and three quarters of that at its end, by its
+/// radius long, three quarters as wide as its parent before the fork or wider, and by a third wider
+/// than that beyond. All assumed.
+bool is_cut_off(const std::vector<preprocess::Branch>& tree, int k);
 
 /// How wide a branch is beyond its start over how wide its parent is as far beyond the fork: what
 /// is beyond the fork is compared, since the ball in it belongs to both. Expects a branch with a

@@ -216,6 +216,28 @@ TEST(Junctions, StumpsAreNone) {
   EXPECT_TRUE(find_junctions(simulate::Way(up, {first, upper})).empty());
 }
 
+TEST(Junctions, ATrunkThatTheImageCutsOffIsNoStump) {
+  // As the ascending aorta on a CT of the neck: the tree's line turns into the right vessel, and
+  // the trunk is seen for so much more, with this radius at its end.
+  const auto count = [](double length, double end_radius, double beyond) {
+    const Branch first{.line = right_renal_way(beyond)};
+    Branch upper{.line = line_through({Vec3(0, 0, 100), Vec3(0, 0, 100 + length)}, 10.0),
+                 .parent = 0,
+                 .parent_arc = 100.0};
+    upper.line.radius.tail(8).setConstant(end_radius);
+    const auto found = find_junctions(simulate::Way(right_renal_way(beyond), {first, upper}));
+    if (!found.empty()) {
+      EXPECT_TRUE(found[0].taken);
+      EXPECT_EQ(found[0].trunk, 1);
+    }
+    return found.size();
+  };
+  EXPECT_EQ(count(28.0, 9.0, 5.0), 1u);
+  EXPECT_EQ(count(18.0, 9.0, 5.0), 0u) << "ends 8 mm beyond the fork's ball";
+  EXPECT_EQ(count(28.0, 6.0, 5.0), 0u) << "narrows to its end, as a sac does";
+  EXPECT_EQ(count(28.0, 9.0, 9.0), 0u) << "the way goes on as wide: a bulge beside it";
+}
+
 TEST(Junctions, WayThatStaysInTheTrunkPassesTheArteryThatTheTreesLineEndsIn) {
   const Branch first{.line = right_renal_way(3.0)};
   const Branch upper{.line = line_through({Vec3(0, 0, 100), Vec3(0, 0, 200)}, 10.0),
