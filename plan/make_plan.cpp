@@ -69,8 +69,13 @@ class Planner {
     find_scripts();
     if (options_.until == PlanOptions::Until::kManoeuvres) return std::move(plan_);
     refine();
-    repeat();
-    refine();  // the repeats may have put others first
+    // The repeats may put others first, and their errors others again.
+    std::size_t refined = 0;
+    do {
+      refined = plan_.refinements.size();
+      repeat();
+      refine();
+    } while (plan_.refinements.size() != refined);
     run_attempts();
     return std::move(plan_);
   }

@@ -87,7 +87,7 @@ double typical_safe_part(const std::vector<RankedPlan>& plans,
 
 void sort_plans(std::vector<RankedPlan>& plans) {
   const auto key = [](const RankedPlan& plan) {
-    return std::tuple(is_sensitive(plan), -plan.expected_safe, plan.expected_score, plan.trial);
+    return std::tuple(ends_unsure(plan), -plan.expected_safe, plan.expected_score, plan.trial);
   };
   std::sort(plans.begin(), plans.end(),
             [&](const RankedPlan& a, const RankedPlan& b) { return key(a) < key(b); });
@@ -134,7 +134,7 @@ void find_ties(std::vector<RankedPlan>& plans, const std::vector<RepeatedPlan>& 
   for (RankedPlan& a : plans) {
     const RepeatedPlan* repeats_a = find_repeated(repeated, a.trial);
     for (const RankedPlan& b : plans) {
-      if (a.trial == b.trial || is_sensitive(a) != is_sensitive(b)) continue;
+      if (a.trial == b.trial || ends_unsure(a) != ends_unsure(b)) continue;
       const double error = a.score_error + b.score_error;
       const double difference = std::abs(a.score.total - b.score.total);
       const RepeatedPlan* repeats_b = find_repeated(repeated, b.trial);
@@ -196,8 +196,9 @@ std::string compare_with_first(const RankedPlan& plan, const RankedPlan& first,
                      compare_forces(metrics[plan.trial].peak_contact_force,
                                     metrics[first.trial].peak_contact_force) +
                      " the first plan";
-  if (is_sensitive(plan) && !is_sensitive(first)) {
-    text += "; behind it because it is sensitive";
+  if (ends_unsure(plan) && !ends_unsure(first)) {
+    text += is_sensitive(plan) ? "; behind it because it is sensitive"
+                               : "; behind it because its tip may not be in the target";
   } else if (plan.robust_score && plan.expected_safe < first.expected_safe) {
     text += "; behind it because it is safe less often";
   } else if (plan.score.total > first.score.total) {
@@ -217,9 +218,12 @@ std::string warnings_of(const RankedPlan& plan, const Metrics& m, const simulate
                         const Limits& limits) {
   std::string text;
   if (is_sensitive(plan)) text += "; sensitive: " + *plan.sensitive;
-  if (!goal.at_section && plan.tip_error && m.tip_to_target + *plan.tip_error >= goal.radius) {
+  if (plan.tip_unsure) {
     text += "; warning: the tip's numerical error of " + two_digits(*plan.tip_error) +
-            " mm may put it outside the target (radius " + two_digits(goal.radius) + " mm)";
+            " mm may put it outside the target (" +
+            (goal.at_section ? "half the lumen's radius is " + two_digits(tip_room(goal, m))
+                             : "radius " + two_digits(goal.radius)) +
+            " mm)";
   }
   if (m.peak_tip_force > limits.tip_force_warn) {
     text += "; warning: tip force " + four_digits(m.peak_tip_force) +
@@ -350,6 +354,14 @@ const RepeatedPlan* find_repeated(const std::vector<RepeatedPlan>& repeated, int
 
 bool is_sensitive(const RankedPlan& plan) { return plan.sensitive && !plan.sensitive->empty(); }
 
+bool ends_unsure(const RankedPlan& plan) { return is_sensitive(plan) || plan.tip_unsure; }
+
+double tip_room(const simulate::Goal& goal, const Metrics& metrics) {
+  constexpr double kPartOfRadius = 0.5;
+  return goal.at_section ? kPartOfRadius * goal.radius
+                         : std::max(0.0, goal.radius - metrics.tip_to_target);
+}
+
 NumericalError assumed_error(const Metrics& metrics) {
   return {.position = kAssumedPositionError,
           .tip = kAssumedPositionError,
@@ -456,6 +468,7 @@ Ranking rank(const Study& study, const std::vector<Candidate>& candidates,
     if (known) {
       plan.position_error = known->position;
       plan.tip_error = known->tip;
+      plan.tip_unsure = known->tip >= tip_room(study.goal, metrics[k]);
     }
     if (!findings.sensitive.empty()) plan.sensitive = findings.sensitive[k];
     plan.score_error = compute_score_error(metrics[k], known.value_or(assumed_error(metrics[k])),

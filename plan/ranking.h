@@ -90,6 +90,8 @@ struct RankedPlan {
   std::optional<double> tip_error;       // as that, of the tip alone                       [mm]
   /// Empty if not known; else why its end hangs on how it is solved, "" where it does not.
   std::optional<std::string> sensitive;
+  bool tip_unsure = false;  // its tip's error is known, and as large as tip_room(): it may not be
+                            // in the target
   std::optional<double> robust_score;  // mean over its repeats; empty without them
   double expected_safe = 1.0;          // part of its repeats in which it is safe, see rank()
   double expected_score = 0.0;         // mean over as many repeats as any plan has, see rank()
@@ -131,7 +133,7 @@ struct Findings {
 
 /// Orders the plans, and says which of them are tied.
 ///
-/// Order: plans that are known to be sensitive come behind all others. Then by the part of its
+/// Order: plans whose end is known to be unsure come behind all others. Then by the part of its
 /// repeats in which a plan is safe; then by the mean score over all
 /// repeats, in which one that is not safe costs 1; equals by index of the candidate. A plan without
 /// repeats stands as if it were safe as often as those with them, in the median. Fewer repeats than
@@ -139,7 +141,7 @@ struct Findings {
 /// (its own score without any) plus what the repeats that it lacks typically add, which is the
 /// median over the plans that have them.
 ///
-/// Ties: two plans, both or none of them sensitive, are tied
+/// Ties: two plans, both or none of an unsure end, are tied
 ///   - if their scores differ by no more than the sum of their errors; or
 ///   - if both have repeats, and the central 90 % of their paired differences over the repeats that
 ///     both have, widened by both errors, holds 0: then the unknowns decide which is better; or
@@ -153,6 +155,14 @@ Ranking rank(const Study& study, const std::vector<Candidate>& candidates,
 
 /// Whether it is known that the plan's end hangs on how it is solved.
 bool is_sensitive(const RankedPlan& plan);
+
+/// Whether it is known that the plan is sensitive or may not end in the target.
+bool ends_unsure(const RankedPlan& plan);
+
+/// How large the stated error of a tip may be that reached: half the radius of a cross-section's
+/// lumen, chosen, and of a sphere what is left to its border [mm]. With a larger one it is open
+/// whether the tip is in that vessel or before its mouth.
+double tip_room(const simulate::Goal& goal, const Metrics& metrics);
 
 /// Why a trial is no plan, in a sentence; empty if it is one.
 std::string exclusion_reason(const Measured& trial, const Study& study, const Limits& limits);

@@ -311,9 +311,7 @@ class Weighing {
       return;
     }
     const double distance = trial(first.trial).metrics.tip_to_target;
-    const double room = goal.at_section ? rules_.tip_error_part * goal.radius
-                                        : std::max(0.0, goal.radius - distance);
-    const bool large = *first.tip_error >= room;
+    const bool large = first.tip_unsure;
     std::string text = "The tip's stated error is " + two_digits(*first.tip_error) +
                        " mm, of the computation alone";
     text += goal.at_section

@@ -54,10 +54,6 @@ struct VerdictRules {
   /// of three failures in ten one would want to hear before. It takes 9 repeats that are all safe,
   /// or 15 of 16.
   double sure_share = 0.7;
-  /// Of the lumen's radius at a target in a vessel: with a larger error of the tip it is open
-  /// whether the tip is in that vessel or before its mouth. Of a sphere, what the tip has left to
-  /// its border counts in full.
-  double tip_error_part = 0.5;
   /// Of all trials: where more end without telling whether the wire would reach (at an end of the
   /// image, in a loop that crosses itself, without equilibrium, by our fault), "none reaches" is no
   /// finding. Chosen: the trials that reach are fewer than this in most cases.

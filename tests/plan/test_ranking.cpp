@@ -255,7 +255,7 @@ TEST(Rank, SaysWhyThePlansStandWhereTheyDo) {
 TEST(Rank, PutsSensitivePlansBehindAllOthersWithTheReason) {
   Bench bench(1);
   for (const double force : {0.1, 0.2, 0.3, 0.4}) bench.add(0, 1.0, force);
-  bench.errors.assign(4, NumericalError{.tip = 3.0});  // so large that all scores are tied
+  bench.errors.assign(4, NumericalError{.tip = 2.9});  // so large that all scores are tied
   Findings findings{.errors = bench.errors};
   const std::string why = "with pushes half as long its tip ends 4.6 mm away";
   findings.sensitive = {why, "", std::nullopt, why};
@@ -276,6 +276,27 @@ TEST(Rank, PutsSensitivePlansBehindAllOthersWithTheReason) {
   EXPECT_EQ(order_of(rank(bench.study, bench.candidates, bench.trials, bench.limits, bench.weights,
                           findings)),
             (std::vector<int>{0, 1, 2, 3}));
+}
+
+TEST(Rank, PutsPlansWhoseTipMayNotBeInTheTargetBehindAllOthers) {
+  for (const bool at_section : {false, true}) {
+    Bench bench(1);
+    bench.study.goal.at_section = at_section;
+    Metrics near;
+    near.tip_to_target = 1.0;
+    const double room = tip_room(bench.study.goal, near);
+    EXPECT_EQ(room, at_section ? 0.5 * bench.study.goal.radius : bench.study.goal.radius - 1.0);
+    for (const double force : {0.1, 0.2, 0.3}) bench.add(0, 1.0, force);
+    bench.errors = {NumericalError{.tip = room}, NumericalError{.tip = 0.99 * room}, std::nullopt};
+    const Ranking ranking = bench.ranked();
+    EXPECT_EQ(order_of(ranking), (std::vector<int>{1, 2, 0}));
+    EXPECT_TRUE(ranking.plans[2].tip_unsure && ends_unsure(ranking.plans[2]));
+    EXPECT_TRUE(ranking.plans[2].tied_with.empty());
+    const std::string& why = ranking.plans[2].sentence;
+    EXPECT_NE(why.find("; behind it because its tip may not be in the target"), std::string::npos)
+        << why;
+    EXPECT_NE(why.find(" mm may put it outside the target ("), std::string::npos) << why;
+  }
 }
 
 TEST(Rank, ComparesPlansThatDoNotTouchTheWall) {
