@@ -194,6 +194,24 @@ class Weighing {
   }
 
   // ---- A plan.
+  /// Of its wire, for a catheter of its own or the one that the table of lengths assumes.
+  void weigh_length(const RankedPlan& first) {
+    if (!known_.way || !known_.way->wire_needed) return;
+    const double length = wire_of(first.trial).length();
+    const int own = known_.plan.candidates[static_cast<std::size_t>(first.trial)].catheter;
+    double needed = *known_.way->wire_needed;
+    if (own >= 0) {
+      needed += known_.study.catheters[static_cast<std::size_t>(own)].tool.wire.length() -
+                known_.way->catheter_length;
+    }
+    if (length >= needed) return;
+    const std::string told = whole_millimetres(needed);
+    find(Answer::kFeasible, "The wire is " + whole_millimetres(length) + " long, and " + told +
+                                " are needed to take " + (own < 0 ? "a" : "the") +
+                                " catheter over it and hold it.");
+    change("A wire of at least " + told + ", or a shorter catheter.");
+  }
+
   void weigh_plan(const RankedPlan& first) {
     const RepeatedPlan* repeats = repeats_of(first.trial);
     const Metrics& m = trial(first.trial).metrics;
@@ -217,13 +235,7 @@ class Weighing {
                " mm, more than the " + two_digits(kLinearWallPart) +
                " of the radius that its model holds for: forces there are rough.");
     }
-    const double length = wire_of(first.trial).length();
-    if (known_.way && known_.way->wire_needed && length < *known_.way->wire_needed) {
-      const std::string needed = whole_millimetres(*known_.way->wire_needed);
-      find(Answer::kFeasible, "The wire is " + whole_millimetres(length) + " long, and " + needed +
-                                  " are needed to take a catheter over it and hold it.");
-      change("A wire of at least " + needed + ", or a shorter catheter.");
-    }
+    weigh_length(first);
   }
 
   void weigh_share(const RankedPlan& first, const RepeatedPlan* repeats) {

@@ -40,6 +40,7 @@ struct WayFindings {
   int bend_grade = 0;                 // of 3
   std::string bend_ostium;            // the branch that the way turns into there; else empty
   std::optional<double> wire_needed;  // with what is to be held and taken over the wire    [mm]
+  double catheter_length = 0.0;       // of what is taken over it, in wire_needed           [mm]
 };
 
 /// Where one answer ends and the next begins. None of them was measured on patients.

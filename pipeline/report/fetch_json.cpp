@@ -109,10 +109,18 @@ Json fetch_json(const ReportInput& input, const Json& anatomy) {
   if (plans.empty()) return list;
   const Json& access = anatomy.at("access");
   const Json& lengths = anatomy.at("lengths");
-  const double needed = lengths.at("wire_needed_mm");
   const auto candidate = [&](std::size_t k) -> const plan::Candidate& {
     return input.plan.candidates[static_cast<std::size_t>(plans[k].trial)];
   };
+  const plan::AccessLimits defaults;
+  const double way = lengths.at("way_mm"), working = lengths.at("working_mm");
+  double comes_off = lengths.at("catheter_mm");
+  bool assumed = comes_off == defaults.catheter_length || working == defaults.working_length;
+  if (const int own = candidate(0).catheter; own >= 0) {
+    comes_off = input.study.catheters[static_cast<std::size_t>(own)].tool.wire.length();
+    assumed = working == defaults.working_length;
+  }
+  const double needed = way + comes_off + working;
   std::vector<int> wires;
   for (std::size_t k = 0; k < std::min(kPlansTold, plans.size()); ++k) {
     const int wire = candidate(k).wire;
@@ -133,15 +141,12 @@ Json fetch_json(const ReportInput& input, const Json& anatomy) {
         catheter_row(access.at("device"), first, lengths.at("catheter_mm").get<double>()));
   }
   list.push_back(sheath_row(access.at("sheath"), inside));
-  const plan::AccessLimits defaults;
-  list.push_back(fetch_row(
-      "Wire length", {},
-      format("%.0f mm needed, counted from the access point: %.0f mm of way, %.0f mm of "
-             "catheter that comes off it, %.0f mm to hold; skin to vessel is in the last",
-             needed, lengths.at("way_mm").get<double>(), lengths.at("catheter_mm").get<double>(),
-             lengths.at("working_mm").get<double>()),
-      lengths.at("catheter_mm") == defaults.catheter_length ||
-          lengths.at("working_mm") == defaults.working_length));
+  list.push_back(
+      fetch_row("Wire length", {},
+                format("%.0f mm needed, counted from the access point: %.0f mm of way, %.0f mm of "
+                       "catheter that comes off it, %.0f mm to hold; skin to vessel is in the last",
+                       needed, way, comes_off, working),
+                assumed));
   return list;
 }
 
