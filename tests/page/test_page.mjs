@@ -103,7 +103,7 @@ const checkPage = (title, file) => {
       await page.keyboard.press("Home");
       const atStart = await picture(page);
       assert.notEqual(atStart, atEnd, "the wire is drawn elsewhere");
-      assert.match(await page.textContent("#insertion-state"), /^0\u00a0mm of/);
+      assert.match(await page.textContent("#insertion-state"), /^0\u00a0mm inserted/);
       await page.keyboard.press("End");
       assert.equal(await picture(page), atEnd, "and comes back");
       await page.click("#play");
@@ -133,19 +133,20 @@ const checkPage = (title, file) => {
 
     use("sorts the table both ways and filters it by wire", async (page) => {
       await page.selectOption("#filter-rank", "all");
-      // Whichever angle the case varies.
-      let title;
+      // Whichever angle the case varies; else the rank, by which it is sorted already.
+      let title = "Rank";
       for (const angle of ["Inclination", "Azimuth", "Roll"]) {
         if (new Set(await column(page, angle)).size > 1) title = angle;
       }
-      assert.ok(title, "the case varies an angle");
+      const numbers = async () => (await column(page, title)).map((text) => (text === "\u2013" ? Infinity : parseFloat(text)));
+      if (title === "Rank") await page.click(`#plans th button:text-is("${title}")`);
       await page.click(`#plans th button:text-is("${title}")`);
-      const rising = (await column(page, title)).map(parseFloat);
+      const rising = await numbers();
       assert.ok(new Set(rising).size > 1, "there is something to sort");
       assert.deepEqual(rising, [...rising].sort((a, b) => a - b));
       await page.focus(`#plans th button:text-is("${title}")`);
       await page.keyboard.press("Enter");
-      const falling = (await column(page, title)).map(parseFloat);
+      const falling = await numbers();
       assert.deepEqual(falling, [...falling].sort((a, b) => b - a));
       const wires = new Set(await column(page, "Wire"));
       await page.selectOption("#filter-wire", "0");
@@ -175,7 +176,7 @@ const checkPage = (title, file) => {
           cells.add(await page.evaluate(() => document.activeElement.dataset.trial));
         }
       }
-      assert.ok(cells.size > 1 && !cells.has(undefined));
+      assert.ok(cells.size > (await page.locator("#heat-grid button").count() > 1 ? 1 : 0) && !cells.has(undefined));
       await page.keyboard.press("Enter");
       assert.equal(await page.inputValue("#pick-trial"),
         await page.evaluate(() => document.activeElement.dataset.trial));

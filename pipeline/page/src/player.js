@@ -139,7 +139,7 @@ export const vesselSection = (page, selection) => {
       : "never entered the vessel";
     const last = trial.pushes()[trial.pushes().length - 1]?.insertion ?? 0;
     const moved = page.motion && shape.sections ? `; the vessel moved by ${number(farthest(shape.sections))}\u00a0mm` : "";
-    state.textContent = `${number(insertion)}\u00a0mm of ${number(last)}\u00a0mm inserted: ${forces}${moved}`;
+    state.textContent = `${number(insertion)}\u00a0mm inserted, ${number(last)}\u00a0mm at the end: ${forces}${moved}`;
     slider.setAttribute("aria-valuetext", `${number(insertion)} mm inserted`);
   };
   const show = () => {
