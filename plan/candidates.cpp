@@ -72,6 +72,14 @@ simulate::Introducer make_introducer(const Study& study, const Candidate& candid
       .roll = candidate.roll};
 }
 
+Candidate first_candidate(const Study& study, const ToolPair& pair) {
+  return {.wire = pair.wire,
+          .inclination = study.inclinations.front(),
+          .azimuth = study.azimuths.front(),
+          .roll = study.rolls.front(),
+          .catheter = pair.catheter};
+}
+
 std::vector<simulate::Tool> tools_of(const Study& study, const Candidate& candidate) {
   return {study.catheters.at(static_cast<std::size_t>(candidate.catheter)).tool,
           {.wire = study.wires.at(static_cast<std::size_t>(candidate.wire))}};

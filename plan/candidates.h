@@ -48,6 +48,9 @@ Vec3 introducer_direction(const Vec3& tangent, double inclination, double azimut
 /// Where and how the candidate enters the vessel.
 simulate::Introducer make_introducer(const Study& study, const Candidate& candidate);
 
+/// Scripts of a pair begin so: at the study's first inclination, azimuth and roll of both hubs.
+Candidate first_candidate(const Study& study, const ToolPair& pair);
+
 /// The catheter and the wire of a candidate that has one, from the outside in.
 std::vector<simulate::Tool> tools_of(const Study& study, const Candidate& candidate);
 

@@ -26,8 +26,12 @@ std::vector<bool> try_scripts(simulate::ToolTrial& trial, const std::vector<Tool
 
 struct FoundScript {
   ToolScript steps;
-  double peak_force = 0.0;  // in the scout                                                   [N]
-  double turned = 0.0, depth = 0.0;     // of the hub, of the catheter                    [rad, mm]
+  /// The same, its last turn and pull by so much, whatever is seen; empty where that breaks a rule,
+  /// or is no other script.
+  ToolScript by_length = {};
+  double peak_force = 0.0;              // in the scout, past the way up                         [N]
+  double turned = 0.0, depth = 0.0;     // of the hub, of the catheter                     [rad, mm]
+  bool holds = false;                   // made again from where its start begins, it reaches
   double share = 0.0;                   // of it and its neighbours that reach
   std::vector<ToolScript> spares = {};  // neighbours that do
 };

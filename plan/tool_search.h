@@ -17,9 +17,6 @@ namespace wireplan::plan {
 /// Whether there is anything to search: pairs that fit, and an ostium.
 std::vector<ToolPair> pairs_of(const Study& study);
 
-/// A script of the pair begins so: at the study's first inclination, azimuth and roll of both hubs.
-Candidate first_candidate(const Study& study, const ToolPair& pair);
-
 /// What came of a pair.
 struct PairFindings {
   ToolPair pair;
@@ -48,7 +45,9 @@ Study tool_scout_study(const Study& study);
 /// withdrawals of the wire; at all turns by 30 degrees; pulled or pushed by 2 mm. States whose tip
 /// lies best at the ostium are gone on from. A found script turns and pulls until the tip looks and
 /// lies as it did then, and leads the wire out as far into the branch: what a hand sees, which
-/// holds where friction and stiffness are others. Keeps up to six scripts of a pair, which differ
+/// holds where friction and stiffness are others. Where it does not reach so when made again, and
+/// does by the same lengths, it turns and pulls by these. The way up is made once for a pair, and
+/// not again for neighbours. Keeps up to six scripts of a pair, which differ
 /// in turn, or in depth, first those of whose neighbours (tool_neighbours.h) most reach too. The
 /// same at any thread count. The first script that is found is told to `on_first`, where given, at
 /// once and from any thread.

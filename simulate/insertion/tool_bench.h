@@ -102,6 +102,8 @@ class ToolBench {
   /// brought in together by the introducer from where they do. That is no move: work counts from
   /// then on.
   explicit ToolBench(const ToolScene& scene);
+  /// Where the other is, as its mark would take it back there. Expects one that has settled.
+  ToolBench(const ToolBench& other);
   bool settled() const { return settled_; }
 
   /// In parts that are short enough for the tools to follow. False where even the shortest part

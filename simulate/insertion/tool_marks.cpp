@@ -34,6 +34,11 @@ bool ToolBench::divide(double longest) {
   return true;
 }
 
+ToolBench::ToolBench(const ToolBench& other) : scene_(other.scene_) {
+  expects(other.settled_);
+  restore(other.save());
+}
+
 ToolBench::Mark ToolBench::save() const {
   return {.elements = elements_,
           .places = now_.places,

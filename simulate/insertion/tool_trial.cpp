@@ -66,27 +66,27 @@ ToolTrial::ToolTrial(const std::vector<Tool>& tools, const Introducer& introduce
     : goal_(goal),
       vessel_(vessel),
       options_(options),
-      bench_(std::make_unique<ToolBench>(scene_of(tools, introducer, vessel, options))),
+      bench_(scene_of(tools, introducer, vessel, options)),
       start_roll_(introducer.roll) {
   expects(!goal.at_section || goal.way);
-  start_energy_ = bench_->record().energy.total();
+  start_energy_ = bench_.record().energy.total();
   record_.roll = introducer.roll;
-  record_.terms = name_terms(bench_->composite().rod, {"tools"}, &vessel,
+  record_.terms = name_terms(bench_.composite().rod, {"tools"}, &vessel,
                              friction_of(tools.back().wire, options.insertion));
   for (const Tool& tool : tools) record_.tools.emplace_back().name = tool.wire.name;
   best_distance_ = (tip(static_cast<int>(tools.size()) - 1) - goal.point).norm();
-  if (!bench_->settled()) {
+  if (!bench_.settled()) {
     end(Outcome::kNotConverged, "no equilibrium of the tools at the introducer");
   }
 }
 
 double ToolTrial::insertion(int tool) const {
-  return bench_->places()[static_cast<std::size_t>(tool)].insertion;
+  return bench_.places()[static_cast<std::size_t>(tool)].insertion;
 }
 
 double ToolTrial::foremost() const {
   double most = 0.0;
-  for (const ToolPlace& place : bench_->places()) most = std::max(most, place.insertion);
+  for (const ToolPlace& place : bench_.places()) most = std::max(most, place.insertion);
   return most;
 }
 
@@ -94,17 +94,15 @@ double ToolTrial::foremost_of(int tool) const {
   return tool == kBothTools ? foremost() : insertion(tool);
 }
 
-Vec3 ToolTrial::tip(int tool) const {
-  return bench_->at_rest(bench_->nodes_of(tool).rightCols<1>());
-}
+Vec3 ToolTrial::tip(int tool) const { return bench_.at_rest(bench_.nodes_of(tool).rightCols<1>()); }
 
-Vec3 ToolTrial::foremost_tip() const { return bench_->at_rest(bench_->state().x.rightCols<1>()); }
+Vec3 ToolTrial::foremost_tip() const { return bench_.at_rest(bench_.state().x.rightCols<1>()); }
 
 Vec3 ToolTrial::tip_direction(int tool) const {
-  const Eigen::Matrix3Xd all = bench_->nodes_of(tool);
-  if (all.cols() < 2) return bench_->state().x.col(1) - bench_->state().x.col(0);
+  const Eigen::Matrix3Xd all = bench_.nodes_of(tool);
+  if (all.cols() < 2) return bench_.state().x.col(1) - bench_.state().x.col(0);
   const Eigen::Matrix3Xd nodes =
-      bench_->at_rest(all.rightCols(std::min<Eigen::Index>(3, all.cols())));
+      bench_.at_rest(all.rightCols(std::min<Eigen::Index>(3, all.cols())));
   return (nodes.rightCols<1>() - nodes.leftCols<1>()).normalized();
 }
 
@@ -221,12 +219,12 @@ bool ToolTrial::part(const ToolStep& step) {
     if (!moves(step, k)) continue;
     double others = 0.0;
     for (std::size_t i = 0; i < count; ++i) {
-      if (!moves(step, i)) others = std::max(others, bench_->places()[i].insertion);
+      if (!moves(step, i)) others = std::max(others, bench_.places()[i].insertion);
     }
-    const double here = bench_->places()[k].insertion;
+    const double here = bench_.places()[k].insertion;
     const double least = others >= kToolStart ? 0.0 : kToolStart;
     const double to =
-        std::clamp(here + step.push, std::min(least, here), bench_->tools()[k].wire.length());
+        std::clamp(here + step.push, std::min(least, here), bench_.tools()[k].wire.length());
     move.push[k] = to - here;
     move.turn[k] = step.turn;
     pushed = std::max(pushed, std::abs(move.push[k]));
@@ -238,14 +236,14 @@ bool ToolTrial::part(const ToolStep& step) {
     return false;
   }
   if (!move_or_divide(move)) {
-    if (bench_->through_wall()) {
+    if (bench_.through_wall()) {
       end(Outcome::kLeftLumen, "a tool goes through the wall after " + in_mm(foremost()) +
                                    " of insertion, near " +
-                                   place_text(bench_->state().x.rightCols<1>()) + " mm");
+                                   place_text(bench_.state().x.rightCols<1>()) + " mm");
     } else {
       end(Outcome::kNotConverged, "no equilibrium after " + in_mm(foremost()) +
                                       " of insertion, tip at " +
-                                      place_text(bench_->state().x.rightCols<1>()) + " mm");
+                                      place_text(bench_.state().x.rightCols<1>()) + " mm");
     }
     return false;
   }
@@ -258,18 +256,18 @@ bool ToolTrial::part(const ToolStep& step) {
 /// divided a little finer: nodes then lie elsewhere at ridges of the wall, and friction is spread
 /// anew.
 bool ToolTrial::move_or_divide(const ToolMove& move) {
-  const std::vector<ToolPlace> start = bench_->places();
-  if (bench_->move(move)) return true;
+  const std::vector<ToolPlace> start = bench_.places();
+  if (bench_.move(move)) return true;
   for (const double finer : kFiner) {
     ToolMove rest = move;
     double next = foremost();
     for (std::size_t i = 0; i < start.size(); ++i) {
-      rest.push[i] += start[i].insertion - bench_->places()[i].insertion;
-      rest.turn[i] += start[i].roll - bench_->places()[i].roll;
-      next = std::max(next, bench_->places()[i].insertion + rest.push[i]);
+      rest.push[i] += start[i].insertion - bench_.places()[i].insertion;
+      rest.turn[i] += start[i].roll - bench_.places()[i].roll;
+      next = std::max(next, bench_.places()[i].insertion + rest.push[i]);
     }
-    if (bench_->through_wall()) return false;
-    if (bench_->divide(finer * next) && bench_->move(rest)) return true;
+    if (bench_.through_wall()) return false;
+    if (bench_.divide(finer * next) && bench_.move(rest)) return true;
   }
   return false;
 }
@@ -279,23 +277,23 @@ bool ToolTrial::move_or_divide(const ToolMove& move) {
 bool ToolTrial::divide_for(const ToolMove& move) {
   double next = foremost();
   for (std::size_t i = 0; i < move.push.size(); ++i) {
-    next = std::max(next, bench_->places()[i].insertion + move.push[i]);
+    next = std::max(next, bench_.places()[i].insertion + move.push[i]);
   }
   const double asked = options_.insertion.element_length;
-  const double elements = static_cast<double>(bench_->composite().rod.rest_length.size());
+  const double elements = static_cast<double>(bench_.composite().rod.rest_length.size());
   const bool longer = next > kDivideLonger * asked * elements;
   const bool shorter = foremost() < kDivideShorter * asked * elements && foremost() > 4.0 * asked;
   if (!longer && !shorter) return true;
-  return bench_->divide(next) || next < kLongestEdge * asked * elements;
+  return bench_.divide(next) || next < kLongestEdge * asked * elements;
 }
 
 /// Forces and shape of the present equilibrium.
 void ToolTrial::note(const ToolStep& step) {
-  const ToolRecord& now = bench_->record();
-  const std::vector<Touch> touches = bench_->touches();
+  const ToolRecord& now = bench_.record();
+  const std::vector<Touch> touches = bench_.touches();
   Push push;
   push.insertion = foremost();
-  push.tip = bench_->state().x.rightCols<1>();
+  push.tip = bench_.state().x.rightCols<1>();
   push.hub_angle = now.tools.front().place.roll - start_roll_;
   for (std::size_t i = 0; i < now.tools.size(); ++i) {
     if (moves(step, i)) push.push_force += now.tools[i].push_force;
@@ -309,7 +307,7 @@ void ToolTrial::note(const ToolStep& step) {
     push.max_penetration = std::max(push.max_penetration, touch.penetration);
     if (touch.wall_displacement > push.wall_displacement) {
       push.wall_displacement = touch.wall_displacement;
-      const double radius = bench_->composite().rod.radius - touch.thinner;
+      const double radius = bench_.composite().rod.radius - touch.thinner;
       push.wall_displacement_point = touch.position - radius * touch.normal;
     }
   }
@@ -334,8 +332,8 @@ void ToolTrial::note(const ToolStep& step) {
     track.wall_force.push_back(now.tools[i].wall_force);
     push.tip_force = std::max(push.tip_force, at_tip.norm());
   }
-  const RodState& state = bench_->state();
-  const double h = bench_->composite().rod.rest_length[0];
+  const RodState& state = bench_.state();
+  const double h = bench_.composite().rod.rest_length[0];
   for (Eigen::Index i = 1; i + 1 < state.x.cols(); ++i) {
     const Vec3 before = (state.x.col(i) - state.x.col(i - 1)).normalized(),
                after = (state.x.col(i + 1) - state.x.col(i)).normalized();
@@ -353,7 +351,7 @@ void ToolTrial::note(const ToolStep& step) {
     std::map<int, double> forces;
     for (const Touch& touch : touches) {
       const WireContact contact =
-          contact_of(touch, bench_->composite().rod.radius - touch.thinner, vessel_.locator);
+          contact_of(touch, bench_.composite().rod.radius - touch.thinner, vessel_.locator);
       if (contact.triangle >= 0) forces[contact.triangle] += touch.normal_force;
     }
     for (const auto& [triangle, force] : forces) {
@@ -371,18 +369,18 @@ void ToolTrial::note(const ToolStep& step) {
 }
 
 Shape ToolTrial::shape_here() const {
-  const RodState& state = bench_->state();
+  const RodState& state = bench_.state();
   Shape shape{.insertion = foremost(),
-              .hub_angle = bench_->places().front().roll - start_roll_,
+              .hub_angle = bench_.places().front().roll - start_roll_,
               .nodes = state.x,
               .sections = state.sections,
               .contact_force = Eigen::VectorXd::Zero(state.x.cols())};
-  for (const Touch& touch : bench_->touches()) {
+  for (const Touch& touch : bench_.touches()) {
     const double force = force_on_wire(touch).norm();
     shape.contact_force[touch.edge] += (1.0 - touch.part) * force;
     if (touch.part > 0.0) shape.contact_force[touch.edge + 1] += touch.part * force;
   }
-  for (const ToolPlace& place : bench_->places()) shape.tools.push_back(place.insertion);
+  for (const ToolPlace& place : bench_.places()) shape.tools.push_back(place.insertion);
   return shape;
 }
 
@@ -400,7 +398,7 @@ void ToolTrial::check_place() {
     return end(Outcome::kReached, "tip " + in_mm(best_distance_) + " from the target" + after);
   }
   best_distance_ = to_goal;
-  const Eigen::Matrix3Xd nodes = bench_->at_rest(bench_->state().x);
+  const Eigen::Matrix3Xd nodes = bench_.at_rest(bench_.state().x);
   if (goal_.at_section && goal_.way->may_have_arrived(here) &&
       goal_.way->find_arrival(nodes, vessel_.lumen)) {
     const std::optional<std::string> detour = goal_.way->find_detour(nodes);
@@ -466,16 +464,16 @@ TrialResult ToolTrial::finish() {
   if (!ended()) {
     const Vec3 tip_here = foremost_tip();
     const std::string reason = "the script ends with the tip at " +
-                               place_text(bench_->state().x.rightCols<1>()) + " mm, " +
+                               place_text(bench_.state().x.rightCols<1>()) + " mm, " +
                                in_mm((tip_here - goal_.point).norm()) + " from the target";
     record_.pushes.empty() ? end(Outcome::kMissed, reason)
                            : end_where_it_is(Outcome::kMissed, reason);
   }
-  record_.nodes = bench_->state().x;
-  record_.sections = bench_->state().sections;
-  for (const Touch& touch : bench_->touches()) {
+  record_.nodes = bench_.state().x;
+  record_.sections = bench_.state().sections;
+  for (const Touch& touch : bench_.touches()) {
     record_.contacts.push_back(
-        contact_of(touch, bench_->composite().rod.radius - touch.thinner, vessel_.locator));
+        contact_of(touch, bench_.composite().rod.radius - touch.thinner, vessel_.locator));
   }
   for (std::size_t k = 0; k < peak_.size(); ++k) {
     if (peak_[k] > 0.0) record_.peak_forces.push_back({static_cast<int>(k), peak_[k]});
@@ -486,7 +484,7 @@ TrialResult ToolTrial::finish() {
 
 ToolTrial::Mark ToolTrial::save() const {
   expects(!ended());
-  return {.bench = bench_->save(),
+  return {.bench = bench_.save(),
           .pushes = record_.pushes.size(),
           .shapes = record_.shapes.size(),
           .step = step_,
@@ -496,7 +494,7 @@ ToolTrial::Mark ToolTrial::save() const {
 }
 
 void ToolTrial::restore(const Mark& mark) {
-  bench_->restore(mark.bench);
+  bench_.restore(mark.bench);
   record_.pushes.resize(mark.pushes);
   record_.steps.resize(mark.pushes);
   step_ = mark.step;

@@ -7,7 +7,6 @@
 /// and torque are the catheter's, the hand's force is that on what it moves, work and energy
 /// are those of both. What each tool feels is in ToolTrack. Tips and goals are looked for in the
 /// vessel at rest.
-#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -63,6 +62,7 @@ struct ToolTrialOptions {
   std::optional<TakeOff> take_off;  // that steps may end at; without one they are made whole
 };
 
+/// Copies go on by themselves from where they were copied.
 class ToolTrial {
  public:
   /// Keeps a reference to the vessel. Expects tools from the outside in that fit in one another,
@@ -78,7 +78,7 @@ class ToolTrial {
   bool ended() const { return outcome_.has_value(); }
   bool reached() const { return outcome_ == Outcome::kReached; }
   const std::string& reason() const { return record_.reason; }  // why it has ended
-  const ToolBench& bench() const { return *bench_; }
+  const ToolBench& bench() const { return bench_; }
   double insertion(int tool) const;
   Vec3 tip(int tool) const;  // in the vessel at rest                                      [mm]
   Vec3 foremost_tip() const;
@@ -91,7 +91,8 @@ class ToolTrial {
   /// Ends the trial, unless it has ended: as reached if the tip is in the goal, else as missed.
   TrialResult finish();
 
-  /// save() marks where an unfinished trial is, restore() takes it back there; peak forces stay.
+  /// save() marks where an unfinished trial is, restore() takes it back there; peak forces stay. To
+  /// a mark further on, of a copy, it brings no records of how it came there.
   struct Mark {
     ToolBench::Mark bench;
     std::size_t pushes = 0, shapes = 0;
@@ -121,7 +122,7 @@ class ToolTrial {
   const Goal goal_;
   const VesselModel& vessel_;
   const ToolTrialOptions options_;
-  std::unique_ptr<ToolBench> bench_;
+  ToolBench bench_;
   double start_energy_ = 0.0, start_roll_ = 0.0;  //                          [N mm, rad]
   TrialResult record_;
   std::optional<Outcome> outcome_;

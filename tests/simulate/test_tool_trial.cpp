@@ -151,6 +151,24 @@ TEST(ToolTrial, GoesOnFromAMarkAsItDidBefore) {
   EXPECT_NEAR(trial.insertion(0), 70.0, 1e-9);
 }
 
+TEST(ToolTrial, ACopyKnowsNothingOfWhatTheOtherDoesSince) {
+  ToolTrial trial = hooked_trial();
+  ASSERT_TRUE(trial.make({.tool = 1, .push = 26.0}));
+  ASSERT_TRUE(trial.make({.tool = 0, .push = 20.0}));
+  const ToolTrial::Mark mark = trial.save();
+  ToolTrial copy(trial), early = hooked_trial();
+  ASSERT_TRUE(trial.make({.tool = 1, .push = -20.0}));
+  const ToolStep next{.tool = 0, .push = 4.0};
+  trial.restore(mark);
+  ASSERT_TRUE(trial.make(next));
+  ASSERT_TRUE(copy.make(next));
+  EXPECT_EQ(copy.tip(0), trial.tip(0)) << "bit for bit";
+  EXPECT_EQ(copy.pushes().size(), trial.pushes().size());
+  early.restore(mark);  // marks of one are the other's too
+  ASSERT_TRUE(early.make(next));
+  EXPECT_EQ(early.tip(0), trial.tip(0));
+}
+
 TEST(ToolTrial, ANewDivisionOfTheCentrelineKeepsTheShape) {
   for (const double h : {2.0, 3.5}) {
     SCOPED_TRACE(h);
