@@ -19,6 +19,10 @@ Judgement judge(const Study& study, const Plan& plan, const Limits& limits,
     const int count = static_cast<int>(plan.candidates.size());
     findings.errors = errors_by_trial(plan.refinements, count);
     findings.sensitive = sensitivity_by_trial(plan.refinements, count);
+    findings.refined.assign(plan.candidates.size(), false);
+    for (const Refinement& one : plan.refinements) {
+      findings.refined[static_cast<std::size_t>(one.trial)] = true;
+    }
   }
   for (const Level level : plan.levels) findings.scouted.push_back(level != Level::kFull);
   judgement.ranking = rank(study, plan.candidates, plan.trials, limits, weights, findings);

@@ -218,7 +218,9 @@ std::string warnings_of(const RankedPlan& plan, const Metrics& m, const simulate
                         const Limits& limits) {
   std::string text;
   if (is_sensitive(plan)) text += "; sensitive: " + *plan.sensitive;
-  if (plan.tip_unsure) {
+  if (plan.tip_unsure && !plan.tip_error) {
+    text += "; warning: where its tip ends could not be told by other elements and pushes";
+  } else if (plan.tip_unsure) {
     text += "; warning: the tip's numerical error of " + two_digits(*plan.tip_error) +
             " mm may put it outside the target (" +
             (goal.at_section ? "half the lumen's radius is " + two_digits(tip_room(goal, m))
@@ -447,6 +449,7 @@ Ranking rank(const Study& study, const std::vector<Candidate>& candidates,
   expects(trials.size() == candidates.size());
   expects(errors.empty() || errors.size() == candidates.size());
   expects(findings.sensitive.empty() || findings.sensitive.size() == candidates.size());
+  expects(findings.refined.empty() || findings.refined.size() == candidates.size());
   expects(findings.scouted.empty() || findings.scouted.size() == candidates.size());
   expects_valid(limits, weights);
 
@@ -469,6 +472,8 @@ Ranking rank(const Study& study, const std::vector<Candidate>& candidates,
       plan.position_error = known->position;
       plan.tip_error = known->tip;
       plan.tip_unsure = known->tip >= tip_room(study.goal, metrics[k]);
+    } else {
+      plan.tip_unsure = !findings.refined.empty() && findings.refined[k];
     }
     if (!findings.sensitive.empty()) plan.sensitive = findings.sensitive[k];
     plan.score_error = compute_score_error(metrics[k], known.value_or(assumed_error(metrics[k])),

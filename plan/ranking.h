@@ -90,8 +90,8 @@ struct RankedPlan {
   std::optional<double> tip_error;       // as that, of the tip alone                       [mm]
   /// Empty if not known; else why its end hangs on how it is solved, "" where it does not.
   std::optional<std::string> sensitive;
-  bool tip_unsure = false;  // its tip's error is known, and as large as tip_room(): it may not be
-                            // in the target
+  bool tip_unsure = false;             // its tip may not be in the target: the error is as large as
+                                       // tip_room(), or could not be told though it was refined
   std::optional<double> robust_score;  // mean over its repeats; empty without them
   double expected_safe = 1.0;          // part of its repeats in which it is safe, see rank()
   double expected_score = 0.0;         // mean over as many repeats as any plan has, see rank()
@@ -125,6 +125,7 @@ struct Ranking {
 /// What was found out about single plans besides their trials.
 struct Findings {
   std::vector<std::optional<NumericalError>> errors = {};  // per trial; empty: nothing was refined
+  std::vector<bool> refined = {};  // per trial, with or without an error; empty: nothing was
   /// Per trial, as RankedPlan::sensitive; empty: nothing was refined.
   std::vector<std::optional<std::string>> sensitive = {};
   std::vector<RepeatedPlan> repeated = {};

@@ -316,6 +316,15 @@ class Weighing {
 
   void weigh_tip_error(const RankedPlan& first) {
     const simulate::Goal& goal = known_.study.goal;
+    if (!first.tip_error && first.tip_unsure) {
+      find(Answer::kUnsure,
+           "The error of the tip's place could not be told: runs with other elements or shorter "
+           "pushes do not end there.");
+      doubts_.push_back("runs with other elements or shorter pushes do not end there");
+      change(
+          "Another wire, catheter, angle or roll whose end does not hang on how it is computed.");
+      return;
+    }
     if (!first.tip_error) {
       find(Answer::kUnsure, "The error of the tip's place is not known.");
       doubts_.push_back("the error of the tip's place is not known");

@@ -26,7 +26,7 @@ Json best_plan_json(const Json& report) {
                           "score", "score_error", "mean_score"}) {
     best[key] = plan.at(key);
   }
-  best["sensitive"] = plan.at("sensitive");
+  for (const char* key : {"sensitive", "tip_unsure"}) best[key] = plan.at(key);
   best["repeats_safe"] = nullptr;
   best["repeats"] = nullptr;
   for (const Json& repeated : report.at("robustness").at("plans")) {
@@ -85,16 +85,18 @@ int answer_rank(const Json& row) {
 }
 
 /// Smaller is better: no safe plan last, then by the verdict, plans whose end hangs on how they are
-/// computed after the others, then by the share that is not safe, then by score.
+/// computed, or may not be in the target, after the others, then by the share that is not safe,
+/// then by score.
 std::tuple<bool, int, bool, double, double> order_key(const Json& row) {
   const Json& best = row.at("best_plan");
   if (best.is_null()) return {true, answer_rank(row), false, 1.0, 1.0};
-  const bool sensitive = best.at("sensitive").is_boolean() && best.at("sensitive").get<bool>();
+  const auto holds = [&](const char* key) { return best.value(key, Json()) == true; };
+  const bool unsure = holds("sensitive") || holds("tip_unsure");
   const bool repeated = !best.at("repeats").is_null() && best.at("repeats") != 0;
   const double unsafe =
       repeated ? 1.0 - best.at("repeats_safe").get<double>() / best.at("repeats").get<double>()
                : 0.0;
-  return {false, answer_rank(row), sensitive, unsafe, best.at("score").get<double>()};
+  return {false, answer_rank(row), unsure, unsafe, best.at("score").get<double>()};
 }
 
 /// What the best access comes to, for a row of the same target with a worse answer; null for

@@ -320,6 +320,7 @@ Json ranked_json(const ReportInput& input, std::size_t k) {
     row.put_optional("sensitive", {}, refined == nullptr ? kNotRefined : refined->reason);
   }
   row.put("sensitive_reason", plan.sensitive.value_or(""));
+  row.put("tip_unsure", plan.tip_unsure);
   row.put("sentence", plan.sentence);
   const auto id = static_cast<std::size_t>(plan.trial);
   const plan::Candidate& candidate = input.plan.candidates[id];

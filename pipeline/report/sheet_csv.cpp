@@ -94,6 +94,9 @@ void add_plans(Table& table, const Json& report) {
       table.row("end hangs on how it is computed", plan.at("sensitive"), "", nullptr,
                 plan.at("sensitive_reason"));
     }
+    if (plan.contains("tip_unsure")) {
+      table.row("tip may be outside the target", plan.at("tip_unsure"));
+    }
   }
 }
 

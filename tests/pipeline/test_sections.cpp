@@ -167,7 +167,7 @@ TEST_F(Sections, TellWhatIsWrongWithAllOfThemBeforeAnyIsPushed) {
 
 TEST(Overview, PutsTheBetterAnswerAndThenMoreSafeRepeatsFirst) {
   const auto report = [](int safe, double score, bool plan = true, const char* answer = "feasible",
-                         bool sensitive = false) {
+                         bool sensitive = false, bool tip_unsure = false) {
     Json trial = {{"reached", true}, {"safe", plan}};
     for (const char* key : {"insertion_mm", "peak_tip_force_n", "peak_contact_force_n"}) {
       trial[key] = 0.1;
@@ -179,6 +179,7 @@ TEST(Overview, PutsTheBetterAnswerAndThenMoreSafeRepeatsFirst) {
     }
     Json json = {{"statement", "Research use only."}, {"trials", Json::array({trial})}};
     best["sensitive"] = sensitive;
+    best["tip_unsure"] = tip_unsure;
     json["verdict"] = {{"answer", answer}, {"changes", Json::array()}};
     json["ranking"] = plan ? Json::array({best}) : Json::array();
     json["robustness"]["plans"] =
@@ -211,6 +212,9 @@ TEST(Overview, PutsTheBetterAnswerAndThenMoreSafeRepeatsFirst) {
                    {"b", "t", "b", report(12, 0.4, true, "feasible_with_risk")}}),
             "ba");
   EXPECT_EQ(order({{"a", "t", "a", report(16, 0.1, true, "unsure", true)},
+                   {"b", "t", "b", report(12, 0.4, true, "unsure")}}),
+            "ba");
+  EXPECT_EQ(order({{"a", "t", "a", report(16, 0.1, true, "unsure", false, true)},
                    {"b", "t", "b", report(12, 0.4, true, "unsure")}}),
             "ba");
   const Json both = build_overview(

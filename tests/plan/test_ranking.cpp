@@ -296,6 +296,16 @@ TEST(Rank, PutsPlansWhoseTipMayNotBeInTheTargetBehindAllOthers) {
     EXPECT_NE(why.find("; behind it because its tip may not be in the target"), std::string::npos)
         << why;
     EXPECT_NE(why.find(" mm may put it outside the target ("), std::string::npos) << why;
+
+    // Refined, and without an error all the same, as where finer elements end elsewhere.
+    Findings findings{.errors = {std::nullopt, bench.errors[1], std::nullopt},
+                      .refined = {true, true, false}};
+    const Ranking open =
+        rank(bench.study, bench.candidates, bench.trials, bench.limits, bench.weights, findings);
+    EXPECT_EQ(order_of(open), (std::vector<int>{1, 2, 0}));
+    EXPECT_TRUE(open.plans[2].tip_unsure);
+    EXPECT_NE(open.plans[2].sentence.find("could not be told by other elements and pushes"),
+              std::string::npos);
   }
 }
 

@@ -208,6 +208,10 @@ TEST(Verdict, TipErrorThatIsUnknownOrLargeIsUnsure) {
   unknown.plan.refinements.clear();
   EXPECT_EQ(unknown.verdict().answer, Answer::kUnsure);
   EXPECT_TRUE(tells(unknown.verdict().reasons, "The error of the tip's place is not known."));
+  WhatIsKnown elsewhere = WhatIsKnown::good();
+  elsewhere.plan.refinements[0].error.reset();
+  EXPECT_EQ(elsewhere.verdict().answer, Answer::kUnsure);
+  EXPECT_TRUE(tells(elsewhere.verdict().reasons, "pushes do not end there."));
 
   // Half of the lumen's radius of 2.5 mm.
   for (const double error : {1.24, 1.25}) {

@@ -97,5 +97,5 @@ export const rankingSection = (page, selection) => {
     el("p", {class: "note"},
       "\u00b1 is the estimated error of the simulation's finite elements and of the path that its solver takes; \u00b1\u00a0? where it was not estimated, as only the best plans are run again with finer elements. " +
       (trials.some((t) => t.level !== "full") ? "\u2248 marks trials against a rigid wall, most of them with long elements. " : "") +
-      "Errors of the wire's, the wall's and the image's data are not in it. Plans that the errors cannot tell apart are ties; those whose end hangs on how they are solved are sensitive, and stand last, as do those whose tip's error may put it outside the target."));
+      "Errors of the wire's, the wall's and the image's data are not in it. Plans that the errors cannot tell apart are ties; those whose end hangs on how they are solved are sensitive, and stand last, as do those whose tip's error may put it outside the target, or could not be told."));
 };
