@@ -194,18 +194,12 @@ class Weighing {
   }
 
   // ---- A plan.
-  /// Of its wire, for a catheter of its own or the one that the table of lengths assumes.
   void weigh_length(const RankedPlan& first) {
     if (!known_.way || !known_.way->wire_needed) return;
     const double length = wire_of(first.trial).length();
+    if (length >= *known_.way->wire_needed) return;
     const int own = known_.plan.candidates[static_cast<std::size_t>(first.trial)].catheter;
-    double needed = *known_.way->wire_needed;
-    if (own >= 0) {
-      needed += known_.study.catheters[static_cast<std::size_t>(own)].tool.wire.length() -
-                known_.way->catheter_length;
-    }
-    if (length >= needed) return;
-    const std::string told = whole_millimetres(needed);
+    const std::string told = whole_millimetres(*known_.way->wire_needed);
     find(Answer::kFeasible, "The wire is " + whole_millimetres(length) + " long, and " + told +
                                 " are needed to take " + (own < 0 ? "a" : "the") +
                                 " catheter over it and hold it.");

@@ -39,8 +39,8 @@ struct WayFindings {
   double bend = 0.0, bend_at = 0.0;   // sharpest, between its arms [rad]; arc length [mm]
   int bend_grade = 0;                 // of 3
   std::string bend_ostium;            // the branch that the way turns into there; else empty
-  std::optional<double> wire_needed;  // with what is to be held and taken over the wire    [mm]
-  double catheter_length = 0.0;       // of what is taken over it, in wire_needed           [mm]
+  std::optional<double> wire_needed;  // by the first plan, with what is to be held and taken over
+                                      // the wire                                           [mm]
 };
 
 /// Where one answer ends and the next begins. None of them was measured on patients.

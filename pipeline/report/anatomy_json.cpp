@@ -166,12 +166,7 @@ Json lengths_json(const Centerline& way, const std::vector<plan::Junction>& junc
   return {{"places", places},
           {"way_mm", length},
           {"catheter_mm", limits.catheter_length},
-          {"working_mm", limits.working_length},
-          {"wire_needed_mm", length + limits.catheter_length + limits.working_length},
-          {"assumption",
-           "the wire's tip stays at the target while a catheter of that length comes off the wire, "
-           "and the working length is left to hold; counted from the access point, so what lies "
-           "between it and the skin is part of the working length"}};
+          {"working_mm", limits.working_length}};
 }
 
 /// The line every 2 mm and at its end, to a tenth of a millimetre.
@@ -233,13 +228,36 @@ Json anatomy_panel(const simulate::Way& way) {
   return {{"tree", lines}, {"way", drawn_line(way.path())}};
 }
 
-Json anatomy_json(const Json& figures, const std::vector<simulate::Wire>& wires) {
+Json anatomy_json(const ReportInput& input) {
   Json anatomy;
-  for (const char* key : {"access", "c_arm", "lengths"}) anatomy[key] = figures.at(key);
+  for (const char* key : {"access", "c_arm", "lengths"}) {
+    anatomy[key] = input.figures.at("anatomy").at(key);
+  }
   Json& lengths = anatomy["lengths"];
-  const double needed = lengths.at("wire_needed_mm").get<double>();
+  const auto& plans = input.judgement.ranking.plans;
+  const int catheter =
+      plans.empty() ? -1
+                    : input.plan.candidates[static_cast<std::size_t>(plans.front().trial)].catheter;
+  const bool own = catheter >= 0;
+  lengths["catheter"] = nullptr;
+  if (own) {
+    const simulate::Wire& tube =
+        input.study.catheters[static_cast<std::size_t>(catheter)].tool.wire;
+    lengths["catheter"] = tube.name;
+    lengths["catheter_mm"] = clean(tube.length());
+  }
+  double needed = 0.0;
+  for (const char* part : {"way_mm", "catheter_mm", "working_mm"}) {
+    needed += lengths.at(part).get<double>();
+  }
+  lengths["wire_needed_mm"] = needed;
+  lengths["assumption"] =
+      std::string("the wire's tip stays at the target while ") +
+      (own ? "the catheter of plan 1" : "a catheter of that length") +
+      " comes off the wire, and the working length is left to hold; counted from the access point, "
+      "so what lies between it and the skin is part of the working length";
   lengths["wires"] = Json::array();
-  for (const simulate::Wire& wire : wires) {
+  for (const simulate::Wire& wire : input.study.wires) {
     lengths["wires"].push_back({{"wire", wire.name},
                                 {"length_mm", clean(wire.length())},
                                 {"spare_mm", wire.length() - needed},

@@ -1,11 +1,9 @@
 #pragma once
 /// The report's "anatomy": access, C-arm angles and lengths along the way, as JSON in mm and deg.
-#include <vector>
-
 #include "pipeline/files/json_reader.h"
+#include "pipeline/report/report.h"
 #include "plan/anatomy/access_limits.h"
 #include "simulate/insertion/way.h"
-#include "simulate/wire/rod.h"
 
 namespace wireplan::pipeline {
 
@@ -28,7 +26,8 @@ int grade_from(const std::string& name);
 /// What the page draws: {"tree": [...], "way"}, each line with "points" and "radius" every 2 mm.
 Json anatomy_panel(const simulate::Way& way);
 
-/// The figures of stage anatomy as the report has them, with which wires are long enough.
-Json anatomy_json(const Json& figures, const std::vector<simulate::Wire>& wires);
+/// The figures of stage anatomy as the report has them, with which wires are long enough: for the
+/// catheter of the first plan, where it has one, and else for the one that the limits assume.
+Json anatomy_json(const ReportInput& input);
 
 }  // namespace wireplan::pipeline

@@ -113,14 +113,10 @@ Json fetch_json(const ReportInput& input, const Json& anatomy) {
     return input.plan.candidates[static_cast<std::size_t>(plans[k].trial)];
   };
   const plan::AccessLimits defaults;
-  const double way = lengths.at("way_mm"), working = lengths.at("working_mm");
-  double comes_off = lengths.at("catheter_mm");
-  bool assumed = comes_off == defaults.catheter_length || working == defaults.working_length;
-  if (const int own = candidate(0).catheter; own >= 0) {
-    comes_off = input.study.catheters[static_cast<std::size_t>(own)].tool.wire.length();
-    assumed = working == defaults.working_length;
-  }
-  const double needed = way + comes_off + working;
+  const double way = lengths.at("way_mm"), comes_off = lengths.at("catheter_mm"),
+               working = lengths.at("working_mm"), needed = lengths.at("wire_needed_mm");
+  const bool assumed = working == defaults.working_length ||
+                       (lengths.at("catheter").is_null() && comes_off == defaults.catheter_length);
   std::vector<int> wires;
   for (std::size_t k = 0; k < std::min(kPlansTold, plans.size()); ++k) {
     const int wire = candidate(k).wire;
@@ -137,8 +133,7 @@ Json fetch_json(const ReportInput& input, const Json& anatomy) {
     list.push_back(fetch_row("Catheter", {tube.name},
                              tube.name + format(", %.3g mm outside, of plan 1", inside)));
   } else {
-    list.push_back(
-        catheter_row(access.at("device"), first, lengths.at("catheter_mm").get<double>()));
+    list.push_back(catheter_row(access.at("device"), first, comes_off));
   }
   list.push_back(sheath_row(access.at("sheath"), inside));
   list.push_back(

@@ -487,7 +487,7 @@ Json build_report(const ReportInput& input) {
   report["artifacts"] = artifacts_json(input);
   report["vessel"] = vessel_json(input);
   if (input.figures.contains("anatomy")) {
-    report["anatomy"] = anatomy_json(input.figures.at("anatomy"), input.study.wires);
+    report["anatomy"] = anatomy_json(input);
     report["fetch"] = fetch_json(input, report["anatomy"]);
   }
   if (!input.motion.is_null()) report["vessel_motion"] = input.motion;

@@ -38,7 +38,6 @@ plan::WayFindings way_findings(const Json& anatomy) {
   way.bend_grade = grade_from(bend.at("grade"));
   if (!bend.at("at_ostium_of").is_null()) way.bend_ostium = bend.at("at_ostium_of");
   way.wire_needed = anatomy.at("lengths").at("wire_needed_mm").get<double>();
-  way.catheter_length = anatomy.at("lengths").at("catheter_mm");
   return way;
 }
 

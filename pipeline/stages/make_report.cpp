@@ -75,7 +75,7 @@ plan::Verdict decide(const Workspace& work, const ReportInput& report) {
                     .judgement = report.judgement,
                     .limits = work.given().limits,
                     .angled_wires = other_angled_wires(report.study)};
-  if (work.has("anatomy")) known.way = way_findings(report.figures.at("anatomy"));
+  if (work.has("anatomy")) known.way = way_findings(anatomy_json(report));
   return plan::find_verdict(known);
 }
 

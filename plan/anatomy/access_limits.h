@@ -16,11 +16,11 @@ struct AccessLimits {
   /// of the sharpest bend. Reporting standards for iliac access; references-2 N.
   std::array<double, 3> tortuosity = {1.25, 1.5, 1.6};                                  // [-]
   std::array<double, 3> angle = {160 * kRadPerDeg, 120 * kRadPerDeg, 90 * kRadPerDeg};  // [rad]
-  double calcium_hu = 800.0;    // above the contrast of the lumen, assumed              [HU]
-  double calcium_within = 2.0;  // of the lumen, assumed                                 [mm]
-  double catheter_length =
-      1000.0;                     // that is to come off the wire while its tip stays, assumed [mm]
-  double working_length = 100.0;  // of wire to hold behind it, assumed                    [mm]
+  double calcium_hu = 800.0;        // above the contrast of the lumen, assumed              [HU]
+  double calcium_within = 2.0;      // of the lumen, assumed                                 [mm]
+  double catheter_length = 1000.0;  // that is to come off the wire while its tip stays, assumed,
+                                    // where the first plan has none of its own [mm]
+  double working_length = 100.0;    // of wire to hold behind it, assumed                    [mm]
   ArmLimits arm;
 };
 

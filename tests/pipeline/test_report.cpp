@@ -5,6 +5,7 @@
 
 #include "pipeline/files/case_file.h"
 #include "pipeline/files/trial_file.h"
+#include "pipeline/report/anatomy_json.h"
 #include "pipeline/report/fetch_json.h"
 #include "pipeline/report/report.h"
 #include "pipeline/report/verdict_json.h"
@@ -100,6 +101,32 @@ TEST(Report, TellsAccessViewsAndLengthsOfTheTube) {
   EXPECT_NE(none.at("no_views").get<std::string>().find("axes are not known"), std::string::npos);
   EXPECT_TRUE(none.at("bend").at("best").is_null());
   expect_valid(unknown, folder.path());
+}
+
+TEST(Report, CountsTheWireForTheCatheterOfTheFirstPlan) {
+  ReportInput input;
+  input.figures["anatomy"] = {
+      {"access", Json::object()},
+      {"c_arm", Json::object()},
+      {"lengths", {{"way_mm", 300}, {"catheter_mm", 1000}, {"working_mm", 100}}}};
+  input.study.wires = {{.name = "soft", .sections = {{.length = 1200.0}}}};
+  Json lengths = anatomy_json(input).at("lengths");
+  EXPECT_TRUE(lengths.at("catheter").is_null());
+  EXPECT_EQ(lengths.at("wire_needed_mm"), 1400);
+  EXPECT_FALSE(lengths.at("wires")[0].at("long_enough"));
+
+  input.study.catheters.emplace_back().tool.wire = {.name = "cobra",
+                                                    .sections = {{.length = 650.0}}};
+  input.plan.candidates = {{.wire = 0}, {.wire = 0, .catheter = 0}};
+  input.judgement.ranking.plans.emplace_back().trial = 1;
+  lengths = anatomy_json(input).at("lengths");
+  EXPECT_EQ(lengths.at("catheter"), "cobra");
+  EXPECT_EQ(lengths.at("catheter_mm"), 650);
+  EXPECT_EQ(lengths.at("wire_needed_mm"), 1050);
+  EXPECT_EQ(lengths.at("wires")[0].at("spare_mm"), 150);
+
+  input.judgement.ranking.plans[0].trial = 0;  // the wire alone is first
+  EXPECT_EQ(anatomy_json(input).at("lengths").at("wire_needed_mm"), 1400);
 }
 
 TEST(Report, ListsWhatToFetchWithTheCatalogues) {

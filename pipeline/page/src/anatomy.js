@@ -123,7 +123,7 @@ const wireSentence = (row) =>
 const lengthFacts = (lengths) =>
   facts([
     ["Way from access to target", mm(lengths.way_mm)],
-    ["Wire needed", `${mm(lengths.wire_needed_mm)}: the way, a catheter of ${mm(lengths.catheter_mm)} and ${mm(lengths.working_mm)} to hold`],
+    ["Wire needed", `${mm(lengths.wire_needed_mm)}: the way, ${lengths.catheter ? `${shown(lengths.catheter)} of` : "a catheter of"} ${mm(lengths.catheter_mm)} and ${mm(lengths.working_mm)} to hold`],
     ["Assumed", shown(lengths.assumption)],
     ["Wires of the case", el("ul", {}, lengths.wires.map((row) => el("li", {}, wireSentence(row))))],
   ]);
