@@ -17,9 +17,23 @@ step() {
   echo "== $name"
   if ! "$@"; then
     echo "== $name: FAILED after $((SECONDS - start)) s"
+    wait  # for what runs beside
     exit 1
   fi
   echo "== $name: ok, $((SECONDS - start)) s"
+}
+
+# beside NAME COMMAND...: starts a step that waits for most of its time, to be ended by `step NAME of_beside`.
+beside() {
+  echo "== $1: begun, beside what follows"
+  "${@:2}" >build/beside.log 2>&1 &
+  beside_job=$!
+}
+of_beside() {
+  local status=0
+  wait "$beside_job" || status=$?
+  cat build/beside.log
+  return "$status"
 }
 
 # What clang-format and clang-tidy find changes with their version; ours is Debian 12's and Ubuntu
@@ -144,8 +158,9 @@ step "bundled case" run_bundled_case
 step "cases on real data" run_real_cases
 step "pages in a browser" check_pages
 step "without ITK and Node" check_surface_only
-step "cluster" run_cluster
+beside "cluster" run_cluster
 step "build with Clang and sanitizers" bash tests/build.sh dev
+step "cluster" of_beside
 step "tests under address and undefined behaviour sanitizers" run_suite dev
 step "clang-tidy on simulate and plan" check_tidy
 step "fuzz the parsers" fuzz_parsers
