@@ -6,6 +6,7 @@
 namespace wireplan::preprocess {
 
 PathPlace find_place(const Vec3& p, const Centerline& path) {
+  constexpr double kRounding = 1e-9;  // of a squared length
   expects(path.points.cols() > 0 && path.radius.size() == path.points.cols());
   PathPlace place{.radius = path.radius[0], .from_axis = (p - path.points.col(0)).norm()};
   place.from_lumen = std::max(0.0, place.from_axis - path.radius[0]);
@@ -13,6 +14,13 @@ PathPlace find_place(const Vec3& p, const Centerline& path) {
   for (Eigen::Index k = 1; k < path.points.cols(); ++k) {
     const Vec3 a = path.points.col(k - 1), ab = path.points.col(k) - path.points.col(k - 1);
     const double squared = ab.squaredNorm(), length = std::sqrt(squared);
+    // A segment that begins too far away to matter is not looked at: that is most of them.
+    const double widest = std::max(path.radius[k - 1], path.radius[k]);
+    const double matters = std::max(place.from_axis, place.from_lumen + widest) + length;
+    if ((p - a).squaredNorm() > matters * matters * (1.0 + kRounding)) {
+      before += length;
+      continue;
+    }
     const double t = squared == 0.0 ? 0.0 : std::clamp((p - a).dot(ab) / squared, 0.0, 1.0);
     const double axis = (p - a - t * ab).norm();
     const double radius = (1.0 - t) * path.radius[k - 1] + t * path.radius[k];

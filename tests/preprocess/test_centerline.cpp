@@ -11,11 +11,13 @@
 #include <filesystem>
 #include <fstream>
 #include <optional>
+#include <random>
 #include <sstream>
 #include <string>
 #include <vector>
 
 #include "preprocess/centerline/centerline.h"
+#include "preprocess/centerline/path_place.h"
 #include "preprocess/centerline/section_width.h"
 #include "preprocess/surface/surface.h"
 #include "preprocess/surface/surface_repair.h"
@@ -25,6 +27,50 @@ namespace wireplan::preprocess {
 namespace {
 
 namespace fs = std::filesystem;
+
+/// Nearest place of a path, and the least distance from its balls, segment by segment.
+PathPlace place_among_all(const Vec3& p, const Centerline& path) {
+  PathPlace place{.from_axis = 1e300, .from_lumen = 1e300};
+  for (Eigen::Index k = 1; k < path.points.cols(); ++k) {
+    const Vec3 a = path.points.col(k - 1), b = path.points.col(k);
+    const double squared = (b - a).squaredNorm();
+    const double t = squared > 0.0 ? std::clamp((p - a).dot(b - a) / squared, 0.0, 1.0) : 0.0;
+    const double axis = (p - (1.0 - t) * a - t * b).norm();
+    const double radius = (1.0 - t) * path.radius[k - 1] + t * path.radius[k];
+    place.from_lumen = std::min(place.from_lumen, std::max(0.0, axis - radius));
+    if (axis >= place.from_axis) continue;
+    place.from_axis = axis;
+    place.radius = radius;
+    place.arc = (1.0 - t) * path.arc_length[k - 1] + t * path.arc_length[k];
+  }
+  return place;
+}
+
+// Along a path that comes back near itself, thin and wide in turns, with a point twice.
+TEST(PathPlace, IsThatOfASearchThroughAllSegments) {
+  constexpr int kPoints = 300;
+  Centerline path{Eigen::Matrix3Xd(3, kPoints), Eigen::VectorXd(kPoints),
+                  Eigen::VectorXd::Zero(kPoints)};
+  for (int k = 0; k < kPoints; ++k) {
+    const double s = 0.05 * (k == 150 ? 149 : k);
+    path.points.col(k) = Vec3(40.0 * std::cos(s), 40.0 * std::sin(s), 3.0 * s);
+    path.radius[k] = k % 40 < 3 ? 25.0 : 4.0 + 3.0 * std::sin(9.0 * s);
+    if (k > 0) {
+      path.arc_length[k] =
+          path.arc_length[k - 1] + (path.points.col(k) - path.points.col(k - 1)).norm();
+    }
+  }
+  std::mt19937 random(7);
+  std::uniform_real_distribution<double> side(-90.0, 90.0);
+  for (int trial = 0; trial < 3000; ++trial) {
+    const Vec3 p(side(random), side(random), side(random));
+    const PathPlace found = find_place(p, path), expected = place_among_all(p, path);
+    ASSERT_NEAR(found.from_axis, expected.from_axis, 1e-11);
+    ASSERT_NEAR(found.from_lumen, expected.from_lumen, 1e-11);
+    ASSERT_NEAR(found.arc, expected.arc, 1e-9);
+    ASSERT_NEAR(found.radius, expected.radius, 1e-9);
+  }
+}
 
 Vec3 start_of(const Centerline& line) { return line.points.col(0); }
 Vec3 end_of(const Centerline& line) { return line.points.col(line.points.cols() - 1); }
