@@ -138,6 +138,7 @@ std::vector<std::pair<Level, plan::Spent>> levels_of(const plan::Plan& plan, boo
 void make_trials(Workspace& work, const fs::path& folder) {
   const plan::Study& study = work.study();
   StoredTrials log(work);
+  work.begin_compliance();
   const plan::Plan plan = plan_until(work, Until::kTrials, log);
   Json levels = Json::array();
   plan::Spent all;

@@ -423,6 +423,7 @@ void make_centerline(Workspace& work, const fs::path& folder) {
   require_inside(surface, folder_of_surface, access_key(given) + ".point_mm", study.access);
   require_inside(surface, folder_of_surface, target_key(given) + ".point_mm", study.goal.point);
 
+  work.begin_field();
   const std::vector<Vec3> guide = known_way(work, study.access, study.goal.point);
   const Centerline line = preprocess::find_centerline(
       surface, study.access, study.goal.point,

@@ -9,6 +9,7 @@
 #include "plan/anatomy/branch_names.h"
 #include "plan/catheter_choice.h"
 #include "preprocess/centerline/centerline.h"
+#include "preprocess/cores.h"
 #include "preprocess/files/vessel_io.h"
 
 namespace wireplan::pipeline {
@@ -171,13 +172,39 @@ void Workspace::share_field() {
   if (!find_field()) store_.keep_piece(field_key_text(), rigid_model().lumen.to_bytes());
 }
 
+/// Of the field as a yielding wall needs it, since the wall may come later.
+simulate::LumenOptions Workspace::field_options() {
+  simulate::LumenOptions options = simulate::follow(surface());
+  if (given_.wall.elastic) options.band = simulate::VesselModel::yielding_band(options);
+  return options;
+}
+
+bool Workspace::may_begin() const { return simulates && options_.threads != 1 && core_count() > 1; }
+
+void Workspace::begin_field() {
+  if (!may_begin() || models_->model || store_.find_piece(field_key_text())) return;
+  // A copy: who asked may be gone before the field is done.
+  field_begun_ = std::async(std::launch::async, [from = surface(), options = field_options()] {
+    return std::make_unique<simulate::VesselModel>(from, options);
+  });
+}
+
+void Workspace::begin_compliance() {
+  const ModelStock& stock = models();
+  const bool has = stock.compliance_aside || (stock.model && stock.model->compliance);
+  if (!may_begin() || !given_.wall.elastic || has) return;
+  compliance_begun_ = std::async(
+      std::launch::async,
+      [from = surface(), wall = wall()]() -> std::unique_ptr<const simulate::WallCompliance> {
+        return std::make_unique<const simulate::WallCompliance>(from, wall);
+      });
+}
+
 const simulate::VesselModel& Workspace::rigid_model() {
   ModelStock& stock = models();
+  if (!stock.model && field_begun_.valid()) stock.model = field_begun_.get();
   if (!stock.model && !find_field()) {
-    // The field as a yielding wall needs it, since the wall may come later.
-    simulate::LumenOptions options = simulate::follow(surface());
-    if (given_.wall.elastic) options.band = simulate::VesselModel::yielding_band(options);
-    stock.model = std::make_unique<simulate::VesselModel>(surface(), options);
+    stock.model = std::make_unique<simulate::VesselModel>(surface(), field_options());
   }
   if (stock.model->compliance) stock.compliance_aside = std::move(stock.model->compliance);
   if (stock.model->sections) stock.sections_aside = std::move(stock.model->sections);
@@ -192,6 +219,9 @@ const simulate::VesselModel& Workspace::model() {
   }
   rigid_model();
   if (given_.wall.elastic) {
+    if (!stock.compliance_aside && compliance_begun_.valid()) {
+      stock.compliance_aside = compliance_begun_.get();
+    }
     if (!stock.compliance_aside) {
       stock.compliance_aside = std::make_unique<simulate::WallCompliance>(surface(), wall());
     }

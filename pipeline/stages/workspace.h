@@ -3,6 +3,7 @@
 /// from them.
 #include <filesystem>
 #include <functional>
+#include <future>
 #include <map>
 #include <memory>
 #include <optional>
@@ -77,6 +78,11 @@ class Workspace {
   /// Makes the rigid one whose cross-sections move all the same, for scouts; empty where they do
   /// not.
   std::function<const simulate::VesselModel&()> moving_model();
+  /// Begins to make the field of the vessel, and the wall's stiffness, beside what this thread does
+  /// next, where the run goes on to stages that simulate, may use a second thread, and has none
+  /// yet; the models take them from there. Who drops the workspace before that waits for them.
+  void begin_field();
+  void begin_compliance();
   /// Makes the field of the vessel a piece in the store, unless another process did: for shards, so
   /// that one of them computes it. rigid_model() takes it from there.
   void share_field();
@@ -94,6 +100,7 @@ class Workspace {
   std::string labels_sha256, labels_stamp;       // of the labels; empty where the case has none
   Json parameters;                               // of the case after defaults, without folder names
   std::map<std::string, std::string> key_texts;  // of the stages so far and the one under way
+  bool simulates = false;                        // this run goes on to stages that simulate
   /// Trials that this process ran or read, by level and candidate.
   std::map<std::pair<plan::Level, int>, plan::Measured> measured;
 
@@ -108,7 +115,11 @@ class Workspace {
   std::optional<Wall> wall_;
   std::optional<plan::Study> study_;
   std::shared_ptr<ModelStock> models_;
+  std::future<std::unique_ptr<simulate::VesselModel>> field_begun_;
+  std::future<std::unique_ptr<const simulate::WallCompliance>> compliance_begun_;
 
+  bool may_begin() const;
+  simulate::LumenOptions field_options();
   std::string field_key_text() const;
   ModelStock& models();  // of this surface and wall
   void let_sections_move(ModelStock& stock);
