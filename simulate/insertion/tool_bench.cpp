@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 namespace wireplan::simulate {
 namespace {
@@ -12,7 +13,8 @@ struct BenchTuning {
   double largest_turn = 5.0 * kPi / 180.0;  //                                            [rad]
   double of_element = 0.9;       // at most so much in a vessel: parts as long as elements meet the
                                  // same place of the forces' ripple each time
-  double first_push = 0.1;       // of a move where walls rub: friction turns round within it  [mm]
+  double first_push = 0.1;       // where walls rub and a move does not go on with the last one:
+                                 // friction turns round within it                [mm]
   double shortest = 1.0 / 16.0;  // of such a part, where it is cut
   double unbalanced = 0.02;      // of the work of a part: more, and it is cut
   double unbalanced_in_vessel = 0.2;  // there friction and ridges of the wall are in the forces
@@ -44,13 +46,38 @@ int count_elements(const ToolScene& scene) {
   return elements_over(longest, scene.element_length);
 }
 
+/// How many times the move before this one is; 0 where it goes another way.
+double times_before(const ToolMove& before, const ToolMove& by) {
+  constexpr double kSameWay = 1e-9;  // of the move
+  if (before.push.size() != by.push.size()) return 0.0;
+  double product = 0.0, squared = 0.0, off = 0.0, whole = 0.0;
+  const auto for_each = [&](const auto& act) {
+    for (std::size_t i = 0; i < by.push.size(); ++i) {
+      act(before.push[i], by.push[i]);
+      act(before.turn[i], by.turn[i]);
+    }
+  };
+  for_each([&](double a, double b) {
+    product += a * b;
+    squared += a * a;
+  });
+  if (product <= 0.0) return 0.0;
+  const double times = product / squared;
+  for_each([&](double a, double b) {
+    off = std::max(off, std::abs(b - times * a));
+    whole = std::max(whole, std::abs(b));
+  });
+  return off <= kSameWay * whole ? times : 0.0;
+}
+
 /// How a move is cut: the lengths of its parts, as parts of it, and its longest push.
 struct Parts {
   double first, longest, shortest;  // to cut a part to
   double farthest;                  //                                                   [mm]
 };
 
-Parts parts_of(const ToolScene& scene, const ToolMove& by) {
+/// `going`: the next part of the move before, where this one goes on with it; else 0.
+Parts parts_of(const ToolScene& scene, const ToolMove& by, double going) {
   const bool in_vessel = scene.vessel != nullptr;
   const double longest_push =
       in_vessel ? std::min(kBench.longest_push, kBench.of_element * scene.element_length)
@@ -63,9 +90,15 @@ Parts parts_of(const ToolScene& scene, const ToolMove& by) {
   }
   double first = 1.0 / count;
   if (in_vessel && scene.contact.friction > 0.0 && farthest > 0.0) {
-    first = std::min(first, kBench.first_push / farthest);
+    first = std::min(first, std::max(kBench.first_push / farthest, going));
   }
   return {first, 1.0 / count, kBench.shortest / count, farthest};
+}
+
+/// Whether a node would come off the way of before by a jump in such a part.
+bool snaps(const Eigen::Matrix3Xd& drift, double part) {
+  return drift.cols() > 0 &&
+         part * std::sqrt(drift.colwise().squaredNorm().maxCoeff()) > kBench.snap;
 }
 
 }  // namespace
@@ -172,14 +205,40 @@ void ToolBench::bring_in() {
   record_.work = record_.heat = record_.released = record_.unbalanced = 0.0;
 }
 
+/// What a move begins with: of the one before, in parts of this, where it goes on with that; else
+/// nothing. That one is forgotten.
+ToolBench::Going ToolBench::going_on_with(const ToolMove& by) {
+  const Going before = std::exchange(going_, {});
+  const double times = times_before(before.by, by);
+  Going going{by, times > 0.0 ? before.size / times : 0.0, {}};
+  if (times > 0.0 && before.drift.x.cols() > 0) {
+    going.drift = {times * before.drift.x, times * before.drift.angles};
+  }
+  return going;
+}
+
+/// Friction between the tools in a part of a move.
+void ToolBench::rub_between(const ToolMove& by, double part) {
+  feel(now_, by);
+  for (std::size_t i = 0; i + 1 < by.push.size(); ++i) {
+    const ToolContact contact = find_contact(i, by);
+    const double heat = part * (contact.friction_force * (by.push[i + 1] - by.push[i]) +
+                                contact.friction_torque * (by.turn[i + 1] - by.turn[i]));
+    record_.heat += heat;
+    record_.work += heat;
+  }
+}
+
 bool ToolBench::move(const ToolMove& by) {
   expects(settled_ && by.push.size() == scene_.tools.size() && by.turn.size() == by.push.size());
   record_.iterations = 0;
   record_.worst_energy_rise = 0.0;
-  const Parts parts = parts_of(scene_, by);
+  Going going = going_on_with(by);
+  const Parts parts = parts_of(scene_, by, going.size);
   const std::vector<ToolPlace> start = now_.places;
   double done = 0.0, size = parts.first;
-  Shape drift;                                  // of the last part
+  Shape& drift = going.drift;  // of the last part
+  if (snaps(drift.x, size)) drift = {};
   if (contact_ != nullptr) contact_->forget();  // so that a mark goes on as it did before
   find_slopes(now_, by, false);
   double slope = slope_of_move(now_, by, 1.0);
@@ -241,24 +300,19 @@ bool ToolBench::move(const ToolMove& by) {
     drift = shape();
     drift.x = (drift.x - followed.x) / part;
     drift.angles = (drift.angles - followed.angles) / part;
-    if (part * std::sqrt(drift.x.colwise().squaredNorm().maxCoeff()) > kBench.snap) drift = {};
+    if (snaps(drift.x, part)) drift = {};
     done += part;
-    const bool goes_on = done < 1.0 - 1e-12;
-    slope = !goes_on || is_smooth(now_, by.push) ? next_slope : slope_of_move(now_, by, 1.0);
+    const bool at_end = done >= 1.0 - 1e-12;
+    slope = at_end || is_smooth(now_, by.push) ? next_slope : slope_of_move(now_, by, 1.0);
     record_.released += released;
     record_.unbalanced += excess - released;
     record_.heat += rubbed;
     record_.work += gained + rubbed + released;
-    if (scene_.friction > 0.0) feel(now_, by);
-    for (std::size_t i = 0; i + 1 < by.push.size() && scene_.friction > 0.0; ++i) {
-      const ToolContact contact = find_contact(i, by);
-      const double heat = part * (contact.friction_force * (by.push[i + 1] - by.push[i]) +
-                                  contact.friction_torque * (by.turn[i + 1] - by.turn[i]));
-      record_.heat += heat;
-      record_.work += heat;
-    }
-    size = std::min(parts.longest, 2.0 * part);
+    if (scene_.friction > 0.0) rub_between(by, part);
+    size = std::min(parts.longest, std::max(size, 2.0 * part));
   }
+  going.size = size;
+  going_ = std::move(going);
   report(by);
   return true;
 }

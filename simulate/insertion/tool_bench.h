@@ -96,6 +96,19 @@ struct ToolRecord {
 int elements_over(double length, double element_length);
 
 class ToolBench {
+  /// The centreline, and the angles of the twisted tools, one column each.
+  struct Shape {
+    Eigen::Matrix3Xd x;
+    Eigen::MatrixXd angles;
+  };
+
+  /// How the last move went, for one that goes on with it: friction does not turn round then.
+  struct Going {
+    ToolMove by;        // nothing: there was none, or it did not get to its end
+    double size = 0.0;  // of the next part, as a part of the move; 0: there is none
+    Shape drift;        // what the shape came off the way of before, per move
+  };
+
  public:
   /// Expects what ToolScene says; the tools are then at their places in equilibrium if settled().
   /// Tools that would not lie free in the vessel as they are without loads, as long ones, are
@@ -122,6 +135,7 @@ class ToolBench {
     std::vector<ToolPlace> places;
     RodState state;
     ContactMemory memory;  // with the vessel
+    Going going;
     ToolRecord record;
   };
   Mark save() const;
@@ -169,12 +183,6 @@ class ToolBench {
     std::vector<double> force;   // ... without friction between tools, once felt
   };
 
-  /// The centreline, and the angles of the twisted tools, one column each.
-  struct Shape {
-    Eigen::Matrix3Xd x;
-    Eigen::MatrixXd angles;
-  };
-
   const SectionChain* chain() const {
     return scene_.vessel != nullptr ? scene_.vessel->sections.get() : nullptr;
   }
@@ -198,6 +206,8 @@ class ToolBench {
   static double outside_part(const State& at, std::size_t tool, const Touch& touch);
   bool solve(State& at);
   bool follow_jump(State& at, double& rubbed);
+  Going going_on_with(const ToolMove& by);
+  void rub_between(const ToolMove& by, double part);
   double rub(const Eigen::VectorXd& slides, State& at, double& by_hands);
   void take_forces(State& at);
   Energy find_energy(State& at);
@@ -218,7 +228,8 @@ class ToolBench {
 
   const ToolScene scene_;
   int elements_ = 0;
-  State now_, next_;                      // next_: where a part of a move leads
+  State now_, next_;  // next_: where a part of a move leads
+  Going going_;
   std::unique_ptr<WallContact> contact_;  // with the vessel, of the state that touched last
   ToolRecord record_;
   Statics statics_;

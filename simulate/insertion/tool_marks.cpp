@@ -31,6 +31,7 @@ bool ToolBench::divide(double longest) {
   find_slopes(next, {none, none}, true);
   feel(next, {none, none});
   now_ = std::move(next);
+  going_ = {};
   return true;
 }
 
@@ -44,6 +45,7 @@ ToolBench::Mark ToolBench::save() const {
           .places = now_.places,
           .state = now_.state,
           .memory = now_.memory,
+          .going = going_,
           .record = record_};
 }
 
@@ -60,6 +62,7 @@ void ToolBench::restore(const Mark& mark) {
   find_slopes(at, {none, none}, true);
   feel(at, {none, none});
   now_ = std::move(at);
+  going_ = mark.going;
   record_ = mark.record;
   settled_ = true;
   through_wall_ = false;

@@ -258,6 +258,43 @@ TEST(ToolVessel, WorkOfTheHandsIsWhatIsStoredAndRubbedAway) {
   }
 }
 
+/// The move in so many pieces, each by a copy of the last one or by one bench; its iterations.
+int move_in_pieces(ToolMove move, int count, bool copies, std::unique_ptr<ToolBench>& bench) {
+  for (double& push : move.push) push /= count;
+  for (double& turn : move.turn) turn /= count;
+  int iterations = 0;
+  for (int k = 0; k < count; ++k) {
+    if (copies) bench = std::make_unique<ToolBench>(*bench);
+    EXPECT_TRUE(bench->move(move));
+    iterations += bench->record().iterations;
+  }
+  return iterations;
+}
+
+// As trials move their tools: two millimetres at a time.
+TEST(ToolVessel, AMoveInPiecesEndsWhereTheWholeDoes) {
+  const ToolScene scene = curved_round_the_bend(0.15);
+  ToolBench whole(scene);
+  auto pieces = std::make_unique<ToolBench>(scene), copies = std::make_unique<ToolBench>(scene);
+  ASSERT_TRUE(whole.settled() && pieces->settled() && copies->settled());
+  int iterations = 0, of_pieces = 0;
+  for (const ToolMove& move : scene.moves) {
+    ASSERT_TRUE(whole.move(move));
+    iterations += whole.record().iterations;
+    double longest = 0.0;
+    for (const double push : move.push) longest = std::max(longest, std::abs(push));
+    const int count = std::max(1, static_cast<int>(std::lround(longest / 2.0)));
+    of_pieces += move_in_pieces(move, count, false, pieces);
+    move_in_pieces(move, count, true, copies);
+    EXPECT_EQ(copies->state().x, pieces->state().x);  // a copy goes on as the other
+    for (std::size_t i = 0; i < scene.tools.size(); ++i) {
+      EXPECT_LT((pieces->record().tools[i].tip - whole.record().tools[i].tip).norm(), 0.02);
+    }
+  }
+  EXPECT_NEAR(pieces->record().heat, whole.record().heat, 0.01 * whole.record().heat);
+  EXPECT_LT(of_pieces, 1.2 * iterations);  // no piece begins with short parts
+}
+
 TEST(ToolVessel, StifferWallsLeadToTheRigidOne) {
   const auto run = [](const VesselModel& vessel, double& work, double& yields) {
     ToolScene scene = curved_round_the_bend(0.15);
