@@ -415,8 +415,7 @@ void make_surface(Workspace& work, const fs::path& folder) {
 
 void make_centerline(Workspace& work, const fs::path& folder) {
   // Both ends must lie inside, told by their keys.
-  const Surface surface =
-      preprocess::read_surface_artifact(work.artifact("surface").folder / "surface.vtp");
+  const Surface& surface = work.surface();
   const plan::Study& study = work.given().study;
   const Case& given = work.given();
   const fs::path& folder_of_surface = work.artifact("surface").folder;

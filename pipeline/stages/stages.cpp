@@ -365,11 +365,12 @@ RunResult run_stages(const Case& given, const RunOptions& options,
     work.labels_sha256 = hash_labels(*given.labels);
   }
   for (const auto& [name, artifact] : options.beside) work.add(name, artifact);
-  const auto last = std::find_if(stages.begin(), stages.end(),
-                                 [&](const Stage& stage) { return stage.name == options.to; });
-  const auto trials = std::find_if(stages.begin(), stages.end(),
-                                   [](const Stage& stage) { return stage.name == "trials"; });
-  work.simulates = !options.instead && trials < stages.end() && trials <= last;
+  const auto place_of = [&](const std::string& name) {
+    return std::find_if(stages.begin(), stages.end(),
+                        [&](const Stage& stage) { return stage.name == name; });
+  };
+  const auto trials = place_of("trials");
+  work.simulates = !options.instead && trials < stages.end() && trials <= place_of(options.to);
   for (const Stage& stage : stages) {
     if (options.work.cancelled && options.work.cancelled()) throw Interrupted();
 
