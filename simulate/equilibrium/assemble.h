@@ -35,7 +35,7 @@ Energy assemble(const Problem& problem, const RodState& state, Sink& sink,
                              *problem.distal.tangent, sink);
   }
   if (problem.tools != nullptr) {
-    add_tools(problem, state, sink, energy);
+    add_tools(problem, state, chain, sink, energy);
   } else if (rod.twisted) {
     for (int i = std::max(1, problem.first - 1); i <= std::min(n - 2, problem.last); ++i) {
       if (chain.has(i)) continue;  // it has no shape either
@@ -69,6 +69,24 @@ Energy assemble(const Problem& problem, const RodState& state, Sink& sink,
   }
   if (problem.tip_moment) energy.load += add_tip_moment(problem, state, sink);
   return energy;
+}
+
+/// The straight shaft whose twist is one spring. Of tools in a vessel alone: saddles are left along
+/// modes of the whole Hessian.
+inline TwistChain find_chain_of(const Problem& problem, const RodState& state) {
+  if (problem.last < problem.rod->nodes()) return {};
+  if (problem.first > 0) return find_chain(*problem.rod, problem.first, state);
+  if (problem.tools == nullptr || problem.contact == nullptr) return {};
+  return problem.proximal.hold_roll || problem.distal.hold_roll ? TwistChain{}
+                                                                : find_chain(*problem.tools);
+}
+
+inline void spread_chain(const TwistChain& chain, const Problem& problem, RodState& state) {
+  const ToolTerms* tools = problem.tools;
+  const auto twist = [&](int i) {
+    return tools != nullptr ? tools->twist(0, i) : problem.rod->twist[i];
+  };
+  spread_chain(chain, twist, state);
 }
 
 /// Takes what a support holds out of the Hessian: rows and columns of block k are projected and the

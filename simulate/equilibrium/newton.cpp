@@ -40,17 +40,14 @@ class Newton {
         contact_(problem.contact),
         options_(options),
         count_(problem.last - problem.first),
-        out_of_introducer_(problem.first > 0 && problem.last == problem.rod->nodes()),
         polynomial_(problem.contact == nullptr && D == 3 && !problem.tip_moment && !problem.plane &&
                     problem.springs == nullptr),
         sections_(contact_ != nullptr && contact_->chain() != nullptr ? contact_->chain()->nodes()
                                                                       : 0),
-        banded_(D == 3 && sections_ == 0 && out_of_introducer_ && !problem.distal.hold_along &&
-                !problem.distal.hold_across && contact_ != nullptr &&
+        banded_(D == 3 && sections_ == 0 && problem.first > 0 && problem.last == rod_.nodes() &&
+                !problem.distal.hold_along && !problem.distal.hold_across && contact_ != nullptr &&
                 contact_->remainder_is_banded()),
-        chain_(D == 4 && problem.tools == nullptr && out_of_introducer_ && sections_ == 0
-                   ? find_chain(rod_, problem.first)
-                   : TwistChain{}),
+        chain_(D == 4 && sections_ == 0 ? find_chain_of(problem, state) : TwistChain{}),
         extent_(state.x.cwiseAbs().maxCoeff()),
         state_(state),
         memory_(memory),
@@ -121,7 +118,7 @@ class Newton {
   }
 
   NewtonResult finish(bool converged) {
-    spread_chain(chain_, rod_, state_);
+    spread_chain(chain_, problem_, state_);
     result_.converged = converged;
     result_.energy = wire_energy_;
     if (contact_ != nullptr) {
@@ -165,6 +162,7 @@ class Newton {
     if (chain_.exists()) {
       memory_.coupled.psi.setZero(D * count_);
       sum += add_chain(chain_, rod_, where, sink, memory_.coupled.psi, gradient_);
+      project<D>(problem_, memory_.coupled.psi);
     }
     return sum;
   }
@@ -187,7 +185,7 @@ class Newton {
     if constexpr (D == 3) {
       hessian_.resize(count_);  // the wire's blocks are set, all of each
     } else {
-      hessian_.reset(count_, chain_.edges());
+      hessian_.reset(count_, chain_.without_theta());
     }
     if (sections_ > 0) memory_.sections.reset(count_, sections_);
     BandSink<D> both{gradient, hessian_, memory_.sections};
@@ -394,7 +392,7 @@ class Newton {
   double try_trial(double length) {
     if constexpr (D > 3) {
       const int n = rod_.nodes();
-      for (int k = chain_.edges(); k < count_ && problem_.first + k < n - 1; ++k) {
+      for (int k = chain_.without_theta(); k < count_ && problem_.first + k < n - 1; ++k) {
         for (int r = 3, e = problem_.first + k; r < D; ++r, e += n - 1) {
           trial_.theta[e] = state_.theta[e] + length * step_[D * k + r];
         }
@@ -506,11 +504,10 @@ class Newton {
   const Rod& rod_;
   WallContact* const contact_;
   const NewtonOptions& options_;
-  const int count_;               // free nodes
-  const bool out_of_introducer_;  // the free nodes are those at the tip
-  const bool polynomial_;         // the energy along a step is a quartic
-  const int sections_;            // of the vessel, that move
-  const bool banded_;             // what contact leaves out fits into an unsymmetric band: no GMRES
+  const int count_;        // free nodes
+  const bool polynomial_;  // the energy along a step is a quartic
+  const int sections_;     // of the vessel, that move
+  const bool banded_;      // what contact leaves out fits into an unsymmetric band: no GMRES
   const TwistChain chain_;
   const double extent_;  // largest coordinate at the start                        [mm]
 

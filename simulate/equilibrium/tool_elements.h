@@ -12,6 +12,7 @@
 #include <cmath>
 
 #include "simulate/equilibrium/elements.h"
+#include "simulate/wire/twist_chain.h"
 
 namespace wireplan::simulate {
 
@@ -279,14 +280,17 @@ double add_tool_end(const Problem& problem, const RodState& state, bool proximal
   return bend.energy;
 }
 
-/// All that the tools add to the rod, and the energy that no shape changes.
+/// All that the tools add to the rod but the twist of a chain, and the energy that no shape
+/// changes.
 template <class Sink>
-void add_tools(const Problem& problem, const RodState& state, Sink& sink, Energy& energy) {
+void add_tools(const Problem& problem, const RodState& state, const TwistChain& chain, Sink& sink,
+               Energy& energy) {
   const ToolTerms& tools = *problem.tools;
   const int n = problem.rod->nodes();
   const Eigen::Index edges = state.director.cols();
   energy.bend += tools.stored;
   for (int i = std::max(1, problem.first - 1); i <= std::min(n - 2, problem.last); ++i) {
+    if (chain.has(i)) continue;  // it is straight too
     for (int t = 0; t < tools.twists(); ++t) {
       OneTool<Sink> own{sink, t};
       energy.twist += add_twist(tools.twist(t, i), state, i, own, t);
@@ -296,6 +300,7 @@ void add_tools(const Problem& problem, const RodState& state, Sink& sink, Energy
   if (problem.last == n) energy.bend += add_tool_end(problem, state, false, sink);
   if (problem.first > 0) return;
   energy.bend += add_tool_end(problem, state, true, sink);
+  if (chain.exists()) return;
   for (int t = 0; t < tools.twists(); ++t) {  // the straight part behind the introducer
     const double angle = state.theta[t * edges] - tools.roll[t];
     sink.gradient_theta(0, tools.lead[t] * angle, t);

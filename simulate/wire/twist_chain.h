@@ -1,30 +1,36 @@
 #pragma once
-/// The straight round shaft of a twisted wire as one torsion spring. Where a wire is straight at
-/// rest and round, nothing but its twist depends on the thetas of its edges, and in equilibrium all
-/// of it carries one torque. So these thetas are no unknowns: one spring stands for the free part
-/// of the wire up to its first node that is curved or a strip. Used by Newton's method.
+/// The straight round shaft of a twisted wire, or of the one tool of several that twists, as one
+/// torsion spring. Where a wire is straight at rest and round, nothing but its twist depends on the
+/// thetas of its edges, and in equilibrium all of it carries one torque. So these thetas are no
+/// unknowns: one spring stands for the free part of the wire up to its first node that is curved or
+/// a strip. Used by Newton's method.
 #include <Eigen/Core>
 #include <Eigen/LU>
 
 #include "simulate/wire/block_band.h"
 #include "simulate/wire/rod.h"
+#include "simulate/wire/tool_stack.h"
 
 namespace wireplan::simulate {
 
-/// The spring's energy is W = k/2 psi^2. Its angle psi is theta of edge `last` minus theta of edge
-/// first-1, plus the reference twist at the nodes `first` to `last`; 1/k is the sum of these nodes'
-/// 1/T. During a solve the directors of the edges first to last-1 are not kept, since they follow
-/// the edge behind them without twist. The reference twist of all these nodes then stands at node
-/// `last`.
+/// The spring's energy is W = k/2 psi^2. Its angle psi is theta of edge `last` minus that of where
+/// it begins, plus the reference twist at the nodes `first` to `last`; 1/k is the sum of these
+/// nodes' 1/T. A wire's begins with theta of edge first-1, which is held; a tool's with its hub's
+/// roll: 1/k has its lead's too then, and theta of edge first-1 is no unknown either. During a
+/// solve the directors of the edges first to last-1 are not kept, since they follow the edge behind
+/// them without twist. The reference twist of all these nodes then stands at node `last`.
 struct TwistChain {
   int first = 0, last = -1;  // none where last <= first
   double stiffness = 0.0;    // k                                                       [N mm]
+  double start = 0.0;        // theta that it begins with                                [rad]
+  double lead = 0.0;         // of a tool, from its hub to edge first-1; else 0         [N mm]
 
   bool exists() const { return last > first; }
   bool has(int node) const { return exists() && node >= first && node <= last; }
-  int edges() const { return exists() ? last - first : 0; }  // whose thetas are no unknowns
+  int edges() const { return exists() ? last - first : 0; }     // that keep no director
+  int without_theta() const { return edges() + (lead > 0.0); }  // whose thetas are no unknowns
   double angle(const RodState& state) const {
-    return state.theta[last] - state.theta[first - 1] + state.reference_twist[last];
+    return state.theta[last] - start + state.reference_twist[last];
   }
   double energy(const RodState& state) const {
     const double psi = exists() ? angle(state) : 0.0;
@@ -32,20 +38,34 @@ struct TwistChain {
   }
 };
 
-/// The chain of a wire whose nodes are free from `first`, which is past an introducer, to its tip.
-inline TwistChain find_chain(const Rod& rod, int first) {
-  TwistChain chain;
-  chain.first = first;
-  chain.last = first - 1;
-  while (chain.last < rod.nodes() - 2 && rod.rest_angle[chain.last + 1] == 0.0 &&
-         rod.strip[chain.last + 1] == 0.0) {
-    ++chain.last;
-  }
+/// Of the nodes from chain.first on that are straight, as springs in series.
+template <class IsStraight, class Twist>
+TwistChain as_long_as(TwistChain chain, int nodes, const IsStraight& is_straight,
+                      const Twist& twist) {
+  chain.last = chain.first - 1;
+  while (chain.last < nodes - 2 && is_straight(chain.last + 1)) ++chain.last;
   if (!chain.exists()) return {};
-  double compliance = 0.0;
-  for (int i = chain.first; i <= chain.last; ++i) compliance += 1.0 / rod.twist[i];
+  double compliance = chain.lead > 0.0 ? 1.0 / chain.lead : 0.0;
+  for (int i = chain.first; i <= chain.last; ++i) compliance += 1.0 / twist(i);
   chain.stiffness = 1.0 / compliance;
   return chain;
+}
+
+/// The chain of a wire whose nodes are free from `first`, which is past an introducer, to its tip.
+inline TwistChain find_chain(const Rod& rod, int first, const RodState& state) {
+  return as_long_as(
+      {.first = first, .start = state.theta[first - 1]}, rod.nodes(),
+      [&](int i) { return rod.rest_angle[i] == 0.0 && rod.strip[i] == 0.0; },
+      [&](int i) { return rod.twist[i]; });
+}
+
+/// The chain of the one tool that twists, whose nodes are free from the introducer's on.
+inline TwistChain find_chain(const ToolTerms& tools) {
+  if (tools.rest(0, 0) != 0.0) return {};
+  return as_long_as(
+      {.first = 1, .start = tools.roll[0], .lead = tools.lead[0]},
+      static_cast<int>(tools.rest.cols()), [&](int i) { return tools.rest(0, i) == 0.0; },
+      [&](int i) { return tools.twist(0, i); });
 }
 
 /// Moves the reference twist of all the chain's nodes to its last one.
@@ -56,10 +76,13 @@ inline void gather_chain(const TwistChain& chain, RodState& state) {
   }
 }
 
-/// Gives the chain's edges their directors and thetas back, so that all carry one torque.
-inline void spread_chain(const TwistChain& chain, const Rod& rod, RodState& state) {
+/// Gives the chain's edges their directors and thetas back, so that all carry one torque;
+/// `twist(i)` is T of node i.
+template <class Twist>
+void spread_chain(const TwistChain& chain, const Twist& twist, RodState& state) {
   if (!chain.exists()) return;
   const double torque = chain.stiffness * chain.angle(state);
+  if (chain.lead > 0.0) state.theta[chain.first - 1] = chain.start + torque / chain.lead;
   const auto tangent = [&](int e) -> Vec3 {
     return (state.x.col(e + 1) - state.x.col(e)).normalized();
   };
@@ -69,7 +92,7 @@ inline void spread_chain(const TwistChain& chain, const Rod& rod, RodState& stat
     Vec3 d = parallel_transport(state.director.col(e - 1), before, t);
     d -= d.dot(t) * t;
     state.director.col(e) = d.normalized();
-    state.theta[e] = state.theta[e - 1] + torque / rod.twist[e];
+    state.theta[e] = state.theta[e - 1] + torque / twist(e);
     before = t;
   }
 }

@@ -271,6 +271,33 @@ int move_in_pieces(ToolMove move, int count, bool copies, std::unique_ptr<ToolBe
   return iterations;
 }
 
+// A shaft that is curved by next to nothing has an unknown theta on every edge.
+TEST(ToolVessel, AStraightShaftTwistsAsOneSpring) {
+  const ToolScene one_spring = curved_round_the_bend(0.15);
+  ToolScene every_theta = one_spring;
+  every_theta.tools.front().wire.sections.back().rest_curvature = 1e-13;
+  ToolBench bench(one_spring), other(every_theta);
+  ASSERT_TRUE(bench.settled() && other.settled());
+  for (const ToolMove& move : one_spring.moves) {
+    ASSERT_TRUE(bench.move(move) && other.move(move));
+    if (bench.places().front().insertion > 40.0) {
+      EXPECT_TRUE(find_chain(bench.composite().terms).exists());
+    }
+    EXPECT_FALSE(find_chain(other.composite().terms).exists());
+    EXPECT_LT((bench.state().x - other.state().x).colwise().norm().maxCoeff(), 1e-4);
+    EXPECT_LT((bench.angles(0) - other.angles(0)).cwiseAbs().maxCoeff(), 1e-5);
+    EXPECT_NEAR(bench.record().tools[0].hub_torque, other.record().tools[0].hub_torque, 1e-5);
+    // Every edge is in balance, those of the shaft too.
+    Eigen::VectorXd gradient;
+    Eigen::MatrixXd hessian;
+    Problem problem = bench.problem();
+    problem.contact = nullptr;
+    Statics::derivatives(problem, bench.state(), gradient, hessian);
+    const Eigen::Index edges = bench.state().theta.size();
+    EXPECT_LT(gradient.segment(3 * bench.state().x.cols(), edges).cwiseAbs().maxCoeff(), 1e-6);
+  }
+}
+
 // As trials move their tools: two millimetres at a time.
 TEST(ToolVessel, AMoveInPiecesEndsWhereTheWholeDoes) {
   const ToolScene scene = curved_round_the_bend(0.15);
