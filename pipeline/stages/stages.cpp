@@ -285,7 +285,7 @@ std::vector<Stage> stages_of(const Case& given) {
   stages.push_back(trials);
   Stage manoeuvres = trials;
   manoeuvres.name = "manoeuvres";
-  manoeuvres.version = 30;
+  manoeuvres.version = 31;
   manoeuvres.after.push_back("trials");
   read_too(manoeuvres, {"/manoeuvres"});
   const bool tools = !given.catheters.empty();
@@ -302,7 +302,7 @@ std::vector<Stage> stages_of(const Case& given) {
   stages.push_back(manoeuvres);
   Stage plans = trials;
   plans.name = "plans";
-  plans.version = 14;
+  plans.version = 15;
   plans.after.insert(plans.after.end(), {"trials", "manoeuvres"});
   if (voxels != nullptr) plans.after.emplace_back(voxels);
   read_too(plans, {"/manoeuvres", "/robustness"});

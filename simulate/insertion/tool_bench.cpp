@@ -9,7 +9,6 @@ namespace {
 
 /// All chosen.
 struct BenchTuning {
-  double longest_push = 2.0;                // of a part of a move                             [mm]
   double largest_turn = 5.0 * kPi / 180.0;  //                                            [rad]
   double of_element = 0.9;       // at most so much in a vessel: parts as long as elements meet the
                                  // same place of the forces' ripple each time
@@ -80,8 +79,8 @@ struct Parts {
 Parts parts_of(const ToolScene& scene, const ToolMove& by, double going) {
   const bool in_vessel = scene.vessel != nullptr;
   const double longest_push =
-      in_vessel ? std::min(kBench.longest_push, kBench.of_element * scene.element_length)
-                : kBench.longest_push;
+      in_vessel ? std::min(scene.longest_part, kBench.of_element * scene.element_length)
+                : scene.longest_part;
   double count = 1.0, farthest = 0.0;
   for (std::size_t i = 0; i < by.push.size(); ++i) {
     farthest = std::max(farthest, std::abs(by.push[i]));
@@ -289,7 +288,7 @@ bool ToolBench::move(const ToolMove& by) {
     const double allowed = contact_ != nullptr ? kBench.unbalanced_in_vessel : kBench.unbalanced;
     const double unknown = scene_.residual_tolerance * part * parts.farthest;
     const bool jumped = std::abs(excess) > allowed * scale + kBench.least_work + unknown;
-    if (jumped && may_cut) {
+    if (jumped && may_cut && scene_.cut_jumps) {
       size = 0.5 * part;
       continue;
     }

@@ -54,6 +54,13 @@ struct ToolScene {
   double friction = 0.0;   // Coulomb's coefficient between tools
   double element_length = 1.0;  // where the tools are furthest in                      [mm]
   std::vector<ToolMove> moves;
+  /// Moves are made in parts of so much push at most. In a vessel friction is held to where tools
+  /// were before a part, so that after longer ones they may go on in another branch.
+  double longest_part = 2.0;  //                                                          [mm]
+  /// Whether a part is cut where the hands' forces at its ends are no measure of its work, as where
+  /// tools jump in it. Work is known by the energy all the same; in a vessel this takes several
+  /// times the iterations.
+  bool cut_jumps = true;
   double residual_tolerance = 1e-6;  // largest nodal force out of balance                 [N]
   int max_iterations = 200;          // of a solve
 };

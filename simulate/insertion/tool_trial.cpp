@@ -18,7 +18,8 @@ constexpr double kToolTip = 2.0;                     // that counts as a tip for
 constexpr double kToolOutside = 1.0;                 // penetration that contact does not explain
 constexpr double kToolPatience = 25.0;               // of the last push, without progress     [mm]
 constexpr double kToolTurnStep = 15.0 * kRadPerDeg;  // of a hub between two records
-constexpr double kStepsPerPart = 2.0;      // of the options: a bench cuts a push at 2 mm itself
+constexpr double kStepsPerPart = 2.0;                // of the options, in a record; ...
+constexpr double kPartOfStep = 0.5;        // ... made in parts of this: whole steps led astray
 constexpr double kDivideLonger = 1.25;     // edges than asked for, ...
 constexpr double kFiner[] = {1.06, 1.13};  // elements, where a move finds no equilibrium; chosen
 constexpr double kLongestEdge = 1.45;      // ... of it: ToolBench::divide()
@@ -54,6 +55,8 @@ ToolScene scene_of(const std::vector<Tool>& tools, const Introducer& introducer,
   scene.friction = options.friction_between;
   scene.element_length = options.insertion.element_length;
   scene.loads.gravity = options.insertion.gravity;
+  scene.longest_part = kPartOfStep * options.insertion.step;
+  scene.cut_jumps = false;
   scene.residual_tolerance = options.insertion.residual_tolerance;
   scene.max_iterations = options.insertion.max_iterations;
   return scene;

@@ -298,6 +298,25 @@ TEST(ToolVessel, AStraightShaftTwistsAsOneSpring) {
   }
 }
 
+// As trials do: a jump is made in one part, not looked for in ever smaller ones.
+TEST(ToolVessel, JumpsThatAreNotCutLeadToTheSameShapes) {
+  ToolScene cut = curved_round_the_bend(0.15), whole = cut;
+  whole.cut_jumps = false;
+  ToolBench bench(cut), other(whole);
+  ASSERT_TRUE(bench.settled() && other.settled());
+  int iterations = 0, of_other = 0;
+  for (const ToolMove& move : cut.moves) {
+    ASSERT_TRUE(bench.move(move) && other.move(move));
+    iterations += bench.record().iterations;
+    of_other += other.record().iterations;
+    for (std::size_t i = 0; i < cut.tools.size(); ++i) {
+      EXPECT_LT((bench.record().tools[i].tip - other.record().tools[i].tip).norm(), 1e-3);
+    }
+  }
+  EXPECT_LT(of_other, iterations);
+  EXPECT_NEAR(other.record().heat, bench.record().heat, 0.01 * bench.record().heat);
+}
+
 // As trials move their tools: two millimetres at a time.
 TEST(ToolVessel, AMoveInPiecesEndsWhereTheWholeDoes) {
   const ToolScene scene = curved_round_the_bend(0.15);
