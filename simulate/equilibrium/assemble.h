@@ -71,14 +71,18 @@ Energy assemble(const Problem& problem, const RodState& state, Sink& sink,
   return energy;
 }
 
-/// The straight shaft whose twist is one spring. Of tools in a vessel alone: saddles are left along
-/// modes of the whole Hessian.
+/// The straight shaft whose twist is one spring, of a wire out of an introducer or of the one tool
+/// that twists. None where cross-sections of the vessel move. Of tools in a vessel alone: saddles
+/// are left along modes of the whole Hessian.
 inline TwistChain find_chain_of(const Problem& problem, const RodState& state) {
-  if (problem.last < problem.rod->nodes()) return {};
-  if (problem.first > 0) return find_chain(*problem.rod, problem.first, state);
-  if (problem.tools == nullptr || problem.contact == nullptr) return {};
-  return problem.proximal.hold_roll || problem.distal.hold_roll ? TwistChain{}
-                                                                : find_chain(*problem.tools);
+  const bool moves = problem.contact != nullptr && problem.contact->chain() != nullptr;
+  if (problem.twists() != 1 || moves || problem.last < problem.rod->nodes()) return {};
+  if (problem.tools == nullptr) {
+    return problem.first > 0 ? find_chain(*problem.rod, problem.first, state) : TwistChain{};
+  }
+  const bool rolls = problem.proximal.hold_roll || problem.distal.hold_roll;
+  if (problem.first > 0 || problem.contact == nullptr || rolls) return {};
+  return find_chain(*problem.tools);
 }
 
 inline void spread_chain(const TwistChain& chain, const Problem& problem, RodState& state) {

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "simulate/equilibrium/problem.h"
+#include "simulate/wire/twist_chain.h"
 
 namespace wireplan::simulate {
 

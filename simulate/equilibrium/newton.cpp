@@ -47,7 +47,7 @@ class Newton {
         banded_(D == 3 && sections_ == 0 && problem.first > 0 && problem.last == rod_.nodes() &&
                 !problem.distal.hold_along && !problem.distal.hold_across && contact_ != nullptr &&
                 contact_->remainder_is_banded()),
-        chain_(D == 4 && sections_ == 0 ? find_chain_of(problem, state) : TwistChain{}),
+        chain_(find_chain_of(problem, state)),
         extent_(state.x.cwiseAbs().maxCoeff()),
         state_(state),
         memory_(memory),

@@ -168,23 +168,12 @@ struct NodeJacobian {
   }
 };
 
-/// Whether no tool has a curve at the node.
-inline bool is_straight(const ToolTerms& tools, int node) {
-  for (int t = 0; t < tools.twists(); ++t) {
-    if (tools.rest(t, node) != 0.0) return false;
-  }
-  for (Eigen::Index pair = 0; pair < tools.mutual.rows(); ++pair) {
-    if (tools.mutual(pair, node) != 0.0) return false;
-  }
-  return true;
-}
-
 /// The curves of the tools at a node between two edges.
 template <class Sink>
 double add_tool_bend(const Problem& problem, const RodState& state, int i, Sink& sink) {
   const Rod& rod = *problem.rod;
   const ToolTerms& tools = *problem.tools;
-  if (is_straight(tools, i)) return 0.0;
+  if (tools.is_straight(i)) return 0.0;
   const int T = tools.twists();
   const Eigen::Index edges = state.director.cols();
   std::array<std::optional<Lean>, kMostAngles> leans;
@@ -234,7 +223,7 @@ double add_tool_end(const Problem& problem, const RodState& state, bool proximal
   const ToolTerms& tools = *problem.tools;
   const int node = proximal ? 0 : rod.nodes() - 1, edge = proximal ? 0 : node - 1;
   const std::optional<Vec3>& tangent = (proximal ? problem.proximal : problem.distal).tangent;
-  if (is_straight(tools, node)) return 0.0;
+  if (tools.is_straight(node)) return 0.0;
   const int T = tools.twists();
   const Eigen::Index edges = state.director.cols();
   const Vec3 w = tangent ? (proximal ? Vec3(-*tangent) : *tangent) : Vec3(Vec3::Zero());

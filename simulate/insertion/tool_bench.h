@@ -58,8 +58,8 @@ struct ToolScene {
   /// were before a part, so that after longer ones they may go on in another branch.
   double longest_part = 2.0;  //                                                          [mm]
   /// Whether a part is cut where the hands' forces at its ends are no measure of its work, as where
-  /// tools jump in it. Work is known by the energy all the same; in a vessel this takes several
-  /// times the iterations.
+  /// tools jump in it. What is not cut is a jump by its forces alone. In a vessel cutting takes
+  /// several times the iterations.
   bool cut_jumps = true;
   double residual_tolerance = 1e-6;  // largest nodal force out of balance                 [N]
   int max_iterations = 200;          // of a solve

@@ -18,8 +18,8 @@ constexpr double kToolTip = 2.0;                     // that counts as a tip for
 constexpr double kToolOutside = 1.0;                 // penetration that contact does not explain
 constexpr double kToolPatience = 25.0;               // of the last push, without progress     [mm]
 constexpr double kToolTurnStep = 15.0 * kRadPerDeg;  // of a hub between two records
-constexpr double kStepsPerPart = 2.0;                // of the options, in a record; ...
-constexpr double kPartOfStep = 0.5;        // ... made in parts of this: whole steps led astray
+constexpr double kStepsPerRecord = 2.0;              // of the options; ...
+constexpr double kPartOfStep = 0.5;        // each made in parts of this: whole ones led astray
 constexpr double kDivideLonger = 1.25;     // edges than asked for, ...
 constexpr double kFiner[] = {1.06, 1.13};  // elements, where a move finds no equilibrium; chosen
 constexpr double kLongestEdge = 1.45;      // ... of it: ToolBench::divide()
@@ -157,7 +157,7 @@ bool ToolTrial::make(const ToolStep& step, bool last) {
 /// Part by part. True where it stops since the tool passes the branch by, if that is looked for.
 bool ToolTrial::advance(const ToolStep& step, bool last, bool looks) {
   const double whole = std::abs(step.push) + std::abs(step.turn) / kToolTurnStep;
-  const double most = step.turn == 0.0 ? kStepsPerPart * options_.insertion.step : 1.0;
+  const double most = step.turn == 0.0 ? kStepsPerRecord * options_.insertion.step : 1.0;
   const double unit = step.turn == 0.0 ? 1.0 : kToolTurnStep;
   furthest_ = since_furthest_ = 0.0;
   for (double done = 0.0; whole - done > 1e-9 && !ended();) {

@@ -54,6 +54,10 @@ struct ToolTerms {
   double stored = 0.0;     // energy that no shape changes                              [N mm]
 
   int twists() const { return static_cast<int>(tool.size()); }
+  /// Whether no tool has a curve at the node.
+  bool is_straight(int node) const {
+    return (rest.col(node).array() == 0.0).all() && (mutual.col(node).array() == 0.0).all();
+  }
   /// Row of `mutual` of twisted tools i < k.
   static int pair(int i, int k) { return i + k - 1; }
 };

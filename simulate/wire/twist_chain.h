@@ -61,10 +61,10 @@ inline TwistChain find_chain(const Rod& rod, int first, const RodState& state) {
 
 /// The chain of the one tool that twists, whose nodes are free from the introducer's on.
 inline TwistChain find_chain(const ToolTerms& tools) {
-  if (tools.rest(0, 0) != 0.0) return {};
+  if (!tools.is_straight(0)) return {};
   return as_long_as(
       {.first = 1, .start = tools.roll[0], .lead = tools.lead[0]},
-      static_cast<int>(tools.rest.cols()), [&](int i) { return tools.rest(0, i) == 0.0; },
+      static_cast<int>(tools.rest.cols()), [&](int i) { return tools.is_straight(i); },
       [&](int i) { return tools.twist(0, i); });
 }
 

@@ -11,6 +11,7 @@
 #include <utility>
 #include <vector>
 
+#include "simulate/equilibrium/assemble.h"
 #include "simulate/insertion/insertion.h"
 #include "simulate/insertion/tool_bench.h"
 #include "tests/shapes.h"
@@ -281,9 +282,9 @@ TEST(ToolVessel, AStraightShaftTwistsAsOneSpring) {
   for (const ToolMove& move : one_spring.moves) {
     ASSERT_TRUE(bench.move(move) && other.move(move));
     if (bench.places().front().insertion > 40.0) {
-      EXPECT_TRUE(find_chain(bench.composite().terms).exists());
+      EXPECT_TRUE(find_chain_of(bench.problem(), bench.state()).exists());
     }
-    EXPECT_FALSE(find_chain(other.composite().terms).exists());
+    EXPECT_FALSE(find_chain_of(other.problem(), other.state()).exists());
     EXPECT_LT((bench.state().x - other.state().x).colwise().norm().maxCoeff(), 1e-4);
     EXPECT_LT((bench.angles(0) - other.angles(0)).cwiseAbs().maxCoeff(), 1e-5);
     EXPECT_NEAR(bench.record().tools[0].hub_torque, other.record().tools[0].hub_torque, 1e-5);
@@ -298,7 +299,7 @@ TEST(ToolVessel, AStraightShaftTwistsAsOneSpring) {
   }
 }
 
-// As trials do: a jump is made in one part, not looked for in ever smaller ones.
+// As in trials a jump is made in one part, not looked for in ever smaller ones.
 TEST(ToolVessel, JumpsThatAreNotCutLeadToTheSameShapes) {
   ToolScene cut = curved_round_the_bend(0.15), whole = cut;
   whole.cut_jumps = false;
