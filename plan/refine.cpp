@@ -103,7 +103,8 @@ std::vector<int> choose_plans_to_refine(const Ranking& ranking,
   return next;
 }
 
-Study refined_study(const Study& study, double factor, double insertion) {
+Study refined_study(const Study& study, const Candidate& candidate, double factor,
+                    double insertion) {
   Study changed = study;
   changed.insertion.element_length *= factor;
   for (double& length : changed.insertion.section_element_length) length *= factor;
@@ -112,6 +113,7 @@ Study refined_study(const Study& study, double factor, double insertion) {
   changed.insertion.record_every = insertion;  // no shapes on the way
   changed.insertion.map_forces = false;
   changed.goal = {.point = study.goal.point, .radius = 1e-9};  // no push ends that near
+  if (candidate.catheter >= 0) changed.goal.way = study.goal.way;
   return changed;
 }
 

@@ -67,8 +67,10 @@ inline constexpr std::array kRefineFactors = {2.0, 1.0, 0.5};
 
 /// The study of one such run: elements and contact points `factor` times as far apart, and pushed
 /// to the insertion that the plan ended at, past the goal if need be, so that shapes of equal
-/// insertion are compared.
-Study refined_study(const Study& study, double factor, double insertion);
+/// insertion are compared. Of scripts of tools the way is kept, since their steps end by what is
+/// seen along it.
+Study refined_study(const Study& study, const Candidate& candidate, double factor,
+                    double insertion);
 
 /// The plans to refine next, as trials, best first: those of the first `options.plans` that are not
 /// in `known` yet, and those tied with the first plan, since their error may change which is first,

@@ -13,8 +13,8 @@ simulate::TrialResult simulate_run(const Study& study, const Run& run,
                                    const simulate::VesselModel& vessel) {
   if (run.disturbance) return run_disturbed(study, run.candidate, vessel, *run.disturbance);
   if (run.elements) {
-    Study changed = refined_study(study, run.elements->factor, run.elements->insertion);
     Candidate candidate = run.candidate;
+    Study changed = refined_study(study, candidate, run.elements->factor, run.elements->insertion);
     if (run.elements->setting) change_setting(*run.elements->setting, changed, candidate);
     return run_candidate(changed, candidate, vessel);
   }

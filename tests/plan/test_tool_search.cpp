@@ -10,6 +10,7 @@
 
 #include "plan/catheter_choice.h"
 #include "plan/judge.h"
+#include "plan/refine.h"
 #include "plan/tool_neighbours.h"
 #include "plan/tool_search.h"
 #include "tests/plan/memory_log.h"
@@ -558,6 +559,15 @@ TEST(ToolSearch, MakePlanRanksScriptsOfCatheterAndWire) {
   EXPECT_EQ(plan.candidates[first].catheter, 0);
   EXPECT_EQ(plan.trials[first].tools.size(), 2U);
   EXPECT_TRUE(judged.ranking.plans.front().tip_error.has_value());
+  // Its errors are of the same script, whose steps end by what is seen.
+  const Candidate& script = plan.candidates[first];
+  EXPECT_TRUE(std::any_of(script.steps.begin(), script.steps.end(),
+                          [](const ToolStep& step) { return step.until != Until::kMade; }));
+  const Study same = refined_study(study, script, 1.0, plan.trials[first].metrics.insertion);
+  const auto tip_of = [&](const Study& by) -> Vec3 {
+    return run_candidate(by, script, aorta()).nodes.rightCols<1>();
+  };
+  EXPECT_LT((tip_of(same) - tip_of(study)).norm(), 1e-3);
   ASSERT_FALSE(plan.refinements.empty());
   ASSERT_FALSE(plan.refinements.front().rows.empty());
   EXPECT_NEAR(plan.refinements.front().rows.front().element_length, 6.0, 1e-9)
