@@ -271,6 +271,20 @@ std::vector<std::string> describe_steps(const std::vector<ToolStep>& steps, doub
       text += ", then to the other side, then by twice as much, ";
       text += std::to_string(step.tries) + " times at most";
     }
+    if (step.steers > 0) {
+      text += "; where it goes into another vessel or comes no further, more than ";
+      text += whole_number(simulate::kSteerNear) + " mm before the ostium, withdraw it to ";
+      text += whole_number(simulate::kSteerBack) + " mm before where that began, bring the ";
+      text += "catheter up to " + whole_number(simulate::kSteerBehind) + " mm behind its tip and ";
+      text += "lead it on";
+      if (step.steers > 1) {
+        text += ", the next times from " + whole_number(simulate::kSteerFurther) + " mm further ";
+        text += "back and with the catheter turned on ";
+        text += whole_number(simulate::kSteerTurn / kRadPerDeg) + " degrees clockwise, ";
+        text += std::to_string(step.steers) + " times at most";
+      }
+      text += "; then take the catheter back as it was";
+    }
     told.push_back(std::move(text));
   }
   return told;

@@ -1,5 +1,9 @@
 #include "plan/settings.h"
 
+#include <algorithm>
+
+#include "simulate/insertion/tool_trial.h"
+
 namespace wireplan::plan {
 namespace {
 
@@ -50,6 +54,9 @@ void change_setting(Setting setting, Study& study, Candidate& candidate) {
   switch (setting) {
     case Setting::kStep:
       study.insertion.step *= 0.5;
+      if (candidate.catheter >= 0) {  // whose parts are half as long as a step, up to that
+        study.insertion.step = std::min(study.insertion.step, simulate::kLongestToolPart);
+      }
       return;
     case Setting::kRoll:
       candidate.roll += kTinyRoll;

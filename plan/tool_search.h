@@ -1,7 +1,7 @@
 #pragma once
 /// Scripts of catheter and wire for targets that a wire alone does not reach, from a template that
 /// hands follow (references-2 L):
-///   1. the wire goes up beyond the ostium, and the catheter over it;
+///   1. the wire goes up beyond the ostium, steered past other vessels, the catheter over it;
 ///   2. the wire is withdrawn, so that the catheter's curve forms;
 ///   3. the catheter is turned, by more than half a turn only with a short pull between, and both
 ///   are pulled back, until its tip is in the ostium;

@@ -43,6 +43,7 @@ struct Template {
   double turn_slack = 30.0 * kRadPerDeg;  // ... and of turns
   int again = 8;  // tries more of a wire that passes the ostium by, from so far beside
   double again_pull = 3.0, again_turn = 15.0 * kRadPerDeg;  //                          [mm, rad]
+  int steers = 8;                                           // of a wire on its way up, at most
   std::size_t weighed = 5;  // scripts of a start whose neighbours are tried
 };
 constexpr Template kTemplate;
@@ -158,9 +159,14 @@ class ToolSearch {
   bool go(const ToolStep& step) {
     const State before = here();
     ++findings_.branches;
+    const std::size_t pushes = trial_.pushes().size();
     trial_.make(step);
-    if (!trial_.pushes().empty() && progress() > findings_.furthest) {
-      findings_.furthest = progress();
+    double furthest = 0.0;
+    for (std::size_t k = pushes; k < trial_.pushes().size(); ++k) {
+      furthest = std::max(furthest, preprocess::find_progress(trial_.pushes()[k].tip, path_));
+    }
+    if (furthest > findings_.furthest) {
+      findings_.furthest = furthest;
       findings_.closest = with(steps_, step);
     }
     if (!trial_.ended()) {
@@ -278,6 +284,12 @@ class ToolSearch {
   /// Beyond the ostium, or as far as the vessel goes there. False where that is not far enough to
   /// lead the catheter.
   bool wire_up() {
+    // Steered as far as it can be, then looked at after each push.
+    const double far = ostium_.arc - simulate::kSteerNear - insertion(kWire);
+    const double steered = kTemplate.out * std::floor(far / kTemplate.out);
+    if (steered > 0.0 && !go({.tool = kWire, .push = steered, .steers = count_steers()})) {
+      return false;
+    }
     const double to = std::floor(ostium_.arc) + kTemplate.beyond;
     while (to - insertion(kWire) > 1e-9 && !stop()) {
       const double by = std::min(kTemplate.out, to - insertion(kWire));
@@ -288,10 +300,17 @@ class ToolSearch {
       if (slack > 0.0) go({.tool = kWire, .push = -slack});
     }
     // A wire cuts bends short: it may lie beyond with less of it in than the way is long.
-    const bool far =
+    const bool beyond =
         std::max(insertion(kWire) - ostium_.arc, trial_.measure(Until::kLevel, kWire)) > 0.0;
-    if (far) findings_.stopped.clear();
-    return far && findings_.found.empty();
+    if (beyond) findings_.stopped.clear();
+    return beyond && findings_.found.empty();
+  }
+
+  /// As often as the rules let the catheter be turned; once without.
+  int count_steers() const {
+    const ToolRules& rules = study_.tool_rules;
+    const double most = std::min(rules.most_turn, rules.turn_per_length * simulate::kSteerFurther);
+    return most < simulate::kSteerTurn - 1e-9 ? 1 : kTemplate.steers;
   }
 
   /// Over the wire, to two depths, as far as it comes; the deeper one first.

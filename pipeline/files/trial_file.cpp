@@ -339,6 +339,7 @@ Json steps_json(const std::vector<simulate::ToolStep>& steps) {
                       {"pull_mm", clean(step.try_pull)},
                       {"turn_deg", clean(step.try_turn / kRadPerDeg)}};
     }
+    if (step.steers > 0) row["steers"] = step.steers;
     list.push_back(std::move(row));
   }
   return list;
@@ -356,6 +357,7 @@ std::vector<simulate::ToolStep> steps_of(const Json& list) {
                      .until = {},
                      .at = 0.0});
     simulate::ToolStep& step = steps.back();
+    step.steers = row.value("steers", 0);
     if (row.contains("tries")) {
       step.tries = row.at("tries").at("most");
       step.try_pull = number_of(row.at("tries").at("pull_mm"));

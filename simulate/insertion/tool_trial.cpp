@@ -19,14 +19,17 @@ constexpr double kToolOutside = 1.0;                 // penetration that contact
 constexpr double kToolPatience = 25.0;               // of the last push, without progress     [mm]
 constexpr double kToolTurnStep = 15.0 * kRadPerDeg;  // of a hub between two records
 constexpr double kStepsPerRecord = 2.0;              // of the options; ...
-constexpr double kPartOfStep = 0.5;        // each made in parts of this: whole ones led astray
-constexpr double kDivideLonger = 1.25;     // edges than asked for, ...
+constexpr double kPartOfStep = 0.5;                  // each made in parts of this ...
+constexpr double kDivideLonger = 1.25;               // edges than asked for, ...
 constexpr double kFiner[] = {1.06, 1.13};  // elements, where a move finds no equilibrium; chosen
 constexpr double kLongestEdge = 1.45;      // ... of it: ToolBench::divide()
 constexpr double kDivideShorter = 0.67;    // ... or shorter: the centreline is divided anew
 constexpr double kAtEnd = 0.02;            // of a part: so near, a step is at what ends it; chosen
 constexpr double kShortestToEnd = 0.1;     // of a part, near what ends it; chosen
 constexpr double kTryOut = 20.0, kTryIn = 5.0;  // of a tool that passes a branch by: ToolStep  [mm]
+constexpr double kSteerAstray = 10.0;  // pushed on in another vessel: less may pass its mouth [mm]
+constexpr int kSteerPlaces = 4;        // each so much further back; near the access ...
+constexpr double kSteerShare = 0.6, kSteerShareLess = 0.1;  // ... so much of the insertion
 constexpr double kLooksAside = 0.1;  // sine, of a tip against the trunk: less looks nowhere
 
 std::string in_mm(double value) {
@@ -55,7 +58,7 @@ ToolScene scene_of(const std::vector<Tool>& tools, const Introducer& introducer,
   scene.friction = options.friction_between;
   scene.element_length = options.insertion.element_length;
   scene.loads.gravity = options.insertion.gravity;
-  scene.longest_part = kPartOfStep * options.insertion.step;
+  scene.longest_part = std::min(kLongestToolPart, kPartOfStep * options.insertion.step);
   scene.cut_jumps = false;
   scene.residual_tolerance = options.insertion.residual_tolerance;
   scene.max_iterations = options.insertion.max_iterations;
@@ -140,11 +143,16 @@ std::optional<double> ToolTrial::missing(const ToolStep& step) const {
 
 bool ToolTrial::make(const ToolStep& step, bool last) {
   expects(step.tool >= kBothTools && step.tool < static_cast<int>(record_.tools.size()));
-  expects(step.tries == 0 || (step.tool > 0 && step.push > 0.0));
+  expects(std::min(step.tries, step.steers) == 0);
+  expects(std::max(step.tries, step.steers) == 0 || (step.tool > 0 && step.push > 0.0));
   ++step_;
   const double from = step.tries > 0 ? insertion(step.tool) : 0.0;
-  for (int tried = 0; advance(step, last, tried < step.tries); ++tried) {
-    try_again(step, from, tried + 1);
+  if (step.steers > 0) {
+    make_steered(step, last);
+  } else {
+    for (int tried = 0; advance(step, last, tried < step.tries); ++tried) {
+      try_again(step, from, tried + 1);
+    }
   }
   // The end of each step is looked at.
   if (!ended() && options_.insertion.map_forces && since_shape_ > 0.0) {
@@ -154,7 +162,8 @@ bool ToolTrial::make(const ToolStep& step, bool last) {
   return !ended();
 }
 
-/// Part by part. True where it stops since the tool passes the branch by, if that is looked for.
+/// Part by part. True where it stops since the tool passes the branch by, if that is looked for, or
+/// loses the way, if it is to be steered.
 bool ToolTrial::advance(const ToolStep& step, bool last, bool looks) {
   const double whole = std::abs(step.push) + std::abs(step.turn) / kToolTurnStep;
   const double most = step.turn == 0.0 ? kStepsPerRecord * options_.insertion.step : 1.0;
@@ -176,7 +185,12 @@ bool ToolTrial::advance(const ToolStep& step, bool last, bool looks) {
     if (looks && passes_by(step)) return true;
     // Within another tool it brings no tip on.
     const bool leads = foremost_of(step.tool) > foremost() - 1e-9;
-    if (last && step.push > 0.0 && leads && !check_advance(by)) break;
+    if (!leads || step.push <= 0.0) continue;
+    if (step.steers > 0 && may_lose_way()) {
+      if (loses_way(by)) return true;
+    } else if (last && !check_advance(by)) {
+      break;
+    }
   }
   return false;
 }
@@ -209,6 +223,56 @@ void ToolTrial::try_again(const ToolStep& step, double from, int tried) {
   for (const ToolStep& move : moves) {
     if (!ended() && (move.push != 0.0 || move.turn != 0.0)) advance(move, false, false);
   }
+}
+
+/// Up to the take-off, past the vessels that the tip goes into.
+void ToolTrial::make_steered(const ToolStep& step, bool last) {
+  const int outer = step.tool - 1;
+  const double to = insertion(step.tool) + step.push, outer_was = insertion(outer);
+  double lost_at = 0.0, came = 0.0, turned = 0.0;
+  const auto move = [&](const ToolStep& next) {
+    if (!ended() && (next.push != 0.0 || next.turn != 0.0)) advance(next, false, false);
+  };
+  ToolStep rest = step;
+  for (int tried = 0; advance(rest, last, false); ++tried) {
+    lost_at = std::max(lost_at, insertion(step.tool) - since_furthest_);
+    came = std::max(came, furthest_);
+    rest.push = to - insertion(step.tool);
+    if (tried == step.steers) {
+      if (goal_.way->find_astray(foremost_tip())) {
+        return end_where_it_is(Outcome::kStuck,
+                               "the tip came no further than " + in_mm(came) + " along the way");
+      }
+      rest.steers = 0;  // it is in the way's vessel, as far as that is known
+      continue;
+    }
+    ++tries_;
+    const int place = tried % kSteerPlaces;
+    const double start = std::max(lost_at - kSteerBack - place * kSteerFurther,
+                                  lost_at * (kSteerShare - place * kSteerShareLess));
+    const double behind = std::min(kSteerBehind, 0.5 * start);
+    move({.tool = step.tool, .push = start - insertion(step.tool)});
+    move({.tool = outer, .push = std::max(outer_was, start - behind) - insertion(outer)});
+    if (tried > 0) {
+      move({.tool = outer, .turn = kSteerTurn});
+      turned += kSteerTurn;
+    }
+    rest.push = to - insertion(step.tool);
+  }
+  move({.tool = outer, .push = outer_was - insertion(outer)});
+  move({.tool = outer, .turn = -turned});
+}
+
+/// Whether the tip is still on its way up to the take-off, where it may be steered.
+bool ToolTrial::may_lose_way() const {
+  return goal_.way && options_.take_off && furthest_ < options_.take_off->arc - kSteerNear;
+}
+
+/// Whether the tip goes into another vessel or comes no further.
+bool ToolTrial::loses_way(double pushed) {
+  if (comes_further(pushed)) return false;
+  return since_furthest_ > kToolPatience ||
+         (since_furthest_ > kSteerAstray && goal_.way->find_astray(foremost_tip()).has_value());
 }
 
 /// A part of a step, which is recorded; false where it ends the trial or the tool has no length
@@ -424,18 +488,21 @@ void ToolTrial::check_place() {
   }
 }
 
+/// Whether a push brings the tip further along the way than this step has yet.
+bool ToolTrial::comes_further(double pushed) {
+  const double progress = preprocess::find_progress(foremost_tip(), goal_.way->path());
+  const bool further = progress > furthest_;
+  since_furthest_ = further ? 0.0 : since_furthest_ + pushed;
+  if (further) furthest_ = progress;
+  return further;
+}
+
 /// Whether the last step of a script goes on: its push brings the tip further along the way.
 bool ToolTrial::check_advance(double pushed) {
   if (!goal_.way || ended()) return !ended();
+  if (comes_further(pushed) || since_furthest_ <= kToolPatience) return true;
   const Push& push = record_.pushes.back();
   const double progress = preprocess::find_progress(foremost_tip(), goal_.way->path());
-  if (progress > furthest_) {
-    furthest_ = progress;
-    since_furthest_ = 0.0;
-    return true;
-  }
-  since_furthest_ += pushed;
-  if (since_furthest_ <= kToolPatience) return true;
   end_where_it_is(progress > 0.0 ? Outcome::kStuck : Outcome::kMissed,
                   "the tip came no further than " + in_mm(furthest_) + " along the way while " +
                       in_mm(since_furthest_) + " more went in, and is at " + place_text(push.tip) +
@@ -455,8 +522,10 @@ void ToolTrial::end_where_it_is(Outcome outcome, const std::string& reason) {
 void ToolTrial::end(Outcome outcome, const std::string& reason) {
   outcome_ = record_.outcome = outcome;
   record_.reason = reason;
-  if (tries_ == 0) return;
-  record_.reason += "; tried again " + std::to_string(tries_) + (tries_ == 1 ? " time" : " times");
+  if (tries_ > 0) {
+    record_.reason +=
+        "; tried again " + std::to_string(tries_) + (tries_ == 1 ? " time" : " times");
+  }
 }
 
 TrialResult ToolTrial::finish() {

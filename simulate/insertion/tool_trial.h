@@ -18,6 +18,15 @@ namespace wireplan::simulate {
 
 inline constexpr int kBothTools = -1;
 
+/// Moves are made in parts of half a step that are at most so long: longer ones lead astray.
+inline constexpr double kLongestToolPart = 0.5;  //                                         [mm]
+
+/// Of a tool that is led past another vessel: see ToolStep. Chosen.
+inline constexpr double kSteerBack = 30.0, kSteerFurther = 10.0, kSteerBehind = 30.0;  //  [mm]
+inline constexpr double kSteerTurn = 45.0 * kRadPerDeg;
+/// So far before the take-off it is steered: what is astray nearer may lead the other tool on.
+inline constexpr double kSteerNear = 50.0;  //                                             [mm]
+
 /// Where the way takes a branch: what the hand watches on the screen.
 struct TakeOff {
   double arc = 0.0;             // of the ostium, along the way                            [mm]
@@ -44,6 +53,14 @@ struct ToolStep {
   double turn = 0.0;  // of its hub, right-handed about the introducer's direction       [rad]
   Until until = Until::kMade;
   double at = 0.0;  // see Until                                                     [mm, rad]
+  /// Of a push of a tool that leads, at most so often: where its tip, on its way up to the
+  /// take-off, goes into another vessel or comes no further, it is steered. It is withdrawn to
+  /// kSteerBack before where that began, the tool outside it is brought up to kSteerBehind its tip,
+  /// and it is led on. The next times the outer one is turned on by kSteerTurn, and both are
+  /// kSteerFurther back, three times as much at most, then again as at first. Near the access all
+  /// lengths are shorter. Once the tool is up, the outer one is taken back as it was. Where all is
+  /// in vain and the tip in another vessel, the trial ends.
+  int steers = 0;
   /// Of a push of a tool that leads: where it is 20 mm out of the one outside it, and not in the
   /// branch, it is withdrawn to where the step began, and the push begins anew with both pulled
   /// back by `try_pull` from where they were, then pushed on by it, then the outer one turned by
@@ -106,6 +123,10 @@ class ToolTrial {
   bool advance(const ToolStep& step, bool last, bool looks);
   bool passes_by(const ToolStep& step) const;
   void try_again(const ToolStep& step, double from, int tried);
+  void make_steered(const ToolStep& step, bool last);
+  bool may_lose_way() const;
+  bool loses_way(double pushed);
+  bool comes_further(double pushed);
   bool part(const ToolStep& step);
   std::optional<double> missing(const ToolStep& step) const;
   bool divide_for(const ToolMove& move);
@@ -129,7 +150,7 @@ class ToolTrial {
   int step_ = -1;  // of the script, under way
   int tries_ = 0;  // that were made again
   double since_shape_ = 0.0, best_distance_ = 0.0;
-  double furthest_ = 0.0, since_furthest_ = 0.0;  // of the last step
+  double furthest_ = 0.0, since_furthest_ = 0.0;  // along the way, pushed since: of this step [mm]
   std::vector<double> peak_;                      // per triangle of the wall, largest force  [N]
 };
 

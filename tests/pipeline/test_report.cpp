@@ -552,5 +552,22 @@ TEST(TrialFile, KeepsEveryBitAndMakesNullOfWhatIsNoNumber) {
   EXPECT_FALSE(find_trial(folder / "absent.json"));
 }
 
+TEST(Report, StepsOfAScriptAreReadAsTheyAreWritten) {
+  using simulate::Until;
+  const std::vector<simulate::ToolStep> steps = {
+      {.tool = 1, .push = 320.0, .steers = 8},
+      {.tool = 0, .push = 302.5},
+      {.tool = 0, .turn = -180.0 * kRadPerDeg, .until = Until::kFacing, .at = 25.0 * kRadPerDeg},
+      {.tool = simulate::kBothTools, .push = -22.0, .until = Until::kLevel, .at = -5.0},
+      {.tool = 1,
+       .push = 60.0,
+       .until = Until::kInBranch,
+       .at = 18.0,
+       .tries = 8,
+       .try_pull = 3.0,
+       .try_turn = -15.0 * kRadPerDeg}};
+  EXPECT_EQ(steps_of(steps_json(steps)), steps);
+}
+
 }  // namespace
 }  // namespace wireplan::pipeline

@@ -30,6 +30,7 @@ inline std::string text_of(const Run& run) {
     add(step.turn);
     text += " until " + std::to_string(static_cast<int>(step.until));
     add(step.at);
+    text += " tries " + std::to_string(step.tries) + " steers " + std::to_string(step.steers);
   }
   if (run.elements) {
     text += " elements";

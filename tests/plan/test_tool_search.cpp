@@ -218,7 +218,7 @@ TEST(ToolSteps, ReadAsTheHandMakesThem) {
 
 TEST(ToolSteps, SayWhatEndsThem) {
   const std::vector<std::string> told =
-      describe_steps({{.tool = 1, .push = 216.0},
+      describe_steps({{.tool = 1, .push = 216.0, .steers = 7},
                       {.tool = 0, .push = 212.0},
                       {.tool = 0, .turn = -kPi / 2.0, .until = Until::kFacing, .at = kPi / 6.0},
                       {.tool = kBothTools, .push = -40.0, .until = Until::kLevel, .at = -6.0},
@@ -234,15 +234,18 @@ TEST(ToolSteps, SayWhatEndsThem) {
                       {.tool = 1, .push = 90.0}},
                      247.4);
   const std::vector<std::string> expected = {
-      "advance the wire to 220 mm",
+      "advance the wire to 220 mm; where it goes into another vessel or comes no further, more "
+      "than 50 mm before the ostium, withdraw it to 30 mm before where that began, bring the "
+      "catheter up to 30 mm behind its tip and lead it on, the next times from 10 mm further back "
+      "and with the catheter turned on 45 degrees clockwise, 7 times at most; then take the "
+      "catheter back as it was",
       "advance the catheter over the wire to 212 mm",
       "turn the catheter counterclockwise until its tip looks 30 degrees clockwise of the branch, "
       "by 90 degrees at most",
       "pull back catheter and wire together until the catheter's tip is 6 mm short of the level of "
       "the ostium, by 40 mm at most",
       "pull back catheter and wire together until the catheter's tip falls into the ostium, by 9 "
-      "mm "
-      "at most",
+      "mm at most",
       "advance the wire until its tip is 18 mm past the ostium, by 60 mm at most; where it passes "
       "the branch by, withdraw it and try again with both 3 mm back, then on, of where they were, "
       "then with the catheter turned 15 degrees counterclockwise, then to the other side, then by "
