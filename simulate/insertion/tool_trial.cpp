@@ -526,6 +526,7 @@ void ToolTrial::end(Outcome outcome, const std::string& reason) {
     record_.reason +=
         "; tried again " + std::to_string(tries_) + (tries_ == 1 ? " time" : " times");
   }
+  record_.reason += describe_balance(record_.pushes);
 }
 
 TrialResult ToolTrial::finish() {
