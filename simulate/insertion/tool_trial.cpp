@@ -234,10 +234,9 @@ void ToolTrial::make_steered(const ToolStep& step, bool last) {
     if (!ended() && (next.push != 0.0 || next.turn != 0.0)) advance(next, false, false);
   };
   ToolStep rest = step;
-  for (int tried = 0; advance(rest, last, false); ++tried) {
+  for (int tried = 0; advance(rest, last, false); ++tried, rest.push = to - insertion(step.tool)) {
     lost_at = std::max(lost_at, insertion(step.tool) - since_furthest_);
     came = std::max(came, furthest_);
-    rest.push = to - insertion(step.tool);
     if (tried == step.steers) {
       if (goal_.way->find_astray(foremost_tip())) {
         return end_where_it_is(Outcome::kStuck,
@@ -257,7 +256,6 @@ void ToolTrial::make_steered(const ToolStep& step, bool last) {
       move({.tool = outer, .turn = kSteerTurn});
       turned += kSteerTurn;
     }
-    rest.push = to - insertion(step.tool);
   }
   move({.tool = outer, .push = outer_was - insertion(outer)});
   move({.tool = outer, .turn = -turned});

@@ -552,7 +552,7 @@ TEST(TrialFile, KeepsEveryBitAndMakesNullOfWhatIsNoNumber) {
   EXPECT_FALSE(find_trial(folder / "absent.json"));
 }
 
-TEST(Report, StepsOfAScriptAreReadAsTheyAreWritten) {
+TEST(TrialFile, StepsOfAScriptAreReadAsTheyAreWritten) {
   using simulate::Until;
   const std::vector<simulate::ToolStep> steps = {
       {.tool = 1, .push = 320.0, .steers = 8},

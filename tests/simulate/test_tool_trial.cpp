@@ -68,6 +68,17 @@ ToolTrial hooked_trial() {
   return {{hooked_catheter(), straight_wire(20.0)}, kUpward, kNowhere, aorta(), coarse()};
 }
 
+Centerline line_from(const Vec3& from, const Vec3& to, double radius) {
+  const double length = (to - from).norm();
+  const auto n = static_cast<Eigen::Index>(std::lround(length)) + 1;
+  Centerline line{Eigen::Matrix3Xd(3, n), Eigen::VectorXd::Constant(n, radius),
+                  Eigen::VectorXd::LinSpaced(n, 0.0, length)};
+  for (Eigen::Index k = 0; k < n; ++k) {
+    line.points.col(k) = from + line.arc_length[k] / length * (to - from);
+  }
+  return line;
+}
+
 TEST(ToolTrial, TheWireOfACatheterThatStaysOutsideGoesAsTheWireAlone) {
   const VesselModel bend(shapes::bend_tube(4.0, 40.0, 0.5 * kPi, 40.0, 60.0, 1.5),
                          {.grid_spacing = 0.6});
@@ -195,14 +206,8 @@ TEST(ToolTrial, ANewDivisionOfTheCentrelineKeepsTheShape) {
 
 TEST(ToolTrial, AWireThatComesUpInsideTheCatheterIsNotTakenForStuck) {
   // The catheter leads by 90 mm, which is more than the last push is given without progress.
-  Centerline path;
-  path.points.resize(3, 150);
-  for (Eigen::Index k = 0; k < 150; ++k) {
-    path.points.col(k) = Vec3(0.0, 0.0, 5.0 + static_cast<double>(k));
-  }
-  path.radius = Eigen::VectorXd::Constant(150, kAorta);
-  path.arc_length = Eigen::VectorXd::LinSpaced(150, 0.0, 149.0);
-  const auto way = std::make_shared<Way>(path);
+  const auto way =
+      std::make_shared<Way>(line_from(Vec3(0.0, 0.0, 5.0), Vec3(0.0, 0.0, 154.0), kAorta));
   const Goal goal{.point = way->section().center, .radius = kAorta, .at_section = true, .way = way};
   const TrialResult result =
       run_tool_trial({hooked_catheter(), straight_wire(20.0)}, kUpward, goal, aorta(), coarse(),
@@ -278,17 +283,6 @@ const VesselModel& side_branch() {
           Vec3(-7.0, -7.0, -1.5), Vec3(46.0, 7.0, 201.5), 1.0),
       LumenOptions{.grid_spacing = 0.6});
   return vessel;
-}
-
-Centerline line_from(const Vec3& from, const Vec3& to, double radius) {
-  const double length = (to - from).norm();
-  const auto n = static_cast<Eigen::Index>(std::lround(length)) + 1;
-  Centerline line{Eigen::Matrix3Xd(3, n), Eigen::VectorXd::Constant(n, radius),
-                  Eigen::VectorXd::LinSpaced(n, 0.0, length)};
-  for (Eigen::Index k = 0; k < n; ++k) {
-    line.points.col(k) = from + line.arc_length[k] / length * (to - from);
-  }
-  return line;
 }
 
 /// Up that trunk to 190 mm, past a take-off at that arc length of the way.
