@@ -110,12 +110,13 @@ std::vector<Suggestion> suggest_catheters(const std::vector<Catheter>& catheters
   });
   std::vector<Suggestion> suggestions;
   for (const Row& row : rows) {
-    if (suggestions.size() == most || row.kinds_off != rows.front().kinds_off) break;
+    if (suggestions.size() == most) break;
     std::string reason = "the branch turns by " + three_digits(in_degrees(take_off)) +
                          " degrees from its trunk, which asks for a " + kind_name(kind);
-    if (row.kinds_off > 0)
-      reason +=
-          std::string(", of which none is there; a ") + kind_name(row.shape.kind) + " comes next";
+    if (row.kinds_off > 0) {
+      reason += rows.front().kinds_off > 0 ? ", of which none is there" : "";
+      reason += std::string("; a ") + kind_name(row.shape.kind) + " comes next";
+    }
     reason += "; this one is " + three_digits(row.shape.reach) + " mm wide, the trunk " +
               three_digits(ostium.trunk_diameter) + " mm and the branch " +
               three_digits(ostium.branch_diameter) + " mm";

@@ -13,14 +13,16 @@ namespace {
 /// All chosen.
 constexpr double kCover = 6.0;  // of a curve behind its end, where the wire is withdrawn to  [mm]
 constexpr std::size_t kScriptsKept = 6;  // scripts of a pair
-constexpr double kSteady = 0.5;  // of neighbours that reach: one may stand in for the script
+constexpr double kSteady = 0.5;  // of a script and its neighbours that reach: it holds, and one of
+                                 // them may stand in for it
+constexpr std::size_t kSuggestedAtOnce = 3;  // catheters
 
 // Of the search; ten times as much brought half of the wires elsewhere than runs in full   [N]
 constexpr double kScoutResidual = 1e-5;
 
 /// One depth of the catheter and one withdrawal of the wire.
 struct ToolStart {
-  std::size_t pair = 0;
+  std::size_t pair = 0;  // among those that are tried together
   const RaisedTools* depth = nullptr;
   double withdrawn = 0.0;  //                                                                 [mm]
   StartFindings findings;
@@ -33,6 +35,65 @@ void add_starts(const Study& study, const ToolPair& pair, std::size_t slot, cons
   for (const RaisedTools& depth : way.depths) {
     starts.push_back({slot, &depth, all + kCover, {}});
     if (first != all) starts.push_back({slot, &depth, first + kCover, {}});
+  }
+}
+
+/// Indices of pairs, in the order in which they are tried, while none before has a script that
+/// holds: of catheters that the anatomy suggests three, then the next, else all at once.
+std::vector<std::vector<std::size_t>> tried_together(const Study& study,
+                                                     const std::vector<PairFindings>& pairs) {
+  std::vector<std::vector<std::size_t>> groups(1);
+  for (std::size_t p = 0; p < pairs.size(); ++p) {
+    const std::size_t group =
+        study.suggested.empty()
+            ? 0
+            : static_cast<std::size_t>(pairs[p].pair.catheter) / kSuggestedAtOnce;
+    groups.resize(std::max(groups.size(), group + 1));
+    groups[group].push_back(p);
+  }
+  return groups;
+}
+
+/// What a pair's way up and its starts found: the different scripts of it that hold best.
+void gather(const Study& study, const std::vector<ToolStart>& starts, std::size_t slot,
+            const StartFindings& way_up, PairFindings& pair, ToolScripts& all) {
+  std::vector<const StartFindings*> parts;
+  for (const ToolStart& start : starts) {
+    if (start.pair == slot) parts.push_back(&start.findings);
+  }
+  parts.push_back(&way_up);
+  std::vector<FoundScript> found;
+  ToolScript closest;
+  for (const StartFindings* part : parts) {
+    const StartFindings& own = *part;
+    all.branches += own.branches;
+    pair.found += own.count;
+    if (own.nearest_hook >= 0.0 &&
+        (pair.nearest_hook < 0.0 || own.nearest_hook < pair.nearest_hook)) {
+      pair.nearest_hook = own.nearest_hook;
+    }
+    if (closest.empty() || own.furthest > pair.furthest) {
+      pair.furthest = own.furthest;
+      pair.stopped = own.stopped;
+      closest = own.closest;
+    }
+    found.insert(found.end(), own.found.begin(), own.found.end());
+  }
+  std::vector<FoundScript> kept = choose_different(found, kScriptsKept);
+  if (pair.stopped.empty()) pair.stopped = way_up.stopped;
+  if (pair.found > 0) pair.stopped.clear();
+  if (!kept.empty()) pair.held = kept.front().share;
+  if (kept.empty() && !closest.empty()) kept.push_back({.steps = closest});
+  for (FoundScript& script : kept) {
+    Candidate candidate = first_candidate(study, pair.pair);
+    candidate.steps = as_written(std::move(script.steps));
+    all.found.push_back(candidate);
+    all.spares.emplace_back();
+    if (script.share < kSteady) continue;
+    for (ToolScript& spare : script.spares) {
+      candidate.steps = as_written(std::move(spare));
+      all.spares.back().push_back(candidate);
+    }
   }
 }
 
@@ -70,71 +131,39 @@ ToolScripts find_tool_scripts(const Study& study, const simulate::VesselModel& v
     candidate.steps = as_written(findings.found.front().steps);
     on_first(candidate);
   };
-  std::vector<WayUp> ways(all.pairs.size());
-  for_each_slot(
-      static_cast<int>(all.pairs.size()),
-      [&](int slot) {
-        const auto p = static_cast<std::size_t>(slot);
-        const ToolPair& pair = all.pairs[p].pair;
-        if (!pair.unfit.empty()) return;
-        ways[p] = go_up(scout, pair, *ostium, vessel, options.cancelled);
-        tell(pair, ways[p].findings);
-      },
-      options);
-  std::vector<ToolStart> starts;
-  for (std::size_t p = 0; p < all.pairs.size(); ++p) {
-    add_starts(study, all.pairs[p].pair, p, ways[p], starts);
-  }
-  for_each_slot(
-      static_cast<int>(starts.size()),
-      [&](int slot) {
-        ToolStart& start = starts[static_cast<std::size_t>(slot)];
-        const ToolPair& pair = all.pairs[start.pair].pair;
-        start.findings = search_start(scout, pair, *ostium, ways[start.pair], *start.depth,
-                                      start.withdrawn, options.cancelled);
-        tell(pair, start.findings);
-      },
-      options);
-  for (std::size_t p = 0; p < all.pairs.size(); ++p) {
-    PairFindings& pair = all.pairs[p];
-    std::vector<const StartFindings*> parts;
-    for (const ToolStart& start : starts) {
-      if (start.pair == p) parts.push_back(&start.findings);
+  for (const std::vector<std::size_t>& slots : tried_together(study, all.pairs)) {
+    std::vector<WayUp> ways(slots.size());
+    for_each_slot(
+        static_cast<int>(slots.size()),
+        [&](int slot) {
+          const auto k = static_cast<std::size_t>(slot);
+          const ToolPair& pair = all.pairs[slots[k]].pair;
+          if (!pair.unfit.empty()) return;
+          ways[k] = go_up(scout, pair, *ostium, vessel, options.cancelled);
+          tell(pair, ways[k].findings);
+        },
+        options);
+    std::vector<ToolStart> starts;
+    for (std::size_t k = 0; k < slots.size(); ++k) {
+      add_starts(study, all.pairs[slots[k]].pair, k, ways[k], starts);
     }
-    parts.push_back(&ways[p].findings);
-    std::vector<FoundScript> found;
-    ToolScript closest;
-    for (const StartFindings* part : parts) {
-      const StartFindings& own = *part;
-      all.branches += own.branches;
-      pair.found += own.count;
-      if (own.nearest_hook >= 0.0 &&
-          (pair.nearest_hook < 0.0 || own.nearest_hook < pair.nearest_hook)) {
-        pair.nearest_hook = own.nearest_hook;
-      }
-      if (closest.empty() || own.furthest > pair.furthest) {
-        pair.furthest = own.furthest;
-        pair.stopped = own.stopped;
-        closest = own.closest;
-      }
-      found.insert(found.end(), own.found.begin(), own.found.end());
+    for_each_slot(
+        static_cast<int>(starts.size()),
+        [&](int slot) {
+          ToolStart& start = starts[static_cast<std::size_t>(slot)];
+          const ToolPair& pair = all.pairs[slots[start.pair]].pair;
+          start.findings = search_start(scout, pair, *ostium, ways[start.pair], *start.depth,
+                                        start.withdrawn, options.cancelled);
+          tell(pair, start.findings);
+        },
+        options);
+    bool holds = false;
+    for (std::size_t k = 0; k < slots.size(); ++k) {
+      PairFindings& pair = all.pairs[slots[k]];
+      gather(study, starts, k, ways[k].findings, pair, all);
+      holds = holds || pair.held >= kSteady;
     }
-    std::vector<FoundScript> kept = choose_different(found, kScriptsKept);
-    if (pair.stopped.empty()) pair.stopped = ways[p].findings.stopped;
-    if (pair.found > 0) pair.stopped.clear();
-    if (!kept.empty()) pair.held = kept.front().share;
-    if (kept.empty() && !closest.empty()) kept.push_back({.steps = closest});
-    for (FoundScript& script : kept) {
-      Candidate candidate = first_candidate(study, pair.pair);
-      candidate.steps = as_written(std::move(script.steps));
-      all.found.push_back(candidate);
-      all.spares.emplace_back();
-      if (script.share < kSteady) continue;
-      for (ToolScript& spare : script.spares) {
-        candidate.steps = as_written(std::move(spare));
-        all.spares.back().push_back(candidate);
-      }
-    }
+    if (holds) break;
   }
   return all;
 }

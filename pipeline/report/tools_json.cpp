@@ -64,6 +64,9 @@ Json catheters_json(const plan::Study& study, const plan::Plan& plan, bool axes_
         {{"catheter", study.catheters[k].tool.wire.name}, {"reason", study.suggested[k]}});
   }
   json["pairs"] = Json::array();
+  const auto& pairs = plan.scripts.pairs;
+  const bool searched = std::any_of(pairs.begin(), pairs.end(),
+                                    [](const plan::PairFindings& pair) { return pair.tried(); });
   for (const plan::PairFindings& pair : plan.scripts.pairs) {
     const auto& [catheter, wire, unfit] = pair.pair;
     const bool tried = pair.tried();
@@ -72,6 +75,7 @@ Json catheters_json(const plan::Study& study, const plan::Plan& plan, bool axes_
                 {"tried", tried},
                 {"reason", !unfit.empty() ? unfit
                            : tried        ? pair.stopped
+                           : searched     ? "a catheter that was suggested before it has scripts"
                                           : "a wire alone works, or no scripts were asked for"},
                 {"scripts_found", pair.found}};
     if (pair.found > 0) row["neighbours_reach"] = pair.held;

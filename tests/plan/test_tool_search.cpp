@@ -126,78 +126,6 @@ TEST(ToolRules, BoundTheTurnByTheWayThatFollows) {
   EXPECT_NE(find_broken_rule(steps, soft, wire, {.turn_per_length = 80.0 * kRadPerDeg}), "");
 }
 
-/// Sections from the tip on: a straight length, then curves of so many degrees at a radius; a
-/// radius below 0 curves the other way.
-Catheter shaped(double straight, const std::vector<std::pair<double, double>>& curves) {
-  Catheter catheter;
-  catheter.tool.wire.name = "shaped";
-  catheter.tool.wire.radius = 0.83;
-  auto& sections = catheter.tool.wire.sections;
-  sections.push_back({.length = straight, .bending_stiffness = 99.0});
-  for (const auto& [angle, radius] : curves) {
-    sections.push_back({.length = angle * kRadPerDeg * std::abs(radius),
-                        .bending_stiffness = 99.0,
-                        .rest_curvature = 1.0 / radius});
-  }
-  sections.push_back({.length = 600.0, .bending_stiffness = 332.0});
-  return catheter;
-}
-
-Ostium turning_by(double angle, double trunk, double branch) {
-  Ostium ostium = kOstium;
-  ostium.trunk = Vec3::UnitZ();
-  ostium.branch = Vec3(std::sin(angle * kRadPerDeg), 0.0, std::cos(angle * kRadPerDeg));
-  ostium.trunk_diameter = trunk;
-  ostium.branch_diameter = branch;
-  return ostium;
-}
-
-TEST(CatheterShapes, AreThoseOfCirclesAndLines) {
-  const CurveShape quarter = find_shape(shaped(8.0, {{90.0, 10.0}}).tool.wire);
-  EXPECT_NEAR(quarter.turn, 0.5 * kPi, 1e-9);
-  EXPECT_NEAR(quarter.reach, 10.0 + 8.0, 0.01) << "radius, and the straight tip across";
-  EXPECT_EQ(quarter.kind, CurveKind::kHooked);
-  const CurveShape half = find_shape(shaped(8.0, {{180.0, 10.0}}).tool.wire);
-  EXPECT_NEAR(half.reach, 20.0, 0.01);
-  EXPECT_EQ(half.kind, CurveKind::kReversed);
-  const CurveShape cobra = find_shape(shaped(8.0, {{90.0, 10.0}, {60.0, -30.0}}).tool.wire);
-  EXPECT_EQ(cobra.kind, CurveKind::kHooked);
-  EXPECT_EQ(find_shape(shaped(8.0, {}).tool.wire).kind, CurveKind::kStraight);
-  EXPECT_EQ(find_shape(shaped(0.0, {{330.0, 7.0}}).tool.wire).kind, CurveKind::kRing);
-  EXPECT_EQ(find_shape(shaped(8.0, {{45.0, 10.0}}).tool.wire).kind, CurveKind::kSimple);
-}
-
-TEST(CatheterChoice, FollowsTheTakeOffAndTheTrunk) {
-  const std::vector<Catheter> known = {shaped(8.0, {{45.0, 10.0}}),                 // vertebral
-                                       shaped(8.0, {{90.0, 8.0}, {60.0, -25.0}}),   // small Cobra
-                                       shaped(8.0, {{90.0, 12.0}, {60.0, -30.0}}),  // large Cobra
-                                       shaped(8.0, {{60.0, 8.0}, {170.0, 12.0}}),   // Simmons
-                                       shaped(0.0, {{330.0, 7.0}})};                // pigtail
-  const auto chosen = [&](double angle, double trunk, double branch) {
-    std::vector<int> list;
-    for (const Suggestion& s : suggest_catheters(known, turning_by(angle, trunk, branch))) {
-      list.push_back(s.catheter);
-    }
-    return list;
-  };
-  EXPECT_EQ(chosen(150.0, 22.0, 5.0), (std::vector<int>{3})) << "30 degrees down: reversed";
-  EXPECT_EQ(chosen(90.0, 40.0, 5.0), (std::vector<int>{2, 1})) << "Cobras, the wider one first";
-  EXPECT_EQ(chosen(90.0, 8.0, 5.0), (std::vector<int>{1, 2}));
-  EXPECT_EQ(chosen(30.0, 22.0, 5.0), (std::vector<int>{0}));
-  EXPECT_TRUE(chosen(90.0, 22.0, 1.6).empty()) << "thicker than the branch";
-  const std::vector<Suggestion> simmons = suggest_catheters(known, turning_by(150.0, 22.0, 5.0));
-  EXPECT_EQ(simmons.at(0).reason.find("the branch turns by 150 degrees from its trunk, which asks "
-                                      "for a reversed curve; this one is "),
-            0U)
-      << simmons.at(0).reason;
-  const std::vector<Suggestion> next =
-      suggest_catheters({known[0], known[1]}, turning_by(150.0, 22.0, 5.0));
-  ASSERT_EQ(next.size(), 1U);
-  EXPECT_EQ(next[0].catheter, 1);
-  EXPECT_NE(next[0].reason.find("of which none is there; a hooked curve comes next"),
-            std::string::npos);
-}
-
 TEST(ToolSteps, ReadAsTheHandMakesThem) {
   const std::vector<std::string> told = describe_steps({{.tool = 1, .push = 216.0},
                                                         {.tool = 0, .push = 212.0},
@@ -529,14 +457,34 @@ TEST(ToolSearch, AWireThatPassesTheBranchByIsLedOutAnew) {
 
 TEST(CatheterChoice, LeavesTheStudyWhatTheWayAsksFor) {
   Study study = toward(1.0);
-  study.catheters.push_back(shaped(8.0, {{170.0, 12.0}}));
+  study.catheters.insert(study.catheters.begin(), catheter_of(650.0, 1.0, 30.0));
+  study.catheters[0].tool.wire.name = "wide hook";
   keep_suggested(study);
-  ASSERT_EQ(study.catheters.size(), 1U);
+  ASSERT_EQ(study.catheters.size(), 2U);
   EXPECT_EQ(study.catheters[0].tool.wire.name, "hook") << "the branch is square to its trunk";
-  ASSERT_EQ(study.suggested.size(), 1U);
+  ASSERT_EQ(study.suggested.size(), 2U);
   study.goal.way.reset();
   keep_suggested(study);
   EXPECT_TRUE(study.catheters.empty() && study.suggested.empty());
+}
+
+TEST(ToolSearch, TriesSuggestedCathetersThreeAtATime) {
+  const Catheter hook = catheter_of(650.0, 1.0, 8.0), wide = catheter_of(650.0, 1.0, 21.0);
+  Study study = toward(1.0);
+  study.suggested.assign(4, "suggested");
+  study.catheters = {wide, wide, wide, hook};
+  const ToolScripts last = find_tool_scripts(study, aorta(), {.threads = 2});
+  ASSERT_EQ(last.pairs.size(), 4U);
+  for (std::size_t k = 0; k < 3; ++k) EXPECT_FALSE(last.pairs[k].tried());
+  EXPECT_GT(last.pairs[3].found, 0) << last.pairs[3].stopped;
+  ASSERT_FALSE(last.found.empty());
+  EXPECT_EQ(last.found[0].catheter, 3);
+  study.catheters = {wide, hook, wide, hook};
+  const ToolScripts first = find_tool_scripts(study, aorta(), {.threads = 2});
+  EXPECT_GT(first.pairs[1].found, 0);
+  EXPECT_FALSE(first.pairs[3].tried()) << "one before it holds";
+  study.suggested.clear();
+  EXPECT_TRUE(find_tool_scripts(study, aorta(), {.threads = 2}).pairs[3].tried());
 }
 
 TEST(ToolSearch, MakePlanRanksScriptsOfCatheterAndWire) {
