@@ -10,6 +10,7 @@
 
 #include "preprocess/centerline/grid_search.h"
 #include "preprocess/centerline/nearest_wall.h"
+#include "preprocess/centerline/section_width.h"
 #include "preprocess/surface/surface.h"
 
 namespace wireplan::preprocess {
@@ -425,6 +426,22 @@ Eigen::Index nearest_index(const Centerline& line, const Vec3& p) {
   return best;
 }
 
+/// Whether a branch runs in its parent's lumen all along: an edge of a lumen that is not round, as
+/// that of a dissected aorta, whose ridge ends aside.
+bool runs_in_parent(const Surface& surface, const Branch& branch, const Centerline& parent) {
+  const Centerline& line = branch.line;
+  const Eigen::Index last = line.points.cols() - 1;
+  const double start = line.radius(0), end = line.arc_length(last) - 0.3 * line.radius(last);
+  for (const double part : {1.0, 0.5, 0.25, 0.75}) {  // the end, where most differ, first
+    const double at = start + part * (end - start);
+    if (at <= 0.0) continue;
+    Eigen::Index k = 0;
+    while (k < last && line.arc_length(k) < at) ++k;
+    if (!shares_section(surface, line, k, parent)) return false;
+  }
+  return true;
+}
+
 }  // namespace
 
 std::vector<Branch> find_tree(const Surface& surface, const Vec3& root,
@@ -475,6 +492,11 @@ std::vector<Branch> find_tree(const Surface& surface, const Vec3& root,
     }
     branch.line = measured(
         wall, smooth(wall, resample(line, sample), sample, {.least = sample, .part = kSmoothing}));
+    if (parent >= 0 &&
+        runs_in_parent(surface, branch, branches[static_cast<std::size_t>(parent)].line)) {
+      branch_of.push_back(parent);
+      continue;
+    }
     branch_of.push_back(static_cast<int>(branches.size()));
     branches.push_back(std::move(branch));
   }

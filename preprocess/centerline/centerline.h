@@ -59,6 +59,8 @@ inline std::string branch_name(const std::vector<Branch>& tree, int k) {
 ///   2. The cheapest way (1/R^2 per length) from there to the lines found before is a branch, if it
 ///      is longer than the parent's radius and its own together.
 ///   3. This is repeated until lines cover the lumen, so branches come farthest end first.
+/// Edges of a lumen that is not round, as that of a dissected aorta, are no branches: cuts across
+/// the line there, to its end, have the parent's line in them too.
 /// Lines are moved to the ridge as in `find_centerline`, and end in the middle, 0.2 radii before
 /// the wall ahead. A loop is cut where its two ways meet. Vessels thinner than about the search
 /// grid (0.25 to 1 mm by the size of the lumen) are not followed. Throws `Error` when the root lies

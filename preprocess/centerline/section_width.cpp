@@ -154,15 +154,19 @@ double area_without_branches(const std::vector<Vec3>& loop, double whole, const 
   return std::min(whole, 0.5 * twice);
 }
 
-/// Of the smallest cut that goes round the point; the sphere's where none does.
-double diameter_at(const Surface& surface, const Centerline& line, Eigen::Index k) {
+/// Unit, along the chord.
+Vec3 direction_at(const Centerline& line, Eigen::Index k) {
   const double reach = std::max(kLeastChord, line.radius(k));
   Eigen::Index before = k, after = k;
   while (before > 0 && line.arc_length(k) - line.arc_length(before) < reach) --before;
   const Eigen::Index last = line.points.cols() - 1;
   while (after < last && line.arc_length(after) - line.arc_length(k) < reach) ++after;
-  const Vec3 point = line.points.col(k);
-  const Vec3 normal = (line.points.col(after) - line.points.col(before)).normalized();
+  return (line.points.col(after) - line.points.col(before)).normalized();
+}
+
+/// Of the smallest cut that goes round the point; the sphere's where none does.
+double diameter_at(const Surface& surface, const Centerline& line, Eigen::Index k) {
+  const Vec3 point = line.points.col(k), normal = direction_at(line, k);
   double least = std::numeric_limits<double>::infinity();
   for (const std::vector<Vec3>& loop : PlaneCut(surface, point, normal).loops()) {
     const auto [area, turns] = area_and_turns(loop, point, normal);
@@ -190,6 +194,28 @@ Eigen::VectorXd section_diameters(const Surface& surface, const Centerline& line
     mean(k) = sum / some;
   }
   return mean;
+}
+
+bool shares_section(const Surface& surface, const Centerline& line, Eigen::Index k,
+                    const Centerline& other) {
+  const Vec3 point = line.points.col(k), normal = direction_at(line, k);
+  const auto goes_round = [&](const std::vector<Vec3>& loop, const Vec3& place) {
+    return area_and_turns(loop, place, normal).second != 0;
+  };
+  std::vector<std::vector<Vec3>> loops = PlaneCut(surface, point, normal).loops();
+  std::erase_if(loops, [&](const std::vector<Vec3>& loop) { return !goes_round(loop, point); });
+  if (loops.empty()) return false;
+  for (Eigen::Index i = 1; i < other.points.cols(); ++i) {
+    const Vec3 a = other.points.col(i - 1), b = other.points.col(i);
+    const double from = normal.dot(a - point), to = normal.dot(b - point);
+    if ((from < 0.0) == (to < 0.0)) continue;
+    const Vec3 place = a + from / (from - to) * (b - a);
+    const bool inside = std::all_of(loops.begin(), loops.end(), [&](const std::vector<Vec3>& loop) {
+      return goes_round(loop, place);
+    });
+    if (inside) return true;
+  }
+  return false;
 }
 
 }  // namespace wireplan::preprocess

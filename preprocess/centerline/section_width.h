@@ -1,5 +1,6 @@
 #pragma once
-/// How wide the vessel is across a line in its middle.
+/// Cross-sections of the vessel across a line in its middle: how wide they are, and what else runs
+/// through them.
 #include "preprocess/vessel.h"
 
 namespace wireplan::preprocess {
@@ -13,5 +14,10 @@ namespace wireplan::preprocess {
 /// crescent that is an arm, so it comes out narrower.
 /// Expects a line of two points or more.
 Eigen::VectorXd section_diameters(const Surface& surface, const Centerline& line);
+
+/// Whether the vessel's cross-section at point k of `line`, across the chord as above, has `other`
+/// in it too: the two run in one lumen there. False where no closed cut goes round the point.
+bool shares_section(const Surface& surface, const Centerline& line, Eigen::Index k,
+                    const Centerline& other);
 
 }  // namespace wireplan::preprocess

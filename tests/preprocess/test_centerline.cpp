@@ -18,7 +18,6 @@
 
 #include "preprocess/centerline/centerline.h"
 #include "preprocess/centerline/path_place.h"
-#include "preprocess/centerline/section_width.h"
 #include "preprocess/surface/surface.h"
 #include "preprocess/surface/surface_repair.h"
 #include "tests/shapes.h"
@@ -344,69 +343,6 @@ TEST(CenterlineTree, OfATubeIsOneLineToEachEnd) {
   for (const Branch& branch : tree) {
     for (const auto& p : branch.line.points.colwise()) ASSERT_LT(p.head<2>().norm(), 0.15);
   }
-}
-
-/// A straight line along z, 10 to 50 mm, at this distance from the axis.
-Centerline line_along_z(double beside) {
-  constexpr Eigen::Index kPoints = 81;
-  Centerline line{Eigen::Matrix3Xd::Zero(3, kPoints), Eigen::VectorXd::Constant(kPoints, 2.0),
-                  Eigen::VectorXd::LinSpaced(kPoints, 0.0, 40.0)};
-  line.points.row(0).setConstant(beside);
-  line.points.row(2) = (line.arc_length.array() + 10.0).matrix().transpose();
-  return line;
-}
-
-/// A tube along z of 60 mm whose section is an ellipse of these half axes along x and y [mm].
-Surface oval_tube(double half_x, double half_y) {
-  return shapes::level_set(
-      [=](const Vec3& p) {
-        const double part = std::hypot(p.x() / half_x, p.y() / half_y);
-        return std::min({4.0 * (1.0 - part), p.z(), 60.0 - p.z()});
-      },
-      Vec3(-half_x - 1.0, -half_y - 1.0, -1.0), Vec3(half_x + 1.0, half_y + 1.0, 61.0), 0.5);
-}
-
-TEST(SectionWidth, OfATubeIsItsDiameterWhereverTheLineRuns) {
-  const Surface tube = shapes::straight_tube(4.0, 60.0, 0.8);
-  for (const double beside : {0.0, 2.5}) {
-    const Eigen::VectorXd diameters = section_diameters(tube, line_along_z(beside));
-    EXPECT_NEAR(diameters.minCoeff(), 8.0, 0.06);
-    EXPECT_NEAR(diameters.maxCoeff(), 8.0, 0.06);
-  }
-}
-
-TEST(SectionWidth, OfAnEllipseIsThatOfTheCircleOfItsArea) {
-  const Eigen::VectorXd diameters = section_diameters(oval_tube(2.0, 5.0), line_along_z(0.0));
-  EXPECT_NEAR(diameters.mean(), 2.0 * std::sqrt(10.0), 0.1);
-}
-
-TEST(SectionWidth, DoesNotCountTheBranchThatACutRunsInto) {
-  // A branch of 1.5 mm, 20 mm long, at right angles to a tube of 4 mm: its cut is 60 mm^2 more.
-  const Surface tube = shapes::level_set(
-      [](const Vec3& p) {
-        const double trunk = std::min({4.0 - std::hypot(p.x(), p.y()), p.z(), 60.0 - p.z()});
-        const double branch =
-            std::min({1.5 - std::hypot(p.y(), p.z() - 30.0), p.x(), 24.0 - p.x()});
-        return std::max(trunk, branch);
-      },
-      Vec3(-5.0, -5.0, -1.0), Vec3(25.0, 5.0, 61.0), 0.5);
-  for (const double beside : {-1.0, 0.0, 1.5}) {
-    SCOPED_TRACE(beside);
-    const Eigen::VectorXd diameters = section_diameters(tube, line_along_z(beside));
-    EXPECT_NEAR(diameters.minCoeff(), 8.0, 0.15);
-    EXPECT_NEAR(diameters.maxCoeff(), 8.0, 0.15);
-  }
-}
-
-TEST(SectionWidth, OfALongOvalIsWholeFromItsMiddle) {
-  // Three times as long as wide, as a flattened lumen may be: no end of it is a branch.
-  EXPECT_NEAR(section_diameters(oval_tube(2.0, 6.0), line_along_z(0.0)).mean(),
-              2.0 * std::sqrt(12.0), 0.12);
-}
-
-TEST(SectionWidth, WhereNoCutGoesRoundThePointIsTheSpheres) {
-  const Surface tube = shapes::straight_tube(4.0, 60.0, 0.8);
-  EXPECT_DOUBLE_EQ(section_diameters(tube, line_along_z(10.0)).maxCoeff(), 4.0);
 }
 
 TEST(StartTangent, IsTheMeanDirectionOverTheSpan) {
