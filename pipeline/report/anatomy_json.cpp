@@ -120,7 +120,9 @@ Json c_arm_json(const simulate::Way& way, const std::vector<plan::Junction>& jun
   Json rows = Json::array();
   for (const plan::Junction& junction : junctions) {
     if (!junction.taken) continue;
-    Json row = {{"trunk", branch_name(tree, junction.trunk)},
+    const preprocess::Branch& branch = tree[static_cast<std::size_t>(junction.branch)];
+    const double leaves = branch.parent == junction.trunk ? branch.parent_arc : 0.0;
+    Json row = {{"trunk", branch_name(tree, junction.trunk, leaves)},
                 {"branch", branch_name(tree, junction.branch)},
                 {"leads_to_target", junction.branch == along.back()},
                 {"at_mm", junction.arc},

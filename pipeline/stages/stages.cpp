@@ -251,7 +251,7 @@ std::vector<Stage> stages_of(const Case& given) {
   // Names of branches, or the way that was found.
   if (from_labels || from_volume) stages.back().after.emplace_back("segment");
   Stage anatomy{.name = "anatomy",
-                .version = 8,
+                .version = 9,
                 .reads_input = from_volume,
                 .after = {"surface", "centerline"},
                 .parameters = {"/access_limits", "/axes"},
@@ -268,7 +268,7 @@ std::vector<Stage> stages_of(const Case& given) {
        .parameters = {"/wall/thickness_mm", "/wall/young_modulus_kpa", "/wall/poisson_ratio"},
        .make = make_wall});
   Stage trials{.name = "trials",
-               .version = 30,
+               .version = 31,
                .after = {"surface", "centerline"},
                .parameters = {"/access", "/target", "/wires", "/tip_roll_deg", "/friction",
                               "/friction_factor", "/wall/model", "/insertion"},
@@ -302,7 +302,7 @@ std::vector<Stage> stages_of(const Case& given) {
   stages.push_back(manoeuvres);
   Stage plans = trials;
   plans.name = "plans";
-  plans.version = 16;
+  plans.version = 17;
   plans.after.insert(plans.after.end(), {"trials", "manoeuvres"});
   if (voxels != nullptr) plans.after.emplace_back(voxels);
   read_too(plans, {"/manoeuvres", "/robustness"});

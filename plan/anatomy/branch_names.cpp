@@ -10,7 +10,18 @@ namespace {
 
 using preprocess::Branch;
 
+constexpr double kWiderVessel = 2.0;   // than the one that a place is in: assumed
 constexpr double kLeastTrunk = 100.0;  // of an aorta, for a direction                     [mm]
+
+/// Where the vessel begins that a line is in at an arc length: behind the last place before that is
+/// twice as wide [mm].
+double own_vessel_from(const Centerline& line, double arc) {
+  Eigen::Index k = line.arc_length.size() - 1;
+  while (k > 0 && line.arc_length(k) > arc) --k;
+  const double radius = line.radius(k);
+  while (k > 0 && line.radius(k - 1) < kWiderVessel * radius) --k;
+  return line.arc_length(k);
+}
 
 /// Calls branches by places in them, each by the first; keeps what it has called.
 class BranchNames {
@@ -19,11 +30,13 @@ class BranchNames {
 
   void name(const NamedPlace& place, bool root_too) {
     if (tree_.empty() || place.name.empty()) return;
-    const int k = simulate::find_branch(tree_, place.point).branch;
-    const auto index = static_cast<std::size_t>(k);
-    if (named_[index] || (!root_too && tree_[index].parent < 0)) return;
+    const simulate::BranchPlace found = simulate::find_branch(tree_, place.point);
+    const auto index = static_cast<std::size_t>(found.branch);
+    Branch& branch = tree_[index];
+    if (named_[index] || (!root_too && branch.parent < 0)) return;
     named_[index] = true;
-    tree_[index].name = place.name + " (" + branch_name(tree_, k) + ")";
+    branch.end_name = place.name + " (" + branch_name(tree_, found.branch) + ")";
+    branch.end_from = own_vessel_from(branch.line, found.arc);
   }
 
  private:

@@ -17,7 +17,9 @@ struct NamedPlace {
 /// Names branches by what lies in them, with what they were called before in brackets: "left renal
 /// (branch 6)". The target's branch is called after the target, "the target's branch" where that
 /// has no name; others after the other targets and accesses, those that come first before the rest.
-/// The root, from which the tree starts, is called after no access: it goes on far beyond it.
+/// The root, from which the tree starts, is called after no access: it goes on far beyond it. Of a
+/// branch that runs through a vessel twice as wide before the place, what lies beyond that is
+/// named.
 void name_branches(std::vector<preprocess::Branch>& tree, const NamedPlace& target,
                    const std::vector<NamedPlace>& other_targets,
                    const std::vector<NamedPlace>& other_accesses);

@@ -1,6 +1,7 @@
 #pragma once
 /// Closed surface -> line along the middle of the lumen from access to target, with inscribed
 /// radius.
+#include <cmath>
 #include <optional>
 #include <string>
 #include <vector>
@@ -45,12 +46,18 @@ struct Branch {
   int parent = -1;        // index of the branch it leaves; -1: it starts at the root
   double parent_arc = 0;  // where on the parent                                          [mm]
   std::string name = {};  // as people call it; empty where nobody said
+  /// As people call its further part, where its line runs through a wider vessel first, as from a
+  /// groin through the aorta into a renal artery; empty where nobody said.
+  std::string end_name = {};
+  double end_from = 0.0;  // where that part begins                                       [mm]
 };
 
-/// How messages, reports and viewers call a branch of a tree: by its name, or "branch 3".
-inline std::string branch_name(const std::vector<Branch>& tree, int k) {
-  const std::string& name = tree.at(static_cast<std::size_t>(k)).name;
-  return name.empty() ? "branch " + std::to_string(k + 1) : name;
+/// How messages, reports and viewers call a branch of a tree, or its part that is so far along it
+/// [mm]: by its name, or "branch 3".
+inline std::string branch_name(const std::vector<Branch>& tree, int k, double arc = HUGE_VAL) {
+  const Branch& branch = tree.at(static_cast<std::size_t>(k));
+  if (!branch.end_name.empty() && arc >= branch.end_from) return branch.end_name;
+  return branch.name.empty() ? "branch " + std::to_string(k + 1) : branch.name;
 }
 
 /// The middle of the whole lumen that is connected to `root`. Ends are found, not given:

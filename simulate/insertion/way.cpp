@@ -177,7 +177,7 @@ std::optional<Astray> Way::find_astray(const Vec3& tip) const {
   const double leaves = leaves_[static_cast<std::size_t>(on_way.branch)];
   const bool in_branch_of_way = on_way.branch == here.branch;
   const bool in_targets = on_way.branch == target_branch_;
-  const std::string name = branch_name(tree_, here.branch);
+  const std::string name = branch_name(tree_, here.branch, here.arc);
   if (is_across(here, on_way, left)) {
     return Astray{false, "it is in " + name + ", across the bifurcation"};
   }
@@ -228,7 +228,9 @@ std::optional<int> Way::find_image_end(const Vec3& tip, const Lumen& lumen) cons
 }
 
 std::string Way::name_at(const Vec3& point) const {
-  return tree_.empty() ? std::string() : branch_name(tree_, find_branch(tree_, point).branch);
+  if (tree_.empty()) return {};
+  const BranchPlace place = find_branch(tree_, point);
+  return branch_name(tree_, place.branch, place.arc);
 }
 
 }  // namespace wireplan::simulate

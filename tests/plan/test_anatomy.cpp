@@ -275,6 +275,21 @@ TEST(BranchNames, AreThoseOfTheTargetsAndAccessesInThem) {
   EXPECT_EQ(branch_name(named, 2), "branch 3");
 }
 
+TEST(BranchNames, OfALineThatRunsThroughTheAortaAreOfItsEndAlone) {
+  std::vector<Branch> tree = {{.line = right_renal_way(3.0)},
+                              {.line = line_through({Vec3(0, 0, 100), Vec3(0, 0, 200)}, 10.0),
+                               .parent = 0,
+                               .parent_arc = 100.0}};
+  const Centerline& line = tree[0].line;
+  name_branches(tree, {"", Vec3(0, 0, 180)}, {{"right renal", line.points.rightCols<1>()}}, {});
+  EXPECT_EQ(branch_name(tree, 0), "right renal (branch 1)");
+  EXPECT_EQ(branch_name(tree, 0, 60.0), "branch 1") << "the aorta";
+  EXPECT_NEAR(tree[0].end_from, 110.0, 1.0) << "at its wall";
+  const simulate::Way up(line_through({Vec3::Zero(), Vec3(0, 0, 180)}, 10.0), tree);
+  EXPECT_EQ(up.name_at(Vec3(1, 0, 50)), "branch 1");
+  EXPECT_EQ(up.name_at(line.points.rightCols<1>()), "right renal (branch 1)");
+}
+
 TEST(TrunkAxis, IsThatOfTheWideVessels) {
   const auto aorta = [](const Vec3& end) {
     return std::vector<Branch>{{.line = line_through({Vec3::Zero(), end}, 10.0)},
