@@ -42,6 +42,11 @@ std::string why_unfit(const Catheter& catheter, const simulate::Wire& wire, cons
   if (!wire.round() || !tube.round()) {
     return "a strip: tools that bend more easily to one side are not simulated in one another";
   }
+  if (2.0 * tube.radius >= ostium.narrowest) {
+    return "catheter too thick: " + millimetres_of(2.0 * tube.radius) +
+           ", and the way to the ostium is " + millimetres_of(ostium.narrowest) +
+           " wide at its narrowest";
+  }
   if (tube.length() < ostium.arc + rules.outside) {
     return "catheter too short: " + millimetres_of(tube.length()) + ", and the ostium is " +
            millimetres_of(ostium.arc) + " from the access with " + millimetres_of(rules.outside) +
@@ -100,6 +105,7 @@ std::optional<Ostium> find_ostium(const simulate::Goal& goal) {
     here.branch = junction.branch_direction;
     const Eigen::Index before = find_part(path, junction.arc).before;
     here.trunk_diameter = 2.0 * widest_before(path, before, kBefore);
+    here.narrowest = 2.0 * path.radius.head(before + 1).minCoeff();
     here.branch_diameter = 2.0 * mean_radius(path, junction.arc + 2.0, kInto);
     here.end = end;
   }

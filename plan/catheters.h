@@ -1,5 +1,6 @@
 #pragma once
 /// Catheters of a case: which wires go through them, and what a hand does not do with the two.
+#include <cmath>
 #include <optional>
 #include <string>
 #include <vector>
@@ -35,6 +36,7 @@ struct Ostium : simulate::TakeOff {
   double trunk_diameter = 0.0;   // just before                                          [mm]
   double branch_diameter = 0.0;  // of the way, mean over 10 mm beyond it               [mm]
   double end = 0.0;              // of the way, the target's place                       [mm]
+  double narrowest = HUGE_VAL;   // of the way up to the ostium, inscribed               [mm]
 };
 
 /// None where the way takes none, or is not known.
@@ -47,8 +49,9 @@ struct ToolPair {
 };
 
 /// All pairs, wires outermost, each with what speaks against it: a wire as thick as the lumen,
-/// strips, a catheter that ends before the ostium, a wire that is too short behind the catheter's
-/// hub, a curve at the tip that is wider than the vessel that it is to open in.
+/// strips, a catheter thicker than the way to the ostium or that ends before it, a wire that is too
+/// short behind the catheter's hub, a curve at the tip that is wider than the vessel that it is to
+/// open in.
 std::vector<ToolPair> list_pairs(const std::vector<Catheter>& catheters,
                                  const std::vector<simulate::Wire>& wires, const Ostium& ostium,
                                  const ToolRules& rules);

@@ -103,6 +103,17 @@ SceneSurface read_scene_surface(const SceneFile& scene) {
   return {std::move(repaired.surface), preprocess::tell_mends(repaired.mends), std::move(entry)};
 }
 
+// Radius of the thickest wire or tool [mm].
+double thickest(const SceneFile& scene) {
+  if (scene.bench) return scene.bench->wire.radius;
+  if (scene.insertion) return scene.insertion->wire.radius;
+  double radius = 0.0;
+  for (const simulate::Tool& tool : scene.tools->scene.tools) {
+    radius = std::max(radius, tool.wire.radius);
+  }
+  return radius;
+}
+
 LoadedVessel load_vessel(const SceneFile& scene) {
   const SceneVessel& given = *scene.vessel;
   LoadedVessel vessel;
@@ -111,7 +122,8 @@ LoadedVessel load_vessel(const SceneFile& scene) {
   for (const std::string& line : read.mended) vessel.told.push_back("surface: " + line);
   vessel.told.insert(vessel.told.end(), read.entry.begin(), read.entry.end());
   vessel.wall = preprocess::extrude_wall(vessel.surface, given.wall.extrusion).wall;
-  const simulate::LumenOptions options = simulate::follow(vessel.surface);
+  const simulate::LumenOptions options =
+      simulate::follow(vessel.surface, thickest(scene) + given.contact_law.reach());
   auto model = given.wall.elastic
                    ? std::make_unique<simulate::VesselModel>(vessel.surface, vessel.wall, options)
                    : std::make_unique<simulate::VesselModel>(vessel.surface, options);

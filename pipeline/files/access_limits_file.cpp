@@ -25,8 +25,9 @@ void read_grades(JsonReader& reader, const std::string& key, double unit, const 
 
 }  // namespace
 
-plan::AccessLimits read_access_limits(JsonReader& root) {
+plan::AccessLimits read_access_limits(JsonReader& root, double thinnest_catheter) {
   plan::AccessLimits limits;
+  limits.device_diameter = std::max(limits.device_diameter, thinnest_catheter);
   JsonReader reader = root.object("access_limits", false);
   const Range diameter{.min = 0.1, .max = 20.0}, length{.min = 0.0, .max = 5000.0};
   const auto read = [&](const char* key, double& value, const Range& range, double unit = 1.0) {

@@ -5,8 +5,9 @@
 
 namespace wireplan::pipeline {
 
-/// Reads the object, every key of which may be left out.
-plan::AccessLimits read_access_limits(JsonReader& root);
+/// Reads the object, every key of which may be left out. The device is at least as wide as the
+/// thinnest catheter of the case [mm] then, 0 without: thicker ones are weighed as pairs.
+plan::AccessLimits read_access_limits(JsonReader& root, double thinnest_catheter);
 
 /// All of it, under the keys of the case file.
 Json access_limits_json(const plan::AccessLimits& limits);

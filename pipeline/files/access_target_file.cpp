@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cctype>
+#include <filesystem>
 #include <set>
 #include <string_view>
 #include <utility>
@@ -25,6 +26,12 @@ std::string read_section_name(JsonReader& reader, std::set<std::string>& taken) 
                           "letters, digits, spaces, '-', '_' and '.', starting with a letter or "
                           "digit",
                           "folders are named after it");
+  } else if (std::filesystem::path(name).extension() == ".json" ||
+             std::filesystem::path(name).extension() == ".html" ||
+             std::filesystem::path(name).extension() == ".csv") {
+    reader.problems().add(reader.path_of("name"), "\"" + name + "\"",
+                          "a name that does not end in .json, .html or .csv",
+                          "files of the answer beside its folder are called so");
   } else if (!taken.insert(folder_name(name)).second) {
     reader.problems().add(reader.path_of("name"), "\"" + name + "\" again", "a name of its own",
                           "the report tells them apart by name");

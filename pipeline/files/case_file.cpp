@@ -480,7 +480,8 @@ Case read_case(const std::filesystem::path& path, const std::vector<std::string>
     input.study.tool_rules = read_tool_rules(root);
   }
   read_insertion(root, input.study);
-  input.access_limits = read_access_limits(root);
+  input.access_limits =
+      read_access_limits(root, input.suggest_catheters ? 0.0 : thinnest(input.catheters));
   read_limits(root, input.limits);
   read_weights(root, input.weights);
   input.manoeuvres = read_manoeuvring(root);

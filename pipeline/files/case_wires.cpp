@@ -1,6 +1,7 @@
 #include "pipeline/files/case_wires.h"
 
 #include <algorithm>
+#include <cmath>
 #include <set>
 
 #include "pipeline/files/catalogue.h"
@@ -122,6 +123,14 @@ std::vector<Catheter> read_case_catheters(JsonReader& root, const std::vector<De
     }
   }
   return read;
+}
+
+double thinnest(const std::vector<Catheter>& catheters) {
+  double diameter = catheters.empty() ? 0.0 : HUGE_VAL;
+  for (const Catheter& catheter : catheters) {
+    diameter = std::min(diameter, 2.0 * catheter.tube.radius);
+  }
+  return diameter;
 }
 
 Json catheters_json_of(const std::vector<Catheter>& catheters) {

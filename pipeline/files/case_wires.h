@@ -31,6 +31,8 @@ inline constexpr const char* kSuggestCatheters = "suggest";
 std::vector<Catheter> read_case_catheters(JsonReader& root, const std::vector<DeviceWire>& wires);
 
 Json catheters_json_of(const std::vector<Catheter>& catheters);
+/// Diameter of the thinnest, 0 where there is none [mm].
+double thinnest(const std::vector<Catheter>& catheters);
 
 /// As trials take them, their values as far off as the case says of all wires, or as their own
 /// tell.

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <utility>
 
+#include "pipeline/files/text.h"
 #include "pipeline/report/report.h"
 #include "pipeline/stages/held_places.h"
 #include "plan/anatomy/branch_names.h"
@@ -21,6 +22,16 @@ namespace fs = std::filesystem;
 constexpr double kTangentSpan = 10.0;
 // Wire that is brought along where the case leaves it open: a wire does not keep to the middle.
 constexpr double kInsertionFactor = 1.25, kInsertionExtra = 20.0;
+
+// How far from an axis contact reaches, of the thickest tool of the study [mm].
+double felt_from_axis(const plan::Study& study) {
+  double radius = 0.0;
+  for (const simulate::Wire& wire : study.wires) radius = std::max(radius, wire.radius);
+  for (const plan::Catheter& catheter : study.catheters) {
+    radius = std::max(radius, catheter.tool.wire.radius);
+  }
+  return radius + study.insertion.contact_law.reach();
+}
 
 // The tree as find_tree() made it, back from the artifact of stage centerline.
 std::vector<preprocess::Branch> read_tree(const Workspace& work) {
@@ -146,6 +157,7 @@ std::string Workspace::field_key_text() const {
   return pipeline::key_text({{"piece", "field"},
                              {"input surface", artifact("surface").contents()},
                              {"yields", given_.wall.elastic ? "true" : "false"},
+                             {"felt", format("%.17g", felt_from_axis(given_.study))},
                              {"program", build_info().dump()}});
 }
 
@@ -174,7 +186,7 @@ void Workspace::share_field() {
 
 /// Of the field as a yielding wall needs it, since the wall may come later.
 simulate::LumenOptions Workspace::field_options() {
-  simulate::LumenOptions options = simulate::follow(surface());
+  simulate::LumenOptions options = simulate::follow(surface(), felt_from_axis(given_.study));
   if (given_.wall.elastic) options.band = simulate::VesselModel::yielding_band(options);
   return options;
 }

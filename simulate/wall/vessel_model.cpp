@@ -20,8 +20,9 @@ VesselModel make_yielding(const Surface& surface, const Wall& wall, LumenOptions
 
 }  // namespace
 
-LumenOptions follow(const Surface& surface) {
+LumenOptions follow(const Surface& surface, double felt) {
   constexpr double kCoarsest = 0.5, kFinest = 0.1;  // [mm]
+  constexpr double kBeyond = 0.5;                   // what is felt                     [mm]
   double area = 0.0;
   for (Eigen::Index t = 0; t < surface.triangles.cols(); ++t) {
     const Eigen::Vector3i corner = surface.triangles.col(t);
@@ -33,6 +34,7 @@ LumenOptions follow(const Surface& surface) {
   const double edge =
       std::sqrt(4.0 / std::sqrt(3.0) * area / static_cast<double>(surface.triangles.cols()));
   return {.grid_spacing = std::clamp(2.0 / 3.0 * edge, kFinest, kCoarsest),
+          .band = std::max(LumenOptions().band, felt + kBeyond),
           .openings = preprocess::find_openings(surface)};
 }
 

@@ -12,8 +12,10 @@
 namespace wireplan::simulate {
 
 /// The options of a field that follows this surface, with its openings open. Its cells are two
-/// thirds of the mean edge of the triangles, but at most 0.5 mm and at least 0.1 mm.
-LumenOptions follow(const Surface& surface);
+/// thirds of the mean edge of the triangles, but at most 0.5 mm and at least 0.1 mm. Its band holds
+/// contacts as far as `felt` [mm] from an axis: the radius of the thickest tool and its law's
+/// reach.
+LumenOptions follow(const Surface& surface, double felt = 0.0);
 
 struct VesselModel {
   /// A wall that yields is felt further out than one that does not: ten cells, if that is more.

@@ -102,6 +102,17 @@ TEST_F(CaseFile, LeavesTheChoiceOfCathetersToTheAnatomy) {
   EXPECT_FALSE(read(full_case(volume_case())).suggest_catheters);
 }
 
+TEST_F(CaseFile, WeighsTheThinnestCatheterThatItNames) {
+  Json json = full_case(volume_case());
+  json.erase("access_limits");
+  json["catheters"] = {"cobra-c2", "guide-6f"};
+  EXPECT_EQ(read(json).access_limits.device_diameter, 1.67) << "as assumed";
+  json["catheters"] = {"guide-6f"};
+  EXPECT_EQ(read(json).access_limits.device_diameter, 2.0);
+  json["access_limits"] = {{"device_diameter_mm", 1.5}};
+  EXPECT_EQ(read(json).access_limits.device_diameter, 1.5) << "as given";
+}
+
 TEST_F(CaseFile, TakesListsOfNamedAccessesAndTargets) {
   const Case given = read(listed_case());
   ASSERT_EQ(given.accesses.size(), 2u);
@@ -141,6 +152,8 @@ TEST_F(CaseFile, NamesMistakesOfListedAccessesAndTargets) {
                   {"targets[1].name is missing"});
   expect_mentions(told([](Json& j) { j["targets"][1]["name"] = "../sac"; }),
                   {"targets[1].name is \"../sac\"", "folders are named after it"});
+  expect_mentions(told([](Json& j) { j["targets"][1]["name"] = "report.json"; }),
+                  {"targets[1].name is \"report.json\"", "does not end in .json"});
   expect_mentions(told([](Json& j) {
                     j["targets"][0]["name"] = "a b";
                     j["targets"][1]["name"] = "a-b";

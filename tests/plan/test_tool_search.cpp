@@ -67,6 +67,11 @@ TEST(ToolPairs, WhatDoesNotFitIsToldWithTheReason) {
             "wire too short: 789 mm, and 790 mm are needed to hold it behind a catheter of 650 mm");
   EXPECT_EQ(unfit(catheter_of(650.0, 1.0, 21.0), wire_of(1500.0, 0.44)),
             "curve wider than the vessel: 21 mm at the tip, in a lumen of 20 mm before the ostium");
+  Ostium narrow = kOstium;
+  narrow.narrowest = 1.6;
+  EXPECT_EQ(
+      list_pairs({fits}, {wire_of(1500.0, 0.44)}, narrow, {}).at(0).unfit,
+      "catheter too thick: 1.66 mm, and the way to the ostium is 1.6 mm wide at its narrowest");
 }
 
 TEST(ToolPairs, AreAllPairsWiresOutermost) {

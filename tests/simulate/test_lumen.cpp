@@ -52,6 +52,7 @@ TEST(Follow, TakesCellsOfTwoThirdsOfAnEdge) {
               std::max(options.band, 10.0 * options.grid_spacing));
   }
   const Surface tube = shapes::straight_tube(1.0, 10.0, 0.3);
+  EXPECT_EQ(follow(tube, 4.0).band, 4.5) << "what is felt 4 mm from an axis lies in it";
   const Lumen fine(tube, follow(tube)), coarse(tube, {.openings = find_openings(tube)});
   EXPECT_LT(fine.max_deviation(), 0.5 * coarse.max_deviation());
 }
