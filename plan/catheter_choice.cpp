@@ -117,9 +117,9 @@ std::vector<Suggestion> suggest_catheters(const std::vector<Catheter>& catheters
       reason += rows.front().kinds_off > 0 ? ", of which none is there" : "";
       reason += std::string("; a ") + kind_name(row.shape.kind) + " comes next";
     }
-    reason += "; this one is " + three_digits(row.shape.reach) + " mm wide, the trunk " +
-              three_digits(ostium.trunk_diameter) + " mm and the branch " +
-              three_digits(ostium.branch_diameter) + " mm";
+    reason += "; this one's whole shape is " + three_digits(row.shape.reach) +
+              " mm across, the trunk " + three_digits(ostium.trunk_diameter) +
+              " mm and the branch " + three_digits(ostium.branch_diameter) + " mm";
     suggestions.push_back({row.catheter, std::move(reason)});
   }
   return suggestions;

@@ -153,9 +153,11 @@ class Weighing {
 
   static std::string how_trials_ended(const Endings& all, const Endings& fine) {
     const std::string number = std::to_string(all.trials), endings = describe_endings(all);
-    std::string text = endings.starts_with(number + " ")
-                           ? "All " + count_of(all.trials, "trial") + endings.substr(number.size())
-                           : "Of " + count_of(all.trials, "trial") + " " + endings;
+    std::string text =
+        endings.starts_with(number + " ")
+            ? (all.trials == 1 ? "The one trial" : "All " + count_of(all.trials, "trial")) +
+                  endings.substr(number.size())
+            : "Of " + count_of(all.trials, "trial") + " " + endings;
     if (fine.trials < all.trials) {
       text += "; " + std::to_string(fine.trials) +
               " of them were computed with fine elements, the "
@@ -220,7 +222,8 @@ class Weighing {
     weigh_sensitivity(first);
     if (!doubts_.empty()) {
       headline_ = "In the computation the wire " + wire_of(first.trial).name +
-                  " reaches the target within all limits, but " + list_words(doubts_) + ".";
+                  round_it(first.trial) + " reaches the target within all limits, but " +
+                  list_words(doubts_) + ".";
     }
     if (m.wall_motion.beyond_linear_theory()) {
       find(Answer::kFeasibleWithRisk,

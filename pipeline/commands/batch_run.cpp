@@ -330,9 +330,10 @@ class BatchRun {
     if (report.at("ranking").empty()) return row;
     const Json& best = report.at("ranking").front();
     for (const char* key :
-         {"trial", "wire", "inclination_deg", "azimuth_deg", "roll_deg", "score"}) {
+         {"trial", "wire", "inclination_deg", "azimuth_deg", "roll_deg", "script", "score"}) {
       row["best_plan"][key] = best.at(key);
     }
+    if (best.contains("catheter")) row["best_plan"]["catheter"] = best.at("catheter");
     return row;
   }
 

@@ -147,13 +147,19 @@ std::string trials_csv(const Json& report) {
   std::map<int, int> ranks;
   for (const Json& plan : report.at("ranking")) ranks[plan.at("trial")] = plan.at("rank");
 
-  // The columns are the plain values of the first trial; points and lists stay in the JSON.
+  // The columns are the plain values of the first trial, and the catheter where any has one; points
+  // and lists stay in the JSON.
   std::vector<std::string> columns;
   const Json& trials = report.at("trials");
   for (const auto& [key, value] : trials.front().items()) {
     if (key != "wall_motion" && key != "null_reasons" && !value.is_structured()) {
       columns.push_back(key);
     }
+  }
+  const auto has_catheter = [](const Json& trial) { return trial.contains("catheter"); };
+  const bool known = std::find(columns.begin(), columns.end(), "catheter") != columns.end();
+  if (!known && std::any_of(trials.begin(), trials.end(), has_catheter)) {
+    columns.emplace_back("catheter");
   }
   std::string table = "rank";
   for (const std::string& column : columns) table.append(",").append(column);
@@ -162,7 +168,7 @@ std::string trials_csv(const Json& report) {
     const auto rank = ranks.find(trial.at("id"));
     table += rank == ranks.end() ? "" : std::to_string(rank->second);
     for (const std::string& column : columns) {
-      table.append(",").append(csv_field(trial.at(column)));
+      table.append(",").append(csv_field(trial.value(column, Json())));
     }
     table += "\r\n";
   }

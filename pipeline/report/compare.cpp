@@ -53,9 +53,10 @@ std::string name_of(const Json& report) {
 }
 
 std::string describe_way(const Json& plan) {
-  return plan.at("wire").get<std::string>() +
+  return describe_tools(plan) +
          format(", %g/%g/%g deg", plan.at("inclination_deg").get<double>(),
-                plan.at("azimuth_deg").get<double>(), plan.at("roll_deg").get<double>());
+                plan.at("azimuth_deg").get<double>(), plan.at("roll_deg").get<double>()) +
+         (plan.value("script", "").empty() ? "" : ", with moves");
 }
 
 std::vector<std::string> plan_cells(const Json& report, const Json& plan) {

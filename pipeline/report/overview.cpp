@@ -14,6 +14,8 @@
 namespace wireplan::pipeline {
 namespace {
 
+constexpr const char* kCatheter = "catheter";  // in the keys of plans with one alone
+
 /// Of the first ranked plan; null where none is ranked.
 Json best_plan_json(const Json& report) {
   const Json& ranking = report.at("ranking");
@@ -26,6 +28,7 @@ Json best_plan_json(const Json& report) {
                           "score", "score_error", "mean_score"}) {
     best[key] = plan.at(key);
   }
+  if (plan.contains(kCatheter)) best[kCatheter] = plan.at(kCatheter);
   for (const char* key : {"sensitive", "tip_unsure"}) best[key] = plan.at(key);
   best["repeats_safe"] = nullptr;
   best["repeats"] = nullptr;
@@ -49,7 +52,8 @@ Json access_figures(const Json& report) {
   figures["least_diameter_mm"] = access.at("device").at("lumen_diameter_mm");
   figures["device_fits"] = access.at("device").at("fits");
   figures["least_diameter_at_sheath_mm"] = access.at("sheath").at("lumen_diameter_mm");
-  figures["sheath_fits"] = access.at("sheath").at("fits");
+  const bool weighed = !access.at("sheath").value("assumed_longer_than_way", false);
+  figures["sheath_fits"] = weighed ? access.at("sheath").at("fits") : Json(nullptr);
   figures["tortuosity"] = access.at("tortuosity").at("index");
   figures["tortuosity_grade"] = access.at("tortuosity").at("grade");
   figures["sharpest_bend_deg"] = access.at("sharpest_bend").at("angle_deg");
@@ -122,10 +126,10 @@ std::string from(const Json& row) {
 std::string describe_plan(const Json& best) {
   const std::string script = best.at("script").get<std::string>();
   std::string text =
-      best.at("wire").get<std::string>() +
-      format(", inclination %g deg, azimuth %g deg, roll %g deg",
-             best.at("inclination_deg").get<double>(), best.at("azimuth_deg").get<double>(),
-             best.at("roll_deg").get<double>());
+      describe_tools(best) + format(", inclination %g deg, azimuth %g deg, roll %g deg",
+                                    best.at("inclination_deg").get<double>(),
+                                    best.at("azimuth_deg").get<double>(),
+                                    best.at("roll_deg").get<double>());
   if (!script.empty()) text += ", " + script;
   if (!best.at("repeats").is_null()) {
     text += ", safe in " + best.at("repeats_safe").dump() + " of " + best.at("repeats").dump() +
@@ -143,8 +147,9 @@ std::string describe_target(const Json& target) {
   if (first.at("best_plan").is_null()) {
     return name + ": no safe plan" + (rows.size() > 1 ? " from any access" : from(first));
   }
-  return name + ":" + from(first) +
-         (rows.size() > 1 ? ", the best of " + std::to_string(rows.size()) : "") + ": " +
+  const std::string where =
+      from(first) + (rows.size() > 1 ? ", the best of " + std::to_string(rows.size()) : "");
+  return name + ":" + (where.empty() ? "" : where + ":") + " " +
          describe_plan(first.at("best_plan"));
 }
 
@@ -188,21 +193,28 @@ Json build_overview(const std::string& name, const std::vector<SectionReport>& s
 
 std::string overview_csv(const Json& overview) {
   constexpr std::array kRow = {"access", "folder", "trials", "reached", "safe_plans"};
-  constexpr std::array kPlan = {"wire",
-                                "inclination_deg",
-                                "azimuth_deg",
-                                "roll_deg",
-                                "script",
-                                "score",
-                                "repeats_safe",
-                                "repeats",
-                                "insertion_mm",
-                                "peak_tip_force_n",
-                                "peak_contact_force_n"};
+  std::vector<const char*> columns = {"wire",
+                                      "inclination_deg",
+                                      "azimuth_deg",
+                                      "roll_deg",
+                                      "script",
+                                      "score",
+                                      "repeats_safe",
+                                      "repeats",
+                                      "insertion_mm",
+                                      "peak_tip_force_n",
+                                      "peak_contact_force_n"};
+  for (const Json& target : overview.at("targets")) {
+    for (const Json& row : target.at("sections")) {
+      const Json& plan = row.at("best_plan");
+      const bool tools = !plan.is_null() && plan.contains(kCatheter);
+      if (tools && columns[1] != kCatheter) columns.insert(columns.begin() + 1, kCatheter);
+    }
+  }
   std::string table = "target";
   for (const char* key : kRow) table.append(",").append(key);
   table += ",verdict,other_access";
-  for (const char* key : kPlan) table.append(",").append(key);
+  for (const char* key : columns) table.append(",").append(key);
   const Json& any = overview.at("targets").front().at("sections").front().at("access_table");
   for (const auto& [key, value] : any.items()) table.append(",").append(key);
   table += "\r\n";
@@ -213,8 +225,8 @@ std::string overview_csv(const Json& overview) {
       for (const char* key : kRow) table.append(",").append(csv_field(row.at(key)));
       table.append(",").append(csv_field(verdict.value("answer", Json())));
       table.append(",").append(csv_field(row.value("other_access", Json())));
-      for (const char* key : kPlan) {
-        table.append(",").append(csv_field(plan.is_null() ? Json() : plan.at(key)));
+      for (const char* key : columns) {
+        table.append(",").append(csv_field(plan.is_null() ? Json() : plan.value(key, Json())));
       }
       for (const Json& value : row.at("access_table")) table.append(",").append(csv_field(value));
       table += "\r\n";

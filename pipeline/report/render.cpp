@@ -5,12 +5,14 @@
 #include <map>
 #include <utility>
 
+#include "pipeline/files/catalogue.h"
 #include "pipeline/files/text.h"
 #include "pipeline/files/trial_file.h"
 #include "pipeline/report/picture.h"
 #include "pipeline/report/plot.h"
 #include "pipeline/report/report.h"
 #include "preprocess/files/vessel_io.h"
+#include "simulate/insertion/start_line.h"
 
 namespace wireplan::pipeline {
 namespace {
@@ -45,22 +47,25 @@ PictureMarks marks_of(const Json& report, const std::string& title) {
           .target_radius = target_radius(report, asked.at("target"))};
 }
 
-double radius_of(const Json& report, const std::string& wire) {
-  for (const Json& given : report.at("provenance").at("parameters").at("wires")) {
-    if (given.at("name") != wire) continue;
+/// Of a device among the "wires" or "catheters" of the case, or of those that are suggested.
+double radius_of(const Json& report, const char* kind, const std::string& device) {
+  const Json& asked = report.at("provenance").at("parameters").at(kind);
+  const Json& devices = asked.is_string() ? catalogue().file.at(kind) : asked;
+  for (const Json& given : devices) {
+    if (given.at("name") != device) continue;
     const Json& diameter = given.at("diameter_mm");
     return 0.5 * (diameter.is_object() ? diameter.at("value") : diameter).get<double>();
   }
-  throw Error("report: the wire \"" + wire +
-              "\" of a trial is not among those of the case; expected " +
-              "a report as wireplan wrote it");
+  throw Error("report: \"" + device + "\" of a trial is not among the " + kind +
+              " of the case; expected a report as wireplan wrote it");
 }
 
 // The best plans in their final shapes.
 std::vector<PictureWire> best_wires(const Json& report, const fs::path& folder) {
   std::vector<PictureWire> wires;
+  std::size_t shown = 0;
   for (const Json& plan : report.at("ranking")) {
-    if (wires.size() == kPlansShown) break;
+    if (shown++ == kPlansShown) break;
     const fs::path file = folder / trial_file_name(plan.at("trial"));
     const std::optional<simulate::TrialResult> trial = find_trial(file);
     if (!trial) {
@@ -71,8 +76,16 @@ std::vector<PictureWire> best_wires(const Json& report, const fs::path& folder) 
     wires.push_back({.name = "plan " + plan.at("rank").dump() + ": " + plan_name(plan),
                      .nodes = trial->nodes,
                      .contact_force = {},
-                     .radius = radius_of(report, plan.at("wire")),
+                     .radius = radius_of(report, "wires", plan.at("wire")),
                      .color = wire_color(static_cast<int>(wires.size()))});
+    if (trial->tools.empty() || trial->tools.front().insertion.back() <= 0.0) continue;
+    const std::string catheter = plan.at("catheter");
+    wires.push_back(
+        {.name = catheter + ", round it",
+         .nodes = simulate::line_up_to(trial->nodes, trial->tools.front().insertion.back()),
+         .contact_force = {},
+         .radius = radius_of(report, "catheters", catheter),
+         .color = wire_color(static_cast<int>(wires.size()))});
   }
   return wires;
 }

@@ -496,7 +496,8 @@ Json build_report(const ReportInput& input) {
   report["wires"] = std::move(wires);
   if (!input.study.catheters.empty())
     report["catheters"] = catheters_json(input.study, input.plan,
-                                         input.parameters.value("axes", "patient") == "patient");
+                                         input.parameters.value("axes", "patient") == "patient",
+                                         input.parameters.at("manoeuvres") != "never");
   report["pareto"] = input.judgement.ranking.pareto;
   report["robustness"] = input.robustness;
   report["numerics"] = numerics_json(input);
@@ -539,6 +540,11 @@ Json read_report(const std::filesystem::path& path) {
   return report;
 }
 
+std::string describe_tools(const Json& plan) {
+  return plan.at("wire").get<std::string>() +
+         (plan.contains("catheter") ? " in " + plan.at("catheter").get<std::string>() : "");
+}
+
 std::string describe_best(const Json& report) {
   const Json& ranking = report.at("ranking");
   const Json& trials = report.at("trials");
@@ -547,7 +553,7 @@ std::string describe_best(const Json& report) {
       return trial.value("level", "full") != "full";
     });
     return "no plan reaches the target within the limits: " + std::to_string(trials.size()) +
-           " trials" +
+           (trials.size() == 1 ? " trial" : " trials") +
            (scouted > 0 ? ", " + std::to_string(scouted) +
                               " of them on a rigid wall only (--exhaustive runs all in full)"
                         : "") +
@@ -561,10 +567,9 @@ std::string describe_best(const Json& report) {
   return "best of " + std::to_string(ranking.size()) +
          (ranking.size() == 1 ? " safe plan" : " safe plans") + " (reach, no limit broken); " +
          std::to_string(reached) + " of " + std::to_string(trials.size()) +
-         " tried reach: " + best.at("wire").get<std::string>() +
-         (best.contains("catheter") ? " in " + best.at("catheter").get<std::string>() : "") +
-         ", inclination " + best.at("inclination_deg").dump() + " deg, azimuth " +
-         best.at("azimuth_deg").dump() + " deg, roll " + best.at("roll_deg").dump() + " deg, " +
+         " tried reach: " + describe_tools(best) + ", inclination " +
+         best.at("inclination_deg").dump() + " deg, azimuth " + best.at("azimuth_deg").dump() +
+         " deg, roll " + best.at("roll_deg").dump() + " deg, " +
          (script.empty() ? "" : script + ", ") + best.at("sentence").get<std::string>();
 }
 

@@ -44,7 +44,8 @@ Json tools_json(const plan::Study& study, const plan::Measured& trial) {
   return json;
 }
 
-Json catheters_json(const plan::Study& study, const plan::Plan& plan, bool axes_known) {
+Json catheters_json(const plan::Study& study, const plan::Plan& plan, bool axes_known,
+                    bool scripts_wanted) {
   Json json = {{"rules", tool_rules_json(study.tool_rules)}};
   for (const plan::Junction& junction : plan::find_junctions(*study.goal.way)) {
     const std::optional<plan::Ostium> ostium = plan::find_ostium(study.goal);
@@ -70,14 +71,16 @@ Json catheters_json(const plan::Study& study, const plan::Plan& plan, bool axes_
   for (const plan::PairFindings& pair : plan.scripts.pairs) {
     const auto& [catheter, wire, unfit] = pair.pair;
     const bool tried = pair.tried();
-    Json row = {{"catheter", study.catheters[static_cast<std::size_t>(catheter)].tool.wire.name},
-                {"wire", study.wires[static_cast<std::size_t>(wire)].name},
-                {"tried", tried},
-                {"reason", !unfit.empty() ? unfit
-                           : tried        ? pair.stopped
-                           : searched     ? "a catheter that was suggested before it has scripts"
-                                          : "a wire alone works, or no scripts were asked for"},
-                {"scripts_found", pair.found}};
+    Json row = {
+        {"catheter", study.catheters[static_cast<std::size_t>(catheter)].tool.wire.name},
+        {"wire", study.wires[static_cast<std::size_t>(wire)].name},
+        {"tried", tried},
+        {"reason", !unfit.empty() ? unfit
+                   : tried        ? pair.stopped
+                   : searched ? "a catheter that was suggested before it has a script that holds"
+                   : scripts_wanted ? "a wire alone works"
+                                    : "the case asks for no scripts (manoeuvres: never)"},
+        {"scripts_found", pair.found}};
     if (pair.found > 0) row["neighbours_reach"] = pair.held;
     if (tried) {
       if (pair.nearest_hook >= 0.0) row["nearest_hook_mm"] = clean(pair.nearest_hook);

@@ -20,6 +20,7 @@ Json tools_json(const plan::Study& study, const plan::Measured& trial);
 
 /// Rules, ostium with the C-arm's view of it where axes are known, and all pairs: what came of
 /// them, or why they were not tried.
-Json catheters_json(const plan::Study& study, const plan::Plan& plan, bool axes_known);
+Json catheters_json(const plan::Study& study, const plan::Plan& plan, bool axes_known,
+                    bool scripts_wanted);
 
 }  // namespace wireplan::pipeline

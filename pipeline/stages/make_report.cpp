@@ -25,6 +25,7 @@
 #include "pipeline/store/hash.h"
 #include "preprocess/cores.h"
 #include "preprocess/files/vessel_io.h"
+#include "simulate/insertion/start_line.h"
 
 namespace wireplan::pipeline {
 namespace {
@@ -230,13 +231,26 @@ std::string draw_overview(Workspace& work, const ReportInput& report, const Page
     const PageTrial& trial = page.trials[static_cast<std::size_t>(id)];
     if (trial.nodes.cols() < 2) continue;
     const simulate::Outcome outcome = report.plan.trials[static_cast<std::size_t>(id)].outcome;
-    const PictureWire& wire = wires.emplace_back(
-        PictureWire{.name = report.study.wires[w].name + ": " +
-                            (best ? "best plan" : "no plan, " + std::string(outcome_name(outcome))),
-                    .nodes = trial.nodes.cast<double>(),
-                    .contact_force = {},
-                    .radius = report.study.wires[w].radius,
-                    .color = wire_color(static_cast<int>(wires.size()))});
+    wires.push_back(
+        {.name = report.study.wires[w].name + ": " +
+                 (best ? "best plan" : "no plan, " + std::string(outcome_name(outcome))),
+         .nodes = trial.nodes.cast<double>(),
+         .contact_force = {},
+         .radius = report.study.wires[w].radius,
+         .color = wire_color(static_cast<int>(wires.size()))});
+    const int catheter = report.plan.candidates[static_cast<std::size_t>(id)].catheter;
+    if (catheter < 0) continue;
+    const simulate::Wire& tube =
+        report.study.catheters[static_cast<std::size_t>(catheter)].tool.wire;
+    const double in = report.plan.trials[static_cast<std::size_t>(id)].tools.front().insertion;
+    if (in <= 0.0) continue;
+    wires.push_back({.name = tube.name + ", round it",
+                     .nodes = simulate::line_up_to(wires.back().nodes, in),
+                     .contact_force = {},
+                     .radius = tube.radius,
+                     .color = wire_color(static_cast<int>(wires.size()))});
+  }
+  for (const PictureWire& wire : wires) {
     key.push_back({"wire", Json({wire.name, wire.radius, hash_text(bytes_of(wire.nodes))}).dump()});
   }
   // As the best plan moves it.

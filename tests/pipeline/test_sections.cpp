@@ -230,6 +230,17 @@ TEST(Overview, PutsTheBetterAnswerAndThenMoreSafeRepeatsFirst) {
       "case", {{"a", "t", "a", report(0, 0.1, false)}, {"b", "t", "b", report(0, 0.1, false)}});
   EXPECT_FALSE(serves_all_targets(none));
   EXPECT_EQ(describe_overview(none), "t: no safe plan from any access");
+
+  SectionReport tools = {"", "", "a", report(12, 0.1)};
+  tools.report["ranking"][0]["catheter"] = "cobra-c2";
+  tools.report["anatomy"]["access"]["sheath"]["assumed_longer_than_way"] = true;
+  const Json one = build_overview("case", {tools});
+  EXPECT_EQ(describe_overview(one).find("the target: soft in cobra-c2, inclination 0 deg"), 0u)
+      << describe_overview(one);
+  EXPECT_NE(overview_csv(one).find("wire,catheter,inclination_deg"), std::string::npos);
+  EXPECT_EQ(overview_csv(both).find("catheter"), std::string::npos);
+  EXPECT_TRUE(one.at("targets")[0].at("sections")[0].at("access_table").at("sheath_fits").is_null())
+      << "not weighed";
 }
 
 }  // namespace

@@ -79,6 +79,12 @@ TEST(ViewerFiles, ListEveryTrialWithUnitsInTheHeader) {
             "rank,id,wire,insertion_mm,reached\r\n"
             ",0,\"say \"\"x\"\", please\",,false\r\n"
             "1,1,\"soft\",30.5,true\r\n");
+  Json tools = report;
+  tools["trials"][1]["catheter"] = "cobra-c2";
+  EXPECT_EQ(trials_csv(tools),
+            "rank,id,wire,insertion_mm,reached,catheter\r\n"
+            ",0,\"say \"\"x\"\", please\",,false,\r\n"
+            "1,1,\"soft\",30.5,true,\"cobra-c2\"\r\n");
 }
 
 TEST(ViewerFiles, ListTheFiguresOfTheSheet) {

@@ -74,7 +74,7 @@ TEST(CatheterChoice, FollowsTheTakeOffAndTheTrunk) {
   EXPECT_TRUE(chosen(90.0, 22.0, 1.6).empty()) << "thicker than the branch";
   const std::vector<Suggestion> simmons = suggest_catheters(known, turning_by(150.0, 22.0, 5.0));
   EXPECT_EQ(simmons.at(0).reason.find("the branch turns by 150 degrees from its trunk, which asks "
-                                      "for a reversed curve; this one is "),
+                                      "for a reversed curve; this one's whole shape is "),
             0U)
       << simmons.at(0).reason;
   const std::vector<Suggestion> next =

@@ -12,8 +12,8 @@ export const shown = (text) =>
 /** Three significant digits, without an exponent where a reader can do without. */
 export const number = (value) => {
   if (value === null || value === undefined || !Number.isFinite(value)) return "\u2013";
-  if (value === 0) return "0";
   const size = Math.abs(value);
+  if (size < 1e-9) return "0";  // what rounding leaves of a force where nothing touches
   if (size >= 1e5 || size < 1e-4) return value.toExponential(1);
   if (size >= 100) return value.toFixed(0);
   return String(Number(value.toPrecision(3)));

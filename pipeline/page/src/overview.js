@@ -1,7 +1,7 @@
 // The page of a case of several accesses or targets: for each target its accesses side by side, best
 // first, with links to their own reports.
 import {el, name} from "./dom.js";
-import {degrees, number, shown} from "./format.js";
+import {degrees, number, shown, toolsName} from "./format.js";
 import {answerName} from "./sheet.js";
 
 const mm = (value) => `${number(value)}\u00a0mm`;
@@ -13,7 +13,7 @@ const heads = ["Access", "Answer", "Best plan", "Safe repeats", "Largest force o
 const planText = (plan) => {
   if (!plan) return "no safe plan";
   const angles = `tilt ${degrees(plan.inclination_deg)} toward ${degrees(plan.azimuth_deg)}, roll ${degrees(plan.roll_deg)}`;
-  return el("span", {}, name(shown(plan.wire)), `, ${angles}`, plan.script ? `; ${shown(plan.script)}` : "");
+  return el("span", {}, name(toolsName(plan)), `, ${angles}`, plan.script ? `; ${shown(plan.script)}` : "");
 };
 
 const graded = (value, grade) => (value === null ? "not known" : `${value}${grade === "none" ? "" : ` (${grade})`}`);

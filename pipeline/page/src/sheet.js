@@ -1,7 +1,7 @@
 // The first sheet: what is needed to decide and to prepare, on one A4 page. It has the size of the
 // page on paper also on a screen, so that what fits here fits there.
 import {el, name} from "./dom.js";
-import {degrees, number, plural, shown, valueName} from "./format.js";
+import {degrees, number, plural, shown, toolsName, valueName} from "./format.js";
 import {drawView, workingOstium, workingView} from "./anatomy.js";
 
 const kPlans = 3, kReasons = 8, kChanges = 4, kWarnings = 3, kPlaces = 6;
@@ -79,10 +79,10 @@ const stepList = (plan, rank) => {
 const planTable = ({report, trials}) => {
   const {tip_force_warn_n: warn} = report.provenance.parameters.limits ?? {};
   const plans = report.ranking.slice(0, kPlans);
-  const heads = ["", "Wire", "Tilt", "Toward", "Roll", "Moves", "Wire in vessel", "Force at tip", "Largest force on wall", "Safe repeats"];
+  const heads = ["", plans.some((plan) => plan.catheter) ? "Wire and catheter" : "Wire", "Tilt", "Toward", "Roll", "Moves", "Wire in vessel", "Force at tip", "Largest force on wall", "Safe repeats"];
   const rows = plans.map((plan, k) => {
     const t = trials[plan.trial];
-    return [`${k + 1}`, name(shown(t.wire)), degrees(t.inclination_deg), degrees(t.azimuth_deg), degrees(t.roll_deg),
+    return [`${k + 1}`, name(toolsName(t)), degrees(t.inclination_deg), degrees(t.azimuth_deg), degrees(t.roll_deg),
       t.script ? "steps below" : "one push", mm(t.insertion_mm), `${two(t.peak_tip_force_n)}\u00a0N`,
       `${two(t.peak_contact_force_n)}\u00a0N`, safeText(report.robustness?.plans?.find((row) => row.trial === plan.trial))];
   });
