@@ -16,6 +16,7 @@
 #include "pipeline/files/case_file.h"
 #include "pipeline/files/disk.h"
 #include "pipeline/files/text.h"
+#include "pipeline/report/anatomy_json.h"
 #include "pipeline/report/overview.h"
 #include "pipeline/report/page.h"
 #include "pipeline/report/report.h"
@@ -262,6 +263,11 @@ int run_case(const RunArguments& arguments) {
     if (fs::exists(look)) log->info("look first at the outline of the mask: " + look.string());
     const std::string missing = arguments.after_shards ? missing_shards(result) : "";
     if (!missing.empty()) log->warn(missing);
+    for (const Artifact& made : result.artifacts) {
+      if (made.stage != "anatomy" || result.stages.back().stage != made.stage) continue;
+      std::cout << (name.empty() ? "" : name + "\n")
+                << describe_anatomy(read_json(made.folder / kFiguresFile, "wireplan.anatomy/1"));
+    }
     done.push_back(section);
     last = result.stages.back().stage;
   });

@@ -224,6 +224,64 @@ Json calcium_json(double volume, const std::string& unknown, const plan::AccessL
   return row;
 }
 
+std::string describe_fit(const Json& passage) {
+  if (passage.value("assumed_longer_than_way", false)) {
+    return "not weighed: assumed, and longer than the way";
+  }
+  return passage.at("fits") ? "fits" : "does not fit";
+}
+
+std::string describe_anatomy(const Json& figures) {
+  const Json& access = figures.at("access");
+  const auto number = [](const Json& value, const char* form) {
+    return value.is_null() ? std::string("not known") : format(form, value.get<double>());
+  };
+  const Json& bend = access.at("sharpest_bend");
+  const Json& tortuosity = access.at("tortuosity");
+  std::string text = "way: " + number(figures.at("lengths").at("way_mm"), "%.0f mm") +
+                     ", tortuosity " + number(tortuosity.at("index"), "%.2f (") +
+                     tortuosity.at("grade").get<std::string>() + "), sharpest bend " +
+                     number(bend.at("angle_deg"), "%.0f deg") +
+                     number(bend.at("at_mm"), ", %.0f mm in") +
+                     (bend.at("at_ostium_of").is_null()
+                          ? " (" + bend.at("grade").get<std::string>() + ")"
+                          : ", the turn into " + bend.at("at_ostium_of").get<std::string>()) +
+                     "\n";
+  for (const char* key : {"device", "sheath"}) {
+    const Json& row = access.at(key);
+    text += key + number(row.at("device_diameter_mm"), " of %.2f mm: ") + describe_fit(row) +
+            number(row.at("lumen_diameter_mm"), "; narrowest lumen %.2f mm") +
+            number(row.at("at_mm"), ", %.0f mm in\n");
+  }
+  const Json& calcium = access.at("calcium");
+  text += "calcium beside the lumen: " +
+          (calcium.at("volume_mm3").is_null()
+               ? "not known, " + calcium.at("null_reasons").at("volume_mm3").get<std::string>()
+               : number(calcium.at("volume_mm3"), "%.0f mm3")) +
+          "\n";
+  for (const Json& place : figures.at("lengths").at("places")) {
+    text += number(place.at("at_mm"), "%.0f mm in: ") + place.at("what").get<std::string>() +
+            (place.at("branch").is_null() ? "" : " " + place.at("branch").get<std::string>()) +
+            "\n";
+  }
+  const Json& arm = figures.at("c_arm");
+  if (!arm.at("no_views").is_null()) {
+    return text + "no views of the C-arm: " + arm.at("no_views").get<std::string>() + "\n";
+  }
+  for (const Json& ostium : arm.at("ostia")) {
+    text += "view of the turn into " + ostium.at("branch").get<std::string>() + ":";
+    for (const char* key : {"best", "second"}) {
+      if (ostium.at(key).is_null()) continue;
+      const Json& view = ostium.at(key);
+      text += std::string(key == std::string("best") ? " " : "; else ") +
+              view.at("view").get<std::string>() +
+              (view.at("reachable") ? "" : ", out of the C-arm's reach");
+    }
+    text += "\n";
+  }
+  return text;
+}
+
 Json anatomy_panel(const simulate::Way& way) {
   Json lines = Json::array();
   for (const preprocess::Branch& branch : way.tree()) lines.push_back(drawn_line(branch.line));

@@ -17,11 +17,18 @@ Json anatomy_figures(const simulate::Way& way, const Eigen::VectorXd& diameters,
 /// the aorta runs as it does in a patient, or none is there.
 std::string doubt_of_axes(const simulate::Way& way);
 
+/// What a report says of a sheath or device, by its row of "access": "fits", "does not fit", or
+/// that it is not weighed.
+std::string describe_fit(const Json& passage);
+
 /// The row of calcium: a volume [mm^3], or null with the reason where `unknown` tells one.
 Json calcium_json(double volume, const std::string& unknown, const plan::AccessLimits& limits);
 
 /// The grade that a name in those figures stands for, 0 to 3; see plan::grade_of.
 int grade_from(const std::string& name);
+
+/// The same in lines of text, each with its end.
+std::string describe_anatomy(const Json& figures);
 
 /// What the page draws: {"tree": [...], "way"}, each line with "points" and "radius" every 2 mm.
 Json anatomy_panel(const simulate::Way& way);

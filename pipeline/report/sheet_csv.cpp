@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "pipeline/files/viewer_files.h"
+#include "pipeline/report/anatomy_json.h"
 
 namespace wireplan::pipeline {
 namespace {
@@ -108,7 +109,7 @@ void add_anatomy(Table& table, const Json& anatomy) {
     const Json& row = access.at(key);
     const std::string name = key;
     table.row(name + ": narrowest lumen", row.at("lumen_diameter_mm"), "mm",
-              row.at("device_diameter_mm"), row.at("fits") ? "fits" : "does not fit");
+              row.at("device_diameter_mm"), describe_fit(row));
     table.row(name + ": over lumen", row.at("ratio"), "", row.at("max_ratio"), row.at("source"));
     table.row(name + ": place from the access", row.at("at_mm"), "mm");
   }

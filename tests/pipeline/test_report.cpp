@@ -94,6 +94,12 @@ TEST(Report, TellsAccessViewsAndLengthsOfTheTube) {
   EXPECT_TRUE(arm.at("no_views").is_null());
   EXPECT_TRUE(arm.at("bend").at("best").is_object());
   expect_valid(report, folder.path());
+  const std::string told = describe_anatomy(report.at("anatomy"));
+  for (const char* part : {"way: 22 mm, tortuosity 1.0", "device of 9.00 mm: does not fit",
+                           "sheath of 2.70 mm: not weighed", "calcium beside the lumen: not known",
+                           "22 mm in: target\n"}) {
+    EXPECT_NE(told.find(part), std::string::npos) << part << " in\n" << told;
+  }
 
   // Axes that are not the patient's have no front, and no C-arm.
   const Json unknown = run_to_report(folder / "case.json", folder / "cache", 0, {"axes=unknown"});

@@ -15,7 +15,7 @@ const passageRow = (what, row) => [
   what,
   `least lumen ${mm(row.lumen_diameter_mm)} (sphere inside ${mm(row.inscribed_diameter_mm)}), ${mm(row.at_mm)} from the access at ${place(row.place_mm)}`,
   `device over lumen below ${number(row.max_ratio)}`,
-  `${row.fits ? "fits" : "does not fit"}: ${mm(row.device_diameter_mm)} in ${mm(row.lumen_diameter_mm)} is ${number(row.ratio)}`,
+  `${row.assumed_longer_than_way ? "not weighed, since assumed and longer than the way" : row.fits ? "fits" : "does not fit"}: ${mm(row.device_diameter_mm)} in ${mm(row.lumen_diameter_mm)} is ${number(row.ratio)}`,
   shown(row.source),
 ];
 
