@@ -189,10 +189,10 @@ std::vector<Stage> stages_from_labels(const Case& given) {
   const bool in_volume = given.volume.has_value();
   std::vector<Stage> stages;
   if (in_volume) {
-    stages.push_back({.name = "volume", .version = 3, .reads_input = true, .make = make_volume});
+    stages.push_back({.name = "volume", .version = 4, .reads_input = true, .make = make_volume});
   }
   stages.push_back({.name = "segment",
-                    .version = 7,
+                    .version = 8,
                     .reads_input = in_volume,
                     .reads_labels = true,
                     .parameters = {"/mask"},
@@ -201,7 +201,7 @@ std::vector<Stage> stages_from_labels(const Case& given) {
   if (!given.labels->choice.names.empty()) read_too(stages.back(), {"/labels/names"});
   read_points(stages.back(), given);
   stages.push_back({.name = "surface",
-                    .version = 9,
+                    .version = 10,
                     .reads_input = in_volume,
                     .after = {"segment"},
                     .parameters = {"/surface/edge_length_mm"},
@@ -221,15 +221,15 @@ std::vector<Stage> stages_to_surface(const Case& given) {
                       .make = make_surface});
     return stages;
   }
-  stages.push_back({.name = "volume", .version = 3, .reads_input = true, .make = make_volume});
+  stages.push_back({.name = "volume", .version = 4, .reads_input = true, .make = make_volume});
   stages.push_back({.name = "segment",
-                    .version = 13,
+                    .version = 14,
                     .reads_input = true,
                     .parameters = {"/segmentation", "/mask"},
                     .make = make_segment});
   read_points(stages.back(), given);
   stages.push_back({.name = "surface",
-                    .version = 8,
+                    .version = 9,
                     .reads_input = true,
                     .after = {"segment"},
                     .parameters = {"/surface/edge_length_mm"},

@@ -10,7 +10,7 @@
 #include "preprocess/volume/apart.h"
 #include "preprocess/volume/dicom_choice.h"
 #include "preprocess/volume/dicom_slice.h"
-#include "preprocess/volume/dicom_stack.h"
+#include "preprocess/volume/dicom_volume.h"
 #include "preprocess/volume/itk_image.h"
 #include "preprocess/volume/volume_file.h"
 
@@ -27,15 +27,6 @@ constexpr const char* kEndsLibrary =
     "ends the library that reads DICOM: the file is damaged, or of a kind that GDCM does not "
     "expect; "
     "export the series again, uncompressed, or take the file out if it is no slice";
-
-/// Values of a CT are Hounsfield units; a scanner may say that these are not, as those of two
-/// energies. "US" is unspecified (PS3.3 section C.11.1.1.2).
-void require_hounsfield(const std::string& unit, const std::string& modality,
-                        const fs::path& file) {
-  if (modality != "CT" || unit.empty() || unit == "HU" || unit == "HU_MOD" || unit == "US") return;
-  throw Error(file.string() + ": a CT whose values are not in HU but, by its rescale type, " +
-              unit + "; expected HU; export the series of ordinary CT numbers");
-}
 
 /// The files of a folder by their names, or the one that is given.
 std::vector<fs::path> files_of(const fs::path& folder) {
@@ -86,75 +77,23 @@ std::string unit_of(const Series& series) {
     if (unit.empty() || unit == "HU") unit = told.empty() ? unit : told;
   };
   for (const Slice& slice : series) {
-    look(slice.unit);
-    for (const DicomFrame& frame : slice.frames) look(frame.unit);
+    look(slice.image.scale.unit);
+    for (const DicomFrame& frame : slice.frames) look(frame.scale.unit);
   }
   return unit;
 }
 
-/// Where the frames of an enhanced file lie.
-Stack stack_frames(const Slice& slice, const fs::path& folder) {
-  const std::vector<DicomFrame>& frames = slice.frames;
-  if (frames.size() != static_cast<std::size_t>(slice.grid.size[2])) {
-    throw Error(folder.string() + ": a DICOM file of " + std::to_string(slice.grid.size[2]) +
-                " frames that does not tell where each lies, expected an enhanced CT with place, "
-                "orientation and spacing of every frame; export the series as one file per slice");
-  }
-  const DicomFrame& first = frames.front();
-  std::vector<Vec3> origins;
-  const auto axes_of = [](const DicomFrame& frame) {
-    Mat3 axes;
-    axes << frame.right, frame.down, frame.right.cross(frame.down);
-    return axes;
-  };
-  for (const DicomFrame& frame : frames) {
-    require_place(Vec3(frame.along_row, frame.along_column, 1.0), frame.position, axes_of(frame),
-                  folder);
-    const bool like_first = (frame.right - first.right).norm() < 1e-3 &&
-                            (frame.down - first.down).norm() < 1e-3 &&
-                            std::abs(frame.along_row / first.along_row - 1.0) < 1e-3 &&
-                            std::abs(frame.along_column / first.along_column - 1.0) < 1e-3;
-    if (!like_first) {
-      throw Error(folder.string() +
-                  ": frames of several orientations or spacings in one DICOM file, expected one "
-                  "stack; export them as series of their own");
-    }
-    require_hounsfield(frame.unit, slice.modality, slice.file);
-    origins.push_back(frame.position);
-  }
-  Grid grid = slice.grid;
-  grid.spacing = Vec3(first.along_row, first.along_column, 1.0);
-  grid.direction = orthonormal_direction(axes_of(first), folder);
-  return stack(origins, grid);
-}
-
-/// All frames of an enhanced file, in the order of their places, each with its own scale.
-Image read_frames(Slice& slice, const fs::path& folder) {
-  const std::vector<DicomFrame>& frames = slice.frames;
-  const Stack stacked = stack_frames(slice, folder);
-  if (!stacked.problem.empty()) throw Error(folder.string() + ": " + stacked.problem);
-
-  // GDCM scales all frames as the first; what is stored are integers.
-  require_scalar_volume(*slice.io, stacked.grid, folder);
-  std::vector<float> values;
+/// All frames of an enhanced file, in the order of their places.
+std::vector<float> read_frames(const Slice& slice, const Stack& stacked, const fs::path& folder) {
+  std::vector<float> values, sorted;
   append_slice(slice, folder, values);
-  const double slope = slice.io->GetRescaleSlope(), intercept = slice.io->GetRescaleIntercept();
-  const std::size_t size = values.size() / frames.size();
-  Image image{.grid = stacked.grid,
-              .values = {},
-              .modality = slice.modality,
-              .unit = unit_of(Series{slice})};
-  image.values.reserve(values.size());
+  const std::size_t size = values.size() / slice.frames.size();
+  sorted.reserve(values.size());
   for (const std::size_t k : stacked.order) {
-    const DicomFrame& frame = frames[k];
-    const bool scaled_so = frame.slope == slope && frame.intercept == intercept;
-    for (std::size_t n = k * size; n < (k + 1) * size; ++n) {
-      const double stored = std::round((static_cast<double>(values[n]) - intercept) / slope);
-      image.values.push_back(
-          scaled_so ? values[n] : static_cast<float>(frame.slope * stored + frame.intercept));
-    }
+    const auto frame = values.begin() + static_cast<std::ptrdiff_t>(k * size);
+    sorted.insert(sorted.end(), frame, frame + static_cast<std::ptrdiff_t>(size));
   }
-  return image;
+  return sorted;
 }
 
 void send_text(const Send& send, const std::string& text) {
@@ -199,16 +138,14 @@ void send_dicom(const fs::path& path, const std::string& wanted, const Send& sen
   Series slices = find_wanted(path, wanted, at);
   Slice& first = slices.front();
   at(first.file.string());
-  for (const Slice& slice : slices) require_hounsfield(slice.unit, slice.modality, slice.file);
-  if (is_enhanced(slices)) {
-    const Image image = read_frames(first, path);
-    send_header(send, image.grid, image.modality, image.unit);
-    return send(image.values.data(), image.values.size() * sizeof(float));
-  }
-  const Stack stacked = stack(origins_of(slices), first.grid);
-  if (!stacked.problem.empty()) throw Error(path.string() + ": " + stacked.problem);
+  const Stack stacked = stack_series(slices, path, at);
+  if (!stacked.problem.empty()) throw Error(stacked.problem);
   require_scalar_volume(*first.io, stacked.grid, path);
   send_header(send, stacked.grid, first.modality, unit_of(slices));
+  if (is_enhanced(slices)) {
+    const std::vector<float> values = read_frames(first, stacked, path);
+    return send(values.data(), values.size() * sizeof(float));
+  }
   std::vector<float> values;
   for (const std::size_t k : stacked.order) {
     const Slice& slice = slices[k];
@@ -225,7 +162,7 @@ void send_dicom(const fs::path& path, const std::string& wanted, const Send& sen
 // ---- What is seen of a folder ------------------------------------------------------------------
 
 SeriesDescription describe_series(const Series& series, const std::vector<Series>& all,
-                                  const fs::path& folder) {
+                                  const fs::path& folder, const At& at) {
   const Slice& first = series.front();
   const Packing packing = packing_of(first);
   SeriesDescription told{.number = first.shown_number,
@@ -247,13 +184,10 @@ SeriesDescription describe_series(const Series& series, const std::vector<Series
     if (const std::string mixture = find_mixture(series, all); !mixture.empty()) {
       throw Error(mixture);
     }
-    const bool frames = is_enhanced(series);
-    const Stack stacked =
-        frames ? stack_frames(first, folder) : stack(origins_of(series), first.grid);
-    told.placed = frames || told.files > 1;
+    const Stack stacked = stack_series(series, folder, at);
+    told.placed = is_enhanced(series) || told.files > 1;
     told.grid = stacked.grid;
-    told.problem = stacked.problem;
-    for (const Slice& slice : series) require_hounsfield(slice.unit, slice.modality, slice.file);
+    told.problem = without_path(stacked.problem, folder);
   } catch (const Error& error) {
     told.problem = without_path(error.what(), folder);
   }
@@ -293,7 +227,7 @@ std::vector<SeriesDescription> describe_dicom(const fs::path& path) {
           const std::size_t count = all.size();
           send(&count, sizeof count);
           for (auto series = all.begin(); series != all.end(); ++series) {
-            SeriesDescription one = describe_series(*series, all, path);
+            SeriesDescription one = describe_series(*series, all, path, at);
             one.read = series == read && one.problem.empty();
             for_each_field(
                 one, [&](const std::string& field) { send_text(send, field); },

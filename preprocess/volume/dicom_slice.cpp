@@ -99,18 +99,6 @@ std::vector<std::string> patient_of(const gdcm::DataSet& data) {
   return values;
 }
 
-/// The numbers of a text that parts them by backslashes.
-std::vector<double> numbers_of(const std::string& text) {
-  std::vector<double> numbers;
-  std::istringstream parts(text);
-  for (std::string part; std::getline(parts, part, '\\');) {
-    char* end = nullptr;
-    const double number = std::strtod(part.c_str(), &end);
-    if (end != part.c_str() && std::isfinite(number)) numbers.push_back(number);
-  }
-  return numbers;
-}
-
 /// A count of pixels, rows or columns.
 template <std::uint16_t kElement>
 int read_count(const gdcm::DataSet& data) {
@@ -123,26 +111,12 @@ int read_count(const gdcm::DataSet& data) {
   return static_cast<int>(attribute.GetValue());
 }
 
-/// Where an image lies, as its own elements tell; what they do not tell goes into `lacks`.
-Grid told_grid(const gdcm::DataSet& data, std::string& lacks) {
+/// Where an image lies, as its own elements tell.
+Grid told_grid(const DicomFrame& image) {
   Grid grid;
-  const auto numbers = [&](const gdcm::Tag& tag, std::size_t count, const char* name) {
-    std::vector<double> found = numbers_of(dicom_text(data, tag));
-    if (found.size() < count) {
-      lacks += (lacks.empty() ? "" : ", ") + std::string(name);
-      found.clear();
-    }
-    return found;
-  };
-  const std::vector<double> at = numbers({0x20, 0x32}, 3, kPositionTag);
-  const std::vector<double> axes = numbers({0x20, 0x37}, 6, kOrientationTag);
-  const std::vector<double> spacing = numbers({0x28, 0x30}, 2, kSpacingTag);
-  if (!at.empty()) grid.origin = Vec3(at[0], at[1], at[2]);
-  if (!axes.empty()) {
-    const Vec3 right(axes[0], axes[1], axes[2]), down(axes[3], axes[4], axes[5]);
-    grid.direction << right, down, right.cross(down);
-  }
-  if (!spacing.empty()) grid.spacing = Vec3(spacing[1], spacing[0], 1.0);
+  grid.origin = image.position;
+  grid.direction << image.right, image.down, image.right.cross(image.down);
+  grid.spacing = Vec3(image.along_row, image.along_column, 1.0);
   return grid;
 }
 
@@ -160,8 +134,27 @@ std::string not_read(const std::string& syntax) {
          "); export the series again, uncompressed";
 }
 
+/// Why decimals of a file are not read; empty where they are.
+std::string find_no_number(const Slice& slice, const std::vector<std::string>& patient) {
+  const auto tell = [&](const NoNumber& wrong, const std::string& where) {
+    constexpr std::size_t kMost = 64;
+    std::string value = without_identity(wrong.value.substr(0, kMost), patient);
+    std::replace_if(
+        value.begin(), value.end(), [](char c) { return c < ' ' || c > '~'; }, '?');
+    return "its " + wrong.name + where + " is " +
+           (value.empty() ? "not shown" : "\"" + value + "\"") +
+           ", expected numbers with decimal points, parted by backslashes; export the series again";
+  };
+  if (!slice.image.wrong.name.empty()) return tell(slice.image.wrong, "");
+  for (std::size_t k = 0; k < slice.frames.size(); ++k) {
+    const NoNumber& wrong = slice.frames[k].wrong;
+    if (!wrong.name.empty()) return tell(wrong, " of frame " + std::to_string(k + 1));
+  }
+  return {};
+}
+
 /// Why a file whose header is read cannot lie in a volume; empty where it can.
-std::string find_refusal(const Slice& slice, const std::string& lacks, bool inverse) {
+std::string find_refusal(const Slice& slice, bool inverse) {
   if (!is_known(slice.look)) return not_read(slice.look.syntax);
   if (inverse && slice.look.syntax == kDeflated) {
     return "its photometric interpretation is MONOCHROME1, and it is deflated: the library would "
@@ -175,13 +168,13 @@ std::string find_refusal(const Slice& slice, const std::string& lacks, bool inve
            "), expected an enhanced CT with place, orientation and spacing of every frame; export "
            "the series as one file per slice";
   }
-  if (lacks.empty()) return slice.io ? "" : not_read(slice.look.syntax);
-  return "a slice that lacks " + lacks +
+  if (slice.image.lacks.empty()) return slice.io ? "" : not_read(slice.look.syntax);
+  return "a slice that lacks " + slice.image.lacks +
          ", without which its place and size in mm are not known; export the series again with "
          "it, or take the file out if it is no slice";
 }
 
-/// Fills in what the elements tell.
+/// Fills in what the elements tell, with why decimals are not read.
 void read_elements(Slice& slice, const gdcm::DataSet& data) {
   slice.series_uid = dicom_text(data, {0x20, 0x0e});
   slice.series_number = dicom_text(data, {0x20, 0x11});
@@ -189,9 +182,18 @@ void read_elements(Slice& slice, const gdcm::DataSet& data) {
   slice.shown_number = without_date(without_identity(slice.series_number, patient));
   slice.description = without_identity(dicom_text(data, {0x08, 0x103e}), patient);
   slice.modality = dicom_text(data, {0x08, 0x60});
-  slice.unit = dicom_text(data, {0x28, 0x1054});
+  slice.image = read_dicom_file(data);
   slice.localizer = dicom_text(data, {0x08, 0x08}).find("LOCALIZER") != std::string::npos;
-  slice.frames = read_dicom_frames(data);
+  slice.frames = read_dicom_frames(data, slice.image);
+  if (slice.frames.size() == 1) slice.image = slice.frames.front();
+
+  // Its frames tell where they lie, or are asked for it.
+  const double count = std::strtod(dicom_text(data, {0x28, 0x08}).c_str(), nullptr);
+  const int images = count >= 1.0 && count < 1e6 ? static_cast<int>(count) : 1;
+  if (images > 1 || !slice.frames.empty()) slice.image.lacks.clear();
+  slice.grid = told_grid(slice.image);
+  slice.grid.size = {read_count<0x11>(data), read_count<0x10>(data), images};
+  slice.refused = find_no_number(slice, patient);
 }
 
 /// True where the fragments of compressed pixels that start at `at` are all there (DICOM part 5,
@@ -264,6 +266,23 @@ void ask_itk(Slice& slice, const std::string& path) {
   }
 }
 
+/// Gives each frame its own scale: GDCM scales all as the first, and by its groups alone. What is
+/// stored are integers.
+void scale_frames(const Slice& slice, std::size_t first, std::vector<float>& values) {
+  const std::size_t count = slice.frames.size();
+  if (count == 0 || count != static_cast<std::size_t>(slice.grid.size[2])) return;
+  const double slope = slice.io->GetRescaleSlope(), intercept = slice.io->GetRescaleIntercept();
+  const std::size_t size = (values.size() - first) / count;
+  for (std::size_t k = 0; k < count; ++k) {
+    const DicomScale& scale = slice.frames[k].scale;
+    if (scale.slope == slope && scale.intercept == intercept) continue;
+    for (std::size_t n = first + k * size; n < first + (k + 1) * size; ++n) {
+      const double stored = std::round((static_cast<double>(values[n]) - intercept) / slope);
+      values[n] = static_cast<float>(scale.slope * stored + scale.intercept);
+    }
+  }
+}
+
 }  // namespace
 
 bool read_slice_header(Slice& slice) {
@@ -293,19 +312,13 @@ bool read_slice_header(Slice& slice) {
   read_elements(slice, data);
 
   // ITK is not asked where it would make up a place, or end the program for want of one.
-  std::string lacks;
-  slice.grid = told_grid(data, lacks);
   const auto is_placed = [](const DicomFrame& frame) { return frame.lacks.empty(); };
-  const double count = std::strtod(dicom_text(data, {0x28, 0x08}).c_str(), nullptr);
-  const int images = count >= 1.0 && count < 1e6 ? static_cast<int>(count) : 1;
-  if (images > 1 || !slice.frames.empty()) lacks.clear();  // its frames tell, or are asked for it
-  if (is_known(look) && lacks.empty() &&
+  if (slice.refused.empty() && is_known(look) && is_placed(slice.image) &&
       std::all_of(slice.frames.begin(), slice.frames.end(), is_placed)) {
     ask_itk(slice, path);
   }
-  if (!slice.io) slice.grid.size = {read_count<0x11>(data), read_count<0x10>(data), images};
   const bool inverse = dicom_text(data, {0x28, 0x04}) == "MONOCHROME1";
-  slice.refused = find_refusal(slice, lacks, inverse);
+  if (slice.refused.empty()) slice.refused = find_refusal(slice, inverse);
   return true;
 }
 
@@ -329,8 +342,10 @@ void append_slice(const Slice& slice, const fs::path& folder, std::vector<float>
   if (copy) slice.io->SetFileName(copy->path());
   require_whole_dicom(*slice.io, slice.file);
   const LastWords decoder;
+  const std::size_t before = values.size();
   try {
     append_voxels(*slice.io, folder, values);
+    scale_frames(slice, before, values);
   } catch (const Error&) {
     throw;
   } catch (const std::exception&) {

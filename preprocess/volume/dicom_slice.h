@@ -16,13 +16,13 @@ struct Slice {
   std::filesystem::path file;
   DicomLook look;
   itk::GDCMImageIO::Pointer io;    // header read; null where GDCM does not read the image
+  DicomFrame image;                // what the file tells of all, or of its one frame
   std::vector<DicomFrame> frames;  // of an enhanced file, which has groups of them
   std::string refused;             // why it is no slice of a volume; empty where it can be one
   std::string series_uid;          // to compare with, never shown
   std::string series_number;       // to compare with
   std::string shown_number;        // nothing where it may be a date
   std::string description, modality;
-  std::string unit;        // of its values; empty where the file does not tell
   bool localizer = false;  // by its image type
   Grid grid;
 };
@@ -33,7 +33,8 @@ struct Slice {
 /// `Error` for an image without pixels.
 bool read_slice_header(Slice& slice);
 
-/// Reads the pixels of a slice, or of all its frames, and appends their values.
+/// Reads the pixels of a slice, or of all its frames, and appends their values, each frame's by its
+/// own scale.
 void append_slice(const Slice& slice, const std::filesystem::path& folder,
                   std::vector<float>& values);
 

@@ -1,0 +1,61 @@
+#include "preprocess/volume/dicom_elements.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdlib>
+#include <sstream>
+#include <utility>
+
+namespace wireplan::preprocess {
+
+std::string without_padding(std::string text) {
+  while (!text.empty() && (text.back() == ' ' || text.back() == '\0')) text.pop_back();
+  return text;
+}
+
+std::string dicom_bytes(const gdcm::DataSet& data, const gdcm::Tag& tag) {
+  if (!data.FindDataElement(tag)) return {};
+  const gdcm::ByteValue* bytes = data.GetDataElement(tag).GetByteValue();
+  if (bytes == nullptr) return {};
+  return {bytes->GetPointer(), bytes->GetLength()};
+}
+
+std::string dicom_text(const gdcm::DataSet& data, const gdcm::Tag& tag) {
+  return without_padding(dicom_bytes(data, tag));
+}
+
+std::vector<double> read_numbers(const gdcm::DataSet& data, const NamedTag& named,
+                                 NoNumber& wrong) {
+  const std::string text = dicom_text(data, named.tag());
+  std::vector<double> numbers;
+  std::istringstream parts(text);
+  for (std::string part; std::getline(parts, part, '\\');) {
+    part = without_padding(part.substr(std::min(part.find_first_not_of(' '), part.size())));
+    char* end = nullptr;
+    const double number = std::strtod(part.c_str(), &end);
+    const bool is_decimal =
+        !part.empty() && part.find_first_not_of("0123456789+-.eE") == std::string::npos;
+    if (!is_decimal || end != part.c_str() + part.size() || !std::isfinite(number)) {
+      if (wrong.name.empty()) wrong = {named.name, text};
+      return {};
+    }
+    numbers.push_back(number);
+  }
+  return numbers;
+}
+
+void read_scale(const gdcm::DataSet& data, DicomScale& scale, NoNumber& wrong) {
+  const auto read = [&](const NamedTag& named, double& to, bool& has) {
+    const std::vector<double> numbers = read_numbers(data, named, wrong);
+    if (numbers.empty()) return;
+    to = numbers.front();
+    has = true;
+  };
+  read(kSlope, scale.slope, scale.has_slope);
+  read(kIntercept, scale.intercept, scale.has_intercept);
+  if (std::string unit = dicom_text(data, {0x28, 0x1054}); !unit.empty()) {
+    scale.unit = std::move(unit);
+  }
+}
+
+}  // namespace wireplan::preprocess

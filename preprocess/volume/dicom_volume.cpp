@@ -1,0 +1,145 @@
+#include "preprocess/volume/dicom_volume.h"
+
+#include <Eigen/Eigenvalues>  // before ITK, which would bring in its own older copy
+#include <algorithm>
+#include <cmath>
+#include <string>
+#include <vector>
+
+#include "preprocess/volume/itk_image.h"
+
+namespace wireplan::preprocess {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// The images of a series: frames of its one file, or its files.
+class Images {
+ public:
+  explicit Images(const Series& series) : series_(series), frames_(is_enhanced(series)) {}
+
+  bool are_frames() const { return frames_; }
+  std::size_t count() const { return frames_ ? series_.front().frames.size() : series_.size(); }
+  const DicomFrame& operator[](std::size_t k) const {
+    return frames_ ? series_.front().frames[k] : series_[k].image;
+  }
+  /// How an error about one begins.
+  std::string place_of(std::size_t k) const {
+    return frames_ ? series_.front().file.string() + ": frame " + std::to_string(k + 1) + ": "
+                   : series_[k].file.string() + ": ";
+  }
+
+ private:
+  const Series& series_;
+  bool frames_;
+};
+
+/// Values of a CT are Hounsfield units; a scanner may say that these are not, as those of two
+/// energies. "US" is unspecified (PS3.3 section C.11.1.1.2).
+void require_hounsfield(const std::string& unit, const std::string& modality,
+                        const fs::path& file) {
+  if (modality != "CT" || unit.empty() || unit == "HU" || unit == "HU_MOD" || unit == "US") return;
+  throw Error(file.string() + ": a CT whose values are not in HU but, by its rescale type, " +
+              unit + "; expected HU; export the series of ordinary CT numbers");
+}
+
+/// Where the frames of an enhanced file lie.
+Stack stack_frames(const Slice& slice, const fs::path& folder) {
+  const std::vector<DicomFrame>& frames = slice.frames;
+  if (frames.size() != static_cast<std::size_t>(slice.grid.size[2])) {
+    throw Error(folder.string() + ": a DICOM file of " + std::to_string(slice.grid.size[2]) +
+                " frames that does not tell where each lies, expected an enhanced CT with place, "
+                "orientation and spacing of every frame; export the series as one file per slice");
+  }
+  const DicomFrame& first = frames.front();
+  std::vector<Vec3> origins;
+  const auto axes_of = [](const DicomFrame& frame) {
+    Mat3 axes;
+    axes << frame.right, frame.down, frame.right.cross(frame.down);
+    return axes;
+  };
+  for (const DicomFrame& frame : frames) {
+    require_place(Vec3(frame.along_row, frame.along_column, 1.0), frame.position, axes_of(frame),
+                  folder);
+    const bool like_first = (frame.right - first.right).norm() < 1e-3 &&
+                            (frame.down - first.down).norm() < 1e-3 &&
+                            std::abs(frame.along_row / first.along_row - 1.0) < 1e-3 &&
+                            std::abs(frame.along_column / first.along_column - 1.0) < 1e-3;
+    if (!like_first) {
+      throw Error(folder.string() +
+                  ": frames of several orientations or spacings in one DICOM file, expected one "
+                  "stack; export them as series of their own");
+    }
+    origins.push_back(frame.position);
+  }
+  Grid grid = slice.grid;
+  grid.spacing = Vec3(first.along_row, first.along_column, 1.0);
+  grid.direction = orthonormal_direction(axes_of(first), folder);
+  return stack(origins, grid);
+}
+
+/// Whether values can be nothing else than HU: many are air's, and few are as bright as tissue is
+/// that is stored without its usual intercept of -1024.
+bool looks_hounsfield(const Series& series, const fs::path& folder, const At& at) {
+  constexpr float kAir = -1000.0F, kSpread = 100.0F, kBright = 700.0F;  // [HU]
+  constexpr double kLeastAir = 0.01, kMostBright = 0.2;                 // of the voxels; chosen
+  double count = 0.0, air = 0.0, bright = 0.0;
+  std::vector<float> values;
+  for (const Slice& slice : series) {
+    at(slice.file.string());
+    values.clear();
+    append_slice(slice, folder, values);
+    count += static_cast<double>(values.size());
+    for (const float value : values) {
+      air += std::abs(value - kAir) <= kSpread ? 1.0 : 0.0;
+      bright += value > kBright ? 1.0 : 0.0;
+    }
+  }
+  return air >= kLeastAir * count && bright <= kMostBright * count;
+}
+
+/// Why the values of a CT are not known to be HU, as it does not tell how they are scaled, or not
+/// of each image; empty where they are.
+std::string find_unscaled(const Series& series, const Images& images, const fs::path& folder,
+                          const At& at) {
+  if (series.front().modality != "CT") return {};
+  std::string lacks;  // all of them
+  for (const bool slope : {false, true}) {
+    const std::string name = slope ? kSlope.name : kIntercept.name;
+    std::size_t without = 0, first = 0;
+    for (std::size_t k = images.count(); k-- > 0;) {
+      const DicomScale& scale = images[k].scale;
+      if (slope ? scale.has_slope : scale.has_intercept) continue;
+      ++without;
+      first = k;
+    }
+    if (without > 0 && without < images.count()) {
+      return images.place_of(first) + "lacks " + name + ", as " + std::to_string(without) + " of " +
+             std::to_string(images.count()) +
+             " images do, so that their values are not known in HU; export the series again";
+    }
+    if (without > 0) lacks += (lacks.empty() ? "" : " and ") + name;
+  }
+  if (lacks.empty() || looks_hounsfield(series, folder, at)) return {};
+  return images.place_of(0) + "a CT whose images lack " + lacks +
+         ", and whose stored values are not seen to be HU (no air near -1000); export the series "
+         "again with them";
+}
+
+}  // namespace
+
+Stack stack_series(const Series& series, const fs::path& folder, const At& at) {
+  const Slice& first = series.front();
+  const Images images(series);
+  Stack stacked =
+      images.are_frames() ? stack_frames(first, folder) : stack(origins_of(series), first.grid);
+  for (std::size_t k = 0; k < images.count(); ++k) {
+    require_hounsfield(images[k].scale.unit, first.modality,
+                       images.are_frames() ? first.file : series[k].file);
+  }
+  if (!stacked.problem.empty()) stacked.problem = folder.string() + ": " + stacked.problem;
+  if (stacked.problem.empty()) stacked.problem = find_unscaled(series, images, folder, at);
+  return stacked;
+}
+
+}  // namespace wireplan::preprocess

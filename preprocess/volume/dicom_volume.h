@@ -1,0 +1,17 @@
+#pragma once
+/// Whether the images of a series are one volume of Hounsfield units; for the .cpp files here.
+#include <filesystem>
+
+#include "preprocess/volume/apart.h"
+#include "preprocess/volume/dicom_choice.h"
+#include "preprocess/volume/dicom_stack.h"
+
+namespace wireplan::preprocess {
+
+/// Images of a series at their places, or frames of an enhanced file. `problem` tells with its path
+/// why they are no volume: unevenly placed, of values in other
+/// units. Pixels are read of a CT alone that does not tell how its values are scaled. Throws
+/// `Error` where frames have no common grid.
+Stack stack_series(const Series& series, const std::filesystem::path& folder, const At& at);
+
+}  // namespace wireplan::preprocess
