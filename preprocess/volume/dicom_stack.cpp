@@ -59,10 +59,54 @@ std::string find_uneven(const std::vector<double>& positions) {
   return text.str();
 }
 
+/// The parts of steps from one image to the next that lie in their plane, less the usual one.
+std::vector<Vec3> sidesteps(const std::vector<Vec3>& origins, const Stack& stack) {
+  const Mat3& axes = stack.grid.direction;
+  std::vector<Vec3> steps;
+  for (std::size_t k = 1; k < origins.size(); ++k) {
+    Vec3 step = axes.transpose() * (origins[stack.order[k]] - origins[stack.order[k - 1]]);
+    step[2] = 0.0;
+    steps.push_back(step);
+  }
+  Vec3 usual = Vec3::Zero();
+  for (Eigen::Index axis = 0; axis < 2; ++axis) {
+    std::vector<double> sorted;
+    for (const Vec3& step : steps) sorted.push_back(step[axis]);
+    const auto middle = sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2);
+    std::nth_element(sorted.begin(), middle, sorted.end());
+    usual[axis] = *middle;
+  }
+  for (Vec3& step : steps) step -= usual;
+  return steps;
+}
+
+/// Refuses images off the line from first to last, as where the field of view was moved; told at
+/// the one with the widest step. Of a tilted gantry all lie on that line.
+void find_shift(const std::vector<Vec3>& origins, double most, Stack& stack) {
+  const Vec3& first = origins[stack.order.front()];
+  const Vec3 line = (origins[stack.order.back()] - first).normalized();
+  double off_line = 0.0;
+  for (const Vec3& origin : origins) {
+    off_line = std::max(off_line, (origin - first).cross(line).norm());
+  }
+  if (off_line <= most) return;
+  const std::vector<Vec3> steps = sidesteps(origins, stack);
+  const auto widest = std::max_element(
+      steps.begin(), steps.end(), [](const Vec3& a, const Vec3& b) { return a.norm() < b.norm(); });
+  const double shift = widest->norm();
+  stack.image = stack.order[static_cast<std::size_t>(widest - steps.begin()) + 1];
+  stack.problem = "this slice is shifted by " + one_decimal(shift) +
+                  " mm in its plane against the one before, and slices lie up to " +
+                  one_decimal(off_line) +
+                  " mm off the line from first to last (a field of view that was moved), expected "
+                  "at most half a pixel; export the series again with one field of view, or "
+                  "resample it";
+}
+
 }  // namespace
 
 Stack stack(const std::vector<Vec3>& origins, const Grid& first) {
-  Stack stack{.order = std::vector<std::size_t>(origins.size()), .grid = first, .problem = {}};
+  Stack stack{.order = std::vector<std::size_t>(origins.size()), .grid = first};
   if (origins.size() < 2) {
     stack.problem = "one DICOM slice, expected a series of at least 2";
     return stack;
@@ -80,7 +124,10 @@ Stack stack(const std::vector<Vec3>& origins, const Grid& first) {
   grid.origin = origins[stack.order.front()];
   const Vec3 rise = origins[stack.order.back()] - grid.origin;
   const double along = normal.dot(rise), drift = (rise - normal * along).norm();
-  if (stack.problem.empty() && drift > 0.5 * grid.spacing.head<2>().minCoeff()) {
+  // Half a pixel: beyond, the next one is nearer to where the value belongs.
+  const double most = 0.5 * grid.spacing.head<2>().minCoeff();
+  if (stack.problem.empty()) find_shift(origins, most, stack);
+  if (stack.problem.empty() && drift > most) {
     stack.problem = "the slices are shifted by " + one_decimal(drift) +
                     " mm in their plane from first to last (tilted gantry, " +
                     one_decimal(std::atan2(drift, along) / kRadPerDeg) +

@@ -137,7 +137,10 @@ Stack stack_series(const Series& series, const fs::path& folder, const At& at) {
     require_hounsfield(images[k].scale.unit, first.modality,
                        images.are_frames() ? first.file : series[k].file);
   }
-  if (!stacked.problem.empty()) stacked.problem = folder.string() + ": " + stacked.problem;
+  if (!stacked.problem.empty()) {
+    stacked.problem = (stacked.image ? images.place_of(*stacked.image) : folder.string() + ": ") +
+                      stacked.problem;
+  }
   if (stacked.problem.empty()) stacked.problem = find_unscaled(series, images, folder, at);
   return stacked;
 }

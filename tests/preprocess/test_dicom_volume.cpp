@@ -1,4 +1,5 @@
-// DICOM images that lie evenly and yet are no volume of HU.
+// DICOM images that lie evenly and yet are no volume: shifted, of values that
+// are no HU.
 #include "preprocess/volume/describe.h"
 #include "tests/preprocess/field_dicom.h"
 
@@ -53,7 +54,31 @@ class DicomVolume : public FieldDicom {
   }
 };
 
-// ---- Decimals -----------------------------------------------------------------------------------
+// ---- Places and decimals ------------------------------------------------------------------------
+
+TEST_F(DicomVolume, SlicesOffTheLineAreRefusedWithFileAndShiftAndJitterIsNot) {
+  const auto write_shifted = [&](int from, int to, double shift) {
+    write_slices([&](const std::string& bytes, int k) {
+      const double x = k >= from && k < to ? shift : 0.0;
+      return with_element(bytes, 0x20, 0x32, "DS",
+                          dicom_files::decimals(Vec3(x, -0.5 * x, 1.5 * k)));
+    });
+  };
+  write_shifted(3, 6, 3.0);  // pixels of 0.6 mm
+  expect_refused({"3_3: this slice is shifted by 3.4 mm in its plane against the one before"});
+  write_shifted(5, 8, -2.0);
+  expect_refused({"3_5: this slice is shifted by 2.2 mm in its plane against the one before"});
+  write_shifted(4, 5, 0.3);
+  expect_refused({"3_4: this slice is shifted by 0.3 mm", "slices lie up to 0.3 mm off the line"});
+  for (const int to : {4, 5, 8}) {
+    write_shifted(3, to, 0.14);
+    expect_read();
+  }
+  write_slices([](const std::string& bytes, int k) {
+    return with_element(bytes, 0x20, 0x32, "DS", dicom_files::decimals(Vec3(0, 0.4 * k, 1.5 * k)));
+  });
+  expect_refused({"2.8 mm in their plane from first to last (tilted gantry, 14.9 degrees)"});
+}
 
 TEST_F(DicomVolume, DecimalsThatAreNoNumbersAreRefusedWithTagAndValue) {
   struct Case {
