@@ -33,7 +33,8 @@ void read_measures(const gdcm::DataSet& data, DicomFrame& frame, Told& told) {
 }
 
 /// What one functional group, shared or of the frame, tells.
-void read_groups(const gdcm::DataSet& groups, DicomFrame& frame, Told& told) {
+void read_groups(const gdcm::DataSet& groups, const std::vector<gdcm::Tag>& dimensions,
+                 DicomFrame& frame, Told& told) {
   using gdcm::DataSet;
   in_first_item(groups, {0x20, 0x9113},
                 [&](const DataSet& one) { read_position(one, frame, told); });
@@ -43,6 +44,7 @@ void read_groups(const gdcm::DataSet& groups, DicomFrame& frame, Told& told) {
                 [&](const DataSet& one) { read_measures(one, frame, told); });
   in_first_item(groups, {0x28, 0x9145},
                 [&](const DataSet& one) { read_scale(one, frame.scale, frame.wrong); });
+  read_phase(groups, dimensions, frame.phase);
 }
 
 void tell_lacks(const Told& told, DicomFrame& frame) {
@@ -64,6 +66,7 @@ DicomFrame read_dicom_file(const gdcm::DataSet& data) {
   read_measures(data, file, told);
   tell_lacks(told, file);
   read_scale(data, file.scale, file.wrong);
+  read_phase(data, {}, file.phase);
   return file;
 }
 
@@ -75,13 +78,15 @@ std::vector<DicomFrame> read_dicom_frames(const gdcm::DataSet& data, const Dicom
   DicomFrame common = of_all;
   common.lacks.clear();  // its groups tell where a frame lies
   Told told_of_all;
-  in_first_item(data, shared,
-                [&](const gdcm::DataSet& groups) { read_groups(groups, common, told_of_all); });
+  const std::vector<gdcm::Tag> dimensions = read_dimensions(data);
+  in_first_item(data, shared, [&](const gdcm::DataSet& groups) {
+    read_groups(groups, dimensions, common, told_of_all);
+  });
   const auto items = data.GetDataElement(each).GetValueAsSQ();
   for (std::size_t k = 1; items && k <= items->GetNumberOfItems(); ++k) {
     DicomFrame frame = common;
     Told told = told_of_all;
-    read_groups(items->GetItem(k).GetNestedDataSet(), frame, told);
+    read_groups(items->GetItem(k).GetNestedDataSet(), dimensions, frame, told);
     tell_lacks(told, frame);
     frames.push_back(frame);
   }

@@ -6,6 +6,7 @@
 
 #include "preprocess/base.h"
 #include "preprocess/volume/dicom_elements.h"
+#include "preprocess/volume/dicom_phases.h"
 
 namespace wireplan::preprocess {
 
@@ -16,6 +17,7 @@ struct DicomFrame {
   Vec3 right = Vec3::UnitX(), down = Vec3::UnitY();  // unit vectors of a row and a column
   double along_row = 1.0, along_column = 1.0;        // spacing of pixels                  [mm]
   DicomScale scale;
+  DicomPhase phase;
 };
 
 /// What the data set of a file tells of its image, or of all its frames.

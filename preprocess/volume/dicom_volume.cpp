@@ -28,6 +28,22 @@ class Images {
     return frames_ ? series_.front().file.string() + ": frame " + std::to_string(k + 1) + ": "
                    : series_[k].file.string() + ": ";
   }
+  /// "60 frames (1 to 60)", or "60 slices (FILE, FILE and 58 more)".
+  std::string shown(const std::vector<std::size_t>& some) const {
+    constexpr int kShown = 2;
+    std::string text;
+    std::size_t told = 0;
+    for (int n = 0; n < kShown && told < some.size(); ++n) {
+      const std::size_t first = some[told++];
+      std::size_t last = first;  // of frames that follow one another
+      while (frames_ && told < some.size() && some[told] == last + 1) last = some[told++];
+      text += n == 0 ? "" : ", ";
+      text += frames_ ? std::to_string(first + 1) : series_[first].file.string();
+      if (last > first) text += " to " + std::to_string(last + 1);
+    }
+    if (told < some.size()) text += " and " + std::to_string(some.size() - told) + " more";
+    return std::to_string(some.size()) + (frames_ ? " frames (" : " slices (") + text + ")";
+  }
 
  private:
   const Series& series_;
@@ -76,6 +92,19 @@ Stack stack_frames(const Slice& slice, const fs::path& folder) {
   grid.spacing = Vec3(first.along_row, first.along_column, 1.0);
   grid.direction = orthonormal_direction(axes_of(first), folder);
   return stack(origins, grid);
+}
+
+/// Why images are of several phases; empty where they are of one.
+std::string find_several(const Images& images, const std::vector<std::size_t>& order,
+                         const fs::path& folder) {
+  std::vector<const DicomPhase*> phases;
+  for (std::size_t k = 0; k < images.count(); ++k) phases.push_back(&images[k].phase);
+  const std::string found = find_phases(
+      phases, order, [&](const std::vector<std::size_t>& some) { return images.shown(some); });
+  if (found.empty()) return {};
+  return folder.string() + ": images of " + found + "; " +
+         (images.are_frames() ? "export the one to plan on as a series of its own"
+                              : "put the files of the one to plan on into a folder of their own");
 }
 
 /// Whether values can be nothing else than HU: many are air's, and few are as bright as tissue is
@@ -137,9 +166,11 @@ Stack stack_series(const Series& series, const fs::path& folder, const At& at) {
     require_hounsfield(images[k].scale.unit, first.modality,
                        images.are_frames() ? first.file : series[k].file);
   }
-  if (!stacked.problem.empty()) {
-    stacked.problem = (stacked.image ? images.place_of(*stacked.image) : folder.string() + ": ") +
-                      stacked.problem;
+  const std::string uneven = stacked.problem;
+  stacked.problem = find_several(images, stacked.order, folder);
+  if (stacked.problem.empty() && !uneven.empty()) {
+    stacked.problem =
+        (stacked.image ? images.place_of(*stacked.image) : folder.string() + ": ") + uneven;
   }
   if (stacked.problem.empty()) stacked.problem = find_unscaled(series, images, folder, at);
   return stacked;

@@ -1,10 +1,27 @@
-// DICOM images that lie evenly and yet are no volume: shifted, of values that
+// DICOM images that lie evenly and yet are no volume: of several phases, shifted, of values that
 // are no HU.
 #include "preprocess/volume/describe.h"
 #include "tests/preprocess/field_dicom.h"
 
 namespace wireplan::preprocess {
 namespace {
+
+std::string long_value(std::uint32_t value) {
+  std::string bytes;
+  dicom_files::append(bytes, value);
+  return bytes;
+}
+
+std::string double_value(double value) {
+  std::string bytes;
+  dicom_files::append(bytes, value);
+  return bytes;
+}
+
+/// A tag as the value of an element.
+std::string tag_value(std::uint16_t group, std::uint16_t number) {
+  return dicom_files::short_value(group) + dicom_files::short_value(number);
+}
 
 /// More elements in front of an element of the file that is given as bytes.
 std::string with_before(std::string bytes, const std::string& before, const std::string& more) {
@@ -53,6 +70,129 @@ class DicomVolume : public FieldDicom {
     });
   }
 };
+
+// ---- Phases -------------------------------------------------------------------------------------
+
+/// Eight frames 1.5 mm apart, first those of even numbers along z and then the odd ones, each with
+/// a functional group.
+std::string two_by_turns(const std::function<std::string(int place, int frame)>& group) {
+  std::vector<Frame> frames;
+  for (int k = 0; k < 8; ++k) {
+    const int place = k < 4 ? 2 * k : 2 * (k - 4) + 1;
+    frames.push_back({.place = 1.5 * place, .more = group(place, k)});
+  }
+  return enhanced(frames);
+}
+
+std::string content(const std::string& elements) { return sequence(0x20, 0x9111, {elements}); }
+
+TEST_F(DicomVolume, FramesOfTwoStacksOrPhasesHalfAStepApartAreRefusedWithTheirFrames) {
+  struct Kind {
+    std::string told;
+    std::function<std::string(int part)> group;
+  };
+  const std::vector<Kind> kinds = {
+      {"2 stacks (Stack ID (0020,9056))",
+       [](int part) { return content(of(0x20, 0x9056, "SH", std::to_string(part))); }},
+      {"2 temporal positions (Temporal Position Index (0020,9128))",
+       [](int part) {
+         return content(of(0x20, 0x9128, "UL", long_value(static_cast<std::uint32_t>(part))));
+       }},
+      {"2 acquisitions (Frame Acquisition Number (0020,9156)) that lie between one another",
+       [](int part) {
+         return content(
+             of(0x20, 0x9156, "US", dicom_files::short_value(static_cast<std::uint16_t>(part))));
+       }},
+      {"2 values of a dimension (Dimension Index Values (0020,9157), number 1)",
+       [](int part) {
+         return content(of(0x20, 0x9157, "UL", long_value(static_cast<std::uint32_t>(part))));
+       }},
+      {"2 phases of the heart (Nominal Percentage of Cardiac Phase (0020,9241))",
+       [](int part) {
+         return sequence(0x18, 0x9118, {of(0x20, 0x9241, "FD", double_value(30.0 * part))});
+       }},
+      {"2 phases of breath (Nominal Percentage of Respiratory Phase (0020,9245))",
+       [](int part) {
+         return sequence(0x20, 0x9253, {of(0x20, 0x9245, "FD", double_value(50.0 * part))});
+       }},
+      {"2 times (Temporal Position Time Offset (0020,930D)) that lie between one another",
+       [](int part) {
+         return sequence(0x20, 0x9310, {of(0x20, 0x930d, "FD", double_value(20.0 * part))});
+       }},
+      {"2 contrast phases (Contrast/Bolus Agent Phase (0018,9344))", [](int part) {
+         return sequence(
+             0x18, 0x9341,
+             {of(0x18, 0x9344, "CS", part == 1 ? "DURING_INJECTION" : "POST_INJECTION")});
+       }}};
+  for (const Kind& kind : kinds) {
+    SCOPED_TRACE(kind.told);
+    write("ct.dcm", two_by_turns([&](int place, int) { return kind.group(1 + place % 2); }));
+    expect_refused({"images of " + kind.told,
+                    "expected one: 4 frames (1 to 4); 4 frames (5 to 8); export the one to plan on "
+                    "as a series of its own"});
+  }
+}
+
+TEST_F(DicomVolume, ADimensionIsToldByWhatItPointsToAndOneOfPlacesIsNone) {
+  const auto by_dimensions = [&](std::uint16_t group, std::uint16_t number, bool by_place) {
+    const auto index = [](int k) { return long_value(static_cast<std::uint32_t>(k)); };
+    const std::string bytes = two_by_turns([&](int place, int) {
+      return content(
+          of(0x20, 0x9157, "UL", index(1) + index(1 + (by_place ? place / 2 : place % 2))));
+    });
+    const auto pointer = [](std::uint16_t to_group, std::uint16_t to_number) {
+      return of(0x20, 0x9165, "AT", tag_value(to_group, to_number));
+    };
+    const std::string dimensions =
+        sequence(0x20, 0x9222, {pointer(0x20, 0x9056), pointer(group, number)});
+    write("ct.dcm",
+          with_before(bytes, of(0x28, 0x02, "US", dicom_files::short_value(1)), dimensions));
+  };
+  by_dimensions(0x20, 0x9241, false);
+  expect_refused({"2 phases of the heart (Nominal Percentage of Cardiac Phase (0020,9241))"});
+  by_dimensions(0x18, 0x9087, false);
+  expect_refused({"2 values of a dimension (Dimension (0018,9087)) that lie between one another"});
+  by_dimensions(0x20, 0x9057, false);  // in-stack positions, however they are counted
+  EXPECT_EQ(read_image(folder_).grid.size[2], 8);
+  by_dimensions(0x18, 0x9087, true);
+  EXPECT_EQ(read_image(folder_).grid.size[2], 8);
+}
+
+TEST_F(DicomVolume, StacksOneBehindTheOtherAreRefusedAndFramesOfTheirOwnTimesAreRead) {
+  write("ct.dcm", two_by_turns([](int place, int) {
+          return content(of(0x20, 0x9056, "SH", place < 4 ? "1" : "2"));
+        }));
+  expect_refused(
+      {"2 stacks (Stack ID (0020,9056)), expected one: 4 frames (1 to 2, 5 to 6); 4 frames "
+       "(3 to 4, 7 to 8)"});
+  write("ct.dcm", two_by_turns([](int place, int) {  // as a helical scan has it
+          return content(of(0x18, 0x9074, "DT", "2020010112000" + std::to_string(place / 2)) +
+                         of(0x20, 0x9128, "UL", long_value(static_cast<std::uint32_t>(place + 1))) +
+                         of(0x20, 0x9156, "US",
+                            dicom_files::short_value(static_cast<std::uint16_t>(place / 4))));
+        }));
+  EXPECT_EQ(read_image(folder_).grid.size[2], 8);
+}
+
+TEST_F(DicomVolume, TwoAcquisitionsOfOneSeriesBetweenOneAnotherAreRefusedWithTheirFiles) {
+  write_told(0x20, 0x12, "IS", [](int k) { return std::to_string(1 + k % 2); });
+  expect_refused(
+      {"2 acquisitions (Acquisition Number (0020,0012)) that lie between one another, "
+       "expected one: 4 slices (",
+       "3_2 and 2 more); 4 slices (", "3_1, ",
+       "put the files of the one to plan on into a folder of their own"});
+  write_told(0x20, 0x100, "IS", [](int k) { return std::to_string(1 + k % 2); });
+  expect_refused({"2 temporal positions (Temporal Position Identifier (0020,0100)), expected one"});
+  write_told(0x20, 0x100, "IS", [](int k) { return std::to_string(1 + k / 4); });
+  expect_refused({"2 temporal positions (Temporal Position Identifier (0020,0100)), expected one"});
+}
+
+TEST_F(DicomVolume, AcquisitionsOneBehindTheOtherAreOneVolume) {
+  for (const int each : {1, 2, 3, 4, 8}) {
+    write_told(0x20, 0x12, "IS", [&](int k) { return std::to_string(9 - k / each); });
+    expect_read();
+  }
+}
 
 // ---- Places and decimals ------------------------------------------------------------------------
 
