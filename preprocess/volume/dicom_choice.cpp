@@ -214,7 +214,13 @@ std::vector<Series>::iterator find_chosen(std::vector<Series>& all, const std::s
     return is_main(series, all) && (wanted.empty() || first.series_number == wanted ||
                                     first.description == wanted || key_of(series) == wanted);
   };
-  const auto found = only(is_wanted);
+  const auto is_scan = [&](const Series& series) {
+    return is_wanted(series) && !series.front().aside;
+  };
+  auto found = only(is_wanted);
+  if (found == all.end()) found = only(is_scan);
+  if (found != all.end()) return found;
+  found = only([&](const Series& series) { return is_scan(series) && has_volume_shape(series); });
   if (found != all.end()) return found;
   return only([&](const Series& series) { return is_wanted(series) && has_volume_shape(series); });
 }

@@ -24,7 +24,8 @@ bool is_enhanced(const Series& series);
 std::string key_of(const Series& series);
 
 /// The series to read of those whose number, description or key is `wanted`, or of all where that
-/// is empty: the only one, or the one that alone has a volume's shape; the end where there is none.
+/// is empty: the only one, the only scan among doses, segmentations and projections, or the one
+/// that alone has a volume's shape; the end where there is none.
 /// What has its UID but not its shape is not asked for.
 std::vector<Series>::iterator find_chosen(std::vector<Series>& all, const std::string& wanted);
 

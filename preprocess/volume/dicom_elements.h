@@ -20,6 +20,7 @@ struct NamedTag {
 inline constexpr NamedTag kPosition{0x20, 0x32, "Image Position (Patient) (0020,0032)"};
 inline constexpr NamedTag kOrientation{0x20, 0x37, "Image Orientation (Patient) (0020,0037)"};
 inline constexpr NamedTag kSpacing{0x28, 0x30, "Pixel Spacing (0028,0030)"};
+inline constexpr NamedTag kThickness{0x18, 0x50, "Slice Thickness (0018,0050)"};
 inline constexpr NamedTag kIntercept{0x28, 0x1052, "Rescale Intercept (0028,1052)"};
 inline constexpr NamedTag kSlope{0x28, 0x1053, "Rescale Slope (0028,1053)"};
 

@@ -24,12 +24,23 @@ void read_orientation(const gdcm::DataSet& data, DicomFrame& frame, Told& told) 
 }
 
 void read_measures(const gdcm::DataSet& data, DicomFrame& frame, Told& told) {
+  NoNumber passed_over;  // images are read without a thickness
+  const std::vector<double> thickness = read_numbers(data, kThickness, passed_over);
+  if (!thickness.empty()) frame.thickness = thickness[0];
   // Between rows, then between columns (PS3.3 section 10.7.1.3).
   const std::vector<double> spacing = read_numbers(data, kSpacing, frame.wrong);
   if (spacing.size() < 2) return;
   frame.along_column = spacing[0];
   frame.along_row = spacing[1];
   told.spacing = true;
+}
+
+/// The type of an image or a frame, and how it was computed from a volume.
+void read_type(const gdcm::DataSet& data, const gdcm::Tag& tag, DicomFrame& frame) {
+  for (const gdcm::Tag& one : {tag, gdcm::Tag(0x08, 0x9207)}) {
+    const std::string type = dicom_text(data, one);
+    if (!type.empty()) frame.type += (frame.type.empty() ? "" : "\\") + type;
+  }
 }
 
 /// What one functional group, shared or of the frame, tells.
@@ -44,6 +55,11 @@ void read_groups(const gdcm::DataSet& groups, const std::vector<gdcm::Tag>& dime
                 [&](const DataSet& one) { read_measures(one, frame, told); });
   in_first_item(groups, {0x28, 0x9145},
                 [&](const DataSet& one) { read_scale(one, frame.scale, frame.wrong); });
+  for (const gdcm::Tag& modality : {gdcm::Tag(0x18, 0x9329), gdcm::Tag(0x18, 0x9226)}) {  // CT, MR
+    in_first_item(groups, modality, [&](const DataSet& one) {
+      read_type(one, {0x08, 0x9007}, frame);
+    });
+  }
   read_phase(groups, dimensions, frame.phase);
 }
 
@@ -66,6 +82,7 @@ DicomFrame read_dicom_file(const gdcm::DataSet& data) {
   read_measures(data, file, told);
   tell_lacks(told, file);
   read_scale(data, file.scale, file.wrong);
+  read_type(data, {0x08, 0x08}, file);
   read_phase(data, {}, file.phase);
   return file;
 }

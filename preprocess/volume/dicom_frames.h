@@ -16,8 +16,10 @@ struct DicomFrame {
   Vec3 position = Vec3::Zero();  // centre of its first pixel, LPS                        [mm]
   Vec3 right = Vec3::UnitX(), down = Vec3::UnitY();  // unit vectors of a row and a column
   double along_row = 1.0, along_column = 1.0;        // spacing of pixels                  [mm]
+  double thickness = 0.0;                            // 0 where not told                   [mm]
   DicomScale scale;
   DicomPhase phase;
+  std::string type;  // of the image, and how it was computed, parted by backslashes
 };
 
 /// What the data set of a file tells of its image, or of all its frames.

@@ -5,12 +5,14 @@
 
 #include <algorithm>
 #include <array>
+#include <cctype>
 #include <cmath>
 #include <cstdint>
 #include <cstdlib>
 #include <fstream>
 #include <memory>
 #include <sstream>
+#include <string_view>
 
 #include "gdcmAttribute.h"
 #include "gdcmReader.h"
@@ -134,6 +136,50 @@ std::string not_read(const std::string& syntax) {
          "); export the series again, uncompressed";
 }
 
+/// The word by which an image type says that images are projections through a slab or pictures of
+/// a volume; empty where it does not.
+std::string projection_of(std::string type) {
+  constexpr std::array<std::string_view, 12> kWords = {
+      "MAXIP",     "MINIP",  "MINMIP",       "MPVR",          "PROJECTION", "PROJECTED",
+      "RENDERING", "RENDER", "VOLUMERENDER", "SURFACERENDER", "VRT",        "CURVEDMPR"};
+  std::transform(type.begin(), type.end(), type.begin(),
+                 [](unsigned char c) { return static_cast<char>(std::toupper(c)); });
+  for (const bool joined : {false, true}) {  // "MIP_THIN" and "MAX_IP"
+    std::string words = type;
+    if (joined) words.erase(std::remove(words.begin(), words.end(), '_'), words.end());
+    std::replace_if(
+        words.begin(), words.end(), [](unsigned char c) { return std::isalnum(c) == 0; }, ' ');
+    std::istringstream parts(words);
+    for (std::string part; parts >> part;) {
+      const bool known = std::find(kWords.begin(), kWords.end(), part) != kWords.end();
+      if (known || part.starts_with("MIP")) return part.starts_with("MIP") ? "MIP" : part;
+    }
+  }
+  return {};
+}
+
+/// Of what kind an image is that is no slice, nor frames, of a scan; empty where it is of one.
+std::string other_kind(const Slice& slice, const std::string& sop_class) {
+  if (sop_class.starts_with("1.2.840.10008.5.1.4.1.1.66.") || slice.modality == "SEG") {
+    return "a DICOM segmentation (SEG) is not read; export it as NIfTI or NRRD";
+  }
+  std::string projection = projection_of(slice.image.type);
+  for (const DicomFrame& frame : slice.frames) {
+    if (projection.empty()) projection = projection_of(frame.type);
+  }
+  if (projection.empty()) return {};
+  return "a projection or a picture of a volume (its image type says " + projection +
+         "), expected slices; give the series that it was made of";
+}
+
+/// Frames of CT and MR (PS3.4 section B.5), also of such files put together later.
+bool is_scan(const std::string& sop_class, const std::string& modality) {
+  constexpr std::array<std::string_view, 6> kScans = {"2", "2.1", "2.2", "4", "4.1", "4.4"};
+  const std::string images = "1.2.840.10008.5.1.4.1.1.";
+  if (!sop_class.starts_with(images)) return modality == "CT" || modality == "MR";
+  return std::find(kScans.begin(), kScans.end(), sop_class.substr(images.size())) != kScans.end();
+}
+
 /// Why decimals of a file are not read; empty where they are.
 std::string find_no_number(const Slice& slice, const std::vector<std::string>& patient) {
   const auto tell = [&](const NoNumber& wrong, const std::string& where) {
@@ -174,7 +220,7 @@ std::string find_refusal(const Slice& slice, bool inverse) {
          "it, or take the file out if it is no slice";
 }
 
-/// Fills in what the elements tell, with why decimals are not read.
+/// Fills in what the elements tell, with why images of its kind are not read.
 void read_elements(Slice& slice, const gdcm::DataSet& data) {
   slice.series_uid = dicom_text(data, {0x20, 0x0e});
   slice.series_number = dicom_text(data, {0x20, 0x11});
@@ -183,7 +229,7 @@ void read_elements(Slice& slice, const gdcm::DataSet& data) {
   slice.description = without_identity(dicom_text(data, {0x08, 0x103e}), patient);
   slice.modality = dicom_text(data, {0x08, 0x60});
   slice.image = read_dicom_file(data);
-  slice.localizer = dicom_text(data, {0x08, 0x08}).find("LOCALIZER") != std::string::npos;
+  slice.localizer = slice.image.type.find("LOCALIZER") != std::string::npos;
   slice.frames = read_dicom_frames(data, slice.image);
   if (slice.frames.size() == 1) slice.image = slice.frames.front();
 
@@ -193,7 +239,10 @@ void read_elements(Slice& slice, const gdcm::DataSet& data) {
   if (images > 1 || !slice.frames.empty()) slice.image.lacks.clear();
   slice.grid = told_grid(slice.image);
   slice.grid.size = {read_count<0x11>(data), read_count<0x10>(data), images};
-  slice.refused = find_no_number(slice, patient);
+  const std::string sop_class = dicom_text(data, {0x08, 0x16});
+  slice.refused = other_kind(slice, sop_class);
+  slice.aside = !slice.refused.empty() || (images > 1 && !is_scan(sop_class, slice.modality));
+  if (slice.refused.empty()) slice.refused = find_no_number(slice, patient);
 }
 
 /// True where the fragments of compressed pixels that start at `at` are all there (DICOM part 5,

@@ -24,6 +24,7 @@ struct Slice {
   std::string shown_number;        // nothing where it may be a date
   std::string description, modality;
   bool localizer = false;  // by its image type
+  bool aside = false;      // a dose, a segmentation or a projection: passed over beside a scan
   Grid grid;
 };
 

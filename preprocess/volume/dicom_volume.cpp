@@ -107,6 +107,22 @@ std::string find_several(const Images& images, const std::vector<std::size_t>& o
                               : "put the files of the one to plan on into a folder of their own");
 }
 
+/// Why images are slabs that are much thicker than they are apart, as projections are; empty where
+/// they are not. Slices that overlap by half are usual, and scans of 5 mm are read.
+std::string find_slab(const Images& images, const Grid& grid) {
+  constexpr double kMost = 3.0, kThick = 5.0;  // of the spacing; [mm]; both chosen
+  for (std::size_t k = 0; k < images.count(); ++k) {
+    const double thickness = images[k].thickness;
+    const bool derived = images[k].type.starts_with("DERIVED");
+    if (thickness <= kMost * grid.spacing[2] || (!derived && thickness <= kThick)) continue;
+    return images.place_of(k) + "a slab of " + one_decimal(thickness) + " mm (" + kThickness.name +
+           ") in images " + one_decimal(grid.spacing[2]) +
+           " mm apart, as projections (MIP) are, expected slices; give the series that it was made "
+           "of";
+  }
+  return {};
+}
+
 /// Whether values can be nothing else than HU: many are air's, and few are as bright as tissue is
 /// that is stored without its usual intercept of -1024.
 bool looks_hounsfield(const Series& series, const fs::path& folder, const At& at) {
@@ -172,6 +188,7 @@ Stack stack_series(const Series& series, const fs::path& folder, const At& at) {
     stacked.problem =
         (stacked.image ? images.place_of(*stacked.image) : folder.string() + ": ") + uneven;
   }
+  if (stacked.problem.empty()) stacked.problem = find_slab(images, stacked.grid);
   if (stacked.problem.empty()) stacked.problem = find_unscaled(series, images, folder, at);
   return stacked;
 }

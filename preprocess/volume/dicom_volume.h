@@ -9,7 +9,7 @@
 namespace wireplan::preprocess {
 
 /// Images of a series at their places, or frames of an enhanced file. `problem` tells with its path
-/// why they are no volume: of several phases, unevenly placed, of values in other
+/// why they are no volume: of several phases, unevenly placed, thick slabs, of values in other
 /// units. Pixels are read of a CT alone that does not tell how its values are scaled. Throws
 /// `Error` where frames have no common grid.
 Stack stack_series(const Series& series, const std::filesystem::path& folder, const At& at);

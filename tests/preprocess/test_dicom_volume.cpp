@@ -1,10 +1,13 @@
 // DICOM images that lie evenly and yet are no volume: of several phases, shifted, of values that
-// are no HU.
+// are no HU, projections; and objects of other kinds beside a scan.
 #include "preprocess/volume/describe.h"
+#include "preprocess/volume/labels.h"
 #include "tests/preprocess/field_dicom.h"
 
 namespace wireplan::preprocess {
 namespace {
+
+std::string as_they_are(const std::string& bytes, int) { return bytes; }
 
 std::string long_value(std::uint32_t value) {
   std::string bytes;
@@ -317,6 +320,76 @@ TEST_F(DicomVolume, AScaleOfTheWholeEnhancedFileCountsWhereItsFramesTellNone) {
     write(std::to_string(k), enhanced_of({{.place = 1.5 * k, .slope = ""}}));
   }
   EXPECT_EQ(read_image(folder_).values[1], 2.0F * 1.0F - 1024.0F);
+}
+
+// ---- Objects that are no scans ------------------------------------------------------------------
+
+TEST_F(DicomVolume, ProjectionsAndThickSlabsAreRefusedAndOverlappingSlicesAreNot) {
+  for (const char* type : {"DERIVED\\SECONDARY\\AXIAL\\MIP", "DERIVED\\SECONDARY\\MIP_THIN",
+                           "DERIVED\\PRIMARY\\VOLUME\\MIN_IP", "DERIVED\\SECONDARY\\AXIAL\\MinIP",
+                           "DERIVED\\SECONDARY\\PROJECTION IMAGE", "DERIVED\\SECONDARY\\VRT"}) {
+    SCOPED_TRACE(type);
+    write_told(0x08, 0x08, "CS", [&](int) { return std::string(type); });
+    expect_refused({"3_0: a projection or a picture of a volume (its image type says"});
+  }
+  const auto write_thick = [&](const std::string& thickness, const std::string& type) {
+    write_slices([&](const std::string& bytes, int) {
+      return with_element(with_element(bytes, 0x18, 0x50, "DS", thickness), 0x08, 0x08, "CS", type);
+    });
+  };
+  for (const char* thickness : {"1.5", "2", "3", "4.5", "1,5"}) {  // the last one is not needed
+    for (const char* type : {"ORIGINAL\\PRIMARY\\AXIAL", "DERIVED\\SECONDARY\\MPR"}) {
+      write_thick(thickness, type);
+      expect_read();
+    }
+  }
+  write_thick("10.5", "DERIVED\\SECONDARY\\AXIAL");
+  expect_refused({"3_0: a slab of 10.5 mm (Slice Thickness (0018,0050)) in images 1.5 mm apart"});
+  write_thick("10.5", "ORIGINAL\\PRIMARY\\AXIAL");
+  expect_refused({"3_0: a slab of 10.5 mm"});
+}
+
+/// An enhanced file that says to be of another kind of a series of its own.
+std::string other_object(const std::string& sop_class, const std::string& modality) {
+  std::vector<Frame> frames;
+  for (int k = 0; k < 6; ++k) frames.push_back({.place = 1.5 * k});
+  std::string bytes = enhanced(frames);
+  const auto replace = [&](const std::string& old, const std::string& now) {
+    const std::size_t at = bytes.find(old);
+    ASSERT_NE(at, std::string::npos);
+    bytes.replace(at, old.size(), now);
+  };
+  replace(of(0x08, 0x16, "UI", "1.2.840.10008.5.1.4.1.1.2.1"), of(0x08, 0x16, "UI", sop_class));
+  replace(of(0x08, 0x60, "CS", "CT"), of(0x08, 0x60, "CS", modality));
+  return bytes;
+}
+
+TEST_F(DicomVolume, ASegmentationIsRefusedByNameAsAVolumeAndAsLabels) {
+  const fs::path file = write("seg.dcm", other_object("1.2.840.10008.5.1.4.1.1.66.4", "SEG"));
+  const std::string expected = "a DICOM segmentation (SEG) is not read; export it as NIfTI or NRRD";
+  expect_refused({expected});
+  expect_refused({expected}, file);
+  const std::string error = error_of([&] { list_labels(file, {}); });
+  EXPECT_TRUE(has(error, expected)) << error;
+}
+
+TEST_F(DicomVolume, ACtIsReadBesideADoseASegmentationAPictureAndItsProjection) {
+  write_slices(as_they_are);
+  write("dose", other_object("1.2.840.10008.5.1.4.1.1.481.2", "RTDOSE"));
+  expect_read();
+  EXPECT_EQ(describe_volume(folder_).series.size(), 2u);
+  write("seg", other_object("1.2.840.10008.5.1.4.1.1.66.4", "SEG"));
+  write("film", other_object("1.2.840.10008.5.1.4.1.1.7.2", "CT"));
+  expect_read();
+  expect_whole("3");
+  write_slices(
+      [](const std::string& bytes, int) {
+        return with_element(bytes, 0x08, 0x08, "CS", "DERIVED\\SECONDARY\\AXIAL\\MIP");
+      },
+      {.series = "1.2.77", .number = "77"});
+  expect_read();
+  const std::string error = error_of([&] { read_image(folder_, "77"); });
+  EXPECT_TRUE(has(error, "77_0: a projection")) << error;
 }
 
 }  // namespace
