@@ -202,8 +202,12 @@ class CaseMaker {
         (given_.folder / kMarkups).string() + ".");
   }
 
-  void take_points(const std::vector<MarkupPoint>& points) {
+  void take_points(const Markups& read) {
+    const std::vector<MarkupPoint>& points = read.points;
     for (const MarkupPoint& point : points) tell_point(point);
+    for (const std::string& label : read.unplaced) {
+      answer_.found.push_back("\"" + label + "\" is there but has no position: place it");
+    }
     std::vector<std::string> accesses, targets, others;
     for (const MarkupPoint& point : points) {
       (begins_as(point.label, "access")   ? accesses

@@ -61,7 +61,7 @@ std::string one_text_under(const Json& object, const char* key, const std::strin
   return text;
 }
 
-void append_markup(const Json& markup, const std::string& place, std::vector<MarkupPoint>& points) {
+void append_markup(const Json& markup, const std::string& place, Markups& read) {
   const std::string frame = one_text_under(markup, "coordinateSystem", place);
   const Vec3 signs = signs_of_frame(frame.empty() ? "LPS" : frame, place);  // as the schema has it
   const std::string unit = one_text_under(markup, "coordinateUnits", place);
@@ -74,7 +74,10 @@ void append_markup(const Json& markup, const std::string& place, std::vector<Mar
   for (const Json& control : *controls) {
     if (!control.is_object()) throw Error(place + ": a control point is no object; " + kExpected);
     const std::string status = text_under(control, "positionStatus");
-    if (!status.empty() && status != "defined") continue;  // not placed yet
+    if (!status.empty() && status != "defined") {
+      read.unplaced.push_back(text_under(control, "label"));
+      continue;
+    }
     MarkupPoint point{.label = text_under(control, "label"), .point = Vec3::Constant(NAN)};
     const auto position = control.find("position");
     if (position != control.end() && position->is_array() && position->size() == 3) {
@@ -86,22 +89,27 @@ void append_markup(const Json& markup, const std::string& place, std::vector<Mar
     }
     require_place(point.point, point.label, place);
     point.point = signs.cwiseProduct(point.point);
-    points.push_back(std::move(point));
+    read.points.push_back(std::move(point));
   }
 }
 
-std::vector<MarkupPoint> read_markups_json(const std::string& text, const std::string& place) {
+Markups read_markups_json(const std::string& text, const std::string& place) {
   const Json file = Json::parse(text, nullptr, /*allow_exceptions=*/false);
   const auto markups = file.is_object() ? file.find("markups") : file.end();
   if (!file.is_object() || markups == file.end() || !markups->is_array()) {
     throw Error(place + ": no markups, or damaged; " + kExpected);
   }
-  std::vector<MarkupPoint> points;
+  Markups read;
   for (const Json& markup : *markups) {
     if (!markup.is_object()) throw Error(place + ": a markup is no object; " + kExpected);
-    append_markup(markup, place, points);
+    append_markup(markup, place, read);
   }
-  return points;
+  return read;
+}
+
+/// A line of a table that holds nothing, but for the commas that Excel leaves.
+bool is_blank_row(const std::string& line) {
+  return line.find_first_not_of(",\r") == std::string::npos;
 }
 
 /// The cells of a line of a table, with quotes taken off.
@@ -122,7 +130,7 @@ std::vector<std::string> cells_of(const std::string& line) {
 
 /// id, x, y, z, orientation (4), visible, selected, locked, label, description, node; the frame in
 /// a comment above, RAS where it is not told. 3D Slicer 3 wrote label, x, y, z, selected, visible,
-/// in RAS.
+/// in RAS. Excel fills every line up with commas, and may put a mark of UTF-8 before the first.
 std::vector<MarkupPoint> read_fcsv(const std::string& text, const std::string& place) {
   std::size_t label_at = 11;
   std::istringstream lines(text);
@@ -130,14 +138,15 @@ std::vector<MarkupPoint> read_fcsv(const std::string& text, const std::string& p
   std::vector<MarkupPoint> points;
   bool known = false;
   for (std::string line; std::getline(lines, line);) {
-    if (line.empty() || line == "\r") continue;
+    if (line.starts_with("\xef\xbb\xbf")) line.erase(0, 3);
+    if (is_blank_row(line)) continue;
     if (line.front() == '#') {
       const bool old = line.find("Fiducial List file") != std::string::npos;
       if (old) label_at = 0;
       known = known || old || line.find("Markups fiducial file") != std::string::npos;
       const std::size_t key = line.find("CoordinateSystem"), equals = line.find('=');
       if (key == std::string::npos || equals == std::string::npos) continue;
-      std::istringstream(line.substr(equals + 1)) >> frame;
+      std::istringstream(line.substr(equals + 1, line.find(',', equals) - equals - 1)) >> frame;
       continue;
     }
     const std::vector<std::string> cells = cells_of(line);
@@ -211,19 +220,25 @@ class PointFinder {
     const std::string label = reader.text("label", "");
     reader.finish();
     if (problems_.count() > problems_before) return {};
-    std::vector<MarkupPoint> points;
+    Markups read;
     try {
-      points = read_markups(folder_ / name);
+      read = read_markups(folder_ / name);
     } catch (const Error& error) {
       problems_.add(reader.path_of("markups"), name, "a file of markups", error.what());
       return {};
     }
+    const std::vector<MarkupPoint>& points = read.points;
     std::vector<MarkupPoint> named = points;
     std::erase_if(named, [&](const MarkupPoint& point) {
       return reader.has("label") && point.label != label;
     });
     if (named.size() == 1) return named.front().point;
-    if (points.empty()) {
+    const bool unplaced = std::count(read.unplaced.begin(), read.unplaced.end(), label) > 0;
+    if (unplaced && named.empty() && reader.has("label")) {
+      problems_.add(reader.path_of("label"),
+                    "\"" + label + "\", which is in " + name + " but has no position",
+                    "a point that is placed", "place it in 3D Slicer and save the file again");
+    } else if (points.empty()) {
       problems_.add(reader.path_of("markups"), name, "a file with points that are placed");
     } else if (!reader.has("label")) {
       problems_.add(reader.path_of("label"), "missing", "one of the labels of " + name,
@@ -292,7 +307,7 @@ void for_each_in(Json& owner, const std::string& list, const std::string& prefix
 
 }  // namespace
 
-std::vector<MarkupPoint> read_markups(const fs::path& path) {
+Markups read_markups(const fs::path& path) {
   std::ifstream stream(path, std::ios::binary);
   if (!fs::is_regular_file(path) || !stream) {
     throw Error(path.string() + ": no such file; " + kExpected);
@@ -301,7 +316,7 @@ std::vector<MarkupPoint> read_markups(const fs::path& path) {
   std::string ending = path.extension().string();
   std::transform(ending.begin(), ending.end(), ending.begin(),
                  [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  if (ending == ".fcsv") return read_fcsv(text, path.string());
+  if (ending == ".fcsv") return {.points = read_fcsv(text, path.string()), .unplaced = {}};
   return read_markups_json(text, path.string());
 }
 

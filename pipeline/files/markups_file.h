@@ -14,10 +14,14 @@ struct MarkupPoint {
   Vec3 point = Vec3::Zero();  // LPS                                                      [mm]
 };
 
-/// The points that are placed, of all lists, fiducials and curves alike; the frame is the file's
-/// own (LPS or RAS). Throws `Error` where it is missing, no markups, damaged, or in another unit or
-/// frame.
-std::vector<MarkupPoint> read_markups(const std::filesystem::path& path);
+struct Markups {
+  std::vector<MarkupPoint> points;
+  std::vector<std::string> unplaced;  // labels of points that have no position
+};
+
+/// The points of all lists, fiducials and curves alike; the frame is the file's own (LPS or RAS).
+/// Throws `Error` where it is missing, no markups, damaged, or in another unit or frame.
+Markups read_markups(const std::filesystem::path& path);
 
 /// Puts "point_mm" in the place of each "point" of accesses and targets, and a point in that of
 /// each object in "segmentation.seeds_mm". Such an object is one of

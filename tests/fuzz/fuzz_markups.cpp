@@ -13,8 +13,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   const std::string name = kNames[data[0] % kNames.size()];
   const std::filesystem::path file = fuzz::folder().write(name, fuzz::view(data + 1, size - 1));
   try {
-    const std::vector<pipeline::MarkupPoint> points = pipeline::read_markups(file);
-    for (const pipeline::MarkupPoint& point : points) {
+    for (const pipeline::MarkupPoint& point : pipeline::read_markups(file).points) {
       expects(point.point.allFinite() && point.point.cwiseAbs().maxCoeff() <= 1e6);
     }
   } catch (const Error&) {

@@ -117,7 +117,8 @@ TEST_F(Markups, FrameAndUnitMayBeListsAndNothingElse) {
     file["markups"][0][key] = value;
     write("points.mrk.json", file);
     return message_of([&] {
-      EXPECT_LT((read_markups(folder_ / "points.mrk.json").at(0).point - target).norm(), 1e-12);
+      EXPECT_LT((read_markups(folder_ / "points.mrk.json").points.at(0).point - target).norm(),
+                1e-12);
     });
   };
   EXPECT_EQ(with("coordinateSystem", Json::array({"RAS"})), "no error");
@@ -143,7 +144,7 @@ TEST_F(Markups, TablesOfSlicer3AreReadAsRas) {
       "# Fiducial List file F.fcsv\n# version = 2\n# name = F\n"
       "# columns = label,x,y,z,sel,vis\nin,1,2,3,1,1\nout,-4,5.5,6,1,1\n",
       folder_ / "old.fcsv");
-  const std::vector<MarkupPoint> points = read_markups(folder_ / "old.fcsv");
+  const std::vector<MarkupPoint> points = read_markups(folder_ / "old.fcsv").points;
   ASSERT_EQ(points.size(), 2U);
   EXPECT_EQ(points[1].label, "out");
   EXPECT_EQ(points[1].point, Vec3(4.0, -5.5, 6.0));
@@ -163,11 +164,16 @@ TEST_F(Markups, OldTablesAreReadInTheirFrame) {
                                                  {"", turned}}) {
     SCOPED_TRACE(frame);
     write_text(head + frame + columns + row, folder_ / "p.fcsv");
-    const std::vector<MarkupPoint> points = read_markups(folder_ / "p.fcsv");
+    const std::vector<MarkupPoint> points = read_markups(folder_ / "p.fcsv").points;
     ASSERT_EQ(points.size(), 1U);
     EXPECT_EQ(points[0].label, "left, upper");
     EXPECT_EQ(points[0].point, expected);
   }
+  // As Excel saves it: a mark of UTF-8, commas up to the longest line, lines of them alone.
+  write_text("\xef\xbb\xbf" + head.substr(0, head.size() - 1) +
+                 ",,,\r\n# CoordinateSystem = LPS,,,\r\n" + row + ",,,,\r\n",
+             folder_ / "p.fcsv");
+  EXPECT_EQ(read_markups(folder_ / "p.fcsv").points.at(0).point, in_file);
   write_text(head + "# CoordinateSystem = 2\n" + row, folder_ / "p.fcsv");  // voxels
   EXPECT_NE(message_of([&] { read_markups(folder_ / "p.fcsv"); }).find("expected LPS or RAS"),
             std::string::npos);
@@ -262,7 +268,8 @@ TEST_F(Markups, PointsThatAreNotPlacedOrNoPlaceAreNotTaken) {
   Json file = markups("LPS", {{"a", {1, 2, 3}}, {"b", {4, 5, 6}}});
   file["markups"][0]["controlPoints"][1]["positionStatus"] = "undefined";
   write("p.mrk.json", file);
-  EXPECT_EQ(read_markups(folder_ / "p.mrk.json").size(), 1U);
+  EXPECT_EQ(read_markups(folder_ / "p.mrk.json").points.size(), 1U);
+  EXPECT_EQ(read_markups(folder_ / "p.mrk.json").unplaced, std::vector<std::string>{"b"});
   for (const Json& position :
        {Json::array({1, 2}), Json::array({1, 2, "x"}), Json::array({1, 2, 1e9}), Json(nullptr)}) {
     file["markups"][0]["controlPoints"][0]["position"] = position;
@@ -271,6 +278,11 @@ TEST_F(Markups, PointsThatAreNotPlacedOrNoPlaceAreNotTaken) {
               std::string::npos)
         << position;
   }
+  file["markups"][0]["controlPoints"][0]["position"] = {1, 2, 3};
+  write("p.mrk.json", file);
+  point_at("access", {{"markups", "p.mrk.json"}, {"label", "b"}});
+  EXPECT_NE(refusal().find("\"b\", which is in p.mrk.json but has no position"), std::string::npos)
+      << refusal();
   write("p.mrk.json", markups("IJK", {{"a", {1, 2, 3}}}));
   EXPECT_NE(message_of([&] { read_markups(folder_ / "p.mrk.json"); }).find("is IJK, expected LPS"),
             std::string::npos);
