@@ -41,12 +41,14 @@ void compare_with_volume(const Case& given, const preprocess::Image& image,
     const std::string whose =
         one == 0 ? "the labels' edges" : "the edges of " + labels.classes[one - 1].name;
     if (better) {
-      throw Error(given.labels->path.string() + ": the volume does not show " + whose +
-                  " where they lie (a mean step of " + format("%.0f", contrast) +
-                  " HU), but does with " + (one == 0 ? "the labels" : "it") +
-                  " moved, expected labels in the volume's frame (they would fit " +
-                  preprocess::describe_change(*better) +
-                  "; export them again with this volume, or mend their header)");
+      throw Error(
+          given.labels->path.string() + ": the volume does not show " + whose +
+          " where they lie (a mean step of " + format("%.0f", contrast) + " HU), but does with " +
+          (one == 0 ? "the labels" : "it") +
+          " moved, expected labels in the volume's frame (they would fit " +
+          preprocess::describe_change(*better) +
+          (better->linear.isIdentity() ? ", but for what runs along a straight vessel" : "") +
+          "; export them again with this volume, or mend their header)");
     }
     if (contrast < kHardlySeen) {
       figures["warnings"].push_back("segment: the volume hardly shows " + whose +

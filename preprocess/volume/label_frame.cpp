@@ -138,10 +138,12 @@ std::vector<FrameChange> mirrored(const Grid& grid) {
   return changes;
 }
 
-/// The best shift by up to 20 mm: on every second voxel at first, then round the best.
+/// The best shift by up to 20 mm: on every second voxel at first, then round the best, to half a
+/// voxel.
 FrameChange best_shift(const Grid& grid, const Brightness& brightness,
                        const std::vector<EdgePair>& pairs) {
-  constexpr double kReach = 20.0, kPerMm = 0.1;
+  constexpr double kReach = 20.0;
+  constexpr double kPerMm = 2.0;  // HU; half a voxel aside costs some 10
   FrameChange best;
   double most = brightness.contrast(pairs, best);
   std::vector<EdgePair> few;
@@ -168,6 +170,7 @@ FrameChange best_shift(const Grid& grid, const Brightness& brightness,
   const double voxel = std::cbrt(grid.spacing.prod()), coarse = std::max(2.0, 2.0 * voxel);
   try_shifts(Vec3::Zero(), kReach, coarse, few);
   try_shifts(best.shift, coarse, 0.5 * coarse, pairs);
+  try_shifts(best.shift, 0.5 * coarse, 0.25 * coarse, pairs);
   return best;
 }
 
@@ -281,8 +284,9 @@ std::optional<FrameChange> find_better_frame(const Image& image,
                                              const std::vector<std::uint8_t>& classes,
                                              double& contrast, std::uint8_t only) {
   expects(classes.size() == image.grid.voxels());
-  // Seen well: a mean step of a fifth of the usual contrast. As they lie: less than a third of it.
-  constexpr double kSeen = 80.0, kPart = 0.35;
+  // Seen well: a mean step of a fifth of the usual contrast. As they lie: less than a third of it;
+  // half of it where they are seen too well for labels that are drawn too narrow or too wide.
+  constexpr double kSeen = 80.0, kPart = 0.35, kClear = 140.0, kPartOfClear = 0.5;
   constexpr std::size_t kFewest = 100;  // edges, of which chance may find enough elsewhere
   const std::vector<EdgePair> pairs = edge_pairs(image.grid, classes, only);
   const Brightness brightness(image);
@@ -295,7 +299,7 @@ std::optional<FrameChange> find_better_frame(const Image& image,
   double most = kSeen;
   for (const FrameChange& change : changes) {
     const double here = brightness.contrast(pairs, change);
-    if (here < most || contrast > kPart * here) continue;
+    if (here < most || contrast > (here < kClear ? kPart : kPartOfClear) * here) continue;
     most = here;
     best = change;
   }

@@ -304,6 +304,9 @@ TEST(LabelFrame, IsFoundInTheVolumeWhereTheHeaderLies) {
   const auto shifted = find_better_frame(image, draw(Mat3::Identity(), Vec3(10, 0, 0)), contrast);
   ASSERT_TRUE(shifted);
   EXPECT_LE((shifted->shift - Vec3(10, 0, 0)).norm(), 1.0);  // a voxel
+  const auto little = find_better_frame(image, draw(Mat3::Identity(), Vec3(3, 0, 0)), contrast);
+  ASSERT_TRUE(little);
+  EXPECT_LE((little->shift - Vec3(3, 0, 0)).norm(), 1.0);
   EXPECT_LT(contrast, 0.35 * 200.0);
 
   // Where the volume shows nothing, nothing is better.
