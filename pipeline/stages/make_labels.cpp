@@ -74,6 +74,7 @@ void tell_labels(const preprocess::LabelVolume& labels, const preprocess::LabelM
          {"voxels", one.voxels},
          {"volume_ml", voxel / kMm3PerMl * static_cast<double>(one.voxels)}});
   }
+  for (const std::string& line : labels.remarks) tell("segment: labels: " + line);
   for (const std::string& line : labels.resampled) tell("segment: " + line);
   figures["overlaps"] = Json::array();
   for (const preprocess::LabelOverlap& both : labels.overlaps) {
@@ -95,7 +96,7 @@ void tell_labels(const preprocess::LabelVolume& labels, const preprocess::LabelM
          format("%.1f", bridge.radius_mm) + " mm in radius; look whether the vessel goes on there");
   }
   for (const preprocess::LabelClass& one : labels.classes) {
-    if (one.voxels == 0) tell("segment: nothing of " + one.name + " is left on the volume's grid");
+    if (!one.lost.empty()) tell("segment: " + one.lost);
   }
   figures["left_out"] = Json::array();
   constexpr std::size_t kMostTold = 5;

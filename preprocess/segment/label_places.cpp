@@ -208,6 +208,7 @@ LabelledWay find_labelled_way(const LabelMask& labels, const std::vector<LabelCl
                               std::size_t index) {
   expects(index < classes.size());
   const Contacts contacts = count_contacts(labels, classes.size());
+  if (!classes[index].lost.empty()) throw Error(classes[index].lost);
   if (contacts.voxels[index] == 0) {
     throw Error("nothing of " + classes[index].name +
                 " is connected with the other labels, expected gaps below 5 mm");

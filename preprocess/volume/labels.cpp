@@ -97,7 +97,14 @@ struct Known {
   std::string name;
   int value = 0;
   std::size_t layer = 0;
+  std::size_t choice = 0;  // where the case's list has it
 };
+
+void add_once(const std::vector<std::string>& remarks, std::vector<std::string>& to) {
+  for (const std::string& remark : remarks) {
+    if (std::find(to.begin(), to.end(), remark) == to.end()) to.push_back(remark);
+  }
+}
 
 std::vector<Known> known_classes(const VolumeHeader& told, const LabelChoice& choice) {
   std::vector<Known> known;
@@ -107,8 +114,9 @@ std::vector<Known> known_classes(const VolumeHeader& told, const LabelChoice& ch
     const bool old = segment.value == 0;
     const auto renamed = choice.table.find(segment.value);
     const bool other = choice.table_wins && renamed != choice.table.end();
-    known.push_back({other ? renamed->second : segment.name, old ? 1 : segment.value,
-                     old ? k : static_cast<std::size_t>(std::max(0, segment.layer))});
+    known.push_back({.name = other ? renamed->second : segment.name,
+                     .value = old ? 1 : segment.value,
+                     .layer = old ? k : static_cast<std::size_t>(std::max(0, segment.layer))});
   }
   if (!known.empty()) return known;
   for (const auto& [value, name] : choice.table) {
@@ -162,7 +170,7 @@ std::string values_text(const std::vector<Image>& layers) {
 Known chosen_by_value(const fs::path& path, const LabelChoice& choice, std::size_t k,
                       const std::vector<Known>& known, std::size_t layers, Complaints& wrong) {
   const int value = choice.values[k];
-  Known found{"label " + std::to_string(value), value, 0};
+  Known found{.name = "label " + std::to_string(value), .value = value};
   int matches = 0;
   for (const Known& one : known) {
     if (one.value != value) continue;
@@ -176,6 +184,7 @@ Known chosen_by_value(const fs::path& path, const LabelChoice& choice, std::size
               quoted_list(names_of(known)) + ")");
   }
   if (!choice.names.empty()) found.name = choice.names[k];
+  found.choice = k;
   return found;
 }
 
@@ -196,6 +205,7 @@ std::vector<Known> choose_classes(const fs::path& path, const LabelChoice& choic
     const auto count = std::count_if(known.begin(), known.end(), is_it);
     if (count == 1) {
       chosen.push_back(*std::find_if(known.begin(), known.end(), is_it));
+      chosen.back().choice = k;
       continue;
     }
     wrong.add(path.string() + ": " + key_of("names", k) + " is \"" + choice.names[k] + "\"" +
@@ -254,9 +264,25 @@ class Merger {
     for (const std::uint8_t one : volume_.class_of) {
       if (one != 0) ++volume_.classes[one - 1U].voxels;
     }
+    for (std::size_t k = 0; k < volume_.classes.size(); ++k) {
+      if (volume_.classes[k].voxels == 0) volume_.classes[k].lost = why_lost(k);
+    }
   }
 
  private:
+  std::string why_lost(std::size_t k) const {
+    std::vector<std::string> over;
+    for (const LabelOverlap& both : volume_.overlaps) {
+      if (both.second == k) over.push_back("\"" + volume_.classes[both.first].name + "\"");
+    }
+    const std::string name = "\"" + volume_.classes[k].name + "\"";
+    if (over.empty()) return "nothing of " + name + " is left on the volume's grid";
+    return "nothing of " + name + " is left: " + quoted_list(over) +
+           (over.size() > 1 ? " cover" : " covers") +
+           " all of it, and what two classes hold counts as the first's; list " + name +
+           " before in the case's labels";
+  }
+
   void put(std::size_t n, std::uint8_t one) {
     if (one == 0) return;
     std::uint8_t& place = volume_.class_of[n];
@@ -322,14 +348,40 @@ void require_few(std::size_t classes, const fs::path& path) {
               " (choose the arteries alone)");
 }
 
+/// Tells chosen classes that no voxel has.
+void require_voxels(const fs::path& path, const LabelChoice& choice,
+                    const std::vector<Image>& layers, const std::vector<Known>& chosen,
+                    Complaints& wrong) {
+  const bool by_value = !choice.values.empty();
+  for (const Known& one : chosen) {
+    if (one.layer >= layers.size()) {
+      wrong.add(path.string() + ": segment \"" + one.name + "\" lies in layer " +
+                std::to_string(one.layer) + ", but the file has " + std::to_string(layers.size()) +
+                " (export the segmentation again)");
+      continue;
+    }
+    const std::vector<float>& values = layers[one.layer].values;
+    if (std::find(values.begin(), values.end(), static_cast<float>(one.value)) != values.end()) {
+      continue;
+    }
+    wrong.add(path.string() + ": " + key_of(by_value ? "values" : "names", one.choice) + " is " +
+              (by_value ? std::to_string(one.value) : "\"" + one.name + "\"") +
+              ", a class without any voxel, expected one that holds some (delete it; the values " +
+              "that occur are " + values_text(layers) + ")");
+  }
+}
+
 void read_one_file(const fs::path& path, const LabelChoice& choice, const Grid* onto,
                    LabelVolume& volume) {
   VolumeHeader told;
   const std::vector<Image> layers = read_checked(path, told);
   Complaints wrong;
   const std::vector<Known> chosen = choose_classes(path, choice, told, layers, wrong);
-  wrong.throw_if_any();
   require_few(chosen.size(), path);
+  require_voxels(path, choice, layers, chosen, wrong);
+  wrong.throw_if_any();
+  add_once(layers.front().remarks, volume.remarks);
+  for (const Known& one : chosen) volume.classes.push_back({.name = one.name, .value = one.value});
   Merger merger(volume, onto);
   for (std::size_t l = 0; l < layers.size(); ++l) {
     const Image& layer = layers[l];
@@ -337,30 +389,9 @@ void read_one_file(const fs::path& path, const LabelChoice& choice, const Grid* 
     for (std::size_t c = 0; c < chosen.size(); ++c) {
       if (chosen[c].layer != l) continue;
       const auto value = static_cast<float>(chosen[c].value);
-      std::size_t count = 0;
       for (std::size_t n = 0; n < classes.size(); ++n) {
-        if (layer.values[n] != value) continue;
-        classes[n] = static_cast<std::uint8_t>(c + 1);
-        ++count;
+        if (layer.values[n] == value) classes[n] = static_cast<std::uint8_t>(c + 1);
       }
-      if (count > 0) continue;
-      const bool by_value = !choice.values.empty();
-      wrong.add(
-          path.string() + ": " + key_of(by_value ? "values" : "names", c) + " is " +
-          (by_value ? std::to_string(chosen[c].value) : "\"" + chosen[c].name + "\"") +
-          ", a class without any voxel, expected one that holds some (delete it; the values " +
-          "that occur are " + values_text(layers) + ")");
-    }
-    for (const Known& one : chosen) {
-      if (l + 1 == layers.size() && one.layer >= layers.size()) {
-        wrong.add(path.string() + ": segment \"" + one.name + "\" lies in layer " +
-                  std::to_string(one.layer) + ", but the file has " +
-                  std::to_string(layers.size()) + " (export the segmentation again)");
-      }
-    }
-    wrong.throw_if_any();
-    for (const Known& one : chosen) {
-      if (volume.classes.size() < chosen.size()) volume.classes.push_back({one.name, one.value});
     }
     merger.add(path, layer.grid, std::move(classes));
   }
@@ -395,6 +426,7 @@ void read_class_file(const fs::path& file, std::size_t index, const std::string&
                 "labels.names)");
   }
   const Image& layer = layers.front();
+  add_once(layer.remarks, volume.remarks);
   std::vector<std::uint8_t> mask(layer.values.size(), 0);
   std::transform(layer.values.begin(), layer.values.end(), mask.begin(), [&](float value) {
     return value != 0.0F ? static_cast<std::uint8_t>(index + 1) : std::uint8_t{0};
@@ -436,18 +468,21 @@ void read_folder(const fs::path& folder, const LabelChoice& choice, const Grid* 
     wrong.add(folder.string() + ": labels.names is missing, expected some of its classes: " +
               quoted_list(there) + " (name those that are arteries)");
   }
+  std::vector<std::size_t> single;  // of the names, those that one file has
   for (std::size_t k = 0; k < choice.names.size() && choice.values.empty(); ++k) {
     const auto found = files.find(choice.names[k]);
-    if (found != files.end() && found->second.size() == 1) continue;
+    if (found != files.end() && found->second.size() == 1) {
+      single.push_back(k);
+      continue;
+    }
     wrong.add(folder.string() + ": " + key_of("names", k) + " is \"" + choice.names[k] + "\"" +
               (found != files.end() ? ", of which there are several files" : "") +
               ", expected one file of that name: " + quoted_list(there));
   }
-  wrong.throw_if_any();
   require_few(choice.names.size(), folder);
   Merger merger(volume, onto);
   for (const std::string& name : choice.names) volume.classes.push_back({name});
-  for (std::size_t k = 0; k < choice.names.size(); ++k) {
+  for (const std::size_t k : single) {
     try {
       read_class_file(files.at(choice.names[k]).front(), k, choice.names[k], merger, volume);
     } catch (const DiskError&) {
@@ -461,11 +496,11 @@ void read_folder(const fs::path& folder, const LabelChoice& choice, const Grid* 
 }
 
 /// The classes of a file: those that it or `table` names, and other values that occur.
-std::vector<ListedClass> list_file(const fs::path& path, const std::map<int, std::string>& table) {
+LabelListing list_file(const fs::path& path, const std::map<int, std::string>& table) {
   VolumeHeader told;
   const std::vector<Image> layers = read_checked(path, told);
   const std::vector<Known> known = known_classes(told, {.table = table});
-  std::vector<ListedClass> classes;
+  LabelListing listing{.classes = {}, .remarks = layers.front().remarks};
   for (std::size_t l = 0; l < layers.size(); ++l) {
     std::map<int, std::size_t> counts = count_labels(layers[l]);
     std::map<int, std::string> names;
@@ -476,25 +511,26 @@ std::vector<ListedClass> list_file(const fs::path& path, const std::map<int, std
     }
     const double voxel = layers[l].grid.spacing.prod();
     for (const auto& [value, count] : counts) {
-      classes.push_back({names.contains(value) ? names.at(value) : "", value, static_cast<int>(l),
-                         count, voxel * static_cast<double>(count)});
+      listing.classes.push_back({names.contains(value) ? names.at(value) : "", value,
+                                 static_cast<int>(l), count, voxel * static_cast<double>(count)});
     }
   }
-  return classes;
+  return listing;
 }
 
 }  // namespace
 
 LabelListing list_labels(const fs::path& path, const std::map<int, std::string>& table) {
-  if (!fs::is_directory(path)) return {.classes = list_file(path, table)};
+  if (!fs::is_directory(path)) return list_file(path, table);
   LabelListing listing;
   for (const auto& [name, files] : find_class_files(path)) {
     try {
-      std::vector<ListedClass> classes = list_file(files.front(), {});
+      auto [classes, remarks, others] = list_file(files.front(), {});
       if (classes.empty()) classes.emplace_back();
       if (classes.size() > 1 || files.size() > 1) throw Error(name + ": no single class");
       classes.front().name = name;
       listing.classes.push_back(classes.front());
+      add_once(remarks, listing.remarks);
     } catch (const DiskError&) {
       throw;
     } catch (const Error&) {

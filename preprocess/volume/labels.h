@@ -25,6 +25,7 @@ struct LabelClass {
   std::string name;  // "label 3" where none is known
   int value = 0;     // in its file
   std::size_t voxels = 0;
+  std::string lost = {};  // why none of its voxels is left, though its file holds some; else empty
 };
 
 /// Voxels that two chosen classes both hold; they count as the first's.
@@ -39,6 +40,7 @@ struct LabelVolume {
   std::vector<LabelClass> classes;     // in the order in which they were chosen
   std::vector<LabelOverlap> overlaps;
   std::vector<std::string> resampled;  // what was moved to another grid, in words
+  std::vector<std::string> remarks;    // what else a person should know of how they were read
 };
 
 /// Reads the chosen classes, onto the grid `onto` where it is not null; else onto that of the file,
@@ -61,6 +63,7 @@ struct ListedClass {
 /// What a file or folder holds, for people who ask which classes there are.
 struct LabelListing {
   std::vector<ListedClass> classes;  // of a file by layer and value, of a folder by name
+  std::vector<std::string> remarks;  // of how it was read, each once
   int others = 0;                    // files of a folder that hold no single class
 };
 

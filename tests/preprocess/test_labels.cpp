@@ -101,6 +101,13 @@ TEST_F(Labels, ThatOverlapInLayersCountAsTheFirst) {
   ASSERT_EQ(read.overlaps.size(), 1u);
   EXPECT_EQ(read.overlaps[0].voxels, both);
   EXPECT_EQ(read_labels(file, {.names = {"box", "trunk"}}).classes[1].voxels, one - both);
+  // Wholly under another, a class says so.
+  const LabelVolume under = read_labels(
+      write("under.seg.nrrd", label_nrrd(grid, {trunk, trunk}, {{"trunk", 1, 0}, {"part", 1, 1}})),
+      {.names = {"trunk", "part"}});
+  EXPECT_TRUE(under.classes[0].lost.empty());
+  EXPECT_TRUE(has(under.classes[1].lost, "nothing of \"part\" is left: \"trunk\" covers all of it"))
+      << under.classes[1].lost;
   // A value says nothing where layers use it for different things.
   const std::string error = error_of([&] { read_labels(file, {.values = {1}}); });
   EXPECT_TRUE(has(error, "labels.values[0] is 1") && has(error, "trunk, box")) << error;
@@ -113,6 +120,10 @@ TEST_F(Labels, ThatAreNotThereAreToldTogetherWithThoseThatAre) {
   std::string error = error_of([&] { read_labels(file, {.names = {"aorta", "x", "trunk"}}); });
   EXPECT_TRUE(has(error, "labels.names[0] is \"aorta\"") && has(error, "labels.names[1]") &&
               has(error, "trunk, renal"))
+      << error;
+  error = error_of([&] { read_labels(file, {.names = {"aorta", "renal"}}); });
+  EXPECT_TRUE(has(error, "labels.names[0] is \"aorta\"") &&
+              has(error, "labels.names[1] is \"renal\", a class without any voxel"))
       << error;
   error = error_of([&] { read_labels(file, {.names = {"trunk", "renal"}}); });
   EXPECT_TRUE(has(error, "\"renal\", a class without any voxel") && has(error, "2, 5")) << error;
@@ -140,10 +151,10 @@ TEST_F(Labels, OfAFolderAreItsFiles) {
   write("twice.nii", all);
   write("twice.mha", label_mha(grid, none));
   const std::string missing = error_of([&] {
-    read_labels(folder_, {.names = {"aorta", "twice"}});
+    read_labels(folder_, {.names = {"aorta", "twice", "both"}});
   });
   EXPECT_TRUE(has(missing, "labels.names[0] is \"aorta\"") && has(missing, "several files") &&
-              has(missing, "both"))
+              has(missing, "\"both\", whose file holds the values 2, 5"))
       << missing;
   const std::string bad = error_of([&] { read_labels(folder_, {.names = {"both", "empty.nii"}}); });
   EXPECT_TRUE(has(bad, "holds the values 2, 5, expected one class per file") &&
