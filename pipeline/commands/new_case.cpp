@@ -131,6 +131,7 @@ class CaseMaker {
     }
     image_ = preprocess::read_image(given_.volume, given_.series);
     answer_.found.push_back(volume_line(given_.volume, image_));
+    for (const std::string& remark : image_.remarks) answer_.found.push_back("volume: " + remark);
     told_ = inspect_text(told);
   }
 

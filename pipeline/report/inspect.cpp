@@ -45,6 +45,11 @@ bool is_volume(const std::string& ending) {
   return kEndings.count(ending) > 0;
 }
 
+/// Volumes that are not read; their reader says why.
+bool is_other_volume(const std::string& ending) {
+  return ending == ".hdr" || ending == ".img" || ending == ".gz";
+}
+
 // ---- Volumes -----------------------------------------------------------------------------------
 
 /// Which way an axis mostly runs: left, right, posterior, anterior, superior, inferior.
@@ -148,11 +153,13 @@ Json label_folder_json(const fs::path& folder) {
   if (listing.classes.empty()) return nullptr;
   Json told = {{"kind", "labels"}, {"format", "folder"}, {"labels", classes_json(listing.classes)}};
   if (listing.others > 0) told["other_volumes"] = listing.others;
+  if (!listing.remarks.empty()) told["remarks"] = listing.remarks;
   return told;
 }
 
 Json volume_json(const preprocess::VolumeDescription& given, const fs::path& path) {
   const preprocess::VolumeHeader& header = given.header;
+  std::vector<std::string> remarks = given.remarks;
   Json told = {{"kind", given.holds_labels ? "labels" : "image"}, {"format", header.format}};
   if (header.format == "DICOM") {
     told["kind"] = "dicom";
@@ -195,6 +202,7 @@ Json volume_json(const preprocess::VolumeDescription& given, const fs::path& pat
           {{"value", segment.value}, {"layer", segment.layer}, {"name", segment.name}});
     }
   }
+  if (!remarks.empty()) told["remarks"] = remarks;
   if (!given.refused.empty()) told["refused"] = given.refused;
   return told;
 }
@@ -256,7 +264,7 @@ Json inspect(const fs::path& path) {
   Json body;
   if (!folder && is_surface(ending)) {
     body = surface_json(preprocess::describe_surface(path), ending);
-  } else if (folder || is_volume(ending) ||
+  } else if (folder || is_volume(ending) || is_other_volume(ending) ||
              preprocess::check_dicom(path) != preprocess::DicomForm::kNone) {
     try {
       body = volume_json(preprocess::describe_volume(path), path);

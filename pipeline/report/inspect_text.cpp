@@ -229,6 +229,8 @@ std::string inspect_text(const Json& told) {
                                        segment["name"].get<std::string>()}});
     }
   }
+  for (const Json& remark : told.value("remarks", Json::array()))
+    text += columns({{"note", remark}});
   if (told.contains("surface")) text += columns(surface_lines(told["surface"]));
   if (told.contains("refused")) {
     const bool segments = told.contains("segments");

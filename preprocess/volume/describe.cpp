@@ -49,6 +49,8 @@ void describe_values(const Image& image, VolumeDescription& told) {
   if (!told.holds_labels) return;
   for (const auto& [value, voxels] : counts) {
     LabelDescription label{.value = value, .name = {}, .voxels = voxels};
+    const auto named = told.header.label_names.find(value);
+    if (named != told.header.label_names.end()) label.name = named->second;
     for (const NamedSegment& segment : told.header.segments) {
       if (segment.value == value) label.name = segment.name;
     }
@@ -109,6 +111,7 @@ VolumeDescription describe_volume(const fs::path& path) {
   }
   told.grid = image->grid;
   told.modality = image->modality;
+  told.remarks = image->remarks;
   describe_values(*image, told);
   return told;
 }

@@ -4,6 +4,7 @@
 #include <array>
 #include <cstddef>
 #include <filesystem>
+#include <map>
 #include <optional>
 #include <string>
 #include <vector>
@@ -29,6 +30,7 @@ struct VolumeHeader {
   std::array<int, 3> size = {0, 0, 0};  // 0 where the header was not read so far
   Vec3 spacing = Vec3::Zero();          //                                                 [mm]
   std::vector<NamedSegment> segments;
+  std::map<int, std::string> label_names;  // of values, of a NIfTI
 };
 
 /// Images of a DICOM folder that can be slices of one volume.
@@ -61,6 +63,7 @@ struct VolumeDescription {
   double least = 0.0, largest = 0.0;      // of its values
   bool holds_labels = false;              // few whole numbers in patches, and not an image's values
   std::vector<LabelDescription> labels;   // by value; 0 too
+  std::vector<std::string> remarks;       // what a person should know of how it was read
   std::string refused;  // why read_image refuses it, without the path; empty where it reads it
 };
 

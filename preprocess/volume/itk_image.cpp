@@ -75,6 +75,24 @@ std::string trimmed(const std::string& text) {
   return first == std::string::npos ? "" : text.substr(first, last - first + 1);
 }
 
+void require_utf8(const std::string& text, const std::string& what, const fs::path& path) {
+  std::size_t more = 0;  // bytes of a character that are to come
+  bool sound = true;
+  for (const char c : text) {
+    const auto byte = static_cast<unsigned char>(c);
+    const bool continues = (byte & 0xc0U) == 0x80U;
+    sound = sound && continues == (more > 0) && (continues || byte < 0x80 || byte > 0xc1);
+    if (continues) {
+      more -= more > 0 ? 1 : 0;
+    } else {
+      more = byte < 0xc0 ? 0 : byte < 0xe0 ? 1 : byte < 0xf0 ? 2 : 3;
+      sound = sound && byte < 0xf5;
+    }
+  }
+  if (sound && more == 0) return;
+  throw Error(path.string() + ": " + what + " is no UTF-8; save it as UTF-8");
+}
+
 std::string one_decimal(double value) {
   std::ostringstream text;
   text << std::fixed << std::setprecision(1) << value;
@@ -141,6 +159,41 @@ void require_place(const Vec3& spacing, const Vec3& origin, const Mat3& directio
   throw Error(path.string() + ": voxel spacing " + to_text(spacing) + " mm at origin " +
               to_text(origin) +
               " mm, expected positive spacing and a place within a kilometre; mend the header");
+}
+
+Error lacks_spacing(const std::string& keys, const std::string& remedy, const fs::path& path) {
+  return Error(path.string() + ": its header lacks " + keys +
+               ", without which the size of its voxels is not known; " + remedy +
+               ", or save it again from the program that made it");
+}
+
+bool is_same_spacing(double a, double b) {
+  constexpr double kRounding = 0.01;
+  return std::abs(a - b) <= kRounding * std::abs(b);
+}
+
+void require_extent(const std::array<int, 3>& size, const Vec3& spacing, const std::string& keys,
+                    const fs::path& path) {
+  constexpr double kLargest = 3000.0, kLeast = 1.0;  // mm; of any scanner, of any vessel
+  const Vec3 extent = spacing.cwiseProduct(Vec3(size[0], size[1], size[2]));
+  const double across = extent.maxCoeff();
+  if (across >= kLeast && across <= kLargest) return;
+  std::ostringstream text;
+  text << std::setprecision(3) << extent[0] << " x " << extent[1] << " x " << extent[2] << " mm";
+  if (across > kLargest) {
+    text.str("");
+    text << std::fixed << std::setprecision(1) << 1e-3 * extent[0] << " x " << 1e-3 * extent[1]
+         << " x " << 1e-3 * extent[2] << " m";
+  }
+  throw Error(path.string() + ": it is " + text.str() + " across by its " + keys +
+              ", expected between 1 mm and 3 m; mend the one that is wrong, most often the unit");
+}
+
+std::string placed_nowhere(const std::string& lacks, const std::string& frame) {
+  return "its header does not tell where it lies (" + lacks +
+         "): it is taken to lie upright, along the axes of " + frame +
+         ", with its first voxel at the origin; is that the patient's right and left, and are the "
+         "points of this frame?";
 }
 
 double count_values(const itk::ImageIOBase& io) {

@@ -1,6 +1,7 @@
 #pragma once
 /// What the readers of volumes share about ITK's ImageIO objects; for the .cpp files here.
 #include <Eigen/Eigenvalues>  // before ITK, which would bring in its own older copy
+#include <array>
 #include <cstdint>
 #include <filesystem>
 #include <string>
@@ -38,6 +39,10 @@ std::string lower_case(std::string text);
 /// Without blanks at both ends.
 std::string trimmed(const std::string& text);
 
+/// Refuses text of a header that cannot be printed; `what` it is.
+void require_utf8(const std::string& text, const std::string& what,
+                  const std::filesystem::path& path);
+
 std::string one_decimal(double value);  // with one digit behind the point
 
 /// How far the axes are from right angles, at most.
@@ -60,6 +65,21 @@ Grid header_grid(const itk::ImageIOBase& io, const std::filesystem::path& path,
 /// Refuses a grid whose spacing or origin [mm] is no number, not positive or far from any patient.
 void require_place(const Vec3& spacing, const Vec3& origin, const Mat3& direction,
                    const std::filesystem::path& path);
+
+/// Of a header without the size of its voxels; `keys` would tell it.
+Error lacks_spacing(const std::string& keys, const std::string& remedy,
+                    const std::filesystem::path& path);
+
+/// Whether two spacings are the same but for rounding: within 1 % of the second.
+bool is_same_spacing(double a, double b);
+
+/// Refuses a volume that is over 3 m or under 1 mm across, as of a wrong unit; `keys` of the header
+/// say so.
+void require_extent(const std::array<int, 3>& size, const Vec3& spacing, const std::string& keys,
+                    const std::filesystem::path& path);
+
+/// The remark on a volume whose header does not tell where it lies, since it `lacks` that.
+std::string placed_nowhere(const std::string& lacks, const std::string& frame);
 
 /// How many values a header promises, as its sizes say, be they sound or not.
 double count_values(const itk::ImageIOBase& io);

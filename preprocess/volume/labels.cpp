@@ -119,8 +119,9 @@ std::vector<Known> known_classes(const VolumeHeader& told, const LabelChoice& ch
                      .layer = old ? k : static_cast<std::size_t>(std::max(0, segment.layer))});
   }
   if (!known.empty()) return known;
-  for (const auto& [value, name] : choice.table) {
-    if (value != 0) known.push_back({name, value, 0});
+  const bool by_table = choice.table_wins || told.label_names.empty();
+  for (const auto& [value, name] : by_table ? choice.table : told.label_names) {
+    if (value != 0) known.push_back({.name = name, .value = value});
   }
   return known;
 }

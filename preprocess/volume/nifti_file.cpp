@@ -6,6 +6,7 @@
 #include <bit>
 #include <cmath>
 #include <cstdint>
+#include <cstdlib>
 #include <map>
 #include <utility>
 #include <vector>
@@ -164,6 +165,30 @@ double largest_distance(const Form& a, const Form& b, const std::array<int, 3>& 
   return largest;
 }
 
+/// The spacing along an axis as pixdim has it; 0 where it tells none.
+double pixdim_of(const Header& header, std::size_t axis) {
+  const double step = std::abs(header.real(header.layout().spacing, axis + 1));
+  return std::isfinite(step) ? step : 0.0;
+}
+
+/// Where the sform alone places a volume, it must not contradict the spacing that pixdim tells. A
+/// shear makes its axes longer, so a sheared one is left to who looks for that.
+void require_told_spacing(const Header& header, const Form& sform, double unit,
+                          const fs::path& path) {
+  constexpr double kStraight = 1.0;  // degrees: longer by 0.02 % at most
+  if (!sform.axes.allFinite() || shear_degrees(sform.axes) > kStraight) return;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const double told = unit * pixdim_of(header, axis);
+    const double step = sform.axes.col(static_cast<Eigen::Index>(axis)).norm();
+    if (told == 0.0 || is_same_spacing(step, told)) continue;
+    throw Error(path.string() + ": its sform has voxels of " + number_text(step) + " mm along " +
+                "ijk"[axis] + ", its pixdim[" + std::to_string(axis + 1) + "] of " +
+                number_text(told) +
+                " mm, expected the same; save it again from the program that made it, or mend the "
+                "one that is wrong");
+  }
+}
+
 /// The transform to go by. Both forms of a file may differ by rounding, not by a place.
 Form choose_form(const Header& header, const Grid& grid, double unit, const fs::path& path,
                  std::vector<std::string>& remarks) {
@@ -171,6 +196,7 @@ Form choose_form(const Header& header, const Grid& grid, double unit, const fs::
   const bool by_qform = has_qform(header), by_sform = has_sform(header);
   if (!by_qform && !by_sform) {
     if (header.code(header.layout().qform_code, 1) <= 0) {
+      remarks.push_back(placed_nowhere("its qform_code and sform_code are 0", "RAS"));
       return {grid.spacing.asDiagonal(), Vec3::Zero()};
     }
     throw Error(path.string() +
@@ -195,6 +221,7 @@ Form choose_form(const Header& header, const Grid& grid, double unit, const fs::
                         " mm apart, less than half a voxel; the sform counts");
     }
   }
+  if (!by_qform) require_told_spacing(header, sform, unit, path);
   return by_sform ? sform : qform;
 }
 
@@ -228,7 +255,8 @@ void tell_nifti(const Header& header, VolumeHeader& told) {
   told.placed_by = has_sform(header) ? "sform" : has_qform(header) ? "qform" : "";
 }
 
-Grid grid_of(const Header& header, const fs::path& path, std::vector<std::string>& remarks) {
+Grid grid_of(const Header& header, const std::string& told_unit, const fs::path& path,
+             std::vector<std::string>& remarks) {
   const double unit = mm_per_unit(header, path);
   Grid grid;
   const std::int64_t axes = header.dimension(0);
@@ -237,8 +265,7 @@ Grid grid_of(const Header& header, const fs::path& path, std::vector<std::string
         static_cast<std::int64_t>(axis) < axes ? header.dimension(axis + 1) : 1;
     if (size < 1 || size > 100000) throw damaged_nifti(path);
     grid.size[axis] = static_cast<int>(size);
-    const double step = std::abs(header.real(header.layout().spacing, axis + 1));
-    grid.spacing[static_cast<Eigen::Index>(axis)] = unit * (step == 0.0 ? 1.0 : step);
+    grid.spacing[static_cast<Eigen::Index>(axis)] = unit * pixdim_of(header, axis);
   }
   require_volume(grid, path);
   for (std::size_t axis = 4; axis <= static_cast<std::size_t>(std::min<std::int64_t>(axes, 7));
@@ -246,7 +273,18 @@ Grid grid_of(const Header& header, const fs::path& path, std::vector<std::string
     if (header.dimension(axis) > 1) throw several_volumes(header.dimension(axis), path);
   }
 
+  const bool by_sform = has_sform(header) && !has_qform(header);
+  for (std::size_t axis = 0; axis < 3 && !by_sform; ++axis) {
+    if (grid.spacing[static_cast<Eigen::Index>(axis)] > 0.0) continue;
+    throw lacks_spacing("pixdim[" + std::to_string(axis + 1) + "], which is " +
+                            number_text(header.real(header.layout().spacing, axis + 1)),
+                        "write the voxels' size there", path);
+  }
   const Form form = choose_form(header, grid, unit, path, remarks);
+  const Vec3 spacing = form.axes.colwise().norm().transpose();
+  if (spacing.allFinite()) {
+    require_extent(grid.size, spacing, "xyzt_units (" + told_unit + "), pixdim and sform", path);
+  }
   constexpr double kFar = 1e6;  // a kilometre
   if (!form.axes.allFinite() || !form.origin.allFinite() || !(grid.spacing.maxCoeff() < kFar) ||
       form.axes.cwiseAbs().maxCoeff() > kFar || form.origin.cwiseAbs().maxCoeff() > kFar ||
@@ -320,6 +358,28 @@ bool read_values(const Header& header, ByteStream& file, const fs::path& path,
   }
 }
 
+/// The names of labels in the extensions between header and voxels, as TotalSegmentator writes
+/// them: <Label Key="1" ...><![CDATA[aorta]]></Label>.
+std::map<int, std::string> names_in(const std::string& extensions, const fs::path& path) {
+  const std::string label = "<Label ", key = "Key=\"", open = "<![CDATA[", close = "]]>";
+  std::map<int, std::string> names;
+  for (std::size_t at = 0; (at = extensions.find(label, at)) != std::string::npos;) {
+    at += label.size();
+    const std::size_t end = std::min(extensions.find("</Label>", at), extensions.size());
+    const std::string text = extensions.substr(at, std::min<std::size_t>(end - at, 1000));
+    const std::size_t number = text.find(key), name = text.find(open), last = text.find(close);
+    if (number == std::string::npos || name == std::string::npos || last == std::string::npos ||
+        last < name + open.size()) {
+      continue;
+    }
+    const int value = std::atoi(text.c_str() + number + key.size());
+    names[value] = text.substr(name + open.size(), last - name - open.size());
+    require_utf8(names[value], "the name of label " + std::to_string(value), path);
+  }
+  names.erase(0);  // what is around
+  return names;
+}
+
 }  // namespace
 
 Image read_nifti(const fs::path& path, VolumeHeader& told) {
@@ -327,18 +387,23 @@ Image read_nifti(const fs::path& path, VolumeHeader& told) {
   const Header header = read_header(file, path);
   tell_nifti(header, told);
   Image image;
-  image.grid = grid_of(header, path, image.remarks);
+  image.grid = grid_of(header, told.length_unit.empty() ? "not told" : told.length_unit, path,
+                       image.remarks);
   const double offset = header.layout().wide
                             ? static_cast<double>(header.get<std::int64_t>(header.layout().offset))
                             : static_cast<double>(header.get<float>(header.layout().offset));
   // What lies between the header and the voxels are extensions; the header may leave the place
   // open.
   const double start = std::max(offset, static_cast<double>(header.layout().header + 4));
-  constexpr double kFarthest = 1e8;
+  constexpr double kFarthest = 1e8, kLongestNames = 1e6;
   const auto between = start - static_cast<double>(header.layout().header);
-  if (!(start < kFarthest) || !file.skip(static_cast<std::size_t>(between))) {
+  if (!(start < kFarthest)) throw damaged_nifti(path);
+  std::string extensions(static_cast<std::size_t>(std::min(between, kLongestNames)), '\0');
+  if (!file.read(extensions.data(), extensions.size()) ||
+      !file.skip(static_cast<std::size_t>(between) - extensions.size())) {
     throw damaged_nifti(path);
   }
+  told.label_names = names_in(extensions, path);
   require_room(static_cast<double>(image.grid.voxels()),  // of a byte at least
                static_cast<double>(fs::file_size(path)), file.packed() ? kMostDeflated : 1.0,
                "NIfTI", path);

@@ -9,9 +9,11 @@
 namespace wireplan::preprocess {
 
 /// Values times slope plus intercept, where there is a slope; the grid in LPS mm by the sform, else
-/// by the qform, else upright (nifti1.h, methods 3, 2 and 1). Throws `Error` where it is no NIfTI,
-/// damaged or cut short, a colour or 4D image, sheared (with the angle), or where both forms are
-/// given and place a corner more than half a voxel apart; from 0.1 mm on the image's remarks tell.
+/// by the qform, else upright, told in the image's remarks (nifti1.h, methods 3, 2 and 1). Throws
+/// `Error` where it is no NIfTI, damaged or cut short, a colour or 4D image, sheared (with the
+/// angle), without a spacing, over 3 m across, where its sform alone places it with other spacings
+/// than pixdim's, or where both forms are given and place a corner more than half a voxel apart;
+/// from 0.1 mm on the remarks tell.
 /// What is read of the header stands in `told` then too.
 Image read_nifti(const std::filesystem::path& path, VolumeHeader& told);
 

@@ -8,6 +8,7 @@
 #include <cstdlib>
 #include <fstream>
 #include <iomanip>
+#include <iterator>
 #include <map>
 #include <optional>
 #include <set>
@@ -50,7 +51,11 @@ Fields nrrd_fields(const fs::path& path, const std::string& no_image) {
     std::string name = lower_case(trimmed(line.substr(0, colon)));
     require(fields.size() < kMost && (line.size() <= kLongest || added || name == "content"));
     if (colon == std::string::npos) continue;
-    if (name == "datafile") name = "data file";
+    static const std::map<std::string, std::string> kOther = {{"datafile", "data file"},
+                                                              {"axismins", "axis mins"},
+                                                              {"axismaxs", "axis maxs"},
+                                                              {"centerings", "centers"}};
+    if (const auto other = kOther.find(name); other != kOther.end()) name = other->second;
     const std::string value = trimmed(line.substr(colon + 2));
     fields[name] = name == "data file" ? value : lower_case(value);
   }
@@ -159,9 +164,100 @@ std::vector<std::vector<double>> vectors_of(std::string text) {
   return vectors;
 }
 
+/// The words of a field that has one for each axis.
+std::vector<std::string> axis_words(const Fields& fields, const std::string& key) {
+  std::istringstream text(value_of(fields, key));
+  return {std::istream_iterator<std::string>(text), {}};
+}
+
+/// An axis of space without a direction, as the fields of all axes tell it: NaN where they do not
+/// (https://teem.sourceforge.net/nrrd/format.html, "per-axis").
+struct UprightAxis {
+  double size = NAN, spacing = NAN, low = NAN, high = NAN;
+  bool node = false;  // centered: its ends are its first and last voxel's centres, not their edges
+
+  double length_of_voxel() const { return (high - low) / (node ? size - 1.0 : size); }
+  double step() const { return std::isfinite(spacing) ? spacing : length_of_voxel(); }
+  double first() const { return node ? low : low + 0.5 * step(); }
+};
+
+/// Of the axes that hold no lists of values, as `kinds` tells.
+std::vector<UprightAxis> upright_axes(const Fields& fields) {
+  static const std::set<std::string> kOfPlaces = {"domain", "space", "time", "???", "none"};
+  const std::vector<std::string> kinds = axis_words(fields, "kinds"),
+                                 centers = axis_words(fields, "centers");
+  const auto number = [&](const char* key, std::size_t k) {
+    const std::vector<std::string> words = axis_words(fields, key);
+    return k < words.size() ? std::strtod(words[k].c_str(), nullptr) : NAN;
+  };
+  std::vector<UprightAxis> axes;
+  for (std::size_t k = 0; k < axis_words(fields, "sizes").size(); ++k) {
+    if (k < kinds.size() && kOfPlaces.count(kinds[k]) == 0) continue;
+    axes.push_back({.size = number("sizes", k),
+                    .spacing = number("spacings", k),
+                    .low = number("axis mins", k),
+                    .high = number("axis maxs", k),
+                    .node = k < centers.size() && centers[k] == "node"});
+  }
+  return axes;
+}
+
+/// Refuses a header that does not tell how large its voxels are. NrrdIO takes 1 mm for it, and
+/// calls spacings of a space damaged.
+void require_spacing(const Fields& fields, const fs::path& path) {
+  if (fields.empty() || fields.count("space directions") > 0) return;
+  const bool ends = fields.count("axis mins") > 0 || fields.count("axis maxs") > 0;
+  const std::string told = fields.count("spacings") > 0 ? "spacings" : ends ? "axis mins" : "";
+  for (const char* space : {"space", "space dimension"}) {
+    if (fields.count(space) == 0) continue;
+    throw Error(path.string() + ": its header has " + space + (told.empty() ? "" : " and " + told) +
+                ", but no space directions, which tell how its axes run there and how large its "
+                "voxels are; add \"space directions: (a,0,0) (0,b,0) (0,0,c)\", with the spacings "
+                "a, b, c if they run along those of the space" +
+                (told.empty() ? "" : ", and delete " + told));
+  }
+  const std::vector<UprightAxis> axes = upright_axes(fields);
+  for (std::size_t k = 0; k < std::min<std::size_t>(3, axes.size()); ++k) {
+    const UprightAxis& axis = axes[k];
+    if (!std::isfinite(axis.step()) || axis.step() == 0.0) {
+      throw lacks_spacing(std::string("space directions, and spacings (or axis mins and axis "
+                                      "maxs) of axis ") +
+                              "ijk"[k],
+                          "add the line \"spacings: a b c\" with the voxels' sizes", path);
+    }
+    if (!std::isfinite(axis.length_of_voxel()) ||
+        is_same_spacing(axis.length_of_voxel(), axis.step())) {
+      continue;
+    }
+    throw Error(path.string() + ": its spacings tell voxels of " + number_text(axis.step()) +
+                " along " + "ijk"[k] + ", its axis mins and axis maxs of " +
+                number_text(axis.length_of_voxel()) +
+                ", expected the same; delete those that do not hold");
+  }
+}
+
+/// Places a grid whose axes have no directions: along those of LPS.
+void place_upright(const Fields& fields, double mm, const fs::path& path, Grid& grid,
+                   std::vector<std::string>& remarks) {
+  const std::vector<UprightAxis> axes = upright_axes(fields);
+  bool placed = true;
+  for (std::size_t k = 0; k < std::min<std::size_t>(3, axes.size()); ++k) {
+    const auto a = static_cast<Eigen::Index>(k);
+    grid.spacing[a] = mm * std::abs(axes[k].step());
+    grid.direction(a, a) = axes[k].step() < 0.0 ? -1.0 : 1.0;
+    grid.origin[a] = std::isfinite(axes[k].low) ? mm * axes[k].first() : 0.0;
+    placed = placed && std::isfinite(axes[k].low);
+  }
+  remarks.push_back(placed ? std::string("its header names no space: its axes are taken for those "
+                                         "of LPS; are the points of this frame?")
+                           : placed_nowhere("it has no space directions", "LPS"));
+  require_place(grid.spacing, grid.origin, grid.direction, path);
+}
+
 /// Sizes as ITK has them, placed by the header's own fields: ITK takes LAS for something else, and
 /// RAS with time for LPS.
-Grid nrrd_grid(const itk::ImageIOBase& io, const Fields& fields, const fs::path& path, double mm) {
+Grid nrrd_grid(const itk::ImageIOBase& io, const Fields& fields, const fs::path& path, double mm,
+               std::vector<std::string>& remarks) {
   const Vec3 signs = lps_signs(fields, path);
   Mat3 axes;
   Eigen::Index count = 0;
@@ -182,15 +278,25 @@ Grid nrrd_grid(const itk::ImageIOBase& io, const Fields& fields, const fs::path&
                 "3D image");
   }
   Grid grid = header_grid(io, path, mm);
-  if (count == 0) return grid;  // upright
+  const std::string keys = fields.count("space units") > 0 ? "space units" : "units";
+  if (count == 0) {
+    place_upright(fields, mm, path, grid, remarks);
+    require_extent(grid.size, grid.spacing, keys + " and spacings or axis mins and maxs", path);
+    return grid;
+  }
   Vec3 origin = Vec3::Zero();
   const std::vector<std::vector<double>> origins = vectors_of(value_of(fields, "space origin"));
   if (!origins.empty() && origins[0].size() >= 3) {
     origin = mm * signs.cwiseProduct(Vec3(origins[0][0], origins[0][1], origins[0][2]));
+  } else {
+    remarks.push_back(
+        "its header has no space origin: its first voxel is taken to lie at (0, 0, "
+        "0) mm; are the points of this frame?");
   }
   grid.spacing = axes.colwise().norm().transpose();
   grid.origin = origin;
   require_place(grid.spacing, grid.origin, axes, path);
+  require_extent(grid.size, grid.spacing, keys + " and space directions", path);
   grid.direction = orthonormal_direction(axes * grid.spacing.cwiseInverse().asDiagonal(), path);
   return grid;
 }
@@ -240,7 +346,10 @@ std::vector<NamedSegment> nrrd_segments(const fs::path& path) {
       if (!field.starts_with(key + ":=")) return std::nullopt;
       return field.substr(key.size() + 2);
     };
-    if (const auto name = value_of("Name")) segments[number].name = *name;
+    if (const auto name = value_of("Name")) {
+      require_utf8(*name, "its Segment" + std::to_string(number) + "_Name", path);
+      segments[number].name = *name;
+    }
     if (const auto value = value_of("LabelValue"))
       segments[number].value = std::atoi(value->c_str());
     if (const auto layer = value_of("Layer")) segments[number].layer = std::atoi(layer->c_str());
@@ -254,7 +363,6 @@ std::vector<NamedSegment> nrrd_segments(const fs::path& path) {
 void tell_nrrd(const Fields& fields, const fs::path& path, VolumeHeader& told) {
   if (fields.empty()) return;
   told.format = "NRRD";
-  told.segments = nrrd_segments(path);
   told.stored_as = value_of(fields, "type");
   const std::string units = value_of(fields, "space units");
   std::istringstream words(units.empty() ? value_of(fields, "units") : units);
@@ -262,6 +370,7 @@ void tell_nrrd(const Fields& fields, const fs::path& path, VolumeHeader& told) {
   std::istringstream sizes(value_of(fields, "sizes"));
   std::array<int, 3> size{};
   if (sizes >> size[0] >> size[1] >> size[2]) told.size = size;
+  told.segments = nrrd_segments(path);
 }
 
 /// Volumes whose voxels have several values, one for each of these.
@@ -318,6 +427,7 @@ std::vector<Image> read_nrrd(const fs::path& path, VolumeHeader& told, bool laye
     lps_signs(fields, path);
   }
   require_near(fields, path);
+  require_spacing(fields, path);
   const std::string beside = nrrd_data_file(fields, path);
   const double stored =  // bytes; NrrdIO would wait for a pipe
       beside.empty() ? static_cast<double>(fs::file_size(path)) : size_beside(path, beside);
@@ -332,12 +442,17 @@ std::vector<Image> read_nrrd(const fs::path& path, VolumeHeader& told, bool laye
   });
   return call_itk(path, damaged("NRRD"), [&] {
     require_whole_nrrd(*io, encoding, stored, path);
-    const Grid grid = nrrd_grid(*io, fields, path, mm);
-    if (layered && io->GetNumberOfComponents() > 1) return read_values(*io, path, grid);
-    require_scalar_volume(*io, grid, path);
+    std::vector<std::string> remarks;
+    const Grid grid = nrrd_grid(*io, fields, path, mm, remarks);
     std::vector<Image> images(1);
-    images[0].grid = grid;
-    append_voxels(*io, path, images[0].values);
+    if (layered && io->GetNumberOfComponents() > 1) {
+      images = read_values(*io, path, grid);
+    } else {
+      require_scalar_volume(*io, grid, path);
+      images[0].grid = grid;
+      append_voxels(*io, path, images[0].values);
+    }
+    images.front().remarks = std::move(remarks);
     return images;
   });
 }

@@ -11,6 +11,7 @@
 #include <cstdlib>
 #include <fstream>
 #include <limits>
+#include <map>
 #include <optional>
 #include <set>
 #include <sstream>
@@ -28,27 +29,65 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// How many numbers stand behind a key of a MetaImage's header (metaImage.cxx, metaObject.cxx); -1
-/// where it is text, or a key of somebody's own.
+/// What stands behind a key that MetaIO knows (metaImage.cxx, metaObject.cxx).
+enum class MetaValue { kText, kOne, kVector, kMatrix };
+
+const std::map<std::string, MetaValue>& meta_keys() {
+  using enum MetaValue;
+  static const std::map<std::string, MetaValue> kKeys = {{"ObjectType", kText},
+                                                         {"BinaryData", kText},
+                                                         {"BinaryDataByteOrderMSB", kText},
+                                                         {"ElementByteOrderMSB", kText},
+                                                         {"CompressedData", kText},
+                                                         {"ElementType", kText},
+                                                         {"ElementDataFile", kText},
+                                                         {"DistanceUnits", kText},
+                                                         {"AnatomicalOrientation", kText},
+                                                         {"ID", kOne},
+                                                         {"ParentID", kOne},
+                                                         {"CompressedDataSize", kOne},
+                                                         {"HeaderSize", kOne},
+                                                         {"ElementMin", kOne},
+                                                         {"ElementNumberOfChannels", kOne},
+                                                         {"ElementNBits", kOne},
+                                                         {"ElementMax", kOne},
+                                                         {"ElementToIntensityFunctionSlope", kOne},
+                                                         {"ElementToIntensityFunctionOffset", kOne},
+                                                         {"NDims", kOne},
+                                                         {"DimSize", kVector},
+                                                         {"Offset", kVector},
+                                                         {"Position", kVector},
+                                                         {"Origin", kVector},
+                                                         {"CenterOfRotation", kVector},
+                                                         {"ElementSpacing", kVector},
+                                                         {"ElementSize", kVector},
+                                                         {"SequenceID", kVector},
+                                                         {"TransformMatrix", kMatrix},
+                                                         {"Rotation", kMatrix},
+                                                         {"Orientation", kMatrix}};
+  return kKeys;
+}
+
+/// The key as MetaIO writes it, where only its letters are in another case; MetaIO would pass it
+/// over. "id" may be anybody's.
+std::string as_meta_key(const std::string& key) {
+  static const std::map<std::string, std::string> kWritten = [] {
+    std::map<std::string, std::string> written = {{"modality", "Modality"}};
+    for (const auto& [name, value] : meta_keys()) {
+      if (!name.ends_with("ID")) written[lower_case(name)] = name;
+    }
+    return written;
+  }();
+  const auto known = kWritten.find(lower_case(key));
+  return known == kWritten.end() ? key : known->second;
+}
+
+/// How many numbers stand behind a key; -1 where it is text, or a key of somebody's own.
 int count_meta_numbers(const std::string& key, int dimensions) {
-  static const std::set<std::string> kOne = {"ID",
-                                             "ParentID",
-                                             "CompressedDataSize",
-                                             "HeaderSize",
-                                             "ElementMin",
-                                             "ElementNumberOfChannels",
-                                             "ElementNBits",
-                                             "ElementMax",
-                                             "ElementToIntensityFunctionSlope",
-                                             "NDims",
-                                             "ElementToIntensityFunctionOffset"};
-  static const std::set<std::string> kVector = {"DimSize",     "Offset",           "Position",
-                                                "Origin",      "CenterOfRotation", "ElementSpacing",
-                                                "ElementSize", "SequenceID"};
-  static const std::set<std::string> kMatrix = {"TransformMatrix", "Rotation", "Orientation"};
-  if (kOne.count(key) > 0) return 1;
-  if (kVector.count(key) > 0) return dimensions;
-  return kMatrix.count(key) > 0 ? dimensions * dimensions : -1;
+  const auto known = meta_keys().find(key);
+  if (known == meta_keys().end() || known->second == MetaValue::kText) return -1;
+  if (known->second == MetaValue::kOne) return 1;
+  return known->second == MetaValue::kVector ? dimensions : dimensions * dimensions;
 }
 
 /// Whether the text holds so many numbers that a volume in mm may have, and nothing else.
@@ -74,6 +113,7 @@ struct MetaHeader {
   std::string modality;    // as DICOM has it; empty where the header does not tell
   std::string unit;        // of length, as it is told
   double mm = 1.0;         // of a unit of length
+  bool has_spacing = false, has_place = false;
 };
 
 double meta_unit(const std::string& unit, const fs::path& path) {
@@ -110,9 +150,30 @@ MetaLine meta_line(std::string text) {
   MetaLine line{.text = trimmed(text), .key = {}, .value = {}};
   const std::size_t equals = text.find('=');
   if (equals == std::string::npos) return line;
-  line.key = trimmed(text.substr(0, equals));
+  line.key = as_meta_key(trimmed(text.substr(0, equals)));
   line.value = trimmed(text.substr(equals + 1));
   return line;
+}
+
+/// Refuses keys that mean the same and tell different numbers, of which MetaIO takes one.
+void require_one_meaning(const std::vector<MetaLine>& lines, const fs::path& path) {
+  static const std::vector<std::set<std::string>> kSame = {
+      {"Offset", "Position", "Origin"}, {"TransformMatrix", "Rotation", "Orientation"}};
+  constexpr double kRounding = 1e-3;  // mm, or a cosine
+  for (const std::set<std::string>& same : kSame) {
+    const MetaLine* first = nullptr;
+    for (const MetaLine& line : lines) {
+      if (same.count(line.key) == 0) continue;
+      if (first == nullptr) first = &line;
+      std::istringstream numbers(line.value), others(first->value);
+      for (double a = 0.0, b = 0.0; numbers >> a && others >> b;) {
+        if (std::abs(a - b) <= kRounding) continue;
+        throw Error(path.string() + ": its " + first->key + " is " + first->value + ", its " +
+                    line.key + " is " + line.value +
+                    ", expected the same by both; delete the one that does not hold");
+      }
+    }
+  }
 }
 
 /// The lines of keys that MetaIO knows, in their order, to ElementDataFile, each key once; other
@@ -120,10 +181,6 @@ MetaLine meta_line(std::string text) {
 /// no "Key = value", sees those of them that are plain.
 std::vector<MetaLine> read_meta_lines(std::istream& file, const fs::path& path,
                                       MetaHeader& header) {
-  static const std::set<std::string> kTexts = {
-      "ObjectType",          "BinaryData",     "BinaryDataByteOrderMSB",
-      "ElementByteOrderMSB", "CompressedData", "ElementType",
-      "ElementDataFile",     "DistanceUnits",  "AnatomicalOrientation"};
   constexpr std::size_t kMost = 100000;  // lines
   std::vector<MetaLine> known;
   std::set<std::string> keys;
@@ -133,7 +190,7 @@ std::vector<MetaLine> read_meta_lines(std::istream& file, const fs::path& path,
     const bool first = keys.insert(line.key).second;
     header.has_more = header.has_more || line.text != text;
     if (first && line.key == "Modality") header.modality = meta_modality(line.value);
-    if (count_meta_numbers(line.key, 1) < 0 && kTexts.count(line.key) == 0) {
+    if (meta_keys().count(line.key) == 0) {
       const bool word = line.key.find_first_of(" \t") == std::string::npos;
       if (first && word && !line.key.empty() && is_plain(line.text)) {
         header.lines += line.text + "\n";
@@ -179,7 +236,11 @@ MetaHeader read_meta_header(const fs::path& path, const std::string& no_image) {
   for (MetaLine& line : lines) {
     keys.insert(line.key);
     const int numbers = count_meta_numbers(line.key, dimensions);
-    require(numbers < 0 || holds_numbers(line.value, numbers));
+    if (numbers >= 0 && !holds_numbers(line.value, numbers)) {
+      throw Error(path.string() + ": its " + line.key + " is no text of " +
+                  std::to_string(numbers) + (numbers == 1 ? " number" : " numbers") +
+                  " up to 1e12, expected so many; mend the header, or the file is damaged");
+    }
     if (line.key == "ElementDataFile") {
       header.data_file = line.value;
       if (line.value.starts_with("LIST") || line.value.find('%') != std::string::npos) {
@@ -202,6 +263,9 @@ MetaHeader read_meta_header(const fs::path& path, const std::string& no_image) {
   }
   for (const char* key : {"DimSize", "ElementType", "ElementDataFile"})
     require(keys.count(key) > 0);
+  require_one_meaning(lines, path);
+  header.has_spacing = keys.count("ElementSpacing") + keys.count("ElementSize") > 0;
+  header.has_place = keys.count("Offset") + keys.count("Position") + keys.count("Origin") > 0;
   header.end = static_cast<std::streamoff>(file.tellg());
   return header;
 }
@@ -228,6 +292,8 @@ Image read_meta_voxels(const itk::MetaImageIO& io, const MetaHeader& header, con
   Image image;
   image.grid = header_grid(io, path, header.mm);
   require_scalar_volume(io, image.grid, path);
+  require_extent(image.grid.size, image.grid.spacing, "DistanceUnits and ElementSpacing", path);
+  if (!header.has_place) image.remarks.push_back(placed_nowhere("it has no Offset", "LPS"));
   const bool local = header.data_file == "LOCAL";
   const fs::path file = local ? path : path.parent_path() / header.data_file;
   std::vector<char> bytes(static_cast<std::size_t>(io.GetImageSizeInBytes()));
@@ -307,6 +373,10 @@ Image read_meta(const fs::path& path, VolumeHeader& told) {
     told.length_unit = header.unit;
     told.mm_per_unit = header.mm;
     tell_header(*io, told);
+    if (header.has_spacing) return;
+    told.spacing.setZero();  // where MetaIO says 1
+    throw lacks_spacing("ElementSpacing",
+                        "add the line \"ElementSpacing = a b c\" with the voxels' sizes", path);
   });
   const MetaImage& meta = *io->GetMetaImagePointer();
   require_whole_meta(*io, header, meta, path);
@@ -323,6 +393,19 @@ bool ends_with(const fs::path& path, const char* one, const char* other) {
   return name.ends_with(one) || name.ends_with(other);
 }
 
+/// Why a file of another ending is none that is read.
+std::string no_volume(const fs::path& path) {
+  if (ends_with(path, ".hdr", ".img") || ends_with(path, ".hdr.gz", ".img.gz")) {
+    return "one of a pair of files (.hdr and .img, of NIfTI or Analyze), expected header and "
+           "voxels in one file; save it as .nii.gz";
+  }
+  if (ends_with(path, ".nrrd.gz", ".nhdr.gz") || ends_with(path, ".mha.gz", ".mhd.gz")) {
+    return "packed by gzip as a whole, expected its voxels alone to be packed; unpack it, e.g. by "
+           "gunzip";
+  }
+  return std::string("not an image that wireplan reads; ") + kFormats;
+}
+
 }  // namespace
 
 Image read_file(const fs::path& path, VolumeHeader& told) {
@@ -333,7 +416,7 @@ Image read_file(const fs::path& path, VolumeHeader& told) {
     told.format = "DICOM";
     return call_itk(path, damaged("DICOM"), [&] { return read_dicom(path, ""); });
   }
-  throw Error(path.string() + ": not an image that wireplan reads; " + kFormats);
+  throw Error(path.string() + ": " + no_volume(path));
 }
 
 std::vector<Image> read_layers(const fs::path& path, VolumeHeader& told) {

@@ -180,6 +180,8 @@ TEST_F(Inspect, OneDicomFileIsToldAndRefused) {
 TEST_F(Inspect, UnitsOfANiftiAreTold) {
   preprocess::NiftiHeader header;
   header.units = 3;
+  for (std::size_t k = 0; k < 12; ++k) header.rows[k] *= 1e3F;
+  header.sides = {2e3F, 3e3F, 4e3F};
   const Json told = inspect(write("ct.nii", preprocess::nifti(header)));
   EXPECT_EQ(told["format"], "NIfTI-1");
   EXPECT_EQ(told["kind"], "image");
@@ -187,7 +189,7 @@ TEST_F(Inspect, UnitsOfANiftiAreTold) {
   EXPECT_EQ(told["header"]["mm_per_unit"], 1e-3);
   EXPECT_EQ(told["header"]["stored_as"], "int16");
   EXPECT_EQ(told["header"]["placed_by"], "sform");
-  EXPECT_NEAR(told["volume"]["spacing_mm"][2].get<double>(), 4e-3, 1e-9);  // float in the file
+  EXPECT_NEAR(told["volume"]["spacing_mm"][2].get<double>(), 4.0, 1e-6);  // float in the file
   EXPECT_EQ(told["volume"]["values"], Json::parse("[0, 23]"));
   const std::string text = inspect_text(told);
   EXPECT_TRUE(holds(text, "lengths in um, made mm by 0.001; placed by its sform")) << text;

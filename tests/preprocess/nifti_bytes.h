@@ -15,6 +15,8 @@ struct NiftiHeader {
   std::array<float, 6> quaternion = {};        // b, c, d and the offset of the qform
   // rows of the affine, voxel -> RAS: x decreases along i
   std::array<float, 12> rows = {-2, 0, 0, 70, 0, 3, 0, -40, 0, 0, 4, 500};
+  std::array<float, 3> sides = {2, 3, 4};  // pixdim
+  std::string extensions = {};             // between header and voxels
 };
 
 /// NIfTI-1 of 16 bit values 0, 1, 2, ... with the affine as sform. Offsets are those of nifti1.h.
@@ -27,8 +29,8 @@ inline std::string nifti(const NiftiHeader& header) {
   put(40, header.dim);
   put(70, std::int16_t{4});   // datatype: 16 bit signed
   put(72, std::int16_t{16});  // bits per voxel
-  put(76, std::array<float, 8>{1, 2, 3, 4, 1, 1, 1, 1});
-  put(108, 352.0F);  // where the voxels start
+  put(76, std::array<float, 8>{1, header.sides[0], header.sides[1], header.sides[2], 1, 1, 1, 1});
+  put(108, 352.0F + static_cast<float>(header.extensions.size()));  // where the voxels start
   put(112, header.slope);
   put(116, header.intercept);
   put(123, header.units);
@@ -36,6 +38,7 @@ inline std::string nifti(const NiftiHeader& header) {
   put(256, header.quaternion);
   put(280, header.rows);
   put(344, std::array<char, 4>{'n', '+', '1', '\0'});
+  bytes += header.extensions;
   std::int16_t count = 1;
   for (int axis = 1; axis <= header.dim[0]; ++axis) {
     count = static_cast<std::int16_t>(count * header.dim[static_cast<std::size_t>(axis)]);

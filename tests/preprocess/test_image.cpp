@@ -124,7 +124,8 @@ TEST_F(ImageFile, ValuesThatAreNoNumbersAndColoursAreRefused) {
   values[3] = std::numeric_limits<float>::quiet_NaN();
   const fs::path nan =
       write("nan.nrrd",
-            "NRRD0004\ntype: float\ndimension: 3\nsizes: 2 2 2\nendian: little\nencoding: raw\n\n" +
+            "NRRD0004\ntype: float\ndimension: 3\nsizes: 2 2 2\nspacings: 1 1 1\nendian: "
+            "little\nencoding: raw\n\n" +
                 std::string(reinterpret_cast<const char*>(values.data()), sizeof values));
   EXPECT_TRUE(has(read_error(nan), "1 voxels are not finite")) << read_error(nan);
 }
@@ -164,7 +165,8 @@ TEST_F(ImageFile, MetaImageHonoursTransformMatrixAndOffset) {
 TEST_F(ImageFile, AMetaImageWhoseHeaderBreaksOffIsRefusedBeforeItsLibraryReadsIt) {
   const std::string head = "ObjectType = Image\nNDims = 3\n";
   const std::string tail =
-      "DimSize = 2 2 2\nElementType = MET_CHAR\nElementDataFile = LOCAL\n12345678";
+      "ElementSpacing = 1 1 1\nDimSize = 2 2 2\nElementType = MET_CHAR\nElementDataFile = LOCAL\n"
+      "12345678";
   read_image(write("sound.mha", head + tail));
   for (const std::string middle : {"Offset = \xff 0 0\n", "Offset = 1 2\n", "NDims = 3\n"}) {
     EXPECT_TRUE(has(read_error(write("broken.mha", head + middle + tail)), "broken.mha: "));
@@ -199,7 +201,7 @@ TEST_F(ImageFile, NiftiWithoutItsMarkOrWithPlacesBeyondAnyRoomIsRefusedAtOnce) {
   for (const float place : {2e8F, 1e30F}) {
     std::array<float, 12> rows = NiftiHeader{}.rows;
     rows[1] = place;
-    EXPECT_TRUE(has(read_error(write("far.nii", nifti({.rows = rows}))), "far.nii: its header"));
+    EXPECT_TRUE(has(read_error(write("far.nii", nifti({.rows = rows}))), "far.nii: it is"));
   }
 }
 
@@ -449,7 +451,7 @@ TEST_F(ImageFile, FileThatIsNoImageIsAnErrorThatNamesPathAndFormats) {
 TEST_F(ImageFile, FileCutShortIsAnError) {
   write_image(numbered_image({.size = {9, 9, 9}}), folder_ / "whole.nrrd");
   const std::string meta =
-      "ObjectType = Image\nNDims = 3\nBinaryData = True\nDimSize = 9 9 9\n"
+      "ObjectType = Image\nNDims = 3\nBinaryData = True\nDimSize = 9 9 9\nElementSpacing = 1 1 1\n"
       "ElementType = MET_SHORT\nElementDataFile = LOCAL\n" +
       std::string(1458, 'a');
   const std::vector<std::pair<std::string, std::string>> files = {
