@@ -139,8 +139,14 @@ class CaseMaker {
   /// where none is.
   void read_classes() {
     const std::string path = given_.labels.string();
-    const preprocess::LabelListing listing =
-        preprocess::list_labels(given_.labels, find_label_table(given_.labels));
+    const FoundTable table = find_label_table(given_.labels);
+    const preprocess::LabelListing listing = preprocess::list_labels(given_.labels, table.names);
+    for (const std::string& remark : listing.remarks) {
+      answer_.found.push_back("labels: " + remark);
+    }
+    if (!table.problem.empty()) {
+      answer_.found.push_back("the table beside the labels is not read: " + table.problem);
+    }
     std::string all, chosen;
     for (const preprocess::ListedClass& one : listing.classes) {
       if (one.voxels == 0) continue;

@@ -140,15 +140,19 @@ std::string place_in(const std::string& text, std::size_t byte) {
   return "line " + std::to_string(line) + ", column " + std::to_string(column);
 }
 
-/// The parser's own words without its "[json.exception...] parse error at line ...: " head.
-std::string parser_words(const std::string& what) {
+/// The parser's own words without its "[json.exception...] parse error at line ...: " head, and
+/// without what it read last, which may be anybody's.
+std::string parser_words(std::string what) {
+  what.resize(std::min(what.find("; last read: "), what.size()));
   const std::size_t place = what.find(": ");
   if (place != std::string::npos) return what.substr(place + 2);
   const std::size_t bracket = what.find("] ");
   return bracket == std::string::npos ? what : what.substr(bracket + 2);
 }
 
-Json parse(const std::string& text, const std::string& file) {
+}  // namespace
+
+Json parse_plain_json(const std::string& text, const std::string& file) {
   constexpr int kDeepest = 100;  // what walks the value recurses
   DuplicateKeyFinder finder;
   Json value;
@@ -172,6 +176,8 @@ Json parse(const std::string& text, const std::string& file) {
   problems.throw_if_any();
   return value;
 }
+
+namespace {
 
 void expect_finite(const Json& value) {
   if (value.is_number_float() && !std::isfinite(value.get<double>())) {
@@ -234,7 +240,7 @@ std::string nearest_name(const std::string& name, const std::vector<std::string>
 
 Json parse_json(const std::string& text, const std::string& file, const std::string& schema,
                 const std::string& older) {
-  Json value = parse(text, file);
+  Json value = parse_plain_json(text, file);
   if (!value.is_object()) {
     throw Error(file + ": holds " + shown(value) + ", expected a JSON object {...}");
   }

@@ -25,6 +25,10 @@ Json read_json(const std::filesystem::path& path, const std::string& schema,
 Json parse_json(const std::string& text, const std::string& file, const std::string& schema,
                 const std::string& older = {});
 
+/// Any JSON without a schema. Throws `Error` where it is broken (with the place) or a key stands
+/// twice in one object.
+Json parse_plain_json(const std::string& text, const std::string& file);
+
 /// Writes UTF-8, two spaces of indent, numbers with as few digits as read back the same, whole or
 /// not at all (disk.h). Throws LogicError where a number is not finite, DiskError where the disk
 /// refuses.

@@ -61,37 +61,63 @@ void add_name(std::map<int, std::string>& table, int value, const std::string& n
               "\" and \"" + name + "\", expected one name; mend the table");
 }
 
+/// Of a file that is no table of names at all, unlike one that is broken.
+class NoTable : public Error {
+ public:
+  using Error::Error;
+};
+
 std::map<int, std::string> table_of_json(const std::string& text, const fs::path& path) {
-  const Json file = Json::parse(text, nullptr, false);
-  if (!file.is_object()) throw Error(path.string() + ": no JSON object; " + kTables);
-  const Json& pairs =
-      file.contains("labels") && file.at("labels").is_object() ? file.at("labels") : file;
+  const Json file = parse_plain_json(text, path.string());
+  if (!file.is_object()) throw NoTable(path.string() + ": no JSON object; " + kTables);
+  const bool labels = file.contains("labels") && file.at("labels").is_object();
   std::map<int, std::string> table;
-  for (const auto& [key, value] : pairs.items()) {
+  for (const auto& [key, given] : (labels ? file.at("labels") : file).items()) {
+    // A region of nnU-Net is a union of classes, and one only where it has one.
+    if (given.is_array() && given.size() != 1) continue;
+    const Json& value = given.is_array() ? given.front() : given;
     const std::optional<int> number = whole_number(key);
     if (number && value.is_string()) {
       add_name(table, *number, value.get<std::string>(), path);
     } else if (value.is_number_integer() && value.get<std::int64_t>() >= 0 &&
                value.get<std::int64_t>() <= kLargestValue) {
       add_name(table, value.get<int>(), key, path);
-    } else if (!value.is_array()) {  // a region of nnU-Net is a union of classes, not one
-      // What is inside may be nested as deep as the file is long, and writing it recurses.
-      const std::string told = value.is_object() ? "an object" : value.dump().substr(0, 40);
-      throw Error(path.string() + ": \"" + key + "\" is " + told + "; " + kTables);
+    } else {
+      // What is inside may be long, or tell who somebody is.
+      const std::string told = value.is_number() ? value.dump() : std::string(value.type_name());
+      const std::string what = path.string() + ": its \"" + (labels ? "labels." : "") + key +
+                               "\" is " + told + ", no whole number from 0; " + kTables;
+      if (labels) throw Error(what);
+      throw NoTable(what);
     }
   }
   return table;
 }
 
-/// Cells between commas, semicolons or tabs, and else between spaces; what is quoted is one.
-std::vector<std::string> cells_of_line(const std::string& line) {
-  const bool marked = line.find_first_of(",;\t") != std::string::npos;
+/// What parts the cells of most of the lines: a tab, semicolon or comma outside of quotes, or else
+/// spaces.
+char separator_of(const std::vector<std::string>& lines) {
+  for (const char mark : {'\t', ';', ','}) {
+    const auto count = std::count_if(lines.begin(), lines.end(), [&](const std::string& line) {
+      bool quoted = false;
+      return std::any_of(line.begin(), line.end(), [&](char c) {
+        quoted = quoted != (c == '"');
+        return c == mark && !quoted;
+      });
+    });
+    if (2 * count > static_cast<std::ptrdiff_t>(lines.size())) return mark;
+  }
+  return ' ';
+}
+
+/// What is quoted is one cell. Between spaces none is empty.
+std::vector<std::string> cells_of_line(const std::string& line, char separator) {
   std::vector<std::string> cells(1);
   bool quoted = false;
   for (const char c : line) {
     if (c == '"') {
       quoted = !quoted;
-    } else if (!quoted && (marked ? c == ',' || c == ';' || c == '\t' : c == ' ')) {
+    } else if (!quoted && (c == separator || (separator == ' ' && c == '\t'))) {
       cells.emplace_back();
     } else {
       cells.back() += c;
@@ -101,37 +127,121 @@ std::vector<std::string> cells_of_line(const std::string& line) {
     const std::size_t first = cell.find_first_not_of(" \r"), last = cell.find_last_not_of(" \r");
     cell = first == std::string::npos ? "" : cell.substr(first, last - first + 1);
   }
-  std::erase(cells, "");
+  if (separator == ' ') std::erase(cells, "");
   return cells;
 }
 
-std::map<int, std::string> table_of_lines(const std::string& text, const fs::path& path) {
-  std::map<int, std::string> table;
-  std::istringstream lines(text);
-  int number = 0, rows = 0;
-  for (std::string line; std::getline(lines, line);) {
+/// Which columns of a table are meant, by its first line.
+struct TableColumns {
+  std::size_t value = 0, name = 0, count = 0;
+};
+
+/// The first of the words that heads a column; empty where none does.
+std::optional<std::size_t> column_of(const std::vector<std::string>& heads,
+                                     const std::vector<const char*>& words) {
+  for (const char* word : words) {
+    const auto found = std::find(heads.begin(), heads.end(), word);
+    if (found != heads.end()) return static_cast<std::size_t>(found - heads.begin());
+  }
+  return {};
+}
+
+/// Empty where the line heads no names, or not so that it is known.
+std::optional<TableColumns> columns_of(const std::vector<std::string>& cells,
+                                       const fs::path& path) {
+  std::vector<std::string> heads;
+  for (const std::string& cell : cells) {
+    std::string& head = heads.emplace_back();
+    for (const char c : cell) {
+      const auto letter = static_cast<unsigned char>(c);
+      if (std::isalnum(letter) != 0) head += static_cast<char>(std::tolower(letter));
+    }
+  }
+  const auto label = column_of(heads, {"label", "labels"});  // either
+  auto name = column_of(
+      heads, {"name", "labelname", "segmentname", "structurename", "classname", "roiname",
+              "structure", "segment", "class", "region", "roi", "organ", "anatomy", "bezeichnung"});
+  auto value = column_of(heads, {"value", "labelvalue", "labelid", "labelindex", "labelnumber",
+                                 "index", "idx", "integerlabel", "voxelvalue", "pixelvalue"});
+  if (!value && name) value = label;
+  if (!value)
+    value = column_of(heads, {"id", "key", "code", "number", "no", "nr", "wert", "nummer"});
+  if (!name) name = label;
+  if (value && name) return TableColumns{*value, *name, cells.size()};
+  if (!name) return {};
+  throw NoTable(path.string() +
+                ": its first line heads no column of values, expected one called value, label, "
+                "index or id beside the names; " +
+                kTables);
+}
+
+/// A value, and its name; empty where the row has none.
+struct TableRow {
+  std::optional<int> value;
+  std::string name;
+};
+
+/// By columns. Without marks a name may have several words.
+TableRow row_by_columns(const std::vector<std::string>& cells, const TableColumns& columns,
+                        bool marked) {
+  const std::size_t more =
+      marked || cells.size() < columns.count ? 0 : cells.size() - columns.count;
+  const std::size_t value = columns.value + (columns.name < columns.value ? more : 0);
+  if (std::max(value, columns.name + more) >= cells.size()) return {};
+  TableRow row{.value = whole_number(cells[value]), .name = cells[columns.name]};
+  for (std::size_t k = 1; k <= more; ++k) row.name += " " + cells[columns.name + k];
+  return row;
+}
+
+/// Value and name begin the line, in either order. Without marks a name goes on to the next number.
+TableRow row_by_order(std::vector<std::string> cells, bool marked) {
+  std::erase(cells, "");
+  TableRow row;
+  for (std::size_t k = 0; k < cells.size(); ++k) {
+    if (!row.value && (!marked || k < 2)) row.value = whole_number(cells[k]);
+    if (is_number(cells[k])) {
+      if (!row.name.empty()) break;
+    } else if (row.name.empty() || !marked) {
+      row.name += (row.name.empty() ? "" : " ") + cells[k];
+    }
+  }
+  return row;
+}
+
+std::map<int, std::string> table_of_lines(std::string text, const fs::path& path) {
+  if (text.starts_with("\xff\xfe") || text.starts_with("\xfe\xff")) {
+    throw Error(path.string() + ": is UTF-16; save the table as UTF-8");
+  }
+  if (text.starts_with("\xef\xbb\xbf")) text.erase(0, 3);
+  std::istringstream stream(text);
+  std::vector<std::string> lines;  // with their numbers
+  std::vector<int> numbers;
+  int number = 0;
+  for (std::string line; std::getline(stream, line);) {
     ++number;
-    const std::vector<std::string> cells = cells_of_line(line);
-    if (cells.empty() || cells.front().front() == '#') continue;
-    // Value and name begin the line, in either order. Without marks a name goes on to the next
-    // number.
-    const bool marked = line.find_first_of(",;\t") != std::string::npos;
-    std::optional<int> value;
-    std::string name;
-    for (std::size_t k = 0; k < cells.size(); ++k) {
-      if (!value && (!marked || k < 2)) value = whole_number(cells[k]);
-      if (is_number(cells[k])) {
-        if (!name.empty()) break;
-      } else if (name.empty() || !marked) {
-        name += (name.empty() ? "" : " ") + cells[k];
-      }
+    const std::size_t first = line.find_first_not_of(" \t\r,;");
+    if (first == std::string::npos || line[first] == '#') continue;
+    lines.push_back(line);
+    numbers.push_back(number);
+  }
+  const char separator = separator_of(lines);
+  std::map<int, std::string> table;
+  std::optional<TableColumns> columns;
+  for (std::size_t k = 0; k < lines.size(); ++k) {
+    const std::vector<std::string> cells = cells_of_line(lines[k], separator);
+    const TableRow row = columns ? row_by_columns(cells, *columns, separator != ' ')
+                                 : row_by_order(cells, separator != ' ');
+    if (k == 0 && !row.value) {  // what the columns are
+      columns = columns_of(cells, path);
+      continue;
     }
-    if (++rows == 1 && !value) continue;  // what the columns are
-    if (!value || name.empty()) {
-      throw Error(path.string() + ": line " + std::to_string(number) + " has no value and name; " +
-                  kTables);
+    if (!row.value || row.name.empty()) {
+      const std::string what = path.string() + ": line " + std::to_string(numbers[k]) +
+                               " has no value and name; " + kTables;
+      if (columns) throw Error(what);
+      throw NoTable(what);
     }
-    add_name(table, *value, name, path);
+    add_name(table, *row.value, row.name, path);
   }
   return table;
 }
@@ -277,11 +387,11 @@ std::map<int, std::string> read_label_table(const fs::path& path) {
   const std::string text(std::istreambuf_iterator<char>(stream), {});
   const std::map<int, std::string> table =
       small_name(path).ends_with(".json") ? table_of_json(text, path) : table_of_lines(text, path);
-  if (table.empty()) throw Error(path.string() + ": holds no names; " + kTables);
+  if (table.empty()) throw NoTable(path.string() + ": holds no names; " + kTables);
   return table;
 }
 
-std::map<int, std::string> find_label_table(const fs::path& labels) {
+FoundTable find_label_table(const fs::path& labels) {
   if (fs::is_directory(labels)) return {};
   const fs::path folder = fs::absolute(labels).parent_path();
   std::vector<fs::path> places;
@@ -290,15 +400,38 @@ std::map<int, std::string> find_label_table(const fs::path& labels) {
   }
   places.push_back(folder / "dataset.json");
   places.push_back(folder.parent_path() / "dataset.json");
+  std::string problem;
   for (const fs::path& place : places) {
     std::error_code unknown;
     if (!fs::is_regular_file(place, unknown)) continue;
     try {
-      return read_label_table(place);
-    } catch (const Error&) {  // of that name, but no table
+      return {.names = read_label_table(place), .problem = {}};
+    } catch (const NoTable& error) {  // of that name, but something else
+      problem += (problem.empty() ? "" : "\n") + std::string(error.what());
+    } catch (const Error& error) {
+      return {.names = {}, .problem = error.what()};
     }
   }
-  return {};
+  return {.names = {}, .problem = problem};
+}
+
+preprocess::LabelVolume read_labels(const LabelsInput& labels, const preprocess::Grid* onto) {
+  const std::string problem =
+      labels.table_given.empty() ? find_label_table(labels.path).problem : std::string();
+  preprocess::LabelVolume read;
+  try {
+    read = preprocess::read_labels(labels.path, labels.choice, onto);
+  } catch (const DiskError&) {
+    throw;
+  } catch (const Error& error) {
+    if (problem.empty()) throw;
+    throw Error(error.what() + ("\n" + problem));
+  }
+  const bool unnamed =
+      std::any_of(read.classes.begin(), read.classes.end(),
+                  [](const preprocess::LabelClass& one) { return one.name.starts_with("label "); });
+  if (unnamed && !problem.empty()) read.remarks.push_back("the labels have no names: " + problem);
+  return read;
 }
 
 LabelsInput read_labels_input(JsonReader reader, const fs::path& folder) {
@@ -326,7 +459,7 @@ LabelsInput read_labels_input(JsonReader reader, const fs::path& folder) {
   reader.finish();
   if (reader.problems().count() > problems_before) return labels;
   if (labels.table_given.empty()) {
-    labels.choice.table = find_label_table(labels.path);
+    labels.choice.table = find_label_table(labels.path).names;
     return labels;
   }
   try {
@@ -356,7 +489,7 @@ void resolve_branches(Json& file, const fs::path& folder, Problems& problems) {
   const std::size_t most_pieces = read_mask_limits(mask_of, false).pieces();
   std::optional<NamedLumen> lumen;
   try {
-    preprocess::LabelVolume read = preprocess::read_labels(labels.path, labels.choice);
+    preprocess::LabelVolume read = read_labels(labels);
     lumen = NamedLumen{preprocess::merge_labels(read, preprocess::kMostGap, most_pieces),
                        std::move(read.classes)};
   } catch (const DiskError&) {

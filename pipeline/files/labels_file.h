@@ -22,12 +22,26 @@ struct LabelsInput {
 
 /// Names of values, from nnU-Net's dataset.json, another JSON object of names and values (either
 /// way round), or lines of text with a value and a name: CSV, 3D Slicer's colour tables, ITK-SNAP's
-/// label descriptions. Throws `Error` where it is none of these, or a value has two names.
+/// label descriptions. A first line that names columns ("name,r,g,b,value") chooses them; without
+/// one value and name begin the line. Throws `Error` where it is none of these, or a value has two
+/// names.
 std::map<int, std::string> read_label_table(const std::filesystem::path& path);
 
+struct FoundTable {
+  std::map<int, std::string> names;
+  std::string problem;  // a line for each file that may be meant as the table and is none; empty
+                        // where one was read
+};
+
 /// The table beside a file of labels: of its name, ending in .json, .csv, .tsv, .txt or .ctbl, or a
-/// dataset.json in its folder or the one above. Empty where there is none that can be read.
-std::map<int, std::string> find_label_table(const std::filesystem::path& labels);
+/// dataset.json in its folder or the one above; the first of them that is one. Behind one that is
+/// broken none is looked for: its names may be others.
+FoundTable find_label_table(const std::filesystem::path& labels);
+
+/// Reads the labels of a case. What is wrong with a table beside them is told with what is wrong
+/// with the names, or in the remarks where none were asked for.
+preprocess::LabelVolume read_labels(const LabelsInput& labels,
+                                    const preprocess::Grid* onto = nullptr);
 
 /// Reads {"path", "values", "names", "table"}; paths are sought from `folder`.
 LabelsInput read_labels_input(JsonReader reader, const std::filesystem::path& folder);

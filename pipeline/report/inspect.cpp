@@ -182,8 +182,10 @@ Json volume_json(const preprocess::VolumeDescription& given, const fs::path& pat
   }
   if (given.holds_labels) {
     const double voxel = given.grid->spacing.prod();
-    const std::map<int, std::string> table =
-        header.segments.empty() ? find_label_table(path) : std::map<int, std::string>{};
+    const bool names_itself = !header.segments.empty() || !header.label_names.empty();
+    const FoundTable found = names_itself ? FoundTable{} : find_label_table(path);
+    const std::map<int, std::string>& table = found.names;
+    if (!found.problem.empty()) remarks.push_back("its labels have no names: " + found.problem);
     told["labels"] = Json::array();
     for (const preprocess::LabelDescription& label : given.labels) {
       if (label.value == 0) continue;  // what is around

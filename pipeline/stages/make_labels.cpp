@@ -228,10 +228,10 @@ struct LabelledLumen {
 };
 
 LabelledLumen find_lumen(const Case& given, const preprocess::Image* image) {
-  LabelledLumen lumen{.labels = preprocess::read_labels(given.labels->path, given.labels->choice,
-                                                        image != nullptr ? &image->grid : nullptr),
-                      .made = {},
-                      .figures = figures_of("segment")};
+  LabelledLumen lumen{
+      .labels = read_labels(*given.labels, image != nullptr ? &image->grid : nullptr),
+      .made = {},
+      .figures = figures_of("segment")};
   Json& figures = lumen.figures;
   if (image != nullptr) compare_with_volume(given, *image, lumen.labels, figures);
   lumen.made =

@@ -283,6 +283,36 @@ TEST_F(Inspect, NrrdAndMetaImageAreToldWithTheirUnits) {
   EXPECT_TRUE(holds(meta["volume"]["orientation"], "sagittal")) << meta;
 }
 
+TEST_F(Inspect, WhatAPersonShouldKnowOfHowItIsReadIsTold) {
+  preprocess::NiftiHeader nowhere;
+  nowhere.codes = {0, 0};
+  const Json told = inspect(write("ct.nii", preprocess::nifti(nowhere)));
+  ASSERT_EQ(told["remarks"].size(), 1U);
+  EXPECT_TRUE(holds(told["remarks"][0], "its qform_code and sform_code are 0")) << told;
+  EXPECT_TRUE(holds(inspect_text(told), "note         its header does not tell where it lies"));
+
+  write("seg.csv", "name,value\naorta,one\n");
+  const preprocess::Grid grid{.size = {4, 3, 2}, .spacing = Vec3(10, 10, 10)};
+  std::vector<std::uint8_t> one(24, 0);
+  one[3] = 1;
+  const Json labels = inspect(write("seg.nii", preprocess::label_nifti(grid, one)));
+  ASSERT_EQ(labels["remarks"].size(), 1U) << labels;
+  EXPECT_TRUE(holds(labels["remarks"][0], "seg.csv: line 2 has no value and name"));
+
+  const std::string latin = label_nrrd("Segment0_LabelValue:=1\nSegment0_Name:=Art\xe8re Doe\n");
+  const Json refused = inspect(write("l.seg.nrrd", latin));
+  EXPECT_TRUE(holds(refused["refused"], "its Segment0_Name is no UTF-8")) << refused;
+  EXPECT_FALSE(holds(inspect_text(refused), "Doe"));
+  EXPECT_TRUE(
+      holds(message_of([&] { inspect(write("pair.hdr", "x")); }), "one of a pair of files"));
+  EXPECT_TRUE(holds(message_of([&] { inspect(write("l.nrrd.gz", "x")); }), "packed by gzip"));
+
+  fs::create_directory(folder_ / "shown");
+  write_json(told, folder_ / "shown/told.json");
+  write_json(labels, folder_ / "shown/labels.json");
+  expect_follows_schemas(folder_ / "shown");
+}
+
 TEST_F(Inspect, ASurfaceIsToldInEveryUnit) {
   // a tube of radius 4 mm and length 60 mm in metres
   Surface tube = shapes::straight_tube(4.0, 60.0, 1.0);

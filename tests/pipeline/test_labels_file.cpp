@@ -23,10 +23,20 @@ TEST_F(LabelTable, IsReadFromEveryKindOfFile) {
       {"snap.txt", "# ITK-SnAP\n1 255 0 0 1 1 1 \"aorta\"\n7 0 255 0 1 1 1 \"renal left\"\n"},
       {"slicer.ctbl", "# Color\n1 aorta 255 0 0 255\n\n7 \"renal left\" 0 255 0 255\n"},
       {"spaces.txt", "1 aorta 255 0 0\n7 renal left 0 255 0\n"},
-      {"statistics.csv", "1,aorta,4711\n7,renal left,815\n"}};
+      {"statistics.csv", "1,aorta,4711\n7,renal left,815\n"},
+      {"one.json", R"({"labels": {"background": 0, "aorta": [1], "renal left": [7]}})"},
+      // The first line tells which columns are meant.
+      {"last.csv", "name,r,g,b,value\naorta,2,0,0,1\nrenal left,1,255,0,7\n"},
+      {"middle.csv", "\xef\xbb\xbfVoxels;Label Value;Segment\r\n5;1;aorta\r\n;7;renal left\r\n"},
+      {"label.tsv", "index\tcolor\tlabel\n1\t9\taorta\n7\t9\trenal left\n"},
+      {"label_name.csv", "label,name,id\n1,aorta,3\n7,renal left,4\n"},
+      {"words.txt", "name r g b value\naorta 2 0 0 1\nrenal left 1 255 0 7\n"},
+      {"two.csv", "Wert;Beschreibung\n1;aorta\n7;\"renal left\"\n"}};
   for (const auto& [name, text] : files) {
     SCOPED_TRACE(name);
-    EXPECT_EQ(read_label_table(write(name, text)), expected);
+    std::map<int, std::string> read = read_label_table(write(name, text));
+    read.erase(0);
+    EXPECT_EQ(read, expected);
   }
 }
 
@@ -37,22 +47,57 @@ TEST_F(LabelTable, ThatIsNoneIsRefused) {
   expect_mentions(refusal("a.json", "[1]"), {"a.json: no JSON object"});
   expect_mentions(refusal("b.json", R"({"a": 0.5})"), {"\"a\" is 0.5"});
   const std::string deep = std::string(200000, '[') + std::string(200000, ']');
-  expect_mentions(refusal("deep.json", R"({"a": {"b": )" + deep + "}}"), {"\"a\" is an object"});
+  expect_mentions(refusal("deep.json", R"({"a": {"b": )" + deep + "}}"),
+                  {"deep.json: nested deeper"});
   expect_mentions(refusal("c.csv", "1,a\n2\n"), {"line 2 has no value and name"});
   expect_mentions(refusal("d.csv", "1,a\n1,b\n"), {"value 1 is named \"a\" and \"b\""});
   expect_mentions(refusal("e.csv", "# nothing\n"), {"holds no names"});
+  expect_mentions(refusal("g.csv", "structure,volume_ml\naorta,2\n"),
+                  {"g.csv: its first line heads no column of values"});
+  expect_mentions(refusal("m.csv", "index,volume\n1,2.5\n"), {"line 2 has no value and name"});
+  expect_mentions(refusal("h.csv", "name,r,value\naorta,2,x\n"), {"line 2 has no value and name"});
+  expect_mentions(refusal("i.json", R"({"labels": {"a": 1,}})"), {"i.json: broken JSON at line 1"});
+  expect_mentions(refusal("j.json", R"({"labels": {"1": "a", "1": "b"}})"),
+                  {"labels.1 is given twice"});
+  expect_mentions(refusal("k.csv", std::string("\xff\xfe", 2)), {"k.csv: is UTF-16"});
   expect_mentions(refusal("f.csv", "1,art\xe8re\n"), {"the name of value 1 is no UTF-8"});
 }
 
 TEST_F(LabelTable, IsFoundBesideTheLabelsOrAbove) {
   fs::create_directories(folder_ / "labelsTr");
-  EXPECT_TRUE(find_label_table(folder_ / "labelsTr" / "p.nii.gz").empty());
+  EXPECT_TRUE(find_label_table(folder_ / "labelsTr" / "p.nii.gz").names.empty());
   write("dataset.json", R"({"labels": {"above": 1}})");
-  EXPECT_EQ(find_label_table(folder_ / "labelsTr" / "p.nii.gz").at(1), "above");
+  EXPECT_EQ(find_label_table(folder_ / "labelsTr" / "p.nii.gz").names.at(1), "above");
   write("labelsTr/p.json", R"({"Modality": "CT"})");  // beside it, but of something else
-  EXPECT_EQ(find_label_table(folder_ / "labelsTr" / "p.nii.gz").at(1), "above");
+  EXPECT_EQ(find_label_table(folder_ / "labelsTr" / "p.nii.gz").names.at(1), "above");
+  write("labelsTr/p.csv", "structure,volume_ml\nleft,1\n");
+  EXPECT_EQ(find_label_table(folder_ / "labelsTr" / "p.nii.gz").names.at(1), "above");
   write("labelsTr/p.txt", "1 own\n");
-  EXPECT_EQ(find_label_table(folder_ / "labelsTr" / "p.nii.gz").at(1), "own");
+  EXPECT_EQ(find_label_table(folder_ / "labelsTr" / "p.nii.gz").names.at(1), "own");
+}
+
+TEST_F(LabelTable, ThatIsBrokenIsToldWithTheNamesThatItLacks) {
+  fs::create_directories(folder_ / "l");
+  const fs::path labels = folder_ / "l" / "p.nii";
+  write("l/p.nii", preprocess::branched_labels());
+  write("dataset.json", R"({"labels": {"other": 1}})");
+  write("l/p.csv", "structure,volume_ml\naorta,1\n");
+  write("l/dataset.json", R"({"labels": {"aorta": 1, "renal": 2.5}})");
+  const FoundTable found = find_label_table(labels);
+  EXPECT_TRUE(found.names.empty());  // not those of the file above
+  expect_mentions(found.problem, {"l/dataset.json", "\"labels.renal\" is 2.5"});
+  LabelsInput given;
+  given.path = labels;
+  given.choice.names = {"aorta"};
+  expect_mentions(message_of([&] { read_labels(given); }),
+                  {"labels.names[0] is \"aorta\"", "l/dataset.json", "\"labels.renal\" is 2.5"});
+  given.choice = {.values = {1, 2}};
+  const std::vector<std::string> remarks = read_labels(given).remarks;
+  ASSERT_EQ(remarks.size(), 1U);
+  expect_mentions(remarks[0], {"l/dataset.json", "\"labels.renal\" is 2.5"});
+  fs::remove(folder_ / "l" / "dataset.json");
+  EXPECT_EQ(find_label_table(labels).names.at(1), "other");
+  EXPECT_TRUE(find_label_table(labels).problem.empty());
 }
 
 using LabelsCase = CaseFile;
