@@ -35,12 +35,21 @@ struct Projections {
   std::optional<Projection> second;
 };
 
-/// The best looks along the normal of the plane of trunk and branch, from the side that the arm
-/// reaches with less rotation, the left on a tie; it may be out of reach. The second is within
-/// reach, in whole degrees: where the best is within reach, at least 30 deg away from it and from
-/// its mirror image, and shows the branch as long as can be, a tenth of the weight on the trunk;
-/// and else both alike as long as can be. Trunk and branch within 5 deg of one line have no plane:
-/// the best is then what looks across the branch with the least rotation and tilt.
+/// The best looks along the normal of the plane of trunk and branch; it may be out of reach. Trunk
+/// and branch within 5 deg of one line have no plane: the best then looks across the branch, from
+/// the front or as near to that as the arm comes, from the left at a branch from front to back. The
+/// second is within reach, at least 30 deg away from the best and from its mirror image, and shows
+/// the branch as long as can be, a tenth of the weight on the trunk; where the best is out of reach
+/// it is anywhere, and shows both alike as long as can be.
+///
+/// Of views that show as much as each other, that is told which is in reach, then has less tilt,
+/// less rotation, is LAO, is cranial. Views show as much where their foreshortening differs by no
+/// more than half a degree of turning changes it at most: more than the noise of a line in a mesh
+/// (0.01 to 0.1 deg), less than an arm shows (whole degrees). Tilts and rotations count as equal
+/// within 2 deg, since noise moves a view by some times its own size where little is lost beside
+/// it. A view less than half a degree beyond the limits is told at them; one less than that off the
+/// patient's long axis has no rotation. So noise does not choose, unless it is at one of these
+/// edges.
 Projections find_projections(const Vec3& trunk, const Vec3& branch, const ArmLimits& limits = {});
 
 }  // namespace wireplan::plan
