@@ -46,7 +46,7 @@ Json passage_json(const Centerline& way, const Eigen::VectorXd& diameters, doubl
 Json ostium_at(const plan::Corner& bend, const std::vector<plan::Junction>& junctions,
                const Tree& tree) {
   for (const plan::Junction& junction : junctions) {
-    const bool near = std::abs(junction.arc - bend.arc) < bend.arm;
+    const bool near = std::abs(junction.level - bend.arc) < bend.arm;
     if (junction.taken && near) return branch_name(tree, junction.branch);
   }
   return nullptr;
@@ -125,7 +125,7 @@ Json c_arm_json(const simulate::Way& way, const std::vector<plan::Junction>& jun
     Json row = {{"trunk", branch_name(tree, junction.trunk, leaves)},
                 {"branch", branch_name(tree, junction.branch)},
                 {"leads_to_target", junction.branch == along.back()},
-                {"at_mm", junction.arc},
+                {"at_mm", junction.level},
                 {"place_mm", to_json(junction.point)},
                 {"turn_deg", degrees(plan::turn_of(junction))}};
     put_views(row, junction.trunk_direction, junction.branch_direction, arm, axes_known);
@@ -158,8 +158,8 @@ Json lengths_json(const Centerline& way, const std::vector<plan::Junction>& junc
                                         : "passes";
     places.push_back({{"what", what},
                       {"branch", branch_name(tree, junction.branch)},
-                      {"at_mm", junction.arc},
-                      {"place_mm", to_json(junction.point)}});
+                      {"at_mm", junction.level},
+                      {"place_mm", to_json(plan::point_at(way, junction.level))}});
   }
   const double length = way.arc_length(way.arc_length.size() - 1);
   const Vec3 end = way.points.col(way.points.cols() - 1);

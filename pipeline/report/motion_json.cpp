@@ -42,8 +42,8 @@ Json turn_json(const std::vector<preprocess::Branch>& tree, const plan::Junction
   return {{"branch", branch_name(tree, rest.branch)},
           {"at_rest_deg", plan::turn_of(rest) / kRadPerDeg},
           {"moved_deg", plan::turn_of(moved) / kRadPerDeg},
-          {"from_access_mm", rest.arc},
-          {"moved_from_access_mm", moved.arc},
+          {"from_access_mm", rest.level},
+          {"moved_from_access_mm", moved.level},
           {"view_at_rest", view_json(before)},
           {"view_moved", view_json(after)},
           {"view_change_deg", std::acos(std::min(along, 1.0)) / kRadPerDeg}};

@@ -3,7 +3,9 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <optional>
+#include <tuple>
 
 #include "preprocess/centerline/path_place.h"
 
@@ -41,11 +43,11 @@ Centerline joined(const Centerline& way, double arc, const Centerline& after) {
   return line;
 }
 
-/// Where the way, from an arc length on, leaves the trunk's spheres; `arc` where it never does.
-double find_ostium(const Centerline& way, double arc, const Centerline& trunk) {
-  for (Eigen::Index k = segment_at(way, arc); k < way.points.cols(); ++k) {
-    const preprocess::PathPlace place = preprocess::find_place(way.points.col(k), trunk);
-    if (place.from_axis > place.radius) return way.arc_length(k);
+/// Where a line, from an arc length on, leaves the trunk's spheres; `arc` where it never does.
+double find_ostium(const Centerline& line, double arc, const Centerline& trunk) {
+  for (Eigen::Index k = segment_at(line, arc); k < line.points.cols(); ++k) {
+    const preprocess::PathPlace place = preprocess::find_place(line.points.col(k), trunk);
+    if (place.from_axis > place.radius) return line.arc_length(k);
   }
   return arc;
 }
@@ -63,59 +65,79 @@ Vec3 direction_beyond(const Centerline& line, double ostium) {
   return chord(line, end - ostium < kLeast ? std::max(0.0, length - reach) : ostium, end);
 }
 
-/// The junction where the way leaves `trunk` at `arc` of the way.
-Junction taken_junction(const Centerline& way, double arc, const Centerline& trunk) {
-  Junction junction{.taken = true};
-  const preprocess::PathPlace place = preprocess::find_place(point_at(way, arc), trunk);
-  const double reach = 2.0 * place.radius;
-  junction.arc = find_ostium(way, arc, trunk);
+/// How far along the way it is to the level of a place beside the trunk, which the way comes along
+/// to `arc` or turns off there.
+double find_level(const Centerline& way, double arc, const Centerline& trunk, const Vec3& p) {
+  const auto place_of = [&](const Vec3& q) { return preprocess::find_place(q, trunk); };
+  // Counted from where the way is on the trunk's axis. Where a branch begins, a line is bent a
+  // little off it: a chord is not.
+  const double start = preprocess::find_place(trunk.points.col(0), way).arc,
+               before = std::max(start, arc - 2.0 * place_of(point_at(way, arc)).radius);
+  const preprocess::PathPlace place = place_of(p);
+  const Vec3 along = chord(trunk, place.arc - place.radius, place.arc + place.radius);
+  return before + place.arc + (p - point_at(trunk, place.arc)).dot(along) -
+         place_of(point_at(way, before)).arc;
+}
+
+/// The junction at `arc` of the way, where `side` leaves `trunk` beyond `from` of its own: the way
+/// itself where it takes the branch.
+Junction junction_of(const Centerline& way, double arc, const Centerline& trunk,
+                     const Centerline& side, double from) {
+  const preprocess::PathPlace place = preprocess::find_place(point_at(side, from), trunk);
+  const double reach = 2.0 * place.radius, ostium = find_ostium(side, from, trunk);
+  Junction junction{.taken = &side == &way};
+  junction.level = find_level(way, arc, trunk, point_at(side, ostium));
+  junction.arc = junction.taken ? ostium : junction.level;
   junction.point = point_at(way, junction.arc);
   junction.trunk_direction = chord(trunk, place.arc - reach, place.arc + reach);
-  junction.branch_direction = direction_beyond(way, junction.arc);
+  junction.branch_direction = direction_beyond(side, ostium);
   return junction;
 }
 
-/// The junction at `arc` of the way that it passes, where `side` begins at `from` of its line.
-Junction passed_junction(const Centerline& way, double arc, const Centerline& side, double from) {
-  const double reach = 2.0 * radius_at(way, arc);
-  Junction junction;
-  junction.arc = arc;
-  junction.point = point_at(way, arc);
-  junction.trunk_direction = chord(way, arc - reach, arc + reach);
-  junction.branch_direction = direction_beyond(side, find_ostium(side, from, way));
-  return junction;
+/// Whether a child of the tree is the trunk where it leaves its parent.
+bool is_trunk(const std::vector<Branch>& tree, int child) {
+  constexpr double kClearlyWider = 4.0 / 3.0;
+  return simulate::goes_on(tree, child) && simulate::width_over_parent(tree, child) > kClearlyWider;
+}
+
+/// The vessel that a child leaves, past that: its parent, or where that turns off there, up to
+/// there and on in the child that is the trunk.
+Centerline trunk_at(const std::vector<Branch>& tree, int child) {
+  const Branch& branch = tree[static_cast<std::size_t>(child)];
+  const Centerline& line = tree[static_cast<std::size_t>(branch.parent)].line;
+  const double near = branch.parent_arc - radius_at(line, branch.parent_arc);
+  for (std::size_t b = 0; b < tree.size(); ++b) {
+    if (tree[b].parent != branch.parent || tree[b].parent_arc < near) continue;
+    if (is_trunk(tree, static_cast<int>(b))) return joined(line, tree[b].parent_arc, tree[b].line);
+  }
+  return line;
 }
 
 /// At `arc` of the way, where `child` leaves the tree's branch that the way comes along, for the
 /// child where that is what the way takes. None where the other of the two is a stump.
 std::optional<Junction> junction_at(const simulate::Way& of, double arc, int child, bool takes) {
-  constexpr double kClearlyWider = 4.0 / 3.0;
   const std::vector<Branch>& tree = of.tree();
   const Centerline& way = of.path();
   const Branch& branch = tree[static_cast<std::size_t>(child)];
   const int own = branch.parent;
   const Centerline& line = tree[static_cast<std::size_t>(own)].line;
-  const bool goes_on =
-      simulate::goes_on(tree, child) && simulate::width_over_parent(tree, child) > kClearlyWider;
+  const Centerline trunk = trunk_at(tree, child);
+  const bool goes_on = is_trunk(tree, child);
   Junction junction;
   if (!takes) {
     if (simulate::is_stump(tree, child)) return {};
     // The way leaves the child where that is the trunk.
-    junction = goes_on ? taken_junction(way, arc, joined(way, arc, branch.line))
-                       : passed_junction(way, arc, branch.line, 0.0);
-    junction.trunk = goes_on ? child : own;
-    junction.branch = goes_on ? own : child;
+    junction = goes_on ? junction_of(way, arc, trunk, way, arc)
+                       : junction_of(way, arc, trunk, branch.line, 0.0);
   } else if (goes_on) {
     // The way stays in the trunk, and what goes on of the tree's branch leaves it.
     if (simulate::ends_soon(line, branch.parent_arc + simulate::own_start(branch))) return {};
-    junction = passed_junction(way, arc, line, branch.parent_arc);
-    junction.trunk = child;
-    junction.branch = own;
+    junction = junction_of(way, arc, trunk, line, branch.parent_arc);
   } else {
-    junction = taken_junction(way, arc, line);
-    junction.trunk = own;
-    junction.branch = child;
+    junction = junction_of(way, arc, trunk, way, arc);
   }
+  junction.trunk = goes_on ? child : own;
+  junction.branch = goes_on ? own : child;
   const std::optional<simulate::Bifurcation>& fork = of.bifurcation();
   junction.bifurcation = fork && fork->child == child;
   return junction;
@@ -188,6 +210,7 @@ std::vector<Junction> find_junctions(const simulate::Way& of) {
   const Centerline& way = of.path();
   const std::vector<Branch>& tree = of.tree();
   const Vec3 end = way.points.col(way.points.cols() - 1);
+  constexpr double kFacing = 1.0;  // two ostia that differ by less are at one level        [mm]
   const std::vector<int> chain = of.branches();
   std::vector<Junction> junctions;
   for (std::size_t k = 0; k < chain.size(); ++k) {
@@ -198,16 +221,31 @@ std::vector<Junction> find_junctions(const simulate::Way& of) {
     const double left_at = next >= 0 ? tree[static_cast<std::size_t>(next)].parent_arc
                                      : preprocess::find_place(end, line).arc;
 
+    // A branch that faces the one that the way takes may begin a little later.
+    const bool turns = next >= 0 && !is_trunk(tree, next);
+    const double last = turns ? left_at + 2.0 * radius_at(line, left_at) : left_at;
+
+    std::vector<Junction> here;
+    double level = std::numeric_limits<double>::infinity();
     for (std::size_t b = 0; b < tree.size(); ++b) {
-      if (tree[b].parent != own || tree[b].parent_arc > left_at) continue;
-      const double arc = preprocess::find_place(point_at(line, tree[b].parent_arc), way).arc;
       const int child = static_cast<int>(b);
+      if (tree[b].parent != own || tree[b].parent_arc > last) continue;
+      if (tree[b].parent_arc > left_at && is_trunk(tree, child)) continue;
+      const double arc = preprocess::find_place(point_at(line, tree[b].parent_arc), way).arc;
       const std::optional<Junction> junction = junction_at(of, arc, child, child == next);
-      if (junction) junctions.push_back(*junction);
+      if (!junction) continue;
+      here.push_back(*junction);
+      if (turns && child == next) level = junction->level;
+    }
+    for (Junction& junction : here) {
+      if (!junction.taken && junction.level > level + kFacing) continue;
+      if (!junction.taken) junction.level = junction.arc = std::min(junction.level, level);
+      junctions.push_back(junction);
     }
   }
-  std::stable_sort(junctions.begin(), junctions.end(),
-                   [](const Junction& a, const Junction& b) { return a.arc < b.arc; });
+  std::stable_sort(junctions.begin(), junctions.end(), [](const Junction& a, const Junction& b) {
+    return std::tie(a.level, a.taken) < std::tie(b.level, b.taken);
+  });
   return junctions;
 }
 

@@ -51,8 +51,9 @@ struct Junction {
   int branch = -1;            // ... and the one that leaves it there
   bool taken = false;         // the way leaves the trunk for the branch; else it passes the branch
   bool bifurcation = false;   // of the aorta (simulate::Bifurcation)
-  double arc = 0.0;           // of the ostium, along the way                              [mm]
+  double arc = 0.0;           // of the ostium, along the way; of one passed its level     [mm]
   Vec3 point = Vec3::Zero();  // there                                                     [mm]
+  double level = 0.0;         // how far along the trunk from the access the ostium is     [mm]
   /// Unit vectors from the ostium: where the trunk goes on, and where the branch goes.
   Vec3 trunk_direction = Vec3::UnitZ(), branch_direction = Vec3::UnitX();
 };
@@ -64,10 +65,13 @@ double turn_of(const Junction& junction);
 /// where it changes from one branch of the tree to another, unless that is the trunk, and where the
 /// trunk is another branch than the one that it stays in: the vessel that goes on
 /// (simulate::goes_on) and is wider by a third, since a tree's first branch may well end in a small
-/// artery. Of a branch that the way takes, the ostium is where the way leaves the trunk's inscribed
-/// spheres; of one that it passes, the nearest point of the way. The trunk's direction is that of a
-/// chord of two of its diameters round the ostium, the branch's that of its first three radii, at
-/// least 6 mm, beyond it. Expects a tree that starts where the way does, as find_tree() makes it.
+/// artery. The ostium is where the branch's line leaves the trunk's inscribed spheres, whether the
+/// way takes it or passes it; its level is the place of the trunk's axis nearest to it, as lengths
+/// between ostia are measured for stent grafts (Chassin-Trubert et al., J Endovasc Ther 2020, from
+/// centre to centre along the aorta), so that ostia which face each other have one. The trunk's
+/// direction is that of a chord of two of its diameters round the ostium, the branch's that of its
+/// first three radii, at least 6 mm. Expects a tree that starts where the way does, as find_tree()
+/// makes it.
 std::vector<Junction> find_junctions(const simulate::Way& of);
 
 }  // namespace wireplan::plan

@@ -196,6 +196,42 @@ TEST(Junctions, OppositeRenalsFourMillimetresApartAreOneOstiumOnTheWay) {
   EXPECT_EQ(same[1].branch, 0);
 }
 
+/// A line as it runs in a tree of the trunk and a branch to one side (1 left, -1 right), whose axes
+/// meet at z = 100: up the trunk's axis to the ostium's level, across, and along the branch's axis.
+std::vector<Vec3> into_branch(double side, double elevation) {
+  const double c = std::cos(elevation), s = std::sin(elevation);
+  const double level = 100.0 + 10.0 * s / c;
+  return {Vec3(0, 0, level), Vec3(10.0 * side, 0, level),
+          Vec3((10.0 + 40.0 * c) * side, 0, level + 40.0 * s)};
+}
+
+TEST(Junctions, OstiaThatFaceEachOtherAreAtOneLevel) {
+  for (const double elevation : {0.0, 40.0, -40.0}) {
+    const double a = elevation * kRadPerDeg, level = 100.0 + 10.0 * std::tan(a);
+    for (const double shift : {-0.4, 0.4}) {  // where the branch that is passed begins
+      SCOPED_TRACE(testing::Message() << elevation << ", " << shift);
+      std::vector<Branch> tree = {{.line = line_through({Vec3::Zero(), Vec3(0, 0, 200)}, 10.0)}};
+      for (const double side : {1.0, -1.0}) {
+        const double begins = level + (side > 0.0 ? 0.0 : shift);
+        std::vector<Vec3> corners = into_branch(side, a);
+        corners.front().z() = begins;
+        tree.push_back({.line = line_through(corners, 3.0), .parent = 0, .parent_arc = begins});
+      }
+      std::vector<Vec3> corners = into_branch(1.0, a);
+      corners.insert(corners.begin(), Vec3::Zero());
+      const auto found = find_junctions(simulate::Way(line_through(corners, 3.0), tree));
+      ASSERT_EQ(found.size(), 2u);
+      EXPECT_FALSE(found[0].taken);
+      EXPECT_EQ(found[0].branch, 2);
+      EXPECT_TRUE(found[1].taken);
+      EXPECT_EQ(found[1].branch, 1);
+      EXPECT_NEAR(found[0].level, level, 0.5);  // a point of the line
+      EXPECT_NEAR(found[1].level, level, 0.5);
+      EXPECT_NEAR(found[1].arc, level + 10.0, 0.51);
+    }
+  }
+}
+
 TEST(Junctions, StumpsAreNone) {
   // A bulge as wide as the trunk that ends 4 mm beyond its wall.
   const Branch stump{.line = line_through({Vec3(0, 0, 96), Vec3(14, 0, 96)}, 10.0),
