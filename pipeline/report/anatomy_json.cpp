@@ -53,8 +53,8 @@ Json ostium_at(const plan::Corner& bend, const std::vector<plan::Junction>& junc
 }
 
 Json access_json(const Centerline& way, const Eigen::VectorXd& diameters,
-                 const std::vector<plan::Junction>& junctions, const Tree& tree,
-                 const plan::AccessLimits& limits) {
+                 const std::vector<plan::Junction>& junctions, const plan::Corner& bend,
+                 const Tree& tree, const plan::AccessLimits& limits) {
   const double length = way.arc_length(way.arc_length.size() - 1);
   Json access;
   access["device"] = passage_json(way, diameters, length, limits.device_diameter, 1.0,
@@ -76,7 +76,8 @@ Json access_json(const Centerline& way, const Eigen::VectorXd& diameters,
                           {"source", kReportingStandards}};
   if (!open) access["tortuosity"]["null_reasons"]["index"] = "the way ends where it starts";
 
-  const plan::Corner bend = plan::find_sharpest_bend(way);
+  // By what is told: at a right angle, which is common, noise would choose the grade.
+  const double told = std::round(degrees(bend.angle)) * kRadPerDeg;
   Json thresholds = Json::array();
   for (const double angle : limits.angle) thresholds.push_back(clean(degrees(angle)));
   access["sharpest_bend"] = {{"angle_deg", degrees(bend.angle)},
@@ -84,7 +85,7 @@ Json access_json(const Centerline& way, const Eigen::VectorXd& diameters,
                              {"place_mm", to_json(bend.point)},
                              {"arm_mm", bend.arm},
                              {"at_ostium_of", ostium_at(bend, junctions, tree)},
-                             {"grade", grade_name(plan::grade_of(bend.angle, limits.angle))},
+                             {"grade", grade_name(plan::grade_of(told, limits.angle))},
                              {"thresholds_deg", thresholds},
                              {"source", kReportingStandards}};
   return access;
@@ -105,16 +106,17 @@ Json projection_json(const plan::Projection& projection) {
           {"branch_foreshortening", projection.branch_foreshortening}};
 }
 
-/// The two views of trunk and branch under "best" and "second"; null without known axes.
+/// The two views of trunk and branch under "best" and "second"; null where none are to be told.
 void put_views(Json& row, const Vec3& trunk, const Vec3& branch, const plan::ArmLimits& arm,
-               bool axes_known) {
+               bool told) {
   const plan::Projections found = plan::find_projections(trunk, branch, arm);
-  row["best"] = axes_known ? projection_json(found.best) : Json(nullptr);
-  row["second"] = axes_known && found.second ? projection_json(*found.second) : Json(nullptr);
+  row["best"] = told ? projection_json(found.best) : Json(nullptr);
+  row["second"] = told && found.second ? projection_json(*found.second) : Json(nullptr);
 }
 
 Json c_arm_json(const simulate::Way& way, const std::vector<plan::Junction>& junctions,
-                const plan::ArmLimits& arm, bool axes_known) {
+                const plan::Corner& bend, const plan::ArmLimits& arm, bool axes_known) {
+  constexpr double kStraight = 170.0 * kRadPerDeg;  // no bend to speak of: noise turns its plane
   const Tree& tree = way.tree();
   const std::vector<int> along = way.branches();
   Json rows = Json::array();
@@ -131,12 +133,8 @@ Json c_arm_json(const simulate::Way& way, const std::vector<plan::Junction>& jun
     put_views(row, junction.trunk_direction, junction.branch_direction, arm, axes_known);
     rows.push_back(std::move(row));
   }
-  const plan::Corner bend = plan::find_sharpest_bend(way.path());
   Json of_bend = {{"at_mm", bend.arc}, {"place_mm", to_json(bend.point)}};
-  const Vec3 before = plan::point_at(way.path(), bend.arc - bend.arm),
-             behind = plan::point_at(way.path(), bend.arc + bend.arm);
-  put_views(of_bend, (bend.point - before).normalized(), (behind - bend.point).normalized(), arm,
-            axes_known);
+  put_views(of_bend, bend.before, bend.behind, arm, axes_known && bend.angle < kStraight);
   return {
       {"ostia", rows},
       {"bend", of_bend},
@@ -192,8 +190,9 @@ Json drawn_line(const Centerline& line) {
 Json anatomy_figures(const simulate::Way& way, const Eigen::VectorXd& diameters,
                      const plan::AccessLimits& limits, bool axes_known) {
   const std::vector<plan::Junction> junctions = plan::find_junctions(way);
-  return {{"access", access_json(way.path(), diameters, junctions, way.tree(), limits)},
-          {"c_arm", c_arm_json(way, junctions, limits.arm, axes_known)},
+  const plan::Corner bend = plan::find_sharpest_bend(way.path(), junctions);
+  return {{"access", access_json(way.path(), diameters, junctions, bend, way.tree(), limits)},
+          {"c_arm", c_arm_json(way, junctions, bend, limits.arm, axes_known)},
           {"lengths", lengths_json(way.path(), junctions, way.tree(), limits)}};
 }
 

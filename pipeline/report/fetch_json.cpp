@@ -96,6 +96,7 @@ std::vector<Seen> places_to_see(const Json& arm) {
                       "ostium of " + ostium.at("branch").get<std::string>(), view_name(ostium)});
   }
   const Json& bend = arm.at("bend");
+  if (bend.at("best").is_null() && arm.at("no_views").is_null()) return places;  // it is straight
   const double at = bend.at("at_mm");
   places.push_back({at, format("bend at %.0f mm", at), view_name(bend)});
   return places;
@@ -174,7 +175,7 @@ Json step_views_json(const plan::Candidate& candidate, const plan::Measured& tri
         std::min_element(places.begin(), places.end(), [&](const Seen& a, const Seen& b) {
           return std::abs(a.arc - depth) < std::abs(b.arc - depth);
         });
-    add(texts[k], &*nearest);
+    add(texts[k], nearest == places.end() ? nullptr : &*nearest);
   }
   return steps;
 }

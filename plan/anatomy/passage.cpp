@@ -56,13 +56,13 @@ Vec3 chord(const Centerline& line, double from, double to) {
   return (point_at(line, to) - point_at(line, from)).normalized();
 }
 
-/// Direction of a line beyond an arc length where it is an ostium.
+/// Direction of a line beyond an arc length where it is an ostium, in which it still sways.
 Vec3 direction_beyond(const Centerline& line, double ostium) {
   constexpr double kLeast = 1.0;  // a stub shorter than that tells no direction           [mm]
-  const double length = length_of(line);
-  const double reach = std::max(6.0, 3.0 * radius_at(line, ostium));
-  const double end = std::min(ostium + reach, length);
-  return chord(line, end - ostium < kLeast ? std::max(0.0, length - reach) : ostium, end);
+  const double length = length_of(line), wanted = std::max(6.0, 3.0 * radius_at(line, ostium));
+  const double start = length - ostium < kLeast ? std::max(0.0, length - wanted) : ostium;
+  const double reach = std::min(wanted, length - start);
+  return chord(line, start + reach / 6.0, start + reach * 5.0 / 6.0);
 }
 
 /// How far along the way it is to the level of a place beside the trunk, which the way comes along
@@ -89,6 +89,7 @@ Junction junction_of(const Centerline& way, double arc, const Centerline& trunk,
   junction.level = find_level(way, arc, trunk, point_at(side, ostium));
   junction.arc = junction.taken ? ostium : junction.level;
   junction.point = point_at(way, junction.arc);
+  junction.radius = radius_at(side, ostium);
   junction.trunk_direction = chord(trunk, place.arc - reach, place.arc + reach);
   junction.branch_direction = direction_beyond(side, ostium);
   return junction;
@@ -111,6 +112,76 @@ Centerline trunk_at(const std::vector<Branch>& tree, int child) {
     if (is_trunk(tree, static_cast<int>(b))) return joined(line, tree[b].parent_arc, tree[b].line);
   }
   return line;
+}
+
+/// Where the way turns into a branch: from the trunk's axis until it has settled in the branch.
+struct Turn {
+  double from = 0.0, corner = 0.0, to = 0.0;  // along the way                             [mm]
+};
+
+std::vector<Turn> list_turns(const Centerline& way, const std::vector<Junction>& junctions) {
+  std::vector<Turn> turns;
+  for (const Junction& j : junctions) {
+    const double free = turns.empty() ? 0.0 : turns.back().to;
+    const Turn turn{std::max(free, j.level - j.radius), j.level, j.arc + j.radius};
+    if (j.taken && turn.from < turn.to && turn.to < length_of(way)) turns.push_back(turn);
+  }
+  return turns;
+}
+
+/// A line on which each turn into a branch is a corner.
+struct Unfolded {
+  std::vector<Vec3> points;
+  std::vector<double> arc;  // of the points, along the way                            [mm]
+  std::vector<bool> is_corner;
+};
+
+/// The way without its turns, what follows one moved up to what is before.
+Unfolded unfold(const Centerline& way, const std::vector<Turn>& turns) {
+  Unfolded line;
+  const auto add = [&](const Vec3& point, double arc, bool is_corner) {
+    line.points.push_back(point);
+    line.arc.push_back(arc);
+    line.is_corner.push_back(is_corner);
+  };
+  Vec3 moved = Vec3::Zero();
+  double done = -1.0;
+  auto turn = turns.begin();
+  for (Eigen::Index k = 0; k < way.points.cols(); ++k) {
+    const double arc = way.arc_length(k);
+    for (; turn != turns.end() && turn->from <= arc; ++turn) {
+      add(point_at(way, turn->from) + moved, turn->corner, true);
+      moved += point_at(way, turn->from) - point_at(way, turn->to);
+      done = turn->to;
+    }
+    if (arc > done) add(way.points.col(k) + moved, arc, false);
+  }
+  return line;
+}
+
+/// Without radii.
+Centerline line_through(const std::vector<Vec3>& points) {
+  const auto count = static_cast<Eigen::Index>(points.size());
+  Centerline line{.points = Eigen::Matrix3Xd(3, count),
+                  .radius = {},
+                  .arc_length = Eigen::VectorXd::Zero(count)};
+  for (Eigen::Index k = 0; k < count; ++k) {
+    line.points.col(k) = points[static_cast<std::size_t>(k)];
+    if (k == 0) continue;
+    line.arc_length(k) =
+        line.arc_length(k - 1) + (line.points.col(k) - line.points.col(k - 1)).norm();
+  }
+  return line;
+}
+
+/// The corner of a line at an arc length, with arms of so much of it: `near` to `far` from there.
+Corner corner_at(const Centerline& line, double arc, double near, double far) {
+  Corner corner;
+  corner.before = chord(line, arc - far, arc - near);
+  corner.behind = chord(line, arc + near, arc + far);
+  corner.angle =
+      kPi - std::atan2(corner.before.cross(corner.behind).norm(), corner.before.dot(corner.behind));
+  return corner;
 }
 
 /// At `arc` of the way, where `child` leaves the tree's branch that the way comes along, for the
@@ -182,27 +253,34 @@ double tortuosity(const Centerline& way) {
   return std::max(1.0, length_of(way) / (end - start).norm());  // rounding of a straight line
 }
 
-Corner find_sharpest_bend(const Centerline& way, double arm) {
-  const double length = length_of(way);
-  Corner sharpest{.angle = kPi, .arm = std::min(arm, length / 3.0)};
-  for (Eigen::Index k = 0; k < way.points.cols(); ++k) {
-    const double arc = way.arc_length(k);
-    if (arc < sharpest.arm || arc > length - sharpest.arm) continue;
-    const Vec3 before = chord(way, arc, arc - sharpest.arm),
-               behind = chord(way, arc, arc + sharpest.arm);
-    const double angle = std::atan2(before.cross(behind).norm(), before.dot(behind));
-    if (angle > sharpest.angle) continue;
-    sharpest.angle = angle;
-    sharpest.arc = arc;
-    sharpest.point = way.points.col(k);
-  }
-  if (sharpest.angle == kPi) return sharpest;
+Corner find_sharpest_bend(const Centerline& way, const std::vector<Junction>& junctions,
+                          double arm) {
   // A middle line rounds a corner: the arms there would take several degrees off.
-  constexpr double kRounded = 0.15;
-  const double near = kRounded * sharpest.arm, far = sharpest.arm - near;
-  const Vec3 before = chord(way, sharpest.arc - near, sharpest.arc - far),
-             behind = chord(way, sharpest.arc + near, sharpest.arc + far);
-  sharpest.angle = std::atan2(before.cross(behind).norm(), before.dot(behind));
+  constexpr double kRounded = 0.15, kShortest = 0.3;  // parts of an arm
+  const Unfolded unfolded = unfold(way, list_turns(way, junctions));
+  const Centerline line = line_through(unfolded.points);
+  const double length = length_of(line);
+  arm = std::min(arm, length / 3.0);
+
+  std::size_t found = 0;
+  double least = kPi;
+  for (std::size_t k = 0; k < unfolded.points.size(); ++k) {
+    const double arc = line.arc_length(static_cast<Eigen::Index>(k));
+    const double shortest = unfolded.is_corner[k] ? kShortest * arm : arm;
+    if (std::min(arc, length - arc) < shortest) continue;
+    const double angle = corner_at(line, arc, 0.0, arm).angle;
+    if (angle >= least) continue;
+    least = angle;
+    found = k;
+  }
+  Corner sharpest;
+  if (least < kPi) {
+    sharpest = corner_at(line, line.arc_length(static_cast<Eigen::Index>(found)), kRounded * arm,
+                         (1.0 - kRounded) * arm);
+    sharpest.arc = unfolded.arc[found];
+    sharpest.point = point_at(way, sharpest.arc);
+  }
+  sharpest.arm = arm;
   return sharpest;
 }
 

@@ -33,18 +33,6 @@ Narrowest find_narrowest(const Centerline& way, double length);
 /// Length of the line over the distance between its ends; infinite where the line is closed.
 double tortuosity(const Centerline& way);
 
-struct Corner {
-  double angle = 0.0;         // between the arms, pi where the way is straight            [rad]
-  double arc = 0.0;           // of the corner                                             [mm]
-  Vec3 point = Vec3::Zero();  //                                                           [mm]
-  double arm = 0.0;           // length of both, along the way                             [mm]
-};
-
-/// Where the chords to the points `arm` before and behind make the smallest angle; the angle told
-/// is that between the arms without their first and last 15 %, since a middle line rounds corners.
-/// Of a circle of radius R that is pi - arm/R. The arm is at most a third of the way.
-Corner find_sharpest_bend(const Centerline& way, double arm = 20.0);
-
 /// Where another vessel leaves the way or the way leaves a vessel.
 struct Junction {
   int trunk = -1;             // branch of the tree that goes on ...
@@ -54,6 +42,7 @@ struct Junction {
   double arc = 0.0;           // of the ostium, along the way; of one passed its level     [mm]
   Vec3 point = Vec3::Zero();  // there                                                     [mm]
   double level = 0.0;         // how far along the trunk from the access the ostium is     [mm]
+  double radius = 0.0;        // of the branch's lumen in the ostium                       [mm]
   /// Unit vectors from the ostium: where the trunk goes on, and where the branch goes.
   Vec3 trunk_direction = Vec3::UnitZ(), branch_direction = Vec3::UnitX();
 };
@@ -70,8 +59,26 @@ double turn_of(const Junction& junction);
 /// between ostia are measured for stent grafts (Chassin-Trubert et al., J Endovasc Ther 2020, from
 /// centre to centre along the aorta), so that ostia which face each other have one. The trunk's
 /// direction is that of a chord of two of its diameters round the ostium, the branch's that of its
-/// first three radii, at least 6 mm. Expects a tree that starts where the way does, as find_tree()
-/// makes it.
+/// first three radii, at least 6 mm, without a sixth at either end: a line crosses the trunk at
+/// right angles, and settles in an oblique branch only beyond the ostium. Expects a tree that
+/// starts where the way does, as find_tree() makes it.
 std::vector<Junction> find_junctions(const simulate::Way& of);
+
+struct Corner {
+  double angle = kPi;         // between the arms, pi where the way is straight            [rad]
+  double arc = 0.0;           // of the corner                                             [mm]
+  Vec3 point = Vec3::Zero();  //                                                           [mm]
+  double arm = 0.0;           // length of both, along the way                             [mm]
+  Vec3 before = Vec3::UnitZ(), behind = Vec3::UnitZ();  // unit, of the arms, onward
+};
+
+/// Where the chords of the points `arm` before and behind make the smallest angle; the angle told
+/// is that between the arms without their first and last 15 %, since a middle line rounds corners.
+/// Of a circle of radius R that is pi - arm/R. The arm is at most a third of the way. The turn into
+/// a branch is one corner, at the level of its ostium: the arms begin where the line has not yet
+/// left the trunk's axis, a radius of the branch before that, and where it has settled in the
+/// branch.
+Corner find_sharpest_bend(const Centerline& way, const std::vector<Junction>& junctions = {},
+                          double arm = 20.0);
 
 }  // namespace wireplan::plan

@@ -92,7 +92,7 @@ TEST(Report, TellsAccessViewsAndLengthsOfTheTube) {
   EXPECT_TRUE(lengths.at("wires").at(0).at("long_enough"));
   const Json& arm = report.at("anatomy").at("c_arm");
   EXPECT_TRUE(arm.at("no_views").is_null());
-  EXPECT_TRUE(arm.at("bend").at("best").is_object());
+  EXPECT_TRUE(arm.at("bend").at("best").is_null()) << "a straight tube";
   expect_valid(report, folder.path());
   const std::string told = describe_anatomy(report.at("anatomy"));
   for (const char* part : {"way: 22 mm, tortuosity 1.0", "device of 9.00 mm: does not fit",
@@ -190,6 +190,12 @@ TEST(Report, StepsOfAScriptHaveTheViewOfThePlaceNextToTheTip) {
   EXPECT_EQ(steps[1].at("view"), "RAO 10, CRA 5");
   EXPECT_EQ(steps[2].at("at"), "ostium of left renal") << "200 mm in";
   EXPECT_EQ(steps[3].at("view"), "LAO 30, CRA 0");
+
+  Json straight = anatomy;
+  straight["c_arm"] = {{"ostia", Json::array()},
+                       {"bend", {{"at_mm", 40.0}, {"best", nullptr}, {"second", nullptr}}},
+                       {"no_views", nullptr}};
+  EXPECT_TRUE(step_views_json(candidate, trial, straight).at(0).at("at").is_null());
 }
 
 TEST(Report, ATargetWithoutARadiusIsTheVesselsCrossSection) {

@@ -51,7 +51,7 @@ TEST(Way, QuarterTorusHasTheTortuosityAndTheAngleOfItsCircle) {
   const Centerline way = quarter_torus();
   const double expected = kPi / (2.0 * std::sqrt(2.0));
   EXPECT_NEAR(tortuosity(way), expected, 1e-4);  // chords of half a degree are short by 3e-6
-  const Corner bend = find_sharpest_bend(way, 20.0);
+  const Corner bend = find_sharpest_bend(way, {}, 20.0);
   EXPECT_NEAR(bend.angle, kPi - 20.0 / 40.0, 0.01);
   EXPECT_DOUBLE_EQ(bend.arm, 20.0);
 }
@@ -228,7 +228,29 @@ TEST(Junctions, OstiaThatFaceEachOtherAreAtOneLevel) {
       EXPECT_NEAR(found[0].level, level, 0.5);  // a point of the line
       EXPECT_NEAR(found[1].level, level, 0.5);
       EXPECT_NEAR(found[1].arc, level + 10.0, 0.51);
+      EXPECT_NEAR(turn_of(found[1]) / kRadPerDeg, 90.0 - elevation, 0.1);
+      EXPECT_NEAR(turn_of(found[0]) / kRadPerDeg, 90.0 - elevation, 0.1);
     }
+  }
+}
+
+TEST(Junctions, TheBendOfAWayThatTurnsIntoABranchIsThatOfTheAxes) {
+  for (const double elevation : {30.0, 0.0, -40.0}) {
+    SCOPED_TRACE(elevation);
+    std::vector<Vec3> corners = into_branch(1.0, elevation * kRadPerDeg);
+    const Branch side{
+        .line = line_through(corners, 3.0), .parent = 0, .parent_arc = corners.front().z()};
+    corners.insert(corners.begin(), Vec3::Zero());
+    const Centerline way = line_through(corners, 3.0);
+    const auto found = find_junctions(
+        simulate::Way(way, {{.line = line_through({Vec3::Zero(), Vec3(0, 0, 200)}, 10.0)}, side}));
+    ASSERT_EQ(found.size(), 1u);
+    const Corner bend = find_sharpest_bend(way, found);
+    EXPECT_NEAR(bend.angle / kRadPerDeg, 90.0 + elevation, 0.1);
+    EXPECT_NEAR((bend.angle + turn_of(found[0])) / kRadPerDeg, 180.0, 0.1);
+    EXPECT_EQ(bend.arc, found[0].level);
+    EXPECT_NEAR(bend.before.z(), 1.0, 1e-6);
+    EXPECT_NEAR(bend.behind.z(), std::sin(elevation * kRadPerDeg), 1e-3);
   }
 }
 
