@@ -1,6 +1,7 @@
 #include "pipeline/files/labels_file.h"
 
 #include <algorithm>
+#include <array>
 #include <cctype>
 #include <cmath>
 #include <cstdlib>
@@ -146,6 +147,20 @@ std::optional<std::size_t> column_of(const std::vector<std::string>& heads,
   return {};
 }
 
+/// The first column whose head ends so, and is no figure of what the voxels hold.
+std::optional<std::size_t> column_that_ends(const std::vector<std::string>& heads,
+                                            const std::vector<const char*>& endings) {
+  constexpr std::array kFigures = {"mean", "max", "min", "std", "median", "volume", "hu", "count"};
+  for (std::size_t k = 0; k < heads.size(); ++k) {
+    const auto starts = [&](const char* word) { return heads[k].starts_with(word); };
+    if (std::any_of(kFigures.begin(), kFigures.end(), starts)) continue;
+    for (const char* ending : endings) {
+      if (heads[k].ends_with(ending)) return k;
+    }
+  }
+  return {};
+}
+
 /// Empty where the line heads no names, or not so that it is known.
 std::optional<TableColumns> columns_of(const std::vector<std::string>& cells,
                                        const fs::path& path) {
@@ -159,13 +174,17 @@ std::optional<TableColumns> columns_of(const std::vector<std::string>& cells,
   }
   const auto label = column_of(heads, {"label", "labels"});  // either
   auto name = column_of(
-      heads, {"name", "labelname", "segmentname", "structurename", "classname", "roiname",
-              "structure", "segment", "class", "region", "roi", "organ", "anatomy", "bezeichnung"});
+      heads, {"name",      "labelname",   "segmentname", "structurename", "classname", "roiname",
+              "structure", "segment",     "class",       "region",        "roi",       "organ",
+              "anatomy",   "bezeichnung", "description", "beschreibung",  "vessel",    "artery",
+              "tissue",    "title",       "text"});
+  if (!name) name = column_that_ends(heads, {"name"});
   auto value = column_of(heads, {"value", "labelvalue", "labelid", "labelindex", "labelnumber",
                                  "index", "idx", "integerlabel", "voxelvalue", "pixelvalue"});
   if (!value && name) value = label;
   if (!value)
     value = column_of(heads, {"id", "key", "code", "number", "no", "nr", "wert", "nummer"});
+  if (!value) value = column_that_ends(heads, {"id", "value", "index", "number", "nr"});
   if (!name) name = label;
   if (value && name) return TableColumns{*value, *name, cells.size()};
   if (!name) return {};
@@ -181,6 +200,12 @@ struct TableRow {
   std::string name;
 };
 
+/// A whole number as tables have it: "1.0" too.
+std::optional<int> cell_number(std::string cell) {
+  if (cell.ends_with(".0")) cell.resize(cell.size() - 2);
+  return whole_number(cell);
+}
+
 /// By columns. Without marks a name may have several words.
 TableRow row_by_columns(const std::vector<std::string>& cells, const TableColumns& columns,
                         bool marked) {
@@ -188,7 +213,7 @@ TableRow row_by_columns(const std::vector<std::string>& cells, const TableColumn
       marked || cells.size() < columns.count ? 0 : cells.size() - columns.count;
   const std::size_t value = columns.value + (columns.name < columns.value ? more : 0);
   if (std::max(value, columns.name + more) >= cells.size()) return {};
-  TableRow row{.value = whole_number(cells[value]), .name = cells[columns.name]};
+  TableRow row{.value = cell_number(cells[value]), .name = cells[columns.name]};
   for (std::size_t k = 1; k <= more; ++k) row.name += " " + cells[columns.name + k];
   return row;
 }
@@ -198,7 +223,7 @@ TableRow row_by_order(std::vector<std::string> cells, bool marked) {
   std::erase(cells, "");
   TableRow row;
   for (std::size_t k = 0; k < cells.size(); ++k) {
-    if (!row.value && (!marked || k < 2)) row.value = whole_number(cells[k]);
+    if (!row.value && (!marked || k < 2)) row.value = cell_number(cells[k]);
     if (is_number(cells[k])) {
       if (!row.name.empty()) break;
     } else if (row.name.empty() || !marked) {
@@ -235,6 +260,7 @@ std::map<int, std::string> table_of_lines(std::string text, const fs::path& path
       columns = columns_of(cells, path);
       continue;
     }
+    if (columns && row.value && row.name.empty()) continue;  // a value that has no name
     if (!row.value || row.name.empty()) {
       const std::string what = path.string() + ": line " + std::to_string(numbers[k]) +
                                " has no value and name; " + kTables;

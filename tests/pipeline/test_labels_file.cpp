@@ -31,6 +31,11 @@ TEST_F(LabelTable, IsReadFromEveryKindOfFile) {
       {"label.tsv", "index\tcolor\tlabel\n1\t9\taorta\n7\t9\trenal left\n"},
       {"label_name.csv", "label,name,id\n1,aorta,3\n7,renal left,4\n"},
       {"words.txt", "name r g b value\naorta 2 0 0 1\nrenal left 1 255 0 7\n"},
+      {"classes.csv", "class_id,class_name\n1,aorta\n7,renal left\n"},
+      {"rois.csv", "roi_id;organ\n1;aorta\n7;renal left\n"},
+      {"mask.csv", "segment,mask_value,mean_value\naorta,1,300\nrenal left,7,250\n"},
+      {"described.csv", "label,description\n1,aorta\n7,renal left\n"},
+      {"pandas.csv", "label,vessel\n1.0,aorta\n7.0,renal left\n9.0,\n"},
       {"two.csv", "Wert;Beschreibung\n1;aorta\n7;\"renal left\"\n"}};
   for (const auto& [name, text] : files) {
     SCOPED_TRACE(name);
