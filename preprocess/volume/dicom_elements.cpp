@@ -4,12 +4,14 @@
 #include <cmath>
 #include <cstdlib>
 #include <sstream>
+#include <string_view>
 #include <utility>
 
 namespace wireplan::preprocess {
 
 std::string without_padding(std::string text) {
-  while (!text.empty() && (text.back() == ' ' || text.back() == '\0')) text.pop_back();
+  const std::string_view padding(" \t\r\n\0", 5);
+  text.erase(text.find_last_not_of(padding) + 1);
   return text;
 }
 

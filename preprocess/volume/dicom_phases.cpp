@@ -62,6 +62,23 @@ std::vector<std::vector<std::size_t>> parts_of(const std::vector<std::string>& v
   return parts;
 }
 
+/// What the images tell under a name. One that tells nothing is of its neighbour's in the order.
+std::vector<std::string> values_of(const std::vector<const DicomPhase*>& images,
+                                   const std::vector<std::size_t>& order, const std::string& name) {
+  std::vector<std::string> values(images.size());
+  std::string last;
+  for (const std::size_t k : order) {  // the first that tells it, for those before
+    if (!images[k]->contains(name)) continue;
+    last = images[k]->at(name);
+    break;
+  }
+  for (const std::size_t k : order) {
+    if (images[k]->contains(name)) last = images[k]->at(name);
+    values[k] = last;
+  }
+  return values;
+}
+
 /// How often the value changes along the order.
 std::size_t count_changes(const std::vector<std::string>& values,
                           const std::vector<std::size_t>& order) {
@@ -126,10 +143,7 @@ std::string find_phases(
     for (const auto& [name, any] : all) {
       const Parting& parting = parting_of(name);
       if (parting.may_follow != may_follow) continue;
-      std::vector<std::string> values;
-      for (const DicomPhase* image : images) {
-        values.push_back(image->contains(name) ? image->at(name) : std::string());
-      }
+      const std::vector<std::string> values = values_of(images, order, name);
       const std::vector<std::vector<std::size_t>> parts = parts_of(values);
       if (parts.size() == 1 || parts.size() == images.size()) continue;
       if (may_follow && count_changes(values, order) == parts.size() - 1) continue;

@@ -180,6 +180,12 @@ bool is_scan(const std::string& sop_class, const std::string& modality) {
   return std::find(kScans.begin(), kScans.end(), sop_class.substr(images.size())) != kScans.end();
 }
 
+bool is_ct(const std::string& sop_class) {
+  constexpr std::array<std::string_view, 3> kClasses = {
+      "1.2.840.10008.5.1.4.1.1.2", "1.2.840.10008.5.1.4.1.1.2.1", "1.2.840.10008.5.1.4.1.1.2.2"};
+  return std::find(kClasses.begin(), kClasses.end(), sop_class) != kClasses.end();
+}
+
 /// Why decimals of a file are not read; empty where they are.
 std::string find_no_number(const Slice& slice, const std::vector<std::string>& patient) {
   const auto tell = [&](const NoNumber& wrong, const std::string& where) {
@@ -227,7 +233,9 @@ void read_elements(Slice& slice, const gdcm::DataSet& data) {
   const std::vector<std::string> patient = patient_of(data);
   slice.shown_number = without_date(without_identity(slice.series_number, patient));
   slice.description = without_identity(dicom_text(data, {0x08, 0x103e}), patient);
+  const std::string sop_class = dicom_text(data, {0x08, 0x16});
   slice.modality = dicom_text(data, {0x08, 0x60});
+  if (slice.modality.empty() && is_ct(sop_class)) slice.modality = "CT";
   slice.image = read_dicom_file(data);
   slice.localizer = slice.image.type.find("LOCALIZER") != std::string::npos;
   slice.frames = read_dicom_frames(data, slice.image);
@@ -239,7 +247,6 @@ void read_elements(Slice& slice, const gdcm::DataSet& data) {
   if (images > 1 || !slice.frames.empty()) slice.image.lacks.clear();
   slice.grid = told_grid(slice.image);
   slice.grid.size = {read_count<0x11>(data), read_count<0x10>(data), images};
-  const std::string sop_class = dicom_text(data, {0x08, 0x16});
   slice.refused = other_kind(slice, sop_class);
   slice.aside = !slice.refused.empty() || (images > 1 && !is_scan(sop_class, slice.modality));
   if (slice.refused.empty()) slice.refused = find_no_number(slice, patient);

@@ -110,14 +110,16 @@ std::string find_several(const Images& images, const std::vector<std::size_t>& o
 /// Why images are slabs that are much thicker than they are apart, as projections are; empty where
 /// they are not. Slices that overlap by half are usual, and scans of 5 mm are read.
 std::string find_slab(const Images& images, const Grid& grid) {
-  constexpr double kMost = 3.0, kThick = 5.0;  // of the spacing; [mm]; both chosen
+  // Of the spacing, which rounding may have made a little less; [mm]; both chosen
+  constexpr double kMost = 5.0 * 1.001, kThick = 5.0;
   for (std::size_t k = 0; k < images.count(); ++k) {
     const double thickness = images[k].thickness;
     const bool derived = images[k].type.starts_with("DERIVED");
     if (thickness <= kMost * grid.spacing[2] || (!derived && thickness <= kThick)) continue;
     return images.place_of(k) + "a slab of " + one_decimal(thickness) + " mm (" + kThickness.name +
            ") in images " + one_decimal(grid.spacing[2]) +
-           " mm apart, as projections (MIP) are, expected slices; give the series that it was made "
+           " mm apart, as thick averages and projections (MIP) are, expected slices; give the "
+           "series that it was made "
            "of";
   }
   return {};

@@ -195,6 +195,9 @@ TEST_F(DicomVolume, AcquisitionsOneBehindTheOtherAreOneVolume) {
     write_told(0x20, 0x12, "IS", [&](int k) { return std::to_string(9 - k / each); });
     expect_read();
   }
+  // The number may be empty: that is no other acquisition.
+  write_told(0x20, 0x12, "IS", [](int k) { return std::string(k % 3 == 1 ? "" : "7"); });
+  expect_read();
 }
 
 // ---- Places and decimals ------------------------------------------------------------------------
@@ -285,6 +288,14 @@ TEST_F(DicomVolume, ACtThatDoesNotTellItsScaleIsReadWhereItsValuesCanBeNothingBu
   expect_refused(
       {"3_0: a CT whose images lack Rescale Intercept (0028,1052) and Rescale Slope "
        "(0028,1053), and whose stored values are not seen to be HU"});
+  write_slices(  // its class says that it is a CT
+      [](const std::string& bytes, int) {
+        std::string less = with_element(bytes, 0x08, 0x60, "CS", std::nullopt);
+        less = with_element(less, 0x28, 0x1052, "DS", std::nullopt);
+        return with_element(less, 0x28, 0x1053, "DS", std::nullopt);
+      },
+      body(1024));
+  expect_refused({"3_0: a CT whose images lack Rescale Intercept"});
   write_without(true, true, -24, 1);
   EXPECT_EQ(read_image(folder_).values[0], -1024.0F);
   write_without(true, false, 1024, 1);
@@ -337,7 +348,7 @@ TEST_F(DicomVolume, ProjectionsAndThickSlabsAreRefusedAndOverlappingSlicesAreNot
       return with_element(with_element(bytes, 0x18, 0x50, "DS", thickness), 0x08, 0x08, "CS", type);
     });
   };
-  for (const char* thickness : {"1.5", "2", "3", "4.5", "1,5"}) {  // the last one is not needed
+  for (const char* thickness : {"1.5", "3", "4.5", "7.5", "1,5"}) {  // the last one is not needed
     for (const char* type : {"ORIGINAL\\PRIMARY\\AXIAL", "DERIVED\\SECONDARY\\MPR"}) {
       write_thick(thickness, type);
       expect_read();
