@@ -426,6 +426,15 @@ Eigen::Index nearest_index(const Centerline& line, const Vec3& p) {
   return best;
 }
 
+/// The way along a twig to the node that another begins at, and on along that; the other's own
+/// where there is none.
+std::vector<int> joined(const std::vector<int>& twig, const std::vector<int>& other) {
+  std::vector<int> nodes(twig.begin(), std::find(twig.begin(), twig.end(), other.front()));
+  if (nodes.size() == twig.size()) nodes.clear();
+  nodes.insert(nodes.end(), other.begin(), other.end());
+  return nodes;
+}
+
 /// Whether a branch runs in its parent's lumen all along: an edge of a lumen that is not round, as
 /// that of a dissected aorta, whose ridge ends aside.
 bool runs_in_parent(const Surface& surface, const Branch& branch, const Centerline& parent) {
@@ -456,10 +465,16 @@ std::vector<Branch> find_tree(const Surface& surface, const Vec3& root,
 
   std::vector<Branch> branches;
   std::vector<int> branch_of;  // of each twig; its parent's where it is none itself
-  for (const Twig& twig : find_twigs(search)) {
+  const std::vector<Twig> twigs = find_twigs(search);
+  std::vector<std::vector<int>> edges(twigs.size());  // nodes of twigs that are edges of a lumen
+  for (std::size_t t = 0; t < twigs.size(); ++t) {
+    const Twig& twig = twigs[t];
     const int parent = twig.parent < 0 ? -1 : branch_of[static_cast<std::size_t>(twig.parent)];
+    const std::vector<int> nodes =
+        twig.parent < 0 ? twig.nodes
+                        : joined(edges[static_cast<std::size_t>(twig.parent)], twig.nodes);
     Points line;
-    for (const int n : twig.nodes) line.push_back(search.at(static_cast<std::size_t>(n)).point);
+    for (const int n : nodes) line.push_back(search.at(static_cast<std::size_t>(n)).point);
     const Vec3 end = line.back();
     line = smooth(wall, resample(line, sample), sample, {.least = 2.0 * spacing});
     line = without_tip(wall, without_ends(wall, line));
@@ -495,6 +510,7 @@ std::vector<Branch> find_tree(const Surface& surface, const Vec3& root,
     if (parent >= 0 &&
         runs_in_parent(surface, branch, branches[static_cast<std::size_t>(parent)].line)) {
       branch_of.push_back(parent);
+      edges[t] = nodes;
       continue;
     }
     branch_of.push_back(static_cast<int>(branches.size()));

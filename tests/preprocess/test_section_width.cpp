@@ -93,7 +93,8 @@ TEST(SharesSection, IsOfOneLumenNotOfTwoSideBySide) {
 }
 
 /// As in a dissected aorta: a flat lumen, half a ring round an axis along z from 0 to 90 mm, 5 mm
-/// thick; with a side branch of 2.5 mm that leaves its middle forward at 45 mm.
+/// thick; with side branches of 2.5 mm that leave its middle forward at 45 mm and its edge at 60
+/// mm.
 double depth_in_crescent(const Vec3& p) {
   constexpr double kRing = 11.0, kHalf = 2.5;
   const double around = std::atan2(p.x(), -p.y());  // 0 in the middle, which lies toward -y
@@ -101,14 +102,15 @@ double depth_in_crescent(const Vec3& p) {
   const Vec3 spine(kRing * std::sin(edge), -kRing * std::cos(edge),
                    std::clamp(p.z(), kHalf, 90.0 - kHalf));
   const double lumen = kHalf - (p - spine).norm();
-  return std::max(lumen, shapes::depth_in_tube(p, {0.0, -kRing, 45.0}, {0.0, -40.0, 45.0}, 2.5));
+  return std::max({lumen, shapes::depth_in_tube(p, {0.0, -kRing, 45.0}, {0.0, -40.0, 45.0}, 2.5),
+                   shapes::depth_in_tube(p, {kRing, -2.0, 60.0}, {40.0, -2.0, 60.0}, 2.5)});
 }
 
 Vec3 last_point(const Centerline& line) { return line.points.col(line.points.cols() - 1); }
 
 TEST(CenterlineTree, EdgesOfACrescentAreNoBranches) {
   const Surface crescent =
-      shapes::level_set(depth_in_crescent, {-18.0, -45.0, -4.0}, {18.0, 8.0, 94.0}, 1.0);
+      shapes::level_set(depth_in_crescent, {-18.0, -45.0, -4.0}, {44.0, 8.0, 94.0}, 1.0);
   const std::vector<Branch> tree = find_tree(crescent, {0.0, -11.0, 6.0});
   // Up the lumen and down to its other end, and the branch; no edge along the way.
   const auto ends_at = [&](const Vec3& place, double within) {
@@ -116,10 +118,14 @@ TEST(CenterlineTree, EdgesOfACrescentAreNoBranches) {
       return (last_point(branch.line) - place).norm() < within;
     });
   };
-  EXPECT_EQ(ends_at({0.0, -40.0, 45.0}, 3.0), 1) << "the side branch";
+  EXPECT_EQ(ends_at({0.0, -40.0, 45.0}, 3.0), 1) << "the side branch of the middle";
+  EXPECT_EQ(ends_at({40.0, -2.0, 60.0}, 3.0), 1) << "that of the edge";
   for (const Branch& branch : tree) {
+    for (const auto& p : branch.line.points.colwise()) {
+      ASSERT_GT(depth_in_crescent(p), 0.0) << "no line leaves the lumen";
+    }
     const Vec3 end = last_point(branch.line);
-    const bool aside = end.y() > -20.0 && end.z() > 15.0 && end.z() < 70.0;
+    const bool aside = end.y() > -20.0 && end.x() < 15.0 && end.z() > 15.0 && end.z() < 70.0;
     EXPECT_FALSE(aside) << end.transpose();
   }
 }
