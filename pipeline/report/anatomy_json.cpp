@@ -238,7 +238,7 @@ std::string describe_anatomy(const Json& figures) {
   const Json& bend = access.at("sharpest_bend");
   const Json& tortuosity = access.at("tortuosity");
   std::string text = "way: " + number(figures.at("lengths").at("way_mm"), "%.0f mm") +
-                     ", tortuosity " + number(tortuosity.at("index"), "%.2f (") +
+                     ", tortuosity " + number(tortuosity.at("index"), "%.2f") + " (" +
                      tortuosity.at("grade").get<std::string>() + "), sharpest bend " +
                      number(bend.at("angle_deg"), "%.0f deg") +
                      number(bend.at("at_mm"), ", %.0f mm in") +

@@ -10,16 +10,28 @@ namespace {
 
 using preprocess::Branch;
 
-constexpr double kWiderVessel = 2.0;   // than the one that a place is in: assumed
+constexpr double kWiderVessel = 1.5;   // than the one that leaves it: assumed
+constexpr double kMouth = 8.0;         // of a vessel, where both are one ...            [mm]
+constexpr double kBeyondMouth = 20.0;  // ... and beyond it, where it has its own width  [mm]
 constexpr double kLeastTrunk = 100.0;  // of an aorta, for a direction                     [mm]
 
 /// Where the vessel begins that a line is in at an arc length: behind the last place before that is
-/// twice as wide [mm].
+/// half as wide again as the line beyond its mouth, and as at that place [mm]. A taper is no step.
 double own_vessel_from(const Centerline& line, double arc) {
-  Eigen::Index k = line.arc_length.size() - 1;
+  const Eigen::Index count = line.arc_length.size();
+  Eigen::Index k = count - 1;
   while (k > 0 && line.arc_length(k) > arc) --k;
-  const double radius = line.radius(k);
-  while (k > 0 && line.radius(k - 1) < kWiderVessel * radius) --k;
+  const double here = line.radius(k);
+  const auto leaves_wider = [&](Eigen::Index at) {
+    double beyond = 0.0;
+    for (Eigen::Index i = at; i < count; ++i) {
+      const double ahead = line.arc_length(i) - line.arc_length(at);
+      if (ahead > kBeyondMouth) break;
+      if (ahead >= kMouth) beyond = std::max(beyond, line.radius(i));
+    }
+    return beyond > 0.0 && line.radius(at) >= kWiderVessel * std::max(beyond, here);
+  };
+  while (k > 0 && !leaves_wider(k - 1)) --k;
   return line.arc_length(k);
 }
 

@@ -349,6 +349,25 @@ TEST(BranchNames, OfALineThatRunsThroughTheAortaAreOfItsEndAlone) {
   EXPECT_EQ(up.name_at(line.points.rightCols<1>()), "right renal (branch 1)");
 }
 
+TEST(BranchNames, ATaperAndAStenosisBeginNoOtherVessel) {
+  // Out of an aorta of 10 mm at 110 mm, from 5.2 to 2.2 mm at its end, narrowed over 6 mm.
+  Branch first{.line = right_renal_way(3.0)};
+  Centerline& line = first.line;
+  for (Eigen::Index k = 0; k < line.radius.size(); ++k) {
+    const double beyond = line.arc_length(k) - 110.0;
+    if (beyond >= 0.0) line.radius(k) = 5.2 - 3.0 * beyond / 40.0;
+    if (std::abs(beyond - 25.0) < 3.0) line.radius(k) = 0.9;
+  }
+  for (const double at : {120.0, 135.0, 149.0}) {  // the second in the stenosis
+    std::vector<Branch> tree = {first};
+    name_branches(tree, {"renal", point_at(line, at)}, {}, {});
+    EXPECT_NEAR(tree[0].end_from, 110.0, 1.0) << at;
+  }
+  std::vector<Branch> tree = {first};
+  name_branches(tree, {"aorta", point_at(line, 60.0)}, {}, {});
+  EXPECT_EQ(tree[0].end_from, 0.0) << "named whole, by a place in the aorta";
+}
+
 TEST(TrunkAxis, IsThatOfTheWideVessels) {
   const auto aorta = [](const Vec3& end) {
     return std::vector<Branch>{{.line = line_through({Vec3::Zero(), end}, 10.0)},
