@@ -92,6 +92,7 @@ double mean_radius(const Centerline& line, double from, double length) {
 
 std::optional<Ostium> find_ostium(const simulate::Goal& goal) {
   constexpr double kBefore = 15.0, kInto = 10.0;  // that diameters are taken over           [mm]
+  constexpr double kWayIn = 6.0, kStub = 1.0;     // at least; shorter has no direction      [mm]
   if (!goal.way) return {};
   const Centerline& path = goal.way->path();
   std::optional<Ostium> last;
@@ -102,7 +103,11 @@ std::optional<Ostium> find_ostium(const simulate::Goal& goal) {
     here.arc = junction.arc;
     here.point = junction.point;
     here.trunk = junction.trunk_direction;
-    here.branch = junction.branch_direction;
+    // Where a wire is led to: from the ostium on, with what the line still sways there.
+    const double into = std::min(junction.arc + std::max(kWayIn, 3.0 * junction.radius), end);
+    here.branch = into - junction.arc < kStub
+                      ? junction.branch_direction
+                      : (point_at(path, into) - junction.point).normalized();
     const Eigen::Index before = find_part(path, junction.arc).before;
     here.trunk_diameter = 2.0 * widest_before(path, before, kBefore);
     here.narrowest = 2.0 * path.radius.head(before + 1).minCoeff();
