@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cctype>
-#include <filesystem>
 #include <set>
 #include <string_view>
 #include <utility>
@@ -26,9 +25,7 @@ std::string read_section_name(JsonReader& reader, std::set<std::string>& taken) 
                           "letters, digits, spaces, '-', '_' and '.', starting with a letter or "
                           "digit",
                           "folders are named after it");
-  } else if (std::filesystem::path(name).extension() == ".json" ||
-             std::filesystem::path(name).extension() == ".html" ||
-             std::filesystem::path(name).extension() == ".csv") {
+  } else if (name.ends_with(".json") || name.ends_with(".html") || name.ends_with(".csv")) {
     reader.problems().add(reader.path_of("name"), "\"" + name + "\"",
                           "a name that does not end in .json, .html or .csv",
                           "files of the answer beside its folder are called so");
