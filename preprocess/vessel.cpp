@@ -16,6 +16,14 @@ Vec3 twice_area(const std::array<Vec3, 3>& p) { return (p[1] - p[0]).cross(p[2] 
 
 }  // namespace
 
+Eigen::VectorXd arc_length_of(const Eigen::Matrix3Xd& points) {
+  Eigen::VectorXd arc = Eigen::VectorXd::Zero(points.cols());
+  for (Eigen::Index k = 1; k < points.cols(); ++k) {
+    arc[k] = arc[k - 1] + (points.col(k) - points.col(k - 1)).norm();
+  }
+  return arc;
+}
+
 Vec3 unit_normal(const Surface& surface, Eigen::Index k) {
   return twice_area(corners_of(surface, k)).normalized();
 }

@@ -21,6 +21,9 @@ struct Centerline {
   Eigen::VectorXd arc_length;  // (p)    counted from the access site                     [mm]
 };
 
+/// (p) arc length of each point of a line (3, p), counted from its first.                  [mm]
+Eigen::VectorXd arc_length_of(const Eigen::Matrix3Xd& points);
+
 /// The wall as paper section 1.5 extrudes it: tetrahedron k is triangle k of the surface and apex
 /// k, which is fixed. `height` is the extrusion per triangle, smaller than the asked thickness
 /// where an apex would come too near another part of the wall.

@@ -14,6 +14,23 @@
 
 namespace wireplan::shapes {
 
+/// A line through corners [mm], with a point every half millimetre or somewhat less.
+inline Centerline line_through(const std::vector<Vec3>& corners, double radius) {
+  std::vector<Vec3> points = {corners.front()};
+  for (std::size_t k = 1; k < corners.size(); ++k) {
+    const Vec3 edge = corners[k] - corners[k - 1];
+    const int parts = static_cast<int>(std::ceil(edge.norm() / 0.5));
+    for (int i = 1; i <= parts; ++i) points.push_back(corners[k - 1] + edge * i / parts);
+  }
+  const auto count = static_cast<Eigen::Index>(points.size());
+  Centerline line{Eigen::Matrix3Xd(3, count), Eigen::VectorXd::Constant(count, radius), {}};
+  for (Eigen::Index k = 0; k < count; ++k) {
+    line.points.col(k) = points[static_cast<std::size_t>(k)];
+  }
+  line.arc_length = arc_length_of(line.points);
+  return line;
+}
+
 /// A circle of vertices: center + radius (cos a u + sin a v) at `sides` even angles from `phase`.
 struct Ring {
   Vec3 center = Vec3::Zero(), u = Vec3::UnitX(), v = Vec3::UnitY();  // mm; unit vectors

@@ -18,10 +18,7 @@ Centerline carried(const Centerline& line, const simulate::SectionChain& chain,
                    const Eigen::Matrix3Xd& u) {
   Centerline moved = line;
   moved.points = chain.carried(line.points, u);
-  for (Eigen::Index k = 1; k < line.points.cols(); ++k) {
-    moved.arc_length[k] =
-        moved.arc_length[k - 1] + (moved.points.col(k) - moved.points.col(k - 1)).norm();
-  }
+  moved.arc_length = arc_length_of(moved.points);
   return moved;
 }
 

@@ -162,15 +162,11 @@ Unfolded unfold(const Centerline& way, const std::vector<Turn>& turns) {
 /// Without radii.
 Centerline line_through(const std::vector<Vec3>& points) {
   const auto count = static_cast<Eigen::Index>(points.size());
-  Centerline line{.points = Eigen::Matrix3Xd(3, count),
-                  .radius = {},
-                  .arc_length = Eigen::VectorXd::Zero(count)};
+  Centerline line{.points = Eigen::Matrix3Xd(3, count), .radius = {}, .arc_length = {}};
   for (Eigen::Index k = 0; k < count; ++k) {
     line.points.col(k) = points[static_cast<std::size_t>(k)];
-    if (k == 0) continue;
-    line.arc_length(k) =
-        line.arc_length(k - 1) + (line.points.col(k) - line.points.col(k - 1)).norm();
   }
+  line.arc_length = arc_length_of(line.points);
   return line;
 }
 

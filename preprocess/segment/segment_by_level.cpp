@@ -143,17 +143,14 @@ Centerline line_along(const Grid& grid, const std::vector<float>& depth,
   for (const WayLevel& place : way) points.push_back(center_of(grid, place.voxel));
   points = smooth_line(std::move(points));
   const auto count = static_cast<Eigen::Index>(points.size());
-  Centerline line{.points = Eigen::Matrix3Xd(3, count),
-                  .radius = Eigen::VectorXd(count),
-                  .arc_length = Eigen::VectorXd::Zero(count)};
+  Centerline line{
+      .points = Eigen::Matrix3Xd(3, count), .radius = Eigen::VectorXd(count), .arc_length = {}};
   for (Eigen::Index k = 0; k < count; ++k) {
     const auto place = static_cast<std::size_t>(k);
     line.points.col(k) = points[place];
     line.radius(k) = static_cast<double>(depth[way[place].voxel]);
-    if (k > 0) {
-      line.arc_length(k) = line.arc_length(k - 1) + (points[place] - points[place - 1]).norm();
-    }
   }
+  line.arc_length = arc_length_of(line.points);
   return line;
 }
 

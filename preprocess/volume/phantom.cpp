@@ -298,10 +298,8 @@ Centerline move_line(const PhantomSpec& spec, Centerline line) {
   if (!spec.breath) return line;
   for (Eigen::Index i = 0; i < line.points.cols(); ++i) {
     line.points.col(i) = moved_by_breath(spec, line.points.col(i));
-    if (i == 0) continue;
-    line.arc_length(i) =
-        line.arc_length(i - 1) + (line.points.col(i) - line.points.col(i - 1)).norm();
   }
+  line.arc_length = arc_length_of(line.points);
   return line;
 }
 

@@ -50,7 +50,7 @@ Centerline trace(const Eigen::Matrix3Xd& points, const Eigen::VectorXd& values) 
   // Fine samples with their arc length.
   constexpr Eigen::Index kSamples = 100;  // per span
   const Eigen::Index count = (controls - 1) * kSamples + 1;
-  Centerline fine{Eigen::Matrix3Xd(3, count), Eigen::VectorXd(count), Eigen::VectorXd(count)};
+  Centerline fine{Eigen::Matrix3Xd(3, count), Eigen::VectorXd(count), {}};
   for (Eigen::Index i = 0; i < count; ++i) {
     const Eigen::Index span = std::min(i / kSamples, controls - 2);
     const double u = static_cast<double>(i - span * kSamples) / static_cast<double>(kSamples);
@@ -58,10 +58,8 @@ Centerline trace(const Eigen::Matrix3Xd& points, const Eigen::VectorXd& values) 
     fine.points.col(i) = catmull_rom(polygon.col(span), polygon.col(span + 1),
                                      polygon.col(span + 2), polygon.col(span + 3), u);
     fine.radius(i) = (1.0 - u) * values(span) + u * values(span + 1);
-    fine.arc_length(i) =
-        i == 0 ? 0.0
-               : fine.arc_length(i - 1) + (fine.points.col(i) - fine.points.col(i - 1)).norm();
   }
+  fine.arc_length = arc_length_of(fine.points);
   return resample(fine, 0.5);
 }
 

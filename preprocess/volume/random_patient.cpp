@@ -78,14 +78,12 @@ Centerline join_axes(const std::vector<Centerline>& axes, Eigen::Index from, Eig
     begin = next;
   }
   const auto count = static_cast<Eigen::Index>(points.size());
-  Centerline line{Eigen::Matrix3Xd(3, count), Eigen::VectorXd(count), Eigen::VectorXd(count)};
+  Centerline line{Eigen::Matrix3Xd(3, count), Eigen::VectorXd(count), {}};
   for (Eigen::Index i = 0; i < count; ++i) {
     line.points.col(i) = points[static_cast<std::size_t>(i)];
     line.radius(i) = radius[static_cast<std::size_t>(i)];
-    line.arc_length(i) =
-        i == 0 ? 0.0
-               : line.arc_length(i - 1) + (line.points.col(i) - line.points.col(i - 1)).norm();
   }
+  line.arc_length = arc_length_of(line.points);
   return line;
 }
 

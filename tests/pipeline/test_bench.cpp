@@ -14,11 +14,13 @@
 #include "preprocess/surface/surface_repair.h"
 #include "preprocess/volume/image.h"
 #include "tests/pipeline/small_case.h"
+#include "tests/shapes.h"
 
 namespace wireplan::pipeline {
 namespace {
 
 namespace fs = std::filesystem;
+using shapes::line_through;
 
 /// A bench in its quick size, and what it said.
 struct QuickRun {
@@ -344,28 +346,6 @@ TEST(Bench, MeasuredWiresThatAreNotThereAreToldAndMistakesInThem) {
   EXPECT_FALSE(fs::exists(folder / "measured.json"));
   if (before != nullptr) ::setenv("WIREPLAN_DATA", kept.c_str(), 1);
   if (before == nullptr) ::unsetenv("WIREPLAN_DATA");
-}
-
-Centerline line_through(const std::vector<Vec3>& corners, double radius) {
-  std::vector<Vec3> points;
-  for (std::size_t k = 0; k + 1 < corners.size(); ++k) {
-    const double length = (corners[k + 1] - corners[k]).norm();
-    for (double s = 0.0; s < length; s += 0.5) {
-      points.emplace_back(corners[k] + s / length * (corners[k + 1] - corners[k]));
-    }
-  }
-  points.push_back(corners.back());
-  const auto count = static_cast<Eigen::Index>(points.size());
-  Centerline line{Eigen::Matrix3Xd(3, count), Eigen::VectorXd::Constant(count, radius),
-                  Eigen::VectorXd::Zero(count)};
-  for (Eigen::Index i = 0; i < count; ++i) {
-    line.points.col(i) = points[static_cast<std::size_t>(i)];
-    if (i > 0) {
-      line.arc_length(i) =
-          line.arc_length(i - 1) + (line.points.col(i) - line.points.col(i - 1)).norm();
-    }
-  }
-  return line;
 }
 
 TEST(Bench, AWayIsRightThatKeepsToTheTrueOneAndSkipsNothingOfIt) {

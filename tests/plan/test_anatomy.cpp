@@ -9,33 +9,14 @@
 #include "plan/anatomy/branch_names.h"
 #include "plan/anatomy/passage.h"
 #include "plan/anatomy/projection.h"
+#include "tests/shapes.h"
 
 namespace wireplan::plan {
 namespace {
 
 using preprocess::Branch;
+using shapes::line_through;
 constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
-
-/// Through the corners, a point every half millimetre.
-Centerline line_through(const std::vector<Vec3>& corners, double radius) {
-  std::vector<Vec3> points = {corners.front()};
-  for (std::size_t k = 1; k < corners.size(); ++k) {
-    const Vec3 step = corners[k] - corners[k - 1];
-    const int parts = static_cast<int>(std::ceil(step.norm() / 0.5));
-    for (int i = 1; i <= parts; ++i) points.push_back(corners[k - 1] + step * i / parts);
-  }
-  const auto count = static_cast<Eigen::Index>(points.size());
-  Centerline line{.points = Eigen::Matrix3Xd(3, count),
-                  .radius = Eigen::VectorXd::Constant(count, radius),
-                  .arc_length = Eigen::VectorXd::Zero(count)};
-  for (Eigen::Index k = 0; k < count; ++k) {
-    line.points.col(k) = points[static_cast<std::size_t>(k)];
-    if (k == 0) continue;
-    line.arc_length(k) =
-        line.arc_length(k - 1) + (line.points.col(k) - line.points.col(k - 1)).norm();
-  }
-  return line;
-}
 
 /// A quarter of a circle of radius 40 mm.
 Centerline quarter_torus() {

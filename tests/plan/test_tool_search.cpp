@@ -254,25 +254,9 @@ const simulate::VesselModel& aorta() {
 }
 
 Centerline line_through(const std::vector<Vec3>& corners) {
-  std::vector<Vec3> points;
-  for (std::size_t k = 0; k + 1 < corners.size(); ++k) {
-    const Vec3 whole = corners[k + 1] - corners[k];
-    const int count = static_cast<int>(whole.norm());
-    for (int i = 0; i < count; ++i) points.push_back(corners[k] + whole * i / count);
-  }
-  points.push_back(corners.back());
-  Centerline line;
-  const Eigen::Index n = std::ssize(points);
-  line.points.resize(3, n);
-  line.radius.resize(n);
-  line.arc_length = Eigen::VectorXd::Zero(n);
-  for (Eigen::Index i = 0; i < n; ++i) {
-    line.points.col(i) = points[static_cast<std::size_t>(i)];
-    line.radius[i] = std::abs(line.points(0, i)) > kAorta - 1.0 ? kRenal : kAorta;
-    if (i > 0) {
-      line.arc_length[i] =
-          line.arc_length[i - 1] + (line.points.col(i) - line.points.col(i - 1)).norm();
-    }
+  Centerline line = shapes::line_through(corners, kAorta);
+  for (Eigen::Index i = 0; i < line.points.cols(); ++i) {
+    if (std::abs(line.points(0, i)) > kAorta - 1.0) line.radius[i] = kRenal;
   }
   return line;
 }

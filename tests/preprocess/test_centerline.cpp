@@ -48,17 +48,13 @@ PathPlace place_among_all(const Vec3& p, const Centerline& path) {
 // Along a path that comes back near itself, thin and wide in turns, with a point twice.
 TEST(PathPlace, IsThatOfASearchThroughAllSegments) {
   constexpr int kPoints = 300;
-  Centerline path{Eigen::Matrix3Xd(3, kPoints), Eigen::VectorXd(kPoints),
-                  Eigen::VectorXd::Zero(kPoints)};
+  Centerline path{Eigen::Matrix3Xd(3, kPoints), Eigen::VectorXd(kPoints), {}};
   for (int k = 0; k < kPoints; ++k) {
     const double s = 0.05 * (k == 150 ? 149 : k);
     path.points.col(k) = Vec3(40.0 * std::cos(s), 40.0 * std::sin(s), 3.0 * s);
     path.radius[k] = k % 40 < 3 ? 25.0 : 4.0 + 3.0 * std::sin(9.0 * s);
-    if (k > 0) {
-      path.arc_length[k] =
-          path.arc_length[k - 1] + (path.points.col(k) - path.points.col(k - 1)).norm();
-    }
   }
+  path.arc_length = arc_length_of(path.points);
   std::mt19937 random(7);
   std::uniform_real_distribution<double> side(-90.0, 90.0);
   for (int trial = 0; trial < 3000; ++trial) {

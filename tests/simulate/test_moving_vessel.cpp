@@ -31,16 +31,12 @@ Wave wave_along(double length, double step, double radius,
   const int points = static_cast<int>(std::lround(length / step)) + 1;
   Wave wave;
   wave.axis.resize(3, points);
-  wave.line.arc_length.setZero(points);
   wave.line.radius.setConstant(points, radius);
   for (int k = 0; k < points; ++k) {
     const double x = length * k / (points - 1);
     wave.axis.col(k) << x, side(x), 0.0;
-    if (k > 0) {
-      wave.line.arc_length[k] =
-          wave.line.arc_length[k - 1] + (wave.axis.col(k) - wave.axis.col(k - 1)).norm();
-    }
   }
+  wave.line.arc_length = arc_length_of(wave.axis);
   wave.line.points = wave.axis;
   return wave;
 }

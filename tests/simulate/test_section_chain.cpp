@@ -22,14 +22,10 @@ Centerline line_of(const std::function<Vec3(double)>& place, double length, doub
   Centerline line;
   line.points.resize(3, points);
   line.radius.setConstant(points, radius);
-  line.arc_length.setZero(points);
   for (int k = 0; k < points; ++k) {
     line.points.col(k) = place(length * k / (points - 1));
-    if (k > 0) {
-      line.arc_length[k] =
-          line.arc_length[k - 1] + (line.points.col(k) - line.points.col(k - 1)).norm();
-    }
   }
+  line.arc_length = arc_length_of(line.points);
   return line;
 }
 

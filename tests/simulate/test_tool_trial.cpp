@@ -86,11 +86,7 @@ TEST(ToolTrial, TheWireOfACatheterThatStaysOutsideGoesAsTheWireAlone) {
   path.points = shapes::bend_axis(40.0, 0.5 * kPi, 40.0, 60.0, 0.5);
   const Eigen::Index n = path.points.cols();
   path.radius = Eigen::VectorXd::Constant(n, 4.0);
-  path.arc_length = Eigen::VectorXd::Zero(n);
-  for (Eigen::Index i = 1; i < n; ++i) {
-    path.arc_length[i] =
-        path.arc_length[i - 1] + (path.points.col(i) - path.points.col(i - 1)).norm();
-  }
+  path.arc_length = arc_length_of(path.points);
   Eigen::Index last = 0;
   while (path.arc_length[last] < 140.0) ++last;
   path.points = path.points.leftCols(last).eval();

@@ -124,11 +124,7 @@ std::unique_ptr<const SectionChain> sections_of_the_bend(double support) {
   Centerline line;
   line.points = shapes::bend_axis(40.0, 0.5 * kPi, 40.0, 60.0, 1.0);
   line.radius.setConstant(line.points.cols(), 4.0);
-  line.arc_length.setZero(line.points.cols());
-  for (Eigen::Index k = 1; k < line.points.cols(); ++k) {
-    line.arc_length[k] =
-        line.arc_length[k - 1] + (line.points.col(k) - line.points.col(k - 1)).norm();
-  }
+  line.arc_length = arc_length_of(line.points);
   return std::make_unique<SectionChain>(
       std::vector<preprocess::Branch>{{.line = line}},
       SectionChainOptions{.support = support, .young_modulus = 0.3, .spacing = 8.0});

@@ -15,28 +15,7 @@ namespace wireplan::simulate {
 namespace {
 
 using preprocess::Branch;
-
-/// A line through points [mm] with samples every half millimetre.
-Centerline line_through(const std::vector<Vec3>& corners, double radius) {
-  std::vector<Vec3> points;
-  for (std::size_t k = 0; k + 1 < corners.size(); ++k) {
-    const Vec3 edge = corners[k + 1] - corners[k];
-    const int steps = static_cast<int>(std::lround(edge.norm() / 0.5));
-    for (int i = 0; i < steps; ++i) points.push_back(corners[k] + edge * i / steps);
-  }
-  points.push_back(corners.back());
-  const auto n = static_cast<Eigen::Index>(points.size());
-  Centerline line{Eigen::Matrix3Xd(3, n), Eigen::VectorXd::Constant(n, radius),
-                  Eigen::VectorXd::Zero(n)};
-  for (Eigen::Index i = 0; i < n; ++i) {
-    line.points.col(i) = points[static_cast<std::size_t>(i)];
-    if (i > 0) {
-      line.arc_length(i) =
-          line.arc_length(i - 1) + (line.points.col(i) - line.points.col(i - 1)).norm();
-    }
-  }
-  return line;
-}
+using shapes::line_through;
 
 Goal goal_of(Centerline path, std::vector<Branch> tree = {}) {
   const auto way = std::make_shared<Way>(std::move(path), std::move(tree));
