@@ -464,9 +464,9 @@ void ToolTrial::check_place() {
   }
   best_distance_ = to_goal;
   const Eigen::Matrix3Xd nodes = bench_.at_rest(bench_.state().x);
-  if (goal_.at_section && goal_.way->may_have_arrived(here) &&
-      goal_.way->find_arrival(nodes, vessel_.lumen)) {
-    const std::optional<std::string> detour = goal_.way->find_detour(nodes);
+  const bool near = goal_.at_section && goal_.way->may_have_arrived(here);
+  if (const auto before = near ? goal_.way->find_arrival(nodes, vessel_.lumen) : std::nullopt) {
+    const std::optional<std::string> detour = goal_.way->find_detour(nodes.leftCols(*before + 1));
     if (detour) {
       return end(Outcome::kAnotherWay,
                  "the tip passes the target" + after +

@@ -227,8 +227,8 @@ void Trial::check_place(std::size_t goal) {
   }
   if (own.at_section && own.way->may_have_arrived(tip_at_rest())) {
     const Eigen::Matrix3Xd wire = insertion_.free_nodes_at_rest();
-    if (own.way->find_arrival(wire, vessel_.lumen)) {
-      const std::optional<std::string> detour = own.way->find_detour(wire);
+    if (const auto before = own.way->find_arrival(wire, vessel_.lumen)) {
+      const std::optional<std::string> detour = own.way->find_detour(wire.leftCols(*before + 1));
       if (!detour) return end(goal, Outcome::kReached, reached_reason(goal));
       return end(goal, Outcome::kAnotherWay,
                  "the tip passes the target" + after +

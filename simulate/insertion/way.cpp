@@ -99,8 +99,8 @@ bool Way::may_have_arrived(const Vec3& tip) const {
   return (tip - section_.center).norm() <= reach;
 }
 
-std::optional<Vec3> Way::find_arrival(const Eigen::Ref<const Eigen::Matrix3Xd>& wire,
-                                      const Lumen& lumen) const {
+std::optional<Eigen::Index> Way::find_arrival(const Eigen::Ref<const Eigen::Matrix3Xd>& wire,
+                                              const Lumen& lumen) const {
   const auto height = [&](Eigen::Index i) {
     return section_.normal.dot(wire.col(i) - section_.center);
   };
@@ -112,7 +112,7 @@ std::optional<Vec3> Way::find_arrival(const Eigen::Ref<const Eigen::Matrix3Xd>& 
       const Vec3 pierced = wire.col(i) - to / (to - from) * edge;
       if ((pierced - section_.center).norm() <= kSectionReach * section_.radius &&
           sees(lumen, section_.center, pierced)) {
-        return pierced;
+        return i - 1;
       }
     }
     walked += edge.norm();

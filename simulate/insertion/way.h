@@ -45,15 +45,15 @@ class Way {
   /// Whether a tip is near enough to the cross-section for find_arrival() to find one.
   bool may_have_arrived(const Vec3& tip) const;
 
-  /// Where the wire, nodes (3, n) that end with the tip, passes the cross-section onward, inside
-  /// the lumen round its middle: in a straight line from there no wall is between. The last 20 mm
-  /// are looked at.
-  std::optional<Vec3> find_arrival(const Eigen::Ref<const Eigen::Matrix3Xd>& wire,
-                                   const Lumen& lumen) const;
+  /// The last node before the cross-section, of a wire, nodes (3, n) that end with the tip, which
+  /// passes it onward, inside the lumen round its middle: in a straight line from there no wall is
+  /// between. The last 20 mm are looked at.
+  std::optional<Eigen::Index> find_arrival(const Eigen::Ref<const Eigen::Matrix3Xd>& wire,
+                                           const Lumen& lumen) const;
 
-  /// Why a wire did not come along the way, if so: part of it lies outside of the way's lumen by
-  /// more than the way's radius there (5 mm at least), or runs back along it by more than four
-  /// radii (20 mm at least).
+  /// Why a wire, as far as it is to lie on the way, did not come along it, if so: part of it lies
+  /// outside of the way's lumen by more than the way's radius there (5 mm at least), or runs back
+  /// along it by more than four radii (20 mm at least).
   std::optional<std::string> find_detour(const Eigen::Ref<const Eigen::Matrix3Xd>& wire) const;
 
   /// Where a tip is that is not on the way; empty for one that is. Half a radius beside the way's

@@ -93,6 +93,17 @@ TEST(Way, EveryWireThatPassesTheSectionOfATubeReachesWhereverItRuns) {
   }
 }
 
+TEST(Way, APushFarPastTheSectionReaches) {
+  const VesselModel tube(shapes::straight_tube(6.0, 80.0, 2.0));
+  const Goal goal = goal_of(line_through({{0.0, 0.0, 5.0}, {0.0, 0.0, 60.0}}, 6.0));
+  const Introducer along{.point = Vec3(0.0, 0.0, 5.0), .direction = Vec3::UnitZ()};
+  InsertionOptions far = options(2.0);
+  far.step = 18.0;
+  const TrialResult trial = run_trial(wire_of(60.0), along, goal, tube, far);
+  EXPECT_EQ(trial.outcome, Outcome::kReached) << outcome_name(trial.outcome) << trial.reason;
+  EXPECT_NEAR(trial.pushes.back().tip.z(), 77.0, 0.1);
+}
+
 TEST(Way, AWireThatStaysInTheTrunkPassedByTheBranch) {
   const Goal goal = goal_of(into_branch(kSecond, 25.0), tree_of_fork());
   const Introducer along{.point = Vec3(0.0, 0.0, 5.0), .direction = Vec3::UnitZ()};
@@ -268,6 +279,7 @@ TEST(Way, ThePlaneOfTheSectionCountsInItsOwnLumenAlone) {
   Eigen::Matrix3Xd backward = wire_at(0.0).rowwise().reverse();
   EXPECT_FALSE(way.find_arrival(backward, both)) << "it comes from beyond";
   EXPECT_FALSE(way.find_arrival(wire_at(0.0).leftCols(10), both)) << "not there yet";
+  EXPECT_EQ(way.find_arrival(wire_at(0.0), both), 9) << "the last node below 40 mm";
 }
 
 TEST(Way, AWireThatCameAnotherWayIsTold) {
