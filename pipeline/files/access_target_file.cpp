@@ -11,10 +11,11 @@ namespace {
 
 constexpr Range kTurn{.min = -360.0, .max = 360.0};
 
-/// Sections are named by it, and so are folders.
+/// Sections are named by it, and so are folders: ACCESS--TARGET.
 std::string read_section_name(JsonReader& reader, std::set<std::string>& taken) {
   const std::string name = reader.text("name", std::nullopt);
-  const bool plain = !name.empty() && std::isalnum(static_cast<unsigned char>(name.front())) != 0 &&
+  const bool plain = name.size() <= kLongestName && !name.empty() &&
+                     std::isalnum(static_cast<unsigned char>(name.front())) != 0 &&
                      std::all_of(name.begin(), name.end(), [](char c) {
                        return std::isalnum(static_cast<unsigned char>(c)) != 0 ||
                               std::string_view("-_. ").find(c) != std::string_view::npos;
@@ -22,9 +23,14 @@ std::string read_section_name(JsonReader& reader, std::set<std::string>& taken) 
   if (name.empty()) return name;  // it is told already
   if (!plain) {
     reader.problems().add(reader.path_of("name"), "\"" + name + "\"",
-                          "letters, digits, spaces, '-', '_' and '.', starting with a letter or "
-                          "digit",
+                          "at most " + std::to_string(kLongestName) +
+                              " letters, digits, spaces, '-', '_' and '.', starting with a letter "
+                              "or digit",
                           "folders are named after it");
+  } else if (folder_name(name).find(kBetweenNames) != std::string::npos) {
+    reader.problems().add(reader.path_of("name"), "\"" + name + "\"",
+                          "no two dashes or spaces in a row",
+                          "they part the access from the target in the names of folders");
   } else if (name.ends_with(".json") || name.ends_with(".html") || name.ends_with(".csv")) {
     reader.problems().add(reader.path_of("name"), "\"" + name + "\"",
                           "a name that does not end in .json, .html or .csv",

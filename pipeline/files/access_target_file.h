@@ -40,6 +40,9 @@ Json degrees_json(const std::vector<double>& angles);
 Json access_json(const AccessInput& access);
 Json target_json(const TargetInput& target);
 
+/// Between access and target in the name of a section's folder; in no name of either.
+inline constexpr const char* kBetweenNames = "--";
+
 /// The name of an access or target as that of a folder: spaces become '-'.
 std::string folder_name(const std::string& name);
 

@@ -66,14 +66,15 @@ std::string default_name(const std::filesystem::path& file) {
 /// The case's name becomes that of folders, so it holds no path.
 std::string read_name(JsonReader& root, const std::filesystem::path& file) {
   const std::string name = root.text("name", default_name(file));
-  const bool plain =
-      !name.empty() && name.front() != '.' && std::all_of(name.begin(), name.end(), [](char c) {
-        return std::isalnum(static_cast<unsigned char>(c)) != 0 ||
-               std::string_view("-_. ").find(c) != std::string_view::npos;
-      });
+  const bool plain = !name.empty() && name.size() <= kLongestName && name.front() != '.' &&
+                     std::all_of(name.begin(), name.end(), [](char c) {
+                       return std::isalnum(static_cast<unsigned char>(c)) != 0 ||
+                              std::string_view("-_. ").find(c) != std::string_view::npos;
+                     });
   if (!plain) {
     root.problems().add("name", "\"" + name + "\"",
-                        "letters, digits, spaces, '-', '_' and '.', not starting with '.'",
+                        "at most " + std::to_string(kLongestName) +
+                            " letters, digits, spaces, '-', '_' and '.', not starting with '.'",
                         "folders are named after the case");
   }
   return name;

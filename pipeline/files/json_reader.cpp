@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cctype>
 #include <cmath>
 #include <cstdlib>
 #include <fstream>
@@ -388,6 +389,19 @@ std::string JsonReader::text(const std::string& key, std::optional<std::string> 
   }
   problems_->add(path_of(key), shown(*value), expected);
   return fallback.value_or("");
+}
+
+std::string JsonReader::file_name(const std::string& key, std::optional<std::string> fallback) {
+  const std::string name = text(key, std::move(fallback));
+  const bool plain = std::all_of(name.begin(), name.end(), [](unsigned char c) {
+    return std::isalnum(c) != 0 || c == '-' || c == '_';
+  });
+  if (!plain || name.size() > kLongestName) {
+    problems_->add(path_of(key), Json(name).dump(),
+                   "at most " + std::to_string(kLongestName) + " letters, digits, - and _",
+                   "files are named after it");
+  }
+  return name;
 }
 
 std::string JsonReader::choice(const std::string& key, std::optional<std::string> fallback,

@@ -67,6 +67,9 @@ class Problems {
   std::vector<std::string> messages_;
 };
 
+/// Of a name that files or folders are called after, two of which may stand in one file's name.
+inline constexpr std::size_t kLongestName = 80;
+
 struct Range {
   double min = -std::numeric_limits<double>::infinity();
   double max = std::numeric_limits<double>::infinity();
@@ -90,6 +93,8 @@ class JsonReader {
   int integer(const std::string& key, std::optional<int> fallback, int min, int max);
   bool boolean(const std::string& key, bool fallback);
   std::string text(const std::string& key, std::optional<std::string> fallback);
+  /// A text that files are called after: letters, digits, - and _, at most kLongestName.
+  std::string file_name(const std::string& key, std::optional<std::string> fallback);
   std::string choice(const std::string& key, std::optional<std::string> fallback,
                      const std::vector<std::string>& allowed);
   Vec3 point(const std::string& key, std::optional<Vec3> fallback);

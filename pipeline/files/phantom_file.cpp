@@ -4,7 +4,6 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
-#include <cctype>
 #include <cmath>
 #include <system_error>
 
@@ -124,12 +123,7 @@ PhantomVertebra read_vertebra(JsonReader reader) {
 
 /// Names of arteries become names of files.
 std::string read_tube_name(JsonReader& reader, const std::vector<PhantomTube>& others) {
-  const std::string name = reader.text("name", std::nullopt);
-  const auto plain = [](unsigned char c) { return std::isalnum(c) || c == '-' || c == '_'; };
-  if (!std::all_of(name.begin(), name.end(), plain)) {
-    reader.problems().add(reader.path_of("name"), Json(name).dump(),
-                          "letters, digits, - and _ alone", "it becomes the name of a file");
-  }
+  const std::string name = reader.file_name("name", std::nullopt);
   const bool taken =
       !name.empty() && std::any_of(others.begin(), others.end(),
                                    [&](const PhantomTube& other) { return other.name == name; });

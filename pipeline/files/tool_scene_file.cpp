@@ -73,24 +73,12 @@ void read_own_tool(JsonReader& reader, simulate::Tool& tool) {
   }
 }
 
-/// A name is part of a file's.
-bool is_file_name(const std::string& name) {
-  return !name.empty() && std::all_of(name.begin(), name.end(), [](char c) {
-    return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '-' ||
-           c == '_';
-  });
-}
-
 void read_tool(JsonReader& reader, ToolBenchScene& into) {
   simulate::Tool tool;
   const bool known = reader.has("device");
   known ? read_known_tool(reader, tool) : read_own_tool(reader, tool);
-  tool.wire.name = reader.text(
+  tool.wire.name = reader.file_name(
       "name", known ? std::optional<std::string>(tool.wire.name) : std::optional<std::string>());
-  if (!is_file_name(tool.wire.name)) {
-    reader.problems().add(reader.path_of("name"), in_quotes(tool.wire.name),
-                          "letters, digits, - and _", "files are named after it");
-  }
   simulate::ToolPlace place;
   place.insertion = reader.number("insertion_mm", std::nullopt, kZeroOrMore);
   place.roll = into.roll_zero +

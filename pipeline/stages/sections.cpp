@@ -79,7 +79,7 @@ std::vector<std::optional<Artifact>> make_lines(const std::vector<Case>& section
 std::filesystem::path section_folder(const Case& section) {
   const std::string access = folder_name(section.accesses[section.access].name),
                     target = folder_name(section.targets[section.target].name);
-  return access + (access.empty() || target.empty() ? "" : "--") + target;
+  return access + (access.empty() || target.empty() ? "" : kBetweenNames) + target;
 }
 
 void for_each_section(const Case& given, const RunOptions& options,

@@ -154,6 +154,13 @@ TEST_F(CaseFile, NamesMistakesOfListedAccessesAndTargets) {
                   {"targets[1].name is \"../sac\"", "folders are named after it"});
   expect_mentions(told([](Json& j) { j["targets"][1]["name"] = "report.json"; }),
                   {"targets[1].name is \"report.json\"", "does not end in .json"});
+  expect_mentions(told([](Json& j) { j["targets"][1]["name"] = "a -b"; }),
+                  {"targets[1].name is \"a -b\"", "no two dashes or spaces in a row"});
+  expect_mentions(told([](Json& j) {
+                    j["targets"][1]["name"] = std::string(300, 'a');
+                    j["name"] = std::string(300, 'b');
+                  }),
+                  {"targets[1].name is \"aaa", "name is \"bbb", "at most 80 letters"});
   expect_mentions(told([](Json& j) {
                     j["targets"][0]["name"] = "a b";
                     j["targets"][1]["name"] = "a-b";

@@ -117,7 +117,7 @@ TEST_F(ToolMistakes, AreToldByKey) {
        [](Json& json) { json["tools"][0]["inner_diameter_mm"] = 2; }},
       {"tools[1].name is \"catheter\", expected a name that no other tool has",
        [](Json& json) { json["tools"][1]["name"] = "catheter"; }},
-      {"tools[1].name is \"a/b\", expected letters, digits, - and _",
+      {"tools[1].name is \"a/b\", expected at most 80 letters, digits, - and _",
        [](Json& json) { json["tools"][1]["name"] = "a/b"; }},
       {"moves[0].tool is \"wir\", expected the name of one of the tools (did you mean \"wire\"?)",
        [](Json& json) { json["moves"][0]["tool"] = "wir"; }},
