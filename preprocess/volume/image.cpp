@@ -23,7 +23,7 @@ void require_finite(const Image& image, const fs::path& path) {
                                  [](float v) { return !std::isfinite(v); });
   if (bad > 0) {
     throw Error(path.string() + ": " + std::to_string(bad) +
-                " voxels are not finite numbers; replace them, e.g. by -1024 HU");
+                " voxels are not finite numbers; replace them, in a CT by -1024, in labels by 0");
   }
 }
 

@@ -7,6 +7,7 @@
 #include <iomanip>
 #include <limits>
 #include <sstream>
+#include <utility>
 
 #include "preprocess/volume/voxels.h"
 
@@ -132,8 +133,26 @@ std::vector<FrameChange> mirrored(const Grid& grid) {
     const Vec3 signs((which & 1) != 0 ? -1 : 1, (which & 2) != 0 ? -1 : 1,
                      (which & 4) != 0 ? -1 : 1);
     const Mat3 m = grid.direction * signs.asDiagonal() * grid.direction.transpose();
-    changes.push_back({m, middle - m * middle});
-    if (which < 4) changes.push_back({Mat3(signs.asDiagonal()), Vec3::Zero()});
+    changes.push_back({.linear = m, .shift = middle - m * middle});
+    if (which < 4) changes.push_back({.linear = Mat3(signs.asDiagonal())});
+  }
+  return changes;
+}
+
+/// Axes of the file in another order under the volume's header, as where programs count z, y, x.
+std::vector<FrameChange> reordered(const Grid& grid) {
+  std::vector<FrameChange> changes;
+  std::array<int, 3> order = {0, 1, 2};
+  while (std::next_permutation(order.begin(), order.end())) {
+    Mat3 swap = Mat3::Zero();
+    std::string text;
+    for (int axis = 0; axis < 3; ++axis) {
+      const int from = order[static_cast<std::size_t>(axis)];
+      swap(axis, from) = grid.spacing[axis] / grid.spacing[from];
+      text += (axis == 0 ? "" : ", ") + std::string(1, "ijk"[from]);
+    }
+    const Mat3 m = grid.direction * swap * grid.direction.transpose();
+    changes.push_back({m, grid.origin - m * grid.origin, text});
   }
   return changes;
 }
@@ -156,7 +175,7 @@ FrameChange best_shift(const Grid& grid, const Brightness& brightness,
     for (int k = -n; k <= n; ++k) {
       for (int j = -n; j <= n; ++j) {
         for (int i = -n; i <= n; ++i) {
-          const FrameChange change{Mat3::Identity(), around + step * Vec3(i, j, k)};
+          const FrameChange change{.shift = around + step * Vec3(i, j, k)};
           // Along a straight vessel all are alike: then the shortest.
           const double here = brightness.contrast(on, change) - kPerMm * change.shift.norm();
           if (here <= most) continue;
@@ -177,6 +196,10 @@ FrameChange best_shift(const Grid& grid, const Brightness& brightness,
 }  // namespace
 
 std::string describe_change(const FrameChange& change) {
+  if (!change.order.empty()) {
+    return "stored in another order of axes: its voxel [i, j, k] is the volume's [" + change.order +
+           "]";
+  }
   const Vec3& t = change.shift;
   const auto triple = [](const Vec3& v) {
     return "(" + place_of(v.x()) + ", " + place_of(v.y()) + ", " + place_of(v.z()) + ")";
@@ -294,6 +317,7 @@ std::optional<FrameChange> find_better_frame(const Image& image,
   if (only != 0 && pairs.size() < kFewest) contrast = std::numeric_limits<double>::quiet_NaN();
   if (!(contrast < kSeen)) return {};
   std::vector<FrameChange> changes = mirrored(image.grid);
+  for (FrameChange& change : reordered(image.grid)) changes.push_back(std::move(change));
   changes.push_back(best_shift(image.grid, brightness, pairs));
   std::optional<FrameChange> best;
   double most = kSeen;

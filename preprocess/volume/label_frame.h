@@ -14,9 +14,11 @@ namespace wireplan::preprocess {
 struct FrameChange {
   Mat3 linear = Mat3::Identity();
   Vec3 shift = Vec3::Zero();  //                                                           [mm]
+  std::string order = {};     // "k, j, i" where axes of the file stand in another order
 };
 
-/// "shifted by (0, 10, 0) mm", "mirrored in y: y' = 12.5 - y", and else the matrix.
+/// "shifted by (0, 10, 0) mm", "mirrored in y: y' = 12.5 - y", the order of axes, and else the
+/// matrix.
 std::string describe_change(const FrameChange& change);
 
 /// Of a grid of labels with the volume's sizes and spacings that holds other places: what would
@@ -34,12 +36,12 @@ std::vector<std::uint8_t> onto_grid(const Grid& to, const Grid& from,
                                     const std::vector<std::uint8_t>& classes);
 
 /// Looks in the volume for the labels' edges: contrast is brighter inside. Returns the change under
-/// which they are seen well where they are not as they lie: mirrored along the grid's axes, x and y
-/// negated (RAS and LPS mixed up), or shifted by up to 20 mm. Empty where they are seen as they lie
-/// and where they are seen nowhere. `contrast` is set to the mean step inward across the edge as
-/// they lie [HU]. Of all classes together, or of one (1 + its index) toward what is in none: the
-/// edges of a trunk hide where a small branch lies. One of less than 100 edges is not judged, and
-/// has no contrast (NaN).
+/// which they are seen well where they are not as they lie: mirrored along the grid's axes, their
+/// order changed, x and y negated (RAS and LPS mixed up), or shifted by up to 20 mm. Empty where
+/// they are seen as they lie and where they are seen nowhere. `contrast` is set to the mean step
+/// inward across the edge as they lie [HU]. Of all classes together, or of one (1 + its index)
+/// toward what is in none: the edges of a trunk hide where a small branch lies. One of less than
+/// 100 edges is not judged, and has no contrast (NaN).
 std::optional<FrameChange> find_better_frame(const Image& image,
                                              const std::vector<std::uint8_t>& classes,
                                              double& contrast, std::uint8_t only = 0);

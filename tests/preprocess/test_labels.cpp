@@ -319,6 +319,12 @@ TEST(LabelFrame, IsFoundInTheVolumeWhereTheHeaderLies) {
   ASSERT_TRUE(little);
   EXPECT_LE((little->shift - Vec3(3, 0, 0)).norm(), 1.0);
   EXPECT_LT(contrast, 0.35 * 200.0);
+  Mat3 swap = Mat3::Zero();  // written by a program that counts z, y, x
+  swap(0, 2) = swap(1, 1) = swap(2, 0) = 1.0;
+  const auto reordered = find_better_frame(image, draw(swap, Vec3::Zero()), contrast);
+  ASSERT_TRUE(reordered);
+  EXPECT_EQ(describe_change(*reordered),
+            "stored in another order of axes: its voxel [i, j, k] is the volume's [k, j, i]");
 
   // Where the volume shows nothing, nothing is better.
   std::fill(image.values.begin(), image.values.end(), 40.0F);
