@@ -22,6 +22,7 @@ void check_volume(const Case& given, Problems& problems, std::vector<std::string
     return;
   }
   const preprocess::Image image = preprocess::read_image(given.volume->path, given.volume->series);
+  if (given.labels) told = check_labels(given, &image);  // of which points may be given
   const preprocess::Grid& grid = image.grid;
   const auto expect_inside = [&](const std::string& key, const Vec3& point) {
     if (!contains(grid, point)) {
@@ -34,8 +35,6 @@ void check_volume(const Case& given, Problems& problems, std::vector<std::string
     expect_inside("segmentation.seeds_mm[" + std::to_string(k) + "]", given.segmentation.seeds[k]);
   }
   for (const std::string& line : warn_of_values(image)) told.push_back("mind: " + line);
-  if (!given.labels || !problems.empty()) return;
-  for (const std::string& line : check_labels(given, &image)) told.push_back(line);
 }
 
 std::vector<std::string> check_surface_file(const Case& given, Problems& problems) {

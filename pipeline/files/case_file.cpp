@@ -446,9 +446,7 @@ Case read_case(const std::filesystem::path& path, const std::vector<std::string>
 
   Problems problems(input.file.string());
   resolve_points(file, input.file.parent_path(), problems);
-  const std::size_t of_points = problems.count();
   resolve_branches(file, input.file.parent_path(), problems);
-  if (problems.count() > of_points) problems.throw_if_any();  // their places are not known
   JsonReader root(file, "", problems);
   root.text("schema", std::nullopt);
   input.name = read_name(root, input.file);

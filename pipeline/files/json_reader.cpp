@@ -357,7 +357,8 @@ double JsonReader::number(const std::string& key, std::optional<double> fallback
   }
   const double number = value->get<double>();
   if (lies_in(number, range)) return number;
-  problems_->add(path_of(key), shown(*value), expected, hint);
+  problems_->add(path_of(key), shown(*value), expected,
+                 number < 0.0 && range.min >= 0.0 ? "" : hint);
   return otherwise;
 }
 

@@ -403,6 +403,34 @@ Json find_named_point(JsonReader& reader, const NamedLumen& lumen) {
   }
 }
 
+/// Of the case's labels, for places that are told by `end`, a key and what it holds. Without one
+/// where they cannot be read, which is told here or by the case's own reader.
+std::optional<NamedLumen> read_named_lumen(const Json& file, const fs::path& folder,
+                                           const std::pair<std::string, Json*>& end,
+                                           Problems& problems) {
+  Problems told_later(problems);
+  JsonReader root(file, "", told_later);
+  if (!root.has("labels")) {
+    problems.add(end.first + ".branch", end.second->at("branch").dump(),
+                 "labels in the case, whose classes have names", "give a point_mm without them");
+    return {};
+  }
+  const std::size_t problems_before = told_later.count();
+  const LabelsInput labels = read_labels_input(root.object("labels", true), folder);
+  if (told_later.count() > problems_before) return {};
+  const std::size_t most_pieces = read_mask_limits(root, false).pieces();
+  try {
+    preprocess::LabelVolume read = read_labels(labels);
+    return NamedLumen{preprocess::merge_labels(read, preprocess::kMostGap, most_pieces),
+                      std::move(read.classes)};
+  } catch (const DiskError&) {
+    throw;
+  } catch (const Error& error) {
+    problems.add("labels", "\"" + labels.given + "\"", "labels that can be read", error.what());
+    return {};
+  }
+}
+
 }  // namespace
 
 std::map<int, std::string> read_label_table(const fs::path& path) {
@@ -501,34 +529,15 @@ LabelsInput read_labels_input(JsonReader reader, const fs::path& folder) {
 void resolve_branches(Json& file, const fs::path& folder, Problems& problems) {
   const std::vector<std::pair<std::string, Json*>> ends = ends_with_branches(file);
   if (ends.empty()) return;
-  JsonReader root(file, "", problems);
-  if (!root.has("labels")) {
-    problems.add(ends.front().first + ".branch", ends.front().second->at("branch").dump(),
-                 "labels in the case, whose classes have names", "give a point_mm without them");
-    return;
-  }
-  const std::size_t problems_before = problems.count();
-  const LabelsInput labels = read_labels_input(root.object("labels", true), folder);
-  if (problems.count() > problems_before) return;
-  Problems told_later(problems);  // the case's reader tells them of its mask
-  JsonReader mask_of(file, "", told_later);
-  const std::size_t most_pieces = read_mask_limits(mask_of, false).pieces();
-  std::optional<NamedLumen> lumen;
-  try {
-    preprocess::LabelVolume read = read_labels(labels);
-    lumen = NamedLumen{preprocess::merge_labels(read, preprocess::kMostGap, most_pieces),
-                       std::move(read.classes)};
-  } catch (const DiskError&) {
-    throw;
-  } catch (const Error& error) {
-    problems.add("labels", "\"" + labels.given + "\"", "labels that can be read", error.what());
-    return;
-  }
+  const std::optional<NamedLumen> lumen = read_named_lumen(file, folder, ends.front(), problems);
+  double apart = 0.0;
   for (const auto& [key, end] : ends) {
     JsonReader reader(*end, key, problems);
-    const Json point = find_named_point(reader, *lumen);
+    Json point = lumen ? find_named_point(reader, *lumen) : nullptr;
     for (const char* used : {"branch", "beyond_ostium_mm", "end"}) end->erase(used);
-    (*end)["point_mm"] = point;
+    // One that is not known lies apart from every other, so that the rest of the case can be read.
+    if (point.is_null()) point = to_json(Vec3(0.0, apart += 1000.0, 0.0));
+    (*end)["point_mm"] = std::move(point);
   }
 }
 

@@ -47,7 +47,8 @@ preprocess::LabelVolume read_labels(const LabelsInput& labels,
 LabelsInput read_labels_input(JsonReader reader, const std::filesystem::path& folder);
 
 /// Puts "point_mm" in the place of "branch" and where in it, "beyond_ostium_mm" or "end", of
-/// accesses and targets. The labels that the case names are read for it, from `folder`.
+/// accesses and targets. The labels that the case names are read for it, from `folder`. What has no
+/// place, which is told, gets one apart from all others.
 void resolve_branches(Json& file, const std::filesystem::path& folder, Problems& problems);
 
 /// As the file has them.

@@ -11,6 +11,7 @@
 #include <sstream>
 
 #include "pipeline/files/case_file.h"
+#include "pipeline/files/labels_file.h"
 #include "preprocess/volume/image.h"
 
 namespace wireplan::pipeline {
@@ -184,7 +185,7 @@ std::string list_labels(const std::vector<MarkupPoint>& points) {
 class PointFinder {
  public:
   PointFinder(const Json& file, const fs::path& folder, Problems& problems)
-      : folder_(folder), problems_(problems) {
+      : file_(file), folder_(folder), problems_(problems), has_labels_(file.contains("labels")) {
     const bool has_volume = file.contains("volume") && file["volume"].is_object();
     if (has_volume && file["volume"].value("path", Json()).is_string()) {
       volume_ = resolve_path(file["volume"]["path"], folder);
@@ -222,7 +223,7 @@ class PointFinder {
     if (problems_.count() > problems_before) return {};
     Markups read;
     try {
-      read = read_markups(folder_ / name);
+      read = read_markups(resolve_path(name, folder_));
     } catch (const Error& error) {
       problems_.add(reader.path_of("markups"), name, "a file of markups", error.what());
       return {};
@@ -263,17 +264,17 @@ class PointFinder {
     reader.finish();
     if (problems_.count() > problems_before) return {};
     const std::string key = reader.path_of("ijk"), given = to_json(ijk).dump();
-    if (volume_.empty()) {
-      problems_.add(key, given, "a case with volume.path",
+    if (volume_.empty() && !has_labels_) {
+      problems_.add(key, given, "a case with volume.path or labels",
                     "a surface has no voxels; give point_mm");
       return {};
     }
     try {
-      if (!grid_) grid_ = preprocess::read_image(volume_, series_).grid;
+      if (!grid_) grid_ = read_grid();
     } catch (const DiskError&) {
       throw;
     } catch (const Error& error) {
-      problems_.add(key, given, "voxels of a volume that can be read", error.what());
+      problems_.add(key, given, "voxels that can be read", error.what());
       return {};
     }
     Vec3 last = Vec3::Zero();
@@ -282,14 +283,26 @@ class PointFinder {
     }
     if (((ijk.array() < -0.5) || (ijk.array() > last.array() + 0.5)).any()) {
       problems_.add(key, given, "voxels from [0, 0, 0] to " + Json(to_json(last)).dump(),
-                    "so many the volume has; they count from 0");
+                    "so many there are; they count from 0");
       return {};
     }
     return grid_->lps_from_ijk(ijk);
   }
 
+  /// The volume's, or that of the labels where they are all there is.
+  preprocess::Grid read_grid() {
+    if (!volume_.empty()) return preprocess::read_image(volume_, series_).grid;
+    Problems of_labels("labels");
+    JsonReader root(file_, "", of_labels);
+    const LabelsInput labels = read_labels_input(root.object("labels", true), folder_);
+    of_labels.throw_if_any();
+    return read_labels(labels).grid;
+  }
+
+  const Json& file_;
   const fs::path& folder_;
   Problems& problems_;
+  bool has_labels_ = false;
   fs::path volume_;  // empty without one
   std::string series_;
   std::optional<preprocess::Grid> grid_;

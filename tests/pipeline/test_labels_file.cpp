@@ -165,6 +165,10 @@ TEST_F(LabelsCase, FindsPlacesByTheBranchTheyLieIn) {
   };
   expect_mentions(told({{"branch", "renl"}, {"end", "distal"}}),
                   {"target.branch is \"renl\"", "aorta, renal", "did you mean \"renal\"?"});
+  json["friction"] = -1;
+  expect_mentions(told({{"branch", "renl"}, {"end", "distal"}}),
+                  {"target.branch is \"renl\"", "friction is -1"});
+  json.erase("friction");
   expect_mentions(told({{"branch", "renal"}}), {"a place in it: beyond_ostium_mm, or end"});
   expect_mentions(told({{"branch", "renal"}, {"beyond_ostium_mm", 90}}),
                   {"target.beyond_ostium_mm is 90", "ends 21.5 mm", "beyond its ostium"});

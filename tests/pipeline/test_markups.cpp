@@ -1,12 +1,16 @@
 // Points of a case from the markups of 3D Slicer.
 #include <gtest/gtest.h>
 
+#include <cstdlib>
+
 #include "pipeline/files/case_file.h"
 #include "pipeline/files/markups_file.h"
 #include "pipeline/files/scene_file.h"
 #include "preprocess/volume/image.h"
+#include "preprocess/volume/labels.h"
 #include "tests/messages.h"
 #include "tests/pipeline/small_case.h"
+#include "tests/preprocess/label_bytes.h"
 
 namespace wireplan::pipeline {
 namespace {
@@ -254,14 +258,44 @@ TEST_F(Markups, VoxelsThatAreNoneAreToldWithAllElse) {
   EXPECT_EQ(both.find("point_mm"), std::string::npos) << both;
   case_["friction"] = 0.1;
   write_text("", folder_ / "ct.nrrd");
-  EXPECT_NE(refusal().find("expected voxels of a volume that can be read"), std::string::npos);
+  EXPECT_NE(refusal().find("expected voxels that can be read"), std::string::npos);
   case_["access"]["point"] = {{"ijk", {1, 2}}};
   EXPECT_NE(refusal().find("access.point.ijk is [1,2]"), std::string::npos) << refusal();
 }
 
+TEST_F(Markups, VoxelsAreThoseOfTheLabelsWhereTheyAreAllThereIs) {
+  if (!preprocess::reads_volumes()) GTEST_SKIP() << "built without imaging";
+  write_text(preprocess::branched_labels(), folder_ / "tree.nii");
+  case_.erase("surface");
+  case_["labels"] = {{"path", "tree.nii"}, {"values", {1, 2}}, {"names", {"aorta", "renal"}}};
+  point_at("access", {{"ijk", {12, 12, 4}}});
+  write("case.json", case_);
+  const preprocess::Grid grid = preprocess::read_labels(folder_ / "tree.nii", {.values = {1}}).grid;
+  EXPECT_LT(
+      (read_case(folder_ / "case.json").accesses[0].point - grid.lps_from_ijk(Vec3(12, 12, 4)))
+          .norm(),
+      1e-9);
+  case_["labels"]["values"] = {1, 9};
+  EXPECT_NE(refusal().find("access.point.ijk is [12.0,12.0,4.0]"), std::string::npos) << refusal();
+}
+
 TEST_F(Markups, ASurfaceHasNoVoxels) {
   point_at("access", {{"ijk", {1, 2, 3}}});
-  EXPECT_NE(refusal().find("expected a case with volume.path"), std::string::npos) << refusal();
+  EXPECT_NE(refusal().find("expected a case with volume.path or labels"), std::string::npos)
+      << refusal();
+}
+
+TEST_F(Markups, FilesMayLieInTheFolderOfData) {
+  std::filesystem::create_directories(folder_ / "data");
+  write("data/p.mrk.json", markups("LPS", {{"a", {1, 2, 3}}}));
+  point_at("access", {{"markups", "${WIREPLAN_DATA}/p.mrk.json"}, {"label", "a"}});
+  const char* before = std::getenv("WIREPLAN_DATA");
+  const std::string kept = before == nullptr ? "" : before;
+  ::setenv("WIREPLAN_DATA", (folder_ / "data").c_str(), 1);
+  write("case.json", case_);
+  EXPECT_EQ(read_case(folder_ / "case.json").accesses[0].point, Vec3(1, 2, 3));
+  if (before != nullptr) ::setenv("WIREPLAN_DATA", kept.c_str(), 1);
+  if (before == nullptr) ::unsetenv("WIREPLAN_DATA");
 }
 
 TEST_F(Markups, PointsThatAreNotPlacedOrNoPlaceAreNotTaken) {
