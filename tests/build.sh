@@ -17,9 +17,9 @@ fi
 export CCACHE_BASEDIR=${CCACHE_BASEDIR:-$PWD} CCACHE_NOHASHDIR=${CCACHE_NOHASHDIR:-1}
 export CCACHE_SLOPPINESS=${CCACHE_SLOPPINESS:-pch_defines,time_macros,include_file_mtime,include_file_ctime}
 
-# One job per core, as far as memory allows: a file that uses CGAL takes up to 2.4 GB to compile.
+# One job per core, as far as memory allows: a file that uses CGAL takes up to 2.6 GB to compile.
 available_kb=$(awk '/^MemAvailable:/ {print $2}' /proc/meminfo)
-jobs=$((available_kb / 2400000))
+jobs=$((available_kb / 2700000))
 cores=$(nproc)
 ((jobs > cores)) && jobs=$cores
 ((jobs < 1)) && jobs=1
