@@ -47,7 +47,7 @@ Json ostium_at(const plan::Corner& bend, const std::vector<plan::Junction>& junc
                const Tree& tree) {
   for (const plan::Junction& junction : junctions) {
     const bool near = std::abs(junction.level - bend.arc) < bend.arm;
-    if (junction.taken && near) return branch_name(tree, junction.branch);
+    if (junction.taken && near) return plan::leaving_name(tree, junction);
   }
   return nullptr;
 }
@@ -118,21 +118,21 @@ Json c_arm_json(const simulate::Way& way, const std::vector<plan::Junction>& jun
                 const plan::Corner& bend, const plan::ArmLimits& arm, bool axes_known) {
   constexpr double kStraight = 170.0 * kRadPerDeg;  // no bend to speak of: noise turns its plane
   const Tree& tree = way.tree();
-  const std::vector<int> along = way.branches();
   Json rows = Json::array();
   for (const plan::Junction& junction : junctions) {
     if (!junction.taken) continue;
     const preprocess::Branch& branch = tree[static_cast<std::size_t>(junction.branch)];
     const double leaves = branch.parent == junction.trunk ? branch.parent_arc : 0.0;
     Json row = {{"trunk", branch_name(tree, junction.trunk, leaves)},
-                {"branch", branch_name(tree, junction.branch)},
-                {"leads_to_target", junction.branch == along.back()},
+                {"branch", plan::leaving_name(tree, junction)},
+                {"leads_to_target", false},
                 {"at_mm", junction.level},
                 {"place_mm", to_json(junction.point)},
                 {"turn_deg", degrees(plan::turn_of(junction))}};
     put_views(row, junction.trunk_direction, junction.branch_direction, arm, axes_known);
     rows.push_back(std::move(row));
   }
+  if (!rows.empty()) rows.back()["leads_to_target"] = true;  // no other vessel is turned into
   Json of_bend = {{"at_mm", bend.arc}, {"place_mm", to_json(bend.point)}};
   put_views(of_bend, bend.before, bend.behind, arm, axes_known && bend.angle < kStraight);
   return {
@@ -155,7 +155,7 @@ Json lengths_json(const Centerline& way, const std::vector<plan::Junction>& junc
                        : junction.taken ? "the way turns into"
                                         : "passes";
     places.push_back({{"what", what},
-                      {"branch", branch_name(tree, junction.branch)},
+                      {"branch", plan::leaving_name(tree, junction)},
                       {"at_mm", junction.level},
                       {"place_mm", to_json(plan::point_at(way, junction.level))}});
   }

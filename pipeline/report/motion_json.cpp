@@ -36,7 +36,7 @@ Json turn_json(const std::vector<preprocess::Branch>& tree, const plan::Junction
   // Of lines of sight: from its other end a line shows the same.
   const double along =
       std::abs(plan::detector_direction(before).dot(plan::detector_direction(after)));
-  return {{"branch", branch_name(tree, rest.branch)},
+  return {{"branch", plan::leaving_name(tree, rest)},
           {"at_rest_deg", plan::turn_of(rest) / kRadPerDeg},
           {"moved_deg", plan::turn_of(moved) / kRadPerDeg},
           {"from_access_mm", rest.level},

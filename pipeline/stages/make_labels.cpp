@@ -272,7 +272,7 @@ double start_of_own(const std::vector<preprocess::Branch>& tree, std::size_t k) 
   return std::min(1.2 * parent.radius(nearest), 0.8 * tree[k].line.arc_length.tail<1>().value());
 }
 
-/// The classes that a branch runs through, in order, each for 5 mm or a fifth of it.
+/// The classes that a branch runs through, in order, each for 5 mm or a fifth of it, in words.
 std::string classes_along(const preprocess::Image& classes, const Json& names,
                           const Centerline& line, double from) {
   constexpr double kLeastMm = 5.0, kLeastPart = 0.2;
@@ -295,8 +295,9 @@ std::string classes_along(const preprocess::Image& classes, const Json& names,
   std::string text;
   for (const auto& [value, length] : lengths) {
     if (length < std::min(kLeastMm, kLeastPart * all)) continue;
-    text += (text.empty() ? "" : " > ") + names.at(value - 1).at("name").get<std::string>();
+    text += (text.empty() ? "" : ", then ") + names.at(value - 1).at("name").get<std::string>();
   }
+  std::replace(text.begin(), text.end(), '_', ' ');
   return text;
 }
 

@@ -243,7 +243,7 @@ std::vector<Stage> stages_of(const Case& given) {
   const bool from_volume = given.volume.has_value(), from_labels = given.labels.has_value();
   std::vector<Stage> stages = stages_to_surface(given);
   stages.push_back({.name = "centerline",
-                    .version = 6,
+                    .version = 7,
                     .after = {"surface"},
                     .parameters = {"/access/point_mm", "/target/point_mm"},
                     .make = make_centerline});
@@ -251,7 +251,7 @@ std::vector<Stage> stages_of(const Case& given) {
   // Names of branches, or the way that was found.
   if (from_labels || from_volume) stages.back().after.emplace_back("segment");
   Stage anatomy{.name = "anatomy",
-                .version = 9,
+                .version = 10,
                 .reads_input = from_volume,
                 .after = {"surface", "centerline"},
                 .parameters = {"/access_limits", "/axes"},

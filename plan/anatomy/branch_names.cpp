@@ -35,6 +35,17 @@ double own_vessel_from(const Centerline& line, double arc) {
   return line.arc_length(k);
 }
 
+/// Where the last vessel before an arc length leaves that goes on from what came before, as a
+/// brachiocephalic trunk beside the carotid that its line ends in; 0 without one [mm].
+double last_stem_before(const std::vector<Branch>& tree, int branch, double arc) {
+  double end = 0.0;
+  for (std::size_t k = 0; k < tree.size(); ++k) {
+    if (tree[k].parent != branch || tree[k].parent_arc >= arc) continue;
+    if (simulate::goes_on(tree, static_cast<int>(k))) end = std::max(end, tree[k].parent_arc);
+  }
+  return end;
+}
+
 /// Calls branches by places in them, each by the first; keeps what it has called.
 class BranchNames {
  public:
@@ -48,7 +59,8 @@ class BranchNames {
     if (named_[index] || (!root_too && branch.parent < 0)) return;
     named_[index] = true;
     branch.end_name = place.name + " (" + branch_name(tree_, found.branch) + ")";
-    branch.end_from = own_vessel_from(branch.line, found.arc);
+    branch.end_from = std::max(own_vessel_from(branch.line, found.arc),
+                               last_stem_before(tree_, found.branch, found.arc));
   }
 
  private:

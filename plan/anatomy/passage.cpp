@@ -224,6 +224,12 @@ double turn_of(const Junction& junction) {
   return std::acos(std::clamp(cosine, -1.0, 1.0));
 }
 
+std::string leaving_name(const std::vector<preprocess::Branch>& tree, const Junction& junction) {
+  const preprocess::Branch& trunk = tree[static_cast<std::size_t>(junction.trunk)];
+  return branch_name(tree, junction.branch,
+                     trunk.parent == junction.branch ? trunk.parent_arc : 0.0);
+}
+
 Vec3 point_at(const Centerline& line, double arc) {
   const auto [k, part] = find_part(line, arc);
   return (1.0 - part) * line.points.col(k) + part * line.points.col(k + 1);

@@ -1,6 +1,7 @@
 #pragma once
 /// What the way from access to target is like, by its centerline alone: how narrow, how tortuous,
 /// where vessels leave it and how far in that is. No wire is simulated for it.
+#include <string>
 #include <vector>
 
 #include "preprocess/vessel.h"
@@ -49,6 +50,9 @@ struct Junction {
 
 /// By how much the branch turns from the trunk [rad].
 double turn_of(const Junction& junction);
+
+/// The vessel that leaves, by the name of its part there.
+std::string leaving_name(const std::vector<preprocess::Branch>& tree, const Junction& junction);
 
 /// All along the way, nearest first; none without a tree, and none of stumps. It leaves a trunk
 /// where it changes from one branch of the tree to another, unless that is the trunk, and where the

@@ -315,6 +315,28 @@ TEST(BranchNames, AreThoseOfTheTargetsAndAccessesInThem) {
   EXPECT_EQ(branch_name(named, 2), "branch 3");
 }
 
+TEST(BranchNames, OfAVesselThatSharesAStemBeginBehindIt) {
+  // A trunk that leaves the aorta: its line ends in a carotid, but a wider artery goes on from it.
+  std::vector<Branch> tree = {{.line = line_through({Vec3::Zero(), Vec3(0, 0, 200)}, 12.0)},
+                              {.line = line_through({Vec3(0, 0, 100), Vec3(80, 0, 100)}, 5.0),
+                               .parent = 0,
+                               .parent_arc = 100.0},
+                              {.line = line_through({Vec3(40, 0, 100), Vec3(40, 60, 100)}, 7.0),
+                               .parent = 1,
+                               .parent_arc = 40.0}};
+  name_branches(tree, {"subclavian", Vec3(40, 50, 100)}, {{"carotid", Vec3(75, 0, 100)}}, {});
+  EXPECT_EQ(branch_name(tree, 1), "carotid (branch 2)");
+  EXPECT_EQ(branch_name(tree, 1, 30.0), "branch 2") << "the stem of both";
+  const simulate::Way way(
+      line_through({Vec3::Zero(), Vec3(0, 0, 100), Vec3(40, 0, 100), Vec3(40, 50, 100)}, 5.0),
+      tree);
+  const auto found = find_junctions(way);
+  ASSERT_EQ(found.size(), 2u);
+  EXPECT_TRUE(found[0].taken && !found[1].taken);
+  EXPECT_EQ(leaving_name(tree, found[0]), "branch 2");
+  EXPECT_EQ(leaving_name(tree, found[1]), "carotid (branch 2)");
+}
+
 TEST(BranchNames, OfALineThatRunsThroughTheAortaAreOfItsEndAlone) {
   std::vector<Branch> tree = {{.line = right_renal_way(3.0)},
                               {.line = line_through({Vec3(0, 0, 100), Vec3(0, 0, 200)}, 10.0),
