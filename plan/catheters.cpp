@@ -205,6 +205,10 @@ namespace {
 /// To the nearest whole number.
 std::string whole_number(double value) { return std::to_string(std::lround(value)); }
 
+std::string count_of_times(int count) {
+  return std::to_string(count) + (count == 1 ? " time" : " times");
+}
+
 /// " until its tip is 20 mm past the ostium", of several tools "the catheter's tip"; empty of steps
 /// that are made whole.
 std::string tell_end(const ToolStep& step) {
@@ -230,6 +234,39 @@ std::string tell_end(const ToolStep& step) {
     }
   }
   return {};
+}
+
+std::string turned_by(double angle) {
+  return whole_number(std::abs(angle) / kRadPerDeg) + " degrees " +
+         (angle > 0.0 ? "clockwise" : "counterclockwise");
+}
+
+/// ". If it passes by the branch, ...": what a hand does then; empty of steps without tries.
+std::string tell_tries(const ToolStep& step) {
+  if (step.tries == 0) return {};
+  const std::string length = whole_number(step.try_pull) + " mm ";
+  return ". If it passes by the branch, withdraw it and try again, " + count_of_times(step.tries) +
+         " at most. First try with both tools " + length + "back from where they were, then " +
+         length + "on. Then try with the catheter turned " + turned_by(step.try_turn) +
+         ", then turned to the other side. Then do the same by twice as much";
+}
+
+/// ". If it goes into another vessel ...": as above, of steps that are steered.
+std::string tell_steers(const ToolStep& step) {
+  if (step.steers == 0) return {};
+  std::string text = ". If it goes into another vessel or stops more than " +
+                     whole_number(simulate::kSteerNear) + " mm before the ostium, withdraw it to " +
+                     whole_number(simulate::kSteerBack) +
+                     " mm before where that began. Bring the catheter up to " +
+                     whole_number(simulate::kSteerBehind) +
+                     " mm behind the wire's tip and advance the wire again. ";
+  if (step.steers > 1) {
+    text += "Do this " + count_of_times(step.steers) + " at most, each new time " +
+            whole_number(simulate::kSteerFurther) +
+            " mm further back and with the catheter turned on by " +
+            turned_by(simulate::kSteerTurn) + ". ";
+  }
+  return text + "Then bring the catheter back to where it was";
 }
 
 }  // namespace
@@ -274,29 +311,7 @@ std::vector<std::string> describe_steps(const std::vector<ToolStep>& steps, doub
       text += end.empty() ? " by " + whole_number(-step.push) + " mm"
                           : ", by " + whole_number(-step.push) + " mm at most";
     }
-    if (step.tries > 0) {
-      text += "; where it passes the branch by, withdraw it and try again with both ";
-      text += whole_number(step.try_pull) + " mm back, then on, of where they were, then with the ";
-      text += "catheter turned " + whole_number(std::abs(step.try_turn) / kRadPerDeg) + " degrees ";
-      text += step.try_turn > 0.0 ? "clockwise" : "counterclockwise";
-      text += ", then to the other side, then by twice as much, ";
-      text += std::to_string(step.tries) + " times at most";
-    }
-    if (step.steers > 0) {
-      text += "; where it goes into another vessel or comes no further, more than ";
-      text += whole_number(simulate::kSteerNear) + " mm before the ostium, withdraw it to ";
-      text += whole_number(simulate::kSteerBack) + " mm before where that began, bring the ";
-      text += "catheter up to " + whole_number(simulate::kSteerBehind) + " mm behind its tip and ";
-      text += "lead it on";
-      if (step.steers > 1) {
-        text += ", the next times from " + whole_number(simulate::kSteerFurther) + " mm further ";
-        text += "back and with the catheter turned on ";
-        text += whole_number(simulate::kSteerTurn / kRadPerDeg) + " degrees clockwise, ";
-        text += std::to_string(step.steers) + " times at most";
-      }
-      text += "; then take the catheter back as it was";
-    }
-    told.push_back(std::move(text));
+    told.push_back(text + tell_tries(step) + tell_steers(step));
   }
   return told;
 }

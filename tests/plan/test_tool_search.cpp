@@ -167,11 +167,11 @@ TEST(ToolSteps, SayWhatEndsThem) {
                       {.tool = 1, .push = 90.0}},
                      247.4);
   const std::vector<std::string> expected = {
-      "advance the wire to 220 mm; where it goes into another vessel or comes no further, more "
-      "than 50 mm before the ostium, withdraw it to 30 mm before where that began, bring the "
-      "catheter up to 30 mm behind its tip and lead it on, the next times from 10 mm further back "
-      "and with the catheter turned on 45 degrees clockwise, 7 times at most; then take the "
-      "catheter back as it was",
+      "advance the wire to 220 mm. If it goes into another vessel or stops more than 50 mm before "
+      "the ostium, withdraw it to 30 mm before where that began. Bring the catheter up to 30 mm "
+      "behind the wire's tip and advance the wire again. Do this 7 times at most, each new time 10 "
+      "mm further back and with the catheter turned on by 45 degrees clockwise. Then bring the "
+      "catheter back to where it was",
       "advance the catheter over the wire to 212 mm",
       "turn the catheter counterclockwise until its tip looks 30 degrees clockwise of the branch, "
       "by 90 degrees at most",
@@ -179,10 +179,10 @@ TEST(ToolSteps, SayWhatEndsThem) {
       "the ostium, by 40 mm at most",
       "pull back catheter and wire together until the catheter's tip falls into the ostium, by 9 "
       "mm at most",
-      "advance the wire until its tip is 18 mm past the ostium, by 60 mm at most; where it passes "
-      "the branch by, withdraw it and try again with both 3 mm back, then on, of where they were, "
-      "then with the catheter turned 15 degrees counterclockwise, then to the other side, then by "
-      "twice as much, 8 times at most",
+      "advance the wire until its tip is 18 mm past the ostium, by 60 mm at most. If it passes "
+      "by the branch, withdraw it and try again, 8 times at most. First try with both tools 3 mm "
+      "back from where they were, then 3 mm on. Then try with the catheter turned 15 degrees "
+      "counterclockwise, then turned to the other side. Then do the same by twice as much",
       "advance the catheter over the wire by 12 mm",
       "advance the wire until its tip is at the target, 247 mm in"};
   EXPECT_EQ(told, expected);
