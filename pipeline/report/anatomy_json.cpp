@@ -25,17 +25,18 @@ const char* grade_name(int grade) { return kGrades.at(static_cast<std::size_t>(g
 /// A device against the first `length` mm of the lumen, which it must pass; and the smallest
 /// inscribed sphere there, since a narrow place may be wide one way alone.
 Json passage_json(const Centerline& way, const Eigen::VectorXd& diameters, double length,
-                  double device, double max_ratio, const char* source) {
+                  const plan::Size& device, double max_ratio, const char* source) {
   Centerline sections = way;
   sections.radius = 0.5 * diameters;
   const plan::Narrowest lumen = plan::find_narrowest(sections, length);
   const double inscribed = plan::find_narrowest(way, length).diameter;
-  const double ratio = device / lumen.diameter;
+  const double ratio = device.value / lumen.diameter;
   return {{"lumen_diameter_mm", lumen.diameter},
           {"inscribed_diameter_mm", inscribed},
           {"at_mm", lumen.arc},
           {"place_mm", to_json(lumen.point)},
-          {"device_diameter_mm", device},
+          {"device_diameter_mm", device.value},
+          {"assumed", device.assumed},
           {"ratio", ratio},
           {"max_ratio", max_ratio},
           {"fits", ratio < max_ratio},
@@ -60,13 +61,12 @@ Json access_json(const Centerline& way, const Eigen::VectorXd& diameters,
   access["device"] = passage_json(way, diameters, length, limits.device_diameter, 1.0,
                                   "limits of the case; a device must be thinner than the lumen");
   access["sheath"] = passage_json(
-      way, diameters, limits.sheath_length, limits.sheath_diameter, limits.max_sheath_ratio,
+      way, diameters, limits.sheath_length.value, limits.sheath_diameter, limits.max_sheath_ratio,
       "limits of the case; the ratio by default that of sheath to femoral artery");
-  access["sheath"]["length_mm"] = limits.sheath_length;
+  access["sheath"]["length_mm"] = limits.sheath_length.value;
   // Nobody would take such a sheath: it is not weighed, see way_findings().
-  const plan::AccessLimits defaults;
   access["sheath"]["assumed_longer_than_way"] =
-      limits.sheath_length > length && limits.sheath_length == defaults.sheath_length;
+      limits.sheath_length.assumed && limits.sheath_length.value > length;
 
   const double index = plan::tortuosity(way);
   const bool open = std::isfinite(index);
@@ -165,8 +165,10 @@ Json lengths_json(const Centerline& way, const std::vector<plan::Junction>& junc
       {{"what", "target"}, {"branch", nullptr}, {"at_mm", length}, {"place_mm", to_json(end)}});
   return {{"places", places},
           {"way_mm", length},
-          {"catheter_mm", limits.catheter_length},
-          {"working_mm", limits.working_length}};
+          {"catheter_mm", limits.catheter_length.value},
+          {"catheter_assumed", limits.catheter_length.assumed},
+          {"working_mm", limits.working_length.value},
+          {"working_assumed", limits.working_length.assumed}};
 }
 
 /// The line every 2 mm and at its end, to a tenth of a millimetre.
@@ -304,6 +306,7 @@ Json anatomy_json(const ReportInput& input) {
         input.study.catheters[static_cast<std::size_t>(catheter)].tool.wire;
     lengths["catheter"] = tube.name;
     lengths["catheter_mm"] = clean(tube.length());
+    lengths["catheter_assumed"] = false;
   }
   double needed = 0.0;
   for (const char* part : {"way_mm", "catheter_mm", "working_mm"}) {

@@ -6,7 +6,6 @@
 
 #include "pipeline/files/catalogue.h"
 #include "pipeline/files/text.h"
-#include "plan/anatomy/access_limits.h"
 #include "plan/catheters.h"
 #include "plan/manoeuvre.h"
 
@@ -57,7 +56,7 @@ Json sheath_row(const Json& sheath, double inside) {
   return fetch_row("Sheath", names,
                    format("below %.3g mm outside, for a catheter of %.3g mm: ", most, inside) +
                        of_catalogue(names) + format("; weighed: %.3g mm", taken),
-                   taken == plan::AccessLimits().sheath_diameter);
+                   sheath.at("assumed"));
 }
 
 /// For a plan of a wire alone: what passes the way over that wire.
@@ -72,7 +71,7 @@ Json catheter_row(const Json& device, const simulate::Wire& wire, double length)
   return fetch_row("Catheter", names,
                    format("below %.3g mm outside, over the wire: ", most) + of_catalogue(names) +
                        format("; weighed: %.3g mm, %.0f mm long", taken, length),
-                   taken == plan::AccessLimits().device_diameter);
+                   device.at("assumed"));
 }
 
 /// A place that a view shows, and how far along the way it is.
@@ -113,11 +112,10 @@ Json fetch_json(const ReportInput& input, const Json& anatomy) {
   const auto candidate = [&](std::size_t k) -> const plan::Candidate& {
     return input.plan.candidates[static_cast<std::size_t>(plans[k].trial)];
   };
-  const plan::AccessLimits defaults;
   const double way = lengths.at("way_mm"), comes_off = lengths.at("catheter_mm"),
                working = lengths.at("working_mm"), needed = lengths.at("wire_needed_mm");
-  const bool assumed = working == defaults.working_length ||
-                       (lengths.at("catheter").is_null() && comes_off == defaults.catheter_length);
+  const bool assumed =
+      lengths.at("working_assumed").get<bool>() || lengths.at("catheter_assumed").get<bool>();
   std::vector<int> wires;
   for (std::size_t k = 0; k < std::min(kPlansTold, plans.size()); ++k) {
     const int wire = candidate(k).wire;

@@ -4,7 +4,6 @@
 #include <iterator>
 
 #include "pipeline/report/anatomy_json.h"
-#include "plan/anatomy/access_limits.h"
 
 namespace wireplan::pipeline {
 namespace {
@@ -13,7 +12,8 @@ plan::Passage passage(const Json& row) {
   return {.lumen = row.at("lumen_diameter_mm"),
           .at = row.at("at_mm"),
           .device = row.at("device_diameter_mm"),
-          .max_ratio = row.at("max_ratio")};
+          .max_ratio = row.at("max_ratio"),
+          .assumed = row.at("assumed")};
 }
 
 }  // namespace
@@ -25,9 +25,6 @@ plan::WayFindings way_findings(const Json& anatomy) {
   plan::WayFindings way;
   way.device = passage(access.at("device"));
   way.sheath = passage(access.at("sheath"));
-  const plan::AccessLimits defaults;
-  way.device.assumed = way.device.device == defaults.device_diameter;
-  way.sheath.assumed = way.sheath.device == defaults.sheath_diameter;
   way.sheath_length = access.at("sheath").at("length_mm");
   way.weighs_sheath = !access.at("sheath").at("assumed_longer_than_way").get<bool>();
   way.length = anatomy.at("lengths").at("way_mm");

@@ -7,8 +7,7 @@
 
 namespace wireplan::pipeline {
 
-/// What the figures of stage anatomy say of the way. Devices of the default diameters count as
-/// assumed.
+/// What the figures of stage anatomy say of the way.
 plan::WayFindings way_findings(const Json& anatomy);
 
 /// "verdict" of a report.

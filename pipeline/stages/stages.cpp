@@ -5,6 +5,7 @@
 #include <initializer_list>
 #include <utility>
 
+#include "pipeline/files/access_limits_file.h"
 #include "pipeline/report/report.h"
 #include "pipeline/store/hash.h"
 #include "plan/search.h"
@@ -334,6 +335,7 @@ Json used_parameters(const Case& given) {
     }
   }
   // What is chosen from; a catalogue that has changed is another case.
+  parameters["access_limits"]["assumed"] = assumed_sizes(given.access_limits);
   if (given.suggest_catheters) parameters["catheters"] = catheters_json_of(given.catheters);
   if (section_name(given).empty()) return parameters;
   const AccessInput& access = given.accesses[given.access];

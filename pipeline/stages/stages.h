@@ -30,8 +30,8 @@ struct Stage {
 /// Those up to `surface`, and `wall`, are the same for all sections of a case.
 std::vector<Stage> stages_of(const Case& given);
 
-/// case_parameters() with file names in the place of paths, and the section's access and target
-/// beside the lists that they are of.
+/// case_parameters() with file names in the place of paths, the section's access and target beside
+/// the lists that they are of, and which sizes of access_limits are "assumed".
 Json used_parameters(const Case& given);
 
 enum class StageState {

@@ -6,11 +6,17 @@
 
 namespace wireplan::plan {
 
+/// A size, and whether it is a default of ours that nobody gave.
+struct Size {
+  double value = 0.0;  //                                                                  [mm]
+  bool assumed = true;
+};
+
 struct AccessLimits {
-  double device_diameter = 1.67;   // of the widest that goes along the whole way; a 5 F catheter,
-                                   // 1 F being a third of a millimetre                      [mm]
-  double sheath_diameter = 2.7;    // outer; a 6 F introducer, assumed: 2 F more than it takes  [mm]
-  double sheath_length = 110.0;    // of the way that it lies in, assumed: a short introducer  [mm]
+  Size device_diameter = {1.67};   // of the widest that goes along the whole way; a 5 F catheter,
+                                   // 1 F being a third of a millimetre
+  Size sheath_diameter = {2.7};    // outer; a 6 F introducer: 2 F more than it takes
+  Size sheath_length = {110.0};    // of the way that it lies in: a short introducer
   double max_sheath_ratio = 1.05;  // sheath over lumen; references-2 N                     [-]
   /// Where mild, moderate and severe begin: centerline over chord, and the angle between the arms
   /// of the sharpest bend. Reporting standards for iliac access; references-2 N.
@@ -18,9 +24,9 @@ struct AccessLimits {
   std::array<double, 3> angle = {160 * kRadPerDeg, 120 * kRadPerDeg, 90 * kRadPerDeg};  // [rad]
   double calcium_hu = 800.0;        // above the contrast of the lumen, assumed              [HU]
   double calcium_within = 2.0;      // of the lumen, assumed                                 [mm]
-  double catheter_length = 1000.0;  // that is to come off the wire while its tip stays, assumed,
-                                    // where the first plan has none of its own [mm]
-  double working_length = 100.0;    // of wire to hold behind it, assumed                    [mm]
+  Size catheter_length = {1000.0};  // that is to come off the wire while its tip stays, where the
+                                    // first plan has none of its own
+  Size working_length = {100.0};    // of wire to hold behind it
   ArmLimits arm;
 };
 

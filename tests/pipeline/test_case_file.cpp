@@ -105,12 +105,37 @@ TEST_F(CaseFile, LeavesTheChoiceOfCathetersToTheAnatomy) {
 TEST_F(CaseFile, WeighsTheThinnestCatheterThatItNames) {
   Json json = full_case(volume_case());
   json.erase("access_limits");
-  json["catheters"] = {"cobra-c2", "guide-6f"};
-  EXPECT_EQ(read(json).access_limits.device_diameter, 1.67) << "as assumed";
-  json["catheters"] = {"guide-6f"};
-  EXPECT_EQ(read(json).access_limits.device_diameter, 2.0);
+  for (const char* first : {"cobra-c2", "guide-6f"}) {
+    json["catheters"] = {first};
+    if (first != std::string("guide-6f")) json["catheters"].push_back("guide-6f");
+    const Case given = read(json);
+    EXPECT_EQ(given.access_limits.device_diameter.value,
+              2.0 * given.study.catheters[0].tool.wire.radius)
+        << first;
+    EXPECT_FALSE(given.access_limits.device_diameter.assumed) << first;
+  }
   json["access_limits"] = {{"device_diameter_mm", 1.5}};
-  EXPECT_EQ(read(json).access_limits.device_diameter, 1.5) << "as given";
+  EXPECT_EQ(read(json).access_limits.device_diameter.value, 1.5) << "as given";
+  json.erase("access_limits");
+  json["catheters"] = "suggest";
+  EXPECT_TRUE(read(json).access_limits.device_diameter.assumed);
+}
+
+TEST_F(CaseFile, KnowsWhichSizesItGivesThoughTheyAreThoseOfTheDefault) {
+  const Case none = read(volume_case());
+  const std::vector<std::string> sizes = {"device_diameter_mm", "sheath_diameter_mm",
+                                          "sheath_length_mm", "catheter_length_mm",
+                                          "working_length_mm"};
+  EXPECT_EQ(used_parameters(none)["access_limits"]["assumed"], Json(sizes));
+  for (const std::string& size : sizes) {
+    Json json = volume_case();
+    json["access_limits"][size] = case_parameters(none)["access_limits"][size];
+    const Case given = read(json);
+    EXPECT_EQ(case_parameters(given), case_parameters(none));
+    std::vector<std::string> others = sizes;
+    std::erase(others, size);
+    EXPECT_EQ(used_parameters(given)["access_limits"]["assumed"], Json(others)) << size;
+  }
 }
 
 TEST_F(CaseFile, TakesListsOfNamedAccessesAndTargets) {

@@ -61,6 +61,15 @@ TEST(Report, AnswersWithAVerdictAndItsReasons) {
   EXPECT_NE(describe_verdict(wide).find("the widest device, of 9.5 mm, does not pass"),
             std::string::npos);
   EXPECT_FALSE(wide.at("ranking").empty());
+  // Given, it is not assumed, though it is as wide as the default.
+  const Json& anatomy = report.at("anatomy");
+  EXPECT_TRUE(way_findings(anatomy).device.assumed);
+  EXPECT_FALSE(way_findings(wide.at("anatomy")).device.assumed);
+  const Json equal = run_to_report(folder / "case.json", folder / "cache", 0,
+                                   {"access_limits.device_diameter_mm=1.67"});
+  EXPECT_EQ(equal.at("anatomy").at("access").at("device").at("device_diameter_mm"),
+            anatomy.at("access").at("device").at("device_diameter_mm"));
+  EXPECT_FALSE(way_findings(equal.at("anatomy")).device.assumed);
 
   Json older = report;
   older.erase("verdict");
@@ -159,13 +168,36 @@ TEST(Report, ListsWhatToFetchWithTheCatalogues) {
             std::string::npos);
   expect_valid(report, folder.path());
 
-  // A sheath that is asked for is not assumed.
-  const Json own = run_to_report(folder / "case.json", folder / "cache", 0,
-                                 {"access_limits.sheath_diameter_mm=3"});
-  for (const Json& each : own.at("fetch")) {
-    if (each.at("what") == "Sheath") {
-      EXPECT_FALSE(each.at("assumed"));
-    }
+  // What is asked for is not assumed, though it is what would be.
+  const Json own = run_to_report(
+      folder / "case.json", folder / "cache", 0,
+      {"access_limits.sheath_diameter_mm=2.7", "access_limits.device_diameter_mm=1.67",
+       "access_limits.catheter_length_mm=1000", "access_limits.working_length_mm=100"});
+  for (const Json& each : list) {
+    const std::string what = each.at("what");
+    EXPECT_EQ(each.at("assumed"), what != "Wire" && what != "In reserve") << what;
+  }
+  for (const Json& each : own.at("fetch")) EXPECT_FALSE(each.at("assumed")) << each;
+}
+
+TEST(Report, WeighsASheathThatTheCaseGivesThoughTheWayIsShorter) {
+  const TemporaryFolder folder;
+  write_finished_tube(folder.path());
+  for (const bool given : {false, true}) {
+    SCOPED_TRACE(given);
+    const Json report =
+        run_to_report(folder / "case.json", folder / "cache", 0,
+                      given ? std::vector<std::string>{"access_limits.sheath_length_mm=110",
+                                                       "access_limits.sheath_diameter_mm=2.7"}
+                            : std::vector<std::string>{});
+    const Json& sheath = report.at("anatomy").at("access").at("sheath");
+    EXPECT_EQ(sheath.at("length_mm"), 110);
+    EXPECT_EQ(sheath.at("assumed"), !given);
+    EXPECT_EQ(sheath.at("assumed_longer_than_way"), !given);
+    const std::string reasons = report.at("verdict").at("reasons").dump();
+    EXPECT_EQ(reasons.find("No sheath is weighed") == std::string::npos, given);
+    EXPECT_EQ(reasons.find("The sheath of 2.7 mm is") != std::string::npos, given);
+    expect_valid(report, folder.path());
   }
 }
 
