@@ -98,10 +98,7 @@ class Weighing {
       if (level == Level::kFull) add(full);
       reached_coarsely += level != Level::kFull && trial(id).metrics.reached;
     }
-    headline_ = all.reached == 0
-                    ? "None of " + count_of(all.trials, "trial") + " reaches the target."
-                    : std::to_string(all.reached) + " of " + count_of(all.trials, "trial") +
-                          " reach the target, none of them within the limits.";
+    headline_ = headline_of_failure(all);
     const Answer answer =
         leaves_open(all, fine, full, reached_coarsely) ? Answer::kUnsure : Answer::kNotFeasible;
     if (full.reached > 0) {
@@ -115,9 +112,19 @@ class Weighing {
     if (answer == Answer::kNotFeasible) tell_rigid(answer, all, full);
     for (std::string& text : changes_by(all, known_, "trial")) change(std::move(text));
     if (full.trials < all.trials) {
-      change("Running all trials in full detail: " + std::to_string(all.trials - full.trials) +
-             " of " + std::to_string(all.trials) + " were run against a rigid wall only.");
+      change("Running all trials in full detail: the wall was taken for rigid in " +
+             part_of(all.trials - full.trials, all.trials, "trial") + ".");
     }
+  }
+
+  static std::string headline_of_failure(const Endings& all) {
+    if (all.reached == 0) {
+      return all.trials == 1 ? "The one trial does not reach the target."
+                             : "None of " + count_of(all.trials, "trial") + " reaches the target.";
+    }
+    return capital(part_of(all.reached, all.trials, "trial")) +
+           (all.reached == 1 ? " reaches the target, but not within the limits."
+                             : " reach the target, none of them within the limits.");
   }
 
   /// What was searched beside straight pushes.
@@ -144,21 +151,21 @@ class Weighing {
   void tell_rigid(Answer answer, const Endings& all, const Endings& full) {
     if (full.trials > 0) return;
     find(answer,
-         "All trials were run against a rigid wall only, which is enough here: most ended "
-         "in another vessel or before the target for want of wire, which a wall that gives "
-         "way by tenths of a millimetre does not change (" +
-             std::to_string(all.trials - all.held_by_wall()) + " of " + std::to_string(all.trials) +
-             ").");
+         "The wall was taken for rigid, which is enough here: " +
+             part_of(all.trials - all.held_by_wall(), all.trials, "trial") +
+             " ended in another vessel or before the target for want of wire, which a wall that "
+             "gives way by tenths of a millimetre does not change.");
   }
 
   static std::string how_trials_ended(const Endings& all, const Endings& fine) {
     const std::string number = std::to_string(all.trials), endings = describe_endings(all);
     std::string text =
         endings.starts_with(number + " ")
-            ? (all.trials == 1 ? "The one trial" : "All " + count_of(all.trials, "trial")) +
-                  endings.substr(number.size())
+            ? capital(part_of(all.trials, all.trials, "trial")) + endings.substr(number.size())
             : "Of " + count_of(all.trials, "trial") + " " + endings;
-    if (fine.trials < all.trials) {
+    if (fine.trials == 0) {
+      text += ", computed coarsely";
+    } else if (fine.trials < all.trials) {
       text += "; " + std::to_string(fine.trials) +
               " of them were computed with fine elements, the "
               "others coarsely";
@@ -171,12 +178,12 @@ class Weighing {
     const std::size_t before = findings_.size();
     if (fine.clear() == 0) {
       find(Answer::kUnsure,
-           "No trial that was computed with fine elements came to a clear end" +
-               std::string(fine.trials == 0 ? ": all were computed coarsely." : "."));
+           fine.trials == 0 ? "No trial was computed with fine elements."
+                            : "No trial that was computed with fine elements came to a clear end.");
     }
     if (all.unclear() > rules_.unclear_part * all.trials) {
       find(Answer::kUnsure,
-           std::to_string(all.unclear()) + " of " + count_of(all.trials, "trial") +
+           capital(part_of(all.unclear(), all.trials, "trial")) +
                " ended without telling whether the wire would reach the target; at most " +
                percent(rules_.unclear_part) + " % may.");
     }
@@ -188,9 +195,9 @@ class Weighing {
     }
     if (full.trials == 0 && 2 * all.held_by_wall() > all.trials) {
       find(Answer::kUnsure,
-           std::to_string(all.held_by_wall()) + " of " + count_of(all.trials, "trial") +
-               " got stuck, folded back or went through the wall, and all were run "
-               "against a rigid wall only: one that gives way may let them pass.");
+           capital(part_of(all.held_by_wall(), all.trials, "trial")) +
+               " got stuck, folded back or went through the wall, which was taken for rigid: one "
+               "that gives way may let the wire pass.");
     }
     return findings_.size() > before;
   }
@@ -381,9 +388,11 @@ class Weighing {
     bool severe = false;
     if (way.tortuosity) {
       severe = way.tortuosity_grade >= kSevere;
+      const std::string times = two_decimals(*way.tortuosity);
       find(severe ? Answer::kFeasibleWithRisk : Answer::kFeasible,
-           "The way is " + three_digits(*way.tortuosity) +
-               " times as long as the straight line between its ends: " +
+           (times == "1.00" ? "The way is straight (1.00 times the line between its ends): "
+                            : "The way is " + times +
+                                  " times as long as the straight line between its ends: ") +
                graded(way.tortuosity_grade, "tortuosity") + ".");
     }
     const std::string bend = "The sharpest bend leaves " + whole_degrees(way.bend) +

@@ -1,6 +1,7 @@
 #include "plan/verdict_changes.h"
 
 #include <algorithm>
+#include <cctype>
 #include <utility>
 
 #include "plan/catheter_choice.h"
@@ -11,11 +12,6 @@ namespace {
 
 /// What fewer than one in so many end by is left out of what would change the verdict.
 constexpr int kOneIn = 10;
-
-/// "12 of 63 trials"
-std::string part_of(int count, const Endings& endings, const std::string& noun) {
-  return std::to_string(count) + " of " + count_of(endings.trials, noun);
-}
 
 bool tried_angled(const Study& study) {
   return std::any_of(study.wires.begin(), study.wires.end(),
@@ -30,6 +26,15 @@ bool tried_moves(const Plan& plan) {
 
 std::string catheter_name(const Known& known, const PairFindings& pair) {
   return known.study.catheters[static_cast<std::size_t>(pair.pair.catheter)].tool.wire.name;
+}
+
+/// "3 of 9 trials went past the branch or into another one"
+std::string tell_astray(const Endings& endings, const std::string& noun) {
+  const int count = endings.passed_by + endings.wrong_branch;
+  return part_of(count, endings.trials, noun) + (endings.wrong_branch == 0 ? " went past the branch"
+                                                 : endings.passed_by == 0
+                                                     ? " went into another branch"
+                                                     : " went past the branch or into another one");
 }
 
 /// Of a case that names catheters: `went` is how many went past the branch.
@@ -72,8 +77,7 @@ std::string change_of_catheters(const std::string& went, const Known& known) {
 }
 
 std::string change_at_branch(const Endings& endings, const Known& known, const std::string& noun) {
-  const std::string went = part_of(endings.passed_by + endings.wrong_branch, endings, noun) +
-                           " went past the branch or into another one";
+  const std::string went = tell_astray(endings, noun);
   if (!known.study.catheters.empty()) return change_of_catheters(went, known);
   if (!tried_angled(known.study)) {
     std::string text = "A wire with an angled tip: " + went + ", and no such wire was tried";
@@ -83,7 +87,7 @@ std::string change_at_branch(const Endings& endings, const Known& known, const s
     return text + ".";
   }
   if (!tried_moves(known.plan)) {
-    return "Turning the wire at the branch: " + went + ", and all were pushed without a turn.";
+    return "Turning the wire at the branch: " + went + "; the wire was not turned.";
   }
   return "A shaped catheter that leads the wire into the branch (not simulated): " + went +
          ", though wires with an angled tip and turns of the wire were tried.";
@@ -91,7 +95,7 @@ std::string change_at_branch(const Endings& endings, const Known& known, const s
 
 std::string change_of_wire_length(const Endings& endings, const Known& known,
                                   const std::string& noun) {
-  return "More wire in the vessel: " + part_of(endings.all_wire_in, endings, noun) +
+  return "More wire in the vessel: " + part_of(endings.all_wire_in, endings.trials, noun) +
          " ended before the target with all the wire in that may go in, at most " +
          one_decimal(known.study.insertion.length) + " mm.";
 }
@@ -109,6 +113,16 @@ std::string list_words(const std::vector<std::string>& parts) {
 
 std::string count_of(int count, const std::string& noun) {
   return std::to_string(count) + " " + noun + (count == 1 ? "" : "s");
+}
+
+std::string part_of(int count, int all, const std::string& noun) {
+  if (count < all || all == 0) return std::to_string(count) + " of " + count_of(all, noun);
+  return all == 1 ? "the one " + noun : "all " + count_of(all, noun);
+}
+
+std::string capital(std::string text) {
+  text.front() = static_cast<char>(std::toupper(static_cast<unsigned char>(text.front())));
+  return text;
 }
 
 void add_ending(Endings& endings, const Measured& trial, const simulate::Wire& wire,
@@ -168,7 +182,7 @@ std::string describe_endings(const Endings& endings) {
       {endings.stuck, "got stuck"},
       {endings.prolapsed, "folded back on the way"},
       {endings.another_way, "came to the target another way"},
-      {endings.crossed, "crossed themselves in a loop"},
+      {endings.crossed, "made a loop that crosses itself"},
       {endings.left_lumen, "went through the wall"},
       {endings.all_wire_in, "ended with all wire in"},
       {endings.missed, "missed the target"},
@@ -227,26 +241,27 @@ std::vector<std::string> changes_by(const Endings& endings, const Known& known,
   add(endings.passed_by + endings.wrong_branch, change_at_branch(endings, known, noun));
   add(endings.stuck + endings.prolapsed,
       "Another access, or a wire of another stiffness: " +
-          part_of(endings.stuck + endings.prolapsed, endings, noun) +
+          part_of(endings.stuck + endings.prolapsed, endings.trials, noun) +
           " got stuck or folded back on the way.");
   const int hurt = endings.left_lumen + endings.broke_wall;
-  add(hurt, "A softer wire: " + part_of(hurt, endings, noun) + " went through the wall.");
+  add(hurt, "A softer wire: " + part_of(hurt, endings.trials, noun) + " went through the wall.");
   add(endings.broke_tip_force,
-      "A wire with a softer tip: " + part_of(endings.broke_tip_force, endings, noun) +
-          " press the tip on the wall with more than " + four_digits(known.limits.tip_force_fail) +
-          " N.");
+      "A wire with a softer tip: " + part_of(endings.broke_tip_force, endings.trials, noun) +
+          " pressed the tip on the wall with more than " +
+          four_digits(known.limits.tip_force_fail) + " N.");
   const int detours = endings.broke_path + endings.another_way;
-  add(detours, "Another entry angle or another access: " + part_of(detours, endings, noun) +
+  add(detours, "Another entry angle or another access: " + part_of(detours, endings.trials, noun) +
                    " came to the target another way.");
   add(endings.all_wire_in, change_of_wire_length(endings, known, noun));
   add(endings.left_image,
-      "A scan that shows more of the vessel: " + part_of(endings.left_image, endings, noun) +
+      "A scan that shows more of the vessel: " + part_of(endings.left_image, endings.trials, noun) +
           " came to an end of the imaged vessel.");
   add(endings.crossed,
-      "A stiffer wire, or a catheter around it: " + part_of(endings.crossed, endings, noun) +
+      "A stiffer wire, or a catheter around it: " + part_of(endings.crossed, endings.trials, noun) +
           " looped until the wire crossed itself.");
   add(endings.no_equilibrium + endings.our_fault,
-      "A finer computation: " + part_of(endings.no_equilibrium + endings.our_fault, endings, noun) +
+      "A finer computation: " +
+          part_of(endings.no_equilibrium + endings.our_fault, endings.trials, noun) +
           " gave no result, as no balance of forces was found or the program failed.");
   std::stable_sort(changes.begin(), changes.end(),
                    [](const auto& a, const auto& b) { return a.first > b.first; });

@@ -11,6 +11,10 @@ namespace wireplan::plan {
 std::string list_words(const std::vector<std::string>& parts);
 /// "1 trial", "3 trials"
 std::string count_of(int count, const std::string& noun);
+/// Of all that there are: "3 of 9 trials", "all 9 trials", "the one trial"
+std::string part_of(int count, int all, const std::string& noun);
+/// With a capital letter in front.
+std::string capital(std::string text);
 
 /// How trials ended.
 struct Endings {

@@ -122,7 +122,7 @@ TEST(Verdict, OfAGoodPlanIsFeasibleAndTellsItsNumbers) {
           "device, of 1.67 mm, passes.",
           "The sheath of 2.7 mm is 0.40 times as wide as the narrowest lumen in the first 110 mm "
           "(6.75 mm); below 1.05 it passes.",
-          "The way is 1.1 times as long as the straight line between its ends: tortuosity below "
+          "The way is 1.10 times as long as the straight line between its ends: tortuosity below "
           "mild.",
           "The sharpest bend leaves 130 deg between its arms (180 is straight), 80 mm from the "
           "access: mild angulation."}));
@@ -169,10 +169,9 @@ TEST(Verdict, OfALowShareTellsReachedRepeatsAndWhatWouldMendThem) {
             "Safe in 11 of 16 disturbed repeats, which is 69 % (44 to 86 % with 95 % confidence), "
             "where 90 % is asked for; it reaches in 12.");
   EXPECT_TRUE(tells(verdict.changes,
-                    "A wire with an angled tip: 4 of 5 failed repeats went past the branch or into "
-                    "another one, and no such wire was tried (in the catalogue: angled-a and "
-                    "angled-b)."));
-  EXPECT_TRUE(tells(verdict.changes, "1 of 5 failed repeats press the tip on the wall"));
+                    "A wire with an angled tip: 4 of 5 failed repeats went past the branch, and no "
+                    "such wire was tried (in the catalogue: angled-a and angled-b)."));
+  EXPECT_TRUE(tells(verdict.changes, "1 of 5 failed repeats pressed the tip on the wall"));
 }
 
 TEST(Verdict, WithoutRepeatsIsUnsure) {
@@ -333,7 +332,40 @@ TEST(Verdict, WhereAllFailInFullIsNotFeasible) {
   EXPECT_TRUE(tells(verdict.changes, "A wire with an angled tip: 7 of 20 trials"));
   EXPECT_TRUE(
       tells(verdict.changes,
-            "Running all trials in full detail: 11 of 20 were run against a rigid wall only."));
+            "Running all trials in full detail: the wall was taken for rigid in 11 of 20 trials."));
+}
+
+TEST(Verdict, OfOneTrialSpeaksOfOne) {
+  WhatIsKnown past;
+  past.add(Outcome::kPassedBy);
+  past.study.wires[0].sections[0].rest_curvature = 0.04;
+  EXPECT_EQ(past.verdict().headline, "The one trial does not reach the target.");
+  EXPECT_EQ(past.verdict().changes,
+            std::vector<std::string>{"Turning the wire at the branch: the one trial went past the "
+                                     "branch; the wire was not turned."});
+  WhatIsKnown rough;
+  rough.add(Outcome::kReached).peak_tip_force = 2.0;
+  EXPECT_EQ(rough.verdict().headline,
+            "The one trial reaches the target, but not within the limits.");
+  WhatIsKnown loop;
+  loop.add(Outcome::kCrossesItself);
+  EXPECT_TRUE(tells(loop.verdict().reasons, "The one trial made a loop that crosses itself."));
+  WhatIsKnown held;
+  held.add(Outcome::kStuck, Level::kProbe);
+  EXPECT_TRUE(tells(held.verdict().reasons, "The one trial got stuck, folded back or went"));
+  EXPECT_TRUE(tells(held.verdict().changes, "the wall was taken for rigid in the one trial."));
+}
+
+TEST(Verdict, AWayThatIsStraightIsCalledSo) {
+  for (const double tortuosity : {1.004, 1.006}) {
+    WhatIsKnown bench = WhatIsKnown::good();
+    bench.way = wide_way();
+    bench.way->tortuosity = tortuosity;
+    EXPECT_TRUE(tells(bench.verdict().reasons,
+                      tortuosity < 1.005
+                          ? "The way is straight (1.00 times the line between its ends): tort"
+                          : "The way is 1.01 times as long as the straight line"));
+  }
 }
 
 TEST(Verdict, WhereAllThatReachBreakALimitIsNotFeasible) {
@@ -375,9 +407,8 @@ TEST(Verdict, WhatWasOnlyScoutedIsUnsure) {
   WhatIsKnown scouted;
   scouted.add_many(9, Outcome::kStuck, Level::kScout);
   EXPECT_EQ(scouted.verdict().answer, Answer::kUnsure);
-  EXPECT_EQ(scouted.verdict().reasons.front(),
-            "No trial that was computed with fine elements came to a clear end: all were computed "
-            "coarsely.");
+  EXPECT_EQ(scouted.verdict().reasons.front(), "No trial was computed with fine elements.");
+  EXPECT_TRUE(tells(scouted.verdict().reasons, "All 9 trials got stuck, computed coarsely."));
 
   WhatIsKnown reached;
   reached.add_many(9, Outcome::kStuck);
@@ -398,14 +429,17 @@ TEST(Verdict, ChangesFollowFromWhatWasTried) {
   WhatIsKnown bench;
   bench.add_many(9, Outcome::kWrongBranch);
   bench.study.wires[0].sections[0].rest_curvature = 0.04;
-  EXPECT_TRUE(tells(bench.verdict().changes, "Turning the wire at the branch: 9 of 9 trials"));
+  EXPECT_TRUE(
+      tells(bench.verdict().changes,
+            "Turning the wire at the branch: all 9 trials went into another branch; the wire "
+            "was not turned."));
   bench.plan.scripts.starts_tried = 2;
   EXPECT_TRUE(tells(bench.verdict().changes, "A shaped catheter that leads the wire"));
 
   WhatIsKnown wire;
   wire.add(Outcome::kMissed).insertion = 400.0;
   EXPECT_TRUE(tells(wire.verdict().changes,
-                    "More wire in the vessel: 1 of 1 trial ended before the target with all the "
+                    "More wire in the vessel: the one trial ended before the target with all the "
                     "wire in that may go in, at most 400.0 mm."));
   // One in eleven is too few to speak of.
   wire.add_many(10, Outcome::kStuck);
@@ -437,10 +471,10 @@ TEST(Verdict, OfCathetersThatDoNotReachSaysWhatStopsThemAndWhichAreLeft) {
                     "No script of cobra with straight reaches: it turns aside; the catheter's tip "
                     "came no nearer to the ostium than 9.7 mm."));
   EXPECT_TRUE(tells(verdict.reasons, "Not tried was short with straight: catheter too short."));
-  EXPECT_TRUE(tells(verdict.changes,
-                    "A catheter of another shape: 9 of 9 trials went past the branch or into "
-                    "another one, though cobra was tried; a simple curve and a reversed curve "
-                    "were not."));
+  EXPECT_TRUE(
+      tells(verdict.changes,
+            "A catheter of another shape: all 9 trials went past the branch, though cobra was "
+            "tried; a simple curve and a reversed curve were not."));
   pairs.erase(pairs.begin());
   EXPECT_TRUE(tells(bench.verdict().changes, "short could not be tried (catheter too short)."));
   bench.study.catheters = {curved("cobra", 1.5), curved("vertebral", 0.8), curved("sos", 4.0)};
@@ -450,8 +484,8 @@ TEST(Verdict, OfCathetersThatDoNotReachSaysWhatStopsThemAndWhichAreLeft) {
     pairs.back().furthest = 9.0;
   }
   EXPECT_TRUE(tells(bench.verdict().changes,
-                    "Another access, or a catheter of another width: 9 of 9 trials went past the "
-                    "branch or into another one, though cobra, vertebral and sos were tried."));
+                    "Another access, or a catheter of another width: all 9 trials went past the "
+                    "branch, though cobra, vertebral and sos were tried."));
 }
 
 TEST(Verdict, AnAssumedSheathLongerThanTheWayIsNotWeighed) {
@@ -473,8 +507,7 @@ TEST(Verdict, OfARigidWallAloneSaysWhyThatIsEnoughOrIsUnsure) {
   bench.add_many(2, Outcome::kStuck, Level::kProbe);
   const Verdict clear = bench.verdict();
   EXPECT_EQ(clear.answer, Answer::kNotFeasible);
-  EXPECT_TRUE(tells(clear.reasons, "rigid wall only, which is enough here"));
-  EXPECT_TRUE(tells(clear.reasons, "(8 of 10)"));
+  EXPECT_TRUE(tells(clear.reasons, "rigid, which is enough here: 8 of 10 trials ended in"));
   bench.add_many(7, Outcome::kStuck, Level::kProbe);
   const Verdict held = bench.verdict();
   EXPECT_EQ(held.answer, Answer::kUnsure);
