@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "plan/number_text.h"
+#include "plan/search.h"
 #include "plan/statistics.h"
 #include "plan/verdict_changes.h"
 
@@ -87,11 +88,14 @@ class Weighing {
   void weigh_failure() {
     Endings all, fine, full;
     int reached_coarsely = 0;
+    const simulate::InsertionOptions &own = known_.study.insertion,
+                                     coarse = scout_study(known_.study).insertion;
     for (std::size_t k = 0; k < known_.plan.trials.size(); ++k) {
       const int id = static_cast<int>(k);
       const Level level = known_.plan.levels[k];
       const auto add = [&](Endings& endings) {
-        add_ending(endings, trial(id), wire_of(id), known_.study, known_.limits);
+        add_ending(endings, trial(id), wire_of(id), level == Level::kScout ? coarse : own,
+                   known_.limits);
       };
       add(all);
       if (level != Level::kScout) add(fine);
@@ -278,7 +282,8 @@ class Weighing {
       if (own.trial != first.trial) continue;
       for (std::size_t k = 0; k < own.trials.size(); ++k) {
         if (repeats->repeats[k].safe) continue;
-        add_ending(failed, own.trials[k], wire_of(first.trial), known_.study, known_.limits);
+        add_ending(failed, own.trials[k], wire_of(first.trial), known_.study.insertion,
+                   known_.limits);
       }
     }
     for (std::string& text_of : changes_by(failed, known_, "failed repeat")) {

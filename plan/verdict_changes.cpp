@@ -100,6 +100,20 @@ std::string change_of_wire_length(const Endings& endings, const Known& known,
          one_decimal(known.study.insertion.length) + " mm.";
 }
 
+/// Of those that missed with wire left to push.
+std::string change_of_aim(const Endings& endings, const Known& known, const std::string& noun) {
+  const std::string missed = part_of(endings.missed, endings.trials, noun);
+  const simulate::Goal& goal = known.study.goal;
+  if (goal.at_section) {
+    return "Another wire, entry angle or roll: " + missed +
+           " ended before the target, with wire left to push.";
+  }
+  return "A target that is the vessel's whole cross-section, or another wire, entry angle or "
+         "roll: " +
+         missed + " missed the sphere of " + one_decimal(goal.radius) +
+         " mm radius, which a wire may pass beside.";
+}
+
 }  // namespace
 
 std::string list_words(const std::vector<std::string>& parts) {
@@ -126,7 +140,7 @@ std::string capital(std::string text) {
 }
 
 void add_ending(Endings& endings, const Measured& trial, const simulate::Wire& wire,
-                const Study& study, const Limits& limits) {
+                const simulate::InsertionOptions& insertion, const Limits& limits) {
   using simulate::Outcome;
   const Metrics& m = trial.metrics;
   ++endings.trials;
@@ -138,8 +152,10 @@ void add_ending(Endings& endings, const Measured& trial, const simulate::Wire& w
       endings.broke_wall += m.max_penetration > limits.penetration_fail;
       return;
     case Outcome::kMissed: {
-      const double most = std::min(study.insertion.length, wire.length());
-      ++(m.insertion > most - 1e-6 ? endings.all_wire_in : endings.missed);
+      const double most = simulate::longest_insertion(wire, insertion);
+      ++(m.insertion < most - 1e-6        ? endings.missed
+         : most < insertion.length - 1e-6 ? endings.whole_wire_in
+                                          : endings.all_wire_in);
       return;
     }
     case Outcome::kPassedBy:
@@ -184,7 +200,7 @@ std::string describe_endings(const Endings& endings) {
       {endings.another_way, "came to the target another way"},
       {endings.crossed, "made a loop that crosses itself"},
       {endings.left_lumen, "went through the wall"},
-      {endings.all_wire_in, "ended with all wire in"},
+      {endings.whole_wire_in + endings.all_wire_in, "ended with all wire in"},
       {endings.missed, "missed the target"},
       {endings.left_image, "came to an end of the imaged vessel"},
       {endings.no_equilibrium, "found no balance of forces"},
@@ -252,7 +268,11 @@ std::vector<std::string> changes_by(const Endings& endings, const Known& known,
   const int detours = endings.broke_path + endings.another_way;
   add(detours, "Another entry angle or another access: " + part_of(detours, endings.trials, noun) +
                    " came to the target another way.");
+  add(endings.whole_wire_in,
+      "A longer wire: " + part_of(endings.whole_wire_in, endings.trials, noun) +
+          " ended before the target with all of the wire in.");
   add(endings.all_wire_in, change_of_wire_length(endings, known, noun));
+  add(endings.missed, change_of_aim(endings, known, noun));
   add(endings.left_image,
       "A scan that shows more of the vessel: " + part_of(endings.left_image, endings.trials, noun) +
           " came to an end of the imaged vessel.");

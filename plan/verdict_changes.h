@@ -25,17 +25,18 @@ struct Endings {
   int another_way = 0;  // at the target, but not along the way
   int crossed = 0;      // ran through themselves: with contact between the loops they may go on
   int no_equilibrium = 0, our_fault = 0;
-  int all_wire_in = 0;  // of those that missed, with no more wire to push ...
-  int missed = 0;       // ... and the others
+  int whole_wire_in = 0;  // of those that missed, with all of the wire in the body, ...
+  int all_wire_in = 0;    // ... with as much of it as may go in ...
+  int missed = 0;         // ... and the others
 
   int unclear() const { return left_image + crossed + no_equilibrium + our_fault; }
   int clear() const { return trials - unclear(); }
   int held_by_wall() const { return stuck + prolapsed + left_lumen; }
 };
 
-/// Adds a trial of that wire.
+/// Adds a trial of that wire, inserted so.
 void add_ending(Endings& endings, const Measured& trial, const simulate::Wire& wire,
-                const Study& study, const Limits& limits);
+                const simulate::InsertionOptions& insertion, const Limits& limits);
 
 /// "12 passed by the branch, 3 got stuck": all that did not reach, the most frequent first.
 std::string describe_endings(const Endings& endings);

@@ -82,6 +82,13 @@ double friction_of(const Wire& wire, const InsertionOptions& options) {
   return options.friction_factor * wire.friction.value_or(options.friction);
 }
 
+double longest_insertion(const Wire& wire, const InsertionOptions& options) {
+  const Eigen::VectorXd edges = layout(wire, options);
+  double sum = 0.0;
+  for (Eigen::Index i = edges.size() - 1; i >= 2; --i) sum += edges[i];
+  return std::min(options.length, sum);
+}
+
 Insertion::Insertion(const Wire& wire, const Introducer& introducer, const VesselModel& vessel,
                      const InsertionOptions& options)
     : introducer_(introducer),
@@ -90,7 +97,7 @@ Insertion::Insertion(const Wire& wire, const Introducer& introducer, const Vesse
       rod_(build_rod(wire, layout(wire, options))),
       contact_(rod_, vessel, contact_options(wire, options)) {
   const int n = rod_.nodes();
-  longest_ = std::min(options.length, rod_.tip_distance[2]);
+  longest_ = longest_insertion(wire, options);
   whole_ = rod_;
   const Vec3 start = introducer.point - rod_.tip_distance[0] * introducer.direction;
   state_ = straight_state(rod_, start, introducer.direction, introducer.roll);

@@ -80,6 +80,10 @@ struct TriangleForce {
   double force = 0.0;  //                                                                 [N]
 };
 
+/// Most of a wire that can be brought into the body: up to `options.length`, and all but the last
+/// two elements of the wire [mm].
+double longest_insertion(const Wire& wire, const InsertionOptions& options);
+
 /// The wire between two moves, always in equilibrium. Nodes in the introducer lie on its axis and
 /// turn with the hub; the others are free. Deterministic; shares the vessel read-only.
 class Insertion {

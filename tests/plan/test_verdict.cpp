@@ -446,6 +446,36 @@ TEST(Verdict, ChangesFollowFromWhatWasTried) {
   EXPECT_FALSE(tells(wire.verdict().changes, "More wire"));
 }
 
+TEST(Verdict, OfAWireThatIsTooShortAsksForALongerOne) {
+  // 120 mm, in elements of 3 mm: two of them stay out, which are four times as long in a scout.
+  for (const Level level : {Level::kFull, Level::kScout}) {
+    WhatIsKnown bench;
+    bench.study.wires[0].sections[0].length = 120.0;
+    bench.study.insertion.element_length = 3.0;
+    bench.add(Outcome::kMissed, level).insertion = level == Level::kFull ? 114.0 : 96.0;
+    const Verdict verdict = bench.verdict();
+    EXPECT_TRUE(tells(verdict.reasons, "The one trial ended with all wire in"));
+    EXPECT_TRUE(tells(verdict.changes,
+                      "A longer wire: the one trial ended before the target with all of the wire "
+                      "in."));
+    EXPECT_FALSE(tells(verdict.changes, "More wire in the vessel"));
+  }
+}
+
+TEST(Verdict, OfAMissWithWireLeftAsksForAnotherAim) {
+  WhatIsKnown bench;
+  bench.add(Outcome::kMissed);
+  EXPECT_EQ(bench.verdict().changes,
+            std::vector<std::string>{"Another wire, entry angle or roll: the one trial ended "
+                                     "before the target, with wire left to push."});
+  bench.study.goal.at_section = false;
+  EXPECT_EQ(bench.verdict().changes,
+            std::vector<std::string>{
+                "A target that is the vessel's whole cross-section, or another wire, entry angle "
+                "or roll: the one trial missed the sphere of 2.5 mm radius, which a wire may pass "
+                "beside."});
+}
+
 Catheter curved(const std::string& name, double angle) {
   Catheter catheter;
   catheter.tool.wire = {
