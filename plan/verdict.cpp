@@ -242,6 +242,13 @@ class Weighing {
                " mm where the vessel's radius is " + two_digits(m.wall_motion.radius) +
                " mm, more than the " + two_digits(kLinearWallPart) +
                " of the radius that its model holds for: forces there are rough.");
+      const auto merit = [&](const RankedPlan& other) {
+        const WallMotion& motion = trial(other.trial).metrics.wall_motion;
+        return motion.beyond_linear_theory() ? "" : two_digits(motion.displacement) + " mm";
+      };
+      if (!offer_other(first, "the wall moves at most ", merit)) {
+        change("A softer wire, which moves the wall less.");
+      }
     }
     weigh_length(first);
   }
@@ -298,6 +305,7 @@ class Weighing {
     return find_spread(forces).high;
   }
 
+  /// As it was planned, and in 95 % of its repeats where it has any.
   double most_tip_force(int id) const {
     const double force = trial(id).metrics.peak_tip_force;
     const RepeatedPlan* repeats = repeats_of(id);
@@ -317,10 +325,13 @@ class Weighing {
             four_digits(warn) + " N (limit " + four_digits(known_.limits.tip_force_fail) + " N).";
     find(risk ? Answer::kFeasibleWithRisk : Answer::kFeasible, text);
     if (!risk) return;
-    offer_other(first, "tip force at most ", [&](const RankedPlan& other) {
+    const auto merit = [&](const RankedPlan& other) {
       const double less = most_tip_force(other.trial);
       return less <= warn ? two_digits(less) + " N" : std::string();
-    });
+    };
+    if (!offer_other(first, "tip force at most ", merit)) {
+      change("A wire with a softer tip, which presses less on the wall.");
+    }
   }
 
   void weigh_tip_error(const RankedPlan& first) {
@@ -369,12 +380,14 @@ class Weighing {
     change("Another wire, angle or roll whose end does not hang on how it is computed.");
   }
 
-  /// The best other plan that `merit` has something to say of.
+  /// The best other plan that `merit` has something to say of, if any: one that was repeated, and
+  /// whose tip is known to end in the target.
   template <typename Merit>
-  void offer_other(const RankedPlan& first, const std::string& what, const Merit& merit) {
+  bool offer_other(const RankedPlan& first, const std::string& what, const Merit& merit) {
     for (std::size_t k = 0; k < ranking_.plans.size(); ++k) {
       const RankedPlan& other = ranking_.plans[k];
-      if (other.trial == first.trial) continue;
+      if (other.trial == first.trial || repeats_of(other.trial) == nullptr) continue;
+      if (!other.tip_error || ends_unsure(other)) continue;
       const std::string text = merit(other);
       if (text.empty()) continue;
       const auto id = static_cast<std::size_t>(other.trial);
@@ -382,8 +395,9 @@ class Weighing {
       sentence.append(describe(known_.study, known_.plan.candidates[id]));
       sentence.append("): ").append(what).append(text).append(".");
       change(std::move(sentence));
-      return;
+      return true;
     }
+    return false;
   }
 
   // ---- The way.

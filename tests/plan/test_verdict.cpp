@@ -247,6 +247,40 @@ TEST(Verdict, AWallMovedBeyondItsModelIsARisk) {
   bench.plan.trials[0].metrics.wall_motion = {.displacement = 1.2, .radius = 3.0};
   EXPECT_EQ(bench.verdict().answer, Answer::kFeasibleWithRisk);
   EXPECT_TRUE(tells(bench.verdict().reasons, "The wall moves 1.2 mm where"));
+  EXPECT_EQ(bench.verdict().changes,
+            std::vector<std::string>{"A softer wire, which moves the wall less."});
+
+  // Rather another plan, where it is known to hold.
+  bench.add(Outcome::kReached).peak_contact_force = 0.3;  // behind the first
+  bench.plan.trials.back().metrics.wall_motion = {.displacement = 0.5, .radius = 3.0};
+  bench.repeat(2, 16);
+  bench.refine(2, 0.1);
+  EXPECT_TRUE(tells(bench.verdict().changes, "Plan 2 in its place ("));
+  EXPECT_TRUE(tells(bench.verdict().changes, "): the wall moves at most 0.50 mm."));
+}
+
+TEST(Verdict, OffersOnlyPlansThatAreKnownToHold) {
+  enum class Lacks { kNothing, kRepeats, kError, kRoom, kOneEnd };
+  for (const Lacks lacks :
+       {Lacks::kNothing, Lacks::kRepeats, Lacks::kError, Lacks::kRoom, Lacks::kOneEnd}) {
+    SCOPED_TRACE(static_cast<int>(lacks));
+    WhatIsKnown bench = WhatIsKnown::good();
+    bench.plan.trials[0].metrics.peak_tip_force = 0.4;  // above the warning level
+    bench.add(Outcome::kReached).peak_contact_force = 0.9;
+    if (lacks != Lacks::kRepeats) bench.repeat(2, 16);
+    if (lacks != Lacks::kError) bench.refine(2, lacks == Lacks::kRoom ? 104.0 : 0.1);
+    if (lacks == Lacks::kOneEnd) {
+      bench.plan.refinements.back().others = {
+          {.setting = Setting::kStep, .change = {.tip = 5.0}, .incomplete = ""}};
+    }
+    const Verdict verdict = bench.verdict();
+    ASSERT_EQ(verdict.answer, Answer::kFeasibleWithRisk);
+    ASSERT_EQ(verdict.changes.size(), 1U);
+    const bool offered = tells(verdict.changes, "): tip force at most 0.10 N.");
+    EXPECT_EQ(offered, lacks == Lacks::kNothing);
+    EXPECT_EQ(tells(verdict.changes, "A wire with a softer tip, which presses less on the wall."),
+              !offered);
+  }
 }
 
 TEST(Verdict, ADeviceIsHeldAgainstTheNarrowestPlaceAndWhatItsWidthIsUnknownBy) {
