@@ -11,7 +11,8 @@
 namespace wireplan::pipeline {
 namespace {
 
-constexpr std::array kGrades = {"none", "mild", "moderate", "severe"};
+constexpr std::array kGrades = {"below mild", "mild", "moderate", "severe"};
+constexpr const char* kUngraded = "a branch's own turn";
 constexpr const char* kReportingStandards =
     "limits of the case; by default the reporting standards for iliac arteries (Chaikof et al. "
     "2002), here applied to the whole way";
@@ -80,14 +81,13 @@ Json access_json(const Centerline& way, const Eigen::VectorXd& diameters,
   const double told = std::round(degrees(bend.angle)) * kRadPerDeg;
   Json thresholds = Json::array();
   for (const double angle : limits.angle) thresholds.push_back(clean(degrees(angle)));
-  access["sharpest_bend"] = {{"angle_deg", degrees(bend.angle)},
-                             {"at_mm", bend.arc},
-                             {"place_mm", to_json(bend.point)},
-                             {"arm_mm", bend.arm},
-                             {"at_ostium_of", ostium_at(bend, junctions, tree)},
-                             {"grade", grade_name(plan::grade_of(told, limits.angle))},
-                             {"thresholds_deg", thresholds},
-                             {"source", kReportingStandards}};
+  const Json ostium = ostium_at(bend, junctions, tree);
+  const char* grade = grade_name(plan::grade_of(told, limits.angle));
+  access["sharpest_bend"] = {
+      {"angle_deg", degrees(bend.angle)}, {"at_mm", bend.arc},
+      {"place_mm", to_json(bend.point)},  {"arm_mm", bend.arm},
+      {"at_ostium_of", ostium},           {"grade", ostium.is_null() ? grade : kUngraded},
+      {"thresholds_deg", thresholds},     {"source", kReportingStandards}};
   return access;
 }
 
@@ -149,7 +149,9 @@ Json c_arm_json(const simulate::Way& way, const std::vector<plan::Junction>& jun
 Json lengths_json(const Centerline& way, const std::vector<plan::Junction>& junctions,
                   const Tree& tree, const plan::AccessLimits& limits) {
   Json places = Json::array();
+  const double length = way.arc_length(way.arc_length.size() - 1);
   for (const plan::Junction& junction : junctions) {
+    if (!junction.taken && junction.level > length) continue;  // the target comes first
     const char* what = junction.bifurcation
                            ? (junction.taken ? "the bifurcation, into" : "the bifurcation, past")
                        : junction.taken ? "the way turns into"
@@ -159,7 +161,6 @@ Json lengths_json(const Centerline& way, const std::vector<plan::Junction>& junc
                       {"at_mm", junction.level},
                       {"place_mm", to_json(plan::point_at(way, junction.level))}});
   }
-  const double length = way.arc_length(way.arc_length.size() - 1);
   const Vec3 end = way.points.col(way.points.cols() - 1);
   places.push_back(
       {{"what", "target"}, {"branch", nullptr}, {"at_mm", length}, {"place_mm", to_json(end)}});
@@ -229,7 +230,10 @@ std::string describe_fit(const Json& passage) {
   if (passage.value("assumed_longer_than_way", false)) {
     return "not weighed: assumed, and longer than the way";
   }
-  return passage.at("fits") ? "fits" : "does not fit";
+  if (!passage.at("fits").get<bool>()) return "does not fit";
+  return passage.at("inscribed_diameter_mm") < passage.at("device_diameter_mm")
+             ? "fits where the lumen, oval there, gives way"
+             : "fits";
 }
 
 std::string describe_anatomy(const Json& figures) {

@@ -29,10 +29,10 @@ Json fetch_row(const char* what, const std::vector<std::string>& items, const st
 /// The first few; all are among the row's items.
 std::string of_catalogue(std::vector<std::string> names) {
   constexpr std::size_t kMostTold = 5;
-  if (names.empty()) return "none of the catalogue";
+  if (names.empty()) return "none in the catalogue";
   const std::size_t left = names.size() - std::min(names.size(), kMostTold);
   names.resize(names.size() - left);
-  return "of the catalogue " + join(names) +
+  return "in the catalogue: " + join(names) +
          (left > 0 ? " and " + std::to_string(left) + " more" : "");
 }
 
@@ -53,10 +53,11 @@ Json sheath_row(const Json& sheath, double inside) {
     if (known.outer_diameter < most && known.inner_diameter >= inside) names.push_back(known.name);
   }
   const double taken = sheath.at("device_diameter_mm");
-  return fetch_row("Sheath", names,
-                   format("below %.3g mm outside, for a catheter of %.3g mm: ", most, inside) +
-                       of_catalogue(names) + format("; weighed: %.3g mm", taken),
-                   sheath.at("assumed"));
+  return fetch_row(
+      "Sheath", names,
+      format("outer diameter below %.3g mm, takes a catheter of %.3g mm; ", most, inside) +
+          of_catalogue(names) + format("; checked here with one of %.3g mm", taken),
+      sheath.at("assumed"));
 }
 
 /// For a plan of a wire alone: what passes the way over that wire.
@@ -69,8 +70,9 @@ Json catheter_row(const Json& device, const simulate::Wire& wire, double length)
   }
   const double taken = device.at("device_diameter_mm");
   return fetch_row("Catheter", names,
-                   format("below %.3g mm outside, over the wire: ", most) + of_catalogue(names) +
-                       format("; weighed: %.3g mm, %.0f mm long", taken, length),
+                   format("outer diameter below %.3g mm, goes over the wire; ", most) +
+                       of_catalogue(names) +
+                       format("; checked here with one of %.3g mm, %.0f mm long", taken, length),
                    device.at("assumed"));
 }
 
@@ -135,12 +137,12 @@ Json fetch_json(const ReportInput& input, const Json& anatomy) {
     list.push_back(catheter_row(access.at("device"), first, comes_off));
   }
   list.push_back(sheath_row(access.at("sheath"), inside));
-  list.push_back(
-      fetch_row("Wire length", {},
-                format("%.0f mm needed, counted from the access point: %.0f mm of way, %.0f mm of "
-                       "catheter that comes off it, %.0f mm to hold; skin to vessel is in the last",
-                       needed, way, comes_off, working),
-                assumed));
+  list.push_back(fetch_row(
+      "Wire length", {},
+      format("%.0f mm needed, counted from the access point: %.0f mm of way, %.0f mm of "
+             "catheter that comes off it, %.0f mm to hold, with the stretch from skin to vessel",
+             needed, way, comes_off, working),
+      assumed));
   return list;
 }
 

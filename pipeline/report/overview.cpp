@@ -136,7 +136,7 @@ std::string describe_plan(const Json& best) {
             " repeats";
   }
   return text +
-         format(", at most %.3f N on the wall", best.at("peak_contact_force_n").get<double>());
+         format(", at most %.3g N on the wall", best.at("peak_contact_force_n").get<double>());
 }
 
 std::string describe_target(const Json& target) {

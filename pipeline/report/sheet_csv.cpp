@@ -124,7 +124,10 @@ void add_anatomy(Table& table, const Json& anatomy) {
             bend.at("at_ostium_of"));
   const Json& calcium = access.at("calcium");
   table.row("calcium beside the lumen", calcium.at("volume_mm3"), "mm3", calcium.at("above_hu"),
-            "limit in HU; blur hides most of thin plaque, and metal or bone above it counts too");
+            calcium.at("volume_mm3").is_null()
+                ? calcium.at("null_reasons").at("volume_mm3")
+                : Json("limit in HU; blur hides most of thin plaque, and metal or bone above it "
+                       "counts too"));
 
   table.begin("c-arm");
   const Json& arm = anatomy.at("c_arm");
@@ -132,19 +135,22 @@ void add_anatomy(Table& table, const Json& anatomy) {
   table.row("reach: tilt", arm.at("max_tilt_deg"), "deg", nullptr, arm.at("source"));
   if (!arm.at("no_views").is_null())
     table.row("no views", nullptr, "", nullptr, arm.at("no_views"));
-  for (const Json& ostium : arm.at("ostia")) {
+  const auto add_views = [&](const Json& row, const std::string& place) {
     for (const auto& [key, title] : {std::pair("best", "best view"), {"second", "second view"}}) {
-      const Json& view = ostium.at(key);
+      const Json& view = row.at(key);
       if (view.is_null()) continue;
-      std::string which = title;
-      which.append(", ostium of ").append(ostium.at("branch").get_ref<const std::string&>());
+      const std::string which = title + (", " + place);
       table.row(which + ": LAO", view.at("lao_deg"), "deg", nullptr, view.at("view"));
       table.row(which + ": cranial", view.at("cranial_deg"), "deg", nullptr,
                 view.at("reachable").get<bool>() ? "within reach" : "out of reach");
       table.row(which + ": trunk foreshortened by", view.at("trunk_foreshortening"));
       table.row(which + ": branch foreshortened by", view.at("branch_foreshortening"));
     }
+  };
+  for (const Json& ostium : arm.at("ostia")) {
+    add_views(ostium, "ostium of " + ostium.at("branch").get<std::string>());
   }
+  add_views(arm.at("bend"), "sharpest bend");
 
   table.begin("lengths");
   const Json& lengths = anatomy.at("lengths");

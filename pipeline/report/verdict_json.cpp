@@ -32,8 +32,11 @@ plan::WayFindings way_findings(const Json& anatomy) {
   way.tortuosity_grade = grade_from(tortuosity.at("grade"));
   way.bend = bend.at("angle_deg").get<double>() * kRadPerDeg;
   way.bend_at = bend.at("at_mm");
-  way.bend_grade = grade_from(bend.at("grade"));
-  if (!bend.at("at_ostium_of").is_null()) way.bend_ostium = bend.at("at_ostium_of");
+  if (bend.at("at_ostium_of").is_null()) {
+    way.bend_grade = grade_from(bend.at("grade"));
+  } else {
+    way.bend_ostium = bend.at("at_ostium_of");
+  }
   way.wire_needed = anatomy.at("lengths").at("wire_needed_mm").get<double>();
   return way;
 }

@@ -90,7 +90,7 @@ TEST(Report, TellsAccessViewsAndLengthsOfTheTube) {
   EXPECT_TRUE(access.at("sheath").at("fits"));
   EXPECT_FALSE(access.at("device").at("fits"));
   EXPECT_NEAR(access.at("tortuosity").at("index"), 1.0, 0.01);
-  EXPECT_EQ(access.at("tortuosity").at("grade"), "none");
+  EXPECT_EQ(access.at("tortuosity").at("grade"), "below mild");
   EXPECT_NEAR(access.at("sharpest_bend").at("angle_deg"), 180.0, 2.0);
   EXPECT_TRUE(access.at("calcium").at("volume_mm3").is_null());
   EXPECT_TRUE(report.at("anatomy").at("c_arm").at("ostia").empty());
@@ -116,6 +116,15 @@ TEST(Report, TellsAccessViewsAndLengthsOfTheTube) {
   EXPECT_NE(none.at("no_views").get<std::string>().find("axes are not known"), std::string::npos);
   EXPECT_TRUE(none.at("bend").at("best").is_null());
   expect_valid(unknown, folder.path());
+}
+
+TEST(Report, ADeviceThatPassesAnOvalLumenByItsAreaAloneIsTold) {
+  Json row = {{"fits", true}, {"inscribed_diameter_mm", 0.584}, {"device_diameter_mm", 0.6}};
+  EXPECT_EQ(describe_fit(row), "fits where the lumen, oval there, gives way");
+  row["device_diameter_mm"] = 0.5;
+  EXPECT_EQ(describe_fit(row), "fits");
+  row["fits"] = false;
+  EXPECT_EQ(describe_fit(row), "does not fit");
 }
 
 TEST(Report, CountsTheWireForTheCatheterOfTheFirstPlan) {

@@ -190,8 +190,8 @@ TEST(Overview, PutsTheBetterAnswerAndThenMoreSafeRepeatsFirst) {
         {"access",
          {{"device", {{"lumen_diameter_mm", 5.0}, {"fits", true}}},
           {"sheath", {{"lumen_diameter_mm", 5.0}, {"fits", true}}},
-          {"tortuosity", {{"index", 1.1}, {"grade", "none"}}},
-          {"sharpest_bend", {{"angle_deg", 170.0}, {"grade", "none"}, {"at_ostium_of", nullptr}}},
+          {"tortuosity", {{"index", 1.1}, {"grade", "below mild"}}},
+          {"sharpest_bend", {{"angle_deg", 170.0}, {"grade", "below mild"}, {"at_ostium_of", nullptr}}},
           {"calcium", {{"volume_mm3", nullptr}}}}}};
     return json;
   };

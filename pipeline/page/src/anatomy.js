@@ -6,16 +6,18 @@ const mm = (value) => `${number(value)}\u00a0mm`;
 const place = (p) => `(${p.map((x) => x.toFixed(1)).join(", ")})\u00a0mm`;
 
 // ---- Access.
-const gradeText = (grade) => (grade === "none" ? "no finding" : grade);
-
 const thresholds = (from, [mild, moderate, severe]) =>
   `mild ${from} ${mild}, moderate ${from} ${moderate}, severe ${from} ${severe}`;
+
+/** Whether a device passes: a lumen may be wide enough one way alone. */
+export const fitText = (row) =>
+  !row.fits ? "does not fit" : row.inscribed_diameter_mm < row.device_diameter_mm ? "fits where the lumen, oval there, gives way" : "fits";
 
 const passageRow = (what, row) => [
   what,
   `least lumen ${mm(row.lumen_diameter_mm)} (sphere inside ${mm(row.inscribed_diameter_mm)}), ${mm(row.at_mm)} from the access at ${place(row.place_mm)}`,
   `device over lumen below ${number(row.max_ratio)}`,
-  `${row.assumed_longer_than_way ? "not weighed, since assumed and longer than the way" : row.fits ? "fits" : "does not fit"}: ${mm(row.device_diameter_mm)} in ${mm(row.lumen_diameter_mm)} is ${number(row.ratio)}`,
+  `${row.assumed_longer_than_way ? "not weighed, since assumed and longer than the way" : fitText(row)}: ${mm(row.device_diameter_mm)} in ${mm(row.lumen_diameter_mm)} is ${number(row.ratio)}`,
   shown(row.source),
 ];
 
@@ -26,11 +28,11 @@ const accessTable = ({device, sheath, tortuosity, sharpest_bend: bend, calcium})
     ["Tortuosity",
      tortuosity.index === null ? shown(tortuosity.null_reasons.index) : `the way is ${number(tortuosity.index)} times as long as the straight line between its ends`,
      thresholds("from", tortuosity.thresholds.map(number)),
-     gradeText(tortuosity.grade), shown(tortuosity.source)],
+     tortuosity.grade, shown(tortuosity.source)],
     ["Sharpest bend",
      `${degrees(bend.angle_deg)} between its arms of ${mm(bend.arm_mm)} (180\u00b0 is straight), ${mm(bend.at_mm)} from the access at ${place(bend.place_mm)}${bend.at_ostium_of ? `, where the way turns into ${bend.at_ostium_of}: an ostium's turn, no bend of the access vessels` : ""}`,
      thresholds("down from", bend.thresholds_deg.map(degrees)),
-     gradeText(bend.grade), shown(bend.source)],
+     bend.grade, shown(bend.source)],
     ["Calcium beside the lumen",
      calcium.volume_mm3 === null ? `not known: ${shown(calcium.null_reasons.volume_mm3)}` : `${number(calcium.volume_mm3)}\u00a0mm\u00b3`,
      `voxels above ${number(calcium.above_hu)}\u00a0HU within ${mm(calcium.within_mm)} of the lumen`,
@@ -39,17 +41,18 @@ const accessTable = ({device, sheath, tortuosity, sharpest_bend: bend, calcium})
   ]);
 
 // ---- C-arm.
-const viewText = (view) => {
+const viewText = (view, [branch, trunk] = ["branch", "trunk"]) => {
   if (!view) return "none";
   const short = (part, what) => (part < 0.005 ? `${what} in full length` : `${what} ${percent(part)} too short`);
-  return `${view.view}: ${short(view.branch_foreshortening, "branch")}, ${short(view.trunk_foreshortening, "trunk")}` +
+  return `${view.view}: ${short(view.branch_foreshortening, branch)}, ${short(view.trunk_foreshortening, trunk)}` +
     (view.reachable ? "" : "; out of the C-arm's reach");
 };
 
-const armTable = ({ostia}) =>
-  table("C-arm angles", ["Ostium", "From the access", "Turn", "Best view", "Second best"],
-    ostia.map((row) => [
-      `from ${shown(row.trunk)} into ${shown(row.branch)}`, mm(row.at_mm), degrees(row.turn_deg), viewText(row.best), viewText(row.second)]));
+const armTable = ({ostia, bend}) =>
+  table("C-arm angles", ["Place", "From the access", "Turn", "Best view", "Second best"], [
+    ...ostia.map((row) => [
+      `from ${shown(row.trunk)} into ${shown(row.branch)}`, mm(row.at_mm), degrees(row.turn_deg), viewText(row.best), viewText(row.second)]),
+    ...(bend.best ? [["the sharpest bend", mm(bend.at_mm), "\u2013", ...[bend.best, bend.second].map((view) => viewText(view, ["far arm", "near arm"]))]] : [])]);
 
 const kFromTheFront = {view: "LAO 0, CRA 0", lao_deg: 0, cranial_deg: 0};
 

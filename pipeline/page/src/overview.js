@@ -16,7 +16,7 @@ const planText = (plan) => {
   return el("span", {}, name(toolsName(plan)), `, ${angles}`, plan.script ? `; ${shown(plan.script)}` : "");
 };
 
-const graded = (value, grade) => (value === null ? "not known" : `${value}${grade === "none" ? "" : ` (${grade})`}`);
+const graded = (value, grade) => (value === null ? "not known" : `${value} (${grade})`);
 
 const cells = (row) => {
   const {best_plan: plan, access_table: table} = row;

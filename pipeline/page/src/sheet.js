@@ -2,7 +2,7 @@
 // page on paper also on a screen, so that what fits here fits there.
 import {el, name} from "./dom.js";
 import {degrees, number, plural, shown, toolsName, valueName} from "./format.js";
-import {drawView, workingOstium, workingView} from "./anatomy.js";
+import {drawView, fitText, workingOstium, workingView} from "./anatomy.js";
 
 const kPlans = 3, kReasons = 8, kChanges = 4, kWarnings = 3, kPlaces = 6;
 const kAnswers = {
@@ -103,10 +103,8 @@ const planTable = ({report, trials}) => {
 };
 
 // ---- Access.
-const gradeText = (grade) => (grade === "none" ? "below mild" : grade);
-
 const passageRow = (what, row) => [what, `lumen of ${mm(row.lumen_diameter_mm)} at its narrowest (sphere inside ${mm(row.inscribed_diameter_mm)}), ${along(row.at_mm)} in`,
-  `${mm(row.device_diameter_mm)}, ratio ${number(Number(row.ratio.toFixed(2)))}`, `below ${number(row.max_ratio)}`, row.fits ? "fits" : "does not fit"];
+  `${mm(row.device_diameter_mm)}, ratio ${number(Number(row.ratio.toFixed(2)))}`, `below ${number(row.max_ratio)}`, fitText(row)];
 
 const accessTable = ({anatomy}) => {
   if (!anatomy) return block("access", "Access", el("p", {}, "Not measured in this report."));
@@ -118,9 +116,9 @@ const accessTable = ({anatomy}) => {
       ? [`Sheath of ${mm(sheath.length_mm)}`, "assumed, and longer than the way", "\u2013", "\u2013", "not weighed"]
       : passageRow(`Sheath, first ${mm(sheath.length_mm)}`, sheath),
     ["Tortuosity", tortuosity.index === null ? "not known" : `way over straight line`, number(tortuosity.index),
-     `severe from ${number(severe(tortuosity.thresholds))}`, gradeText(tortuosity.grade)],
+     `severe from ${number(severe(tortuosity.thresholds))}`, tortuosity.grade],
     ["Sharpest bend", `${along(bend.at_mm)} in${bend.at_ostium_of ? `, the turn into ${bend.at_ostium_of}` : ""}`, degrees(Math.round(bend.angle_deg)),
-     `severe below ${degrees(severe(bend.thresholds_deg))}`, bend.at_ostium_of ? "a branch's own turn" : gradeText(bend.grade)],
+     `severe below ${degrees(severe(bend.thresholds_deg))}`, bend.grade],
     ["Calcium beside it", calcium.volume_mm3 === null ? "not known without a CT" : `above ${number(calcium.above_hu)}\u00a0HU within ${mm(calcium.within_mm)}`,
      calcium.volume_mm3 === null ? "\u2013" : `${number(calcium.volume_mm3)}\u00a0mm\u00b3`, "no grade agreed on",
      calcium.volume_mm3 > 0 ? "look at the slices" : calcium.volume_mm3 === null ? "not known" : "none found"],
