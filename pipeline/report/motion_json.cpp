@@ -109,17 +109,18 @@ Json motion_json(const simulate::Way& way, const simulate::SectionChain& chain,
     const plan::LinePart at = plan::find_part(tree[parent].line, tree[b].parent_arc);
     const Eigen::VectorXd& arcs = moved[parent].line.arc_length;
     moved[b].parent_arc = arcs[at.before] + at.part * (arcs[at.before + 1] - arcs[at.before]);
-    ostia.push_back({{"branch", branch_name(tree, static_cast<int>(b))},
-                     {"place_mm", to_json(rest)},
-                     {"shift_mm", shift.norm()},
-                     {"moved_mm", to_json(shift)}});
+    ostia.push_back(
+        {{"branch", branch_name(tree, static_cast<int>(b), simulate::own_start(tree[b]))},
+         {"place_mm", to_json(rest)},
+         {"shift_mm", shift.norm()},
+         {"moved_mm", to_json(shift)}});
   }
   const simulate::Way there(carried(way.path(), chain, u), moved);
   Json turns = Json::array();
   const std::vector<plan::Junction> after = plan::find_junctions(there);
   for (const plan::Junction& junction : plan::find_junctions(way)) {
     const auto same = std::find_if(after.begin(), after.end(), [&](const plan::Junction& other) {
-      return other.branch == junction.branch && other.taken;
+      return other.branch == junction.branch && other.trunk == junction.trunk && other.taken;
     });
     if (!junction.taken || same == after.end()) continue;
     turns.push_back(turn_json(tree, junction, *same));

@@ -272,11 +272,29 @@ double start_of_own(const std::vector<preprocess::Branch>& tree, std::size_t k) 
   return std::min(1.2 * parent.radius(nearest), 0.8 * tree[k].line.arc_length.tail<1>().value());
 }
 
-/// The classes that a branch runs through, in order, each for 5 mm or a fifth of it, in words.
-std::string classes_along(const preprocess::Image& classes, const Json& names,
-                          const Centerline& line, double from) {
+/// What a class is called in a sentence: "left common carotid artery" of
+/// "common_carotid_artery_left".
+std::string words_of_class(std::string name) {
+  std::replace(name.begin(), name.end(), '_', ' ');
+  for (const std::string side : {"left", "right"}) {
+    const std::string end = " " + side;
+    if (!name.ends_with(end)) continue;
+    name.erase(name.size() - end.size());
+    name.insert(0, side + " ");
+  }
+  return name;
+}
+
+/// The classes that a line runs through beyond `from`, in order, each for 5 mm or a fifth of it.
+std::vector<preprocess::NamedPart> classes_along(const preprocess::Image& classes,
+                                                 const Json& names, const Centerline& line,
+                                                 double from) {
   constexpr double kLeastMm = 5.0, kLeastPart = 0.2;
-  std::vector<std::pair<std::size_t, double>> lengths;  // class, length; in order of appearance
+  struct Run {
+    std::size_t value = 0;
+    double from = 0.0, length = 0.0;
+  };
+  std::vector<Run> runs;
   double all = 0.0;
   for (Eigen::Index k = 1; k < line.arc_length.size(); ++k) {
     if (line.arc_length(k) < from) continue;
@@ -287,18 +305,18 @@ std::string classes_along(const preprocess::Image& classes, const Json& names,
         voxel ? static_cast<std::size_t>(classes.values[preprocess::index_of(classes.grid, *voxel)])
               : 0;
     if (value == 0) continue;
-    auto found = std::find_if(lengths.begin(), lengths.end(),
-                              [&](const auto& one) { return one.first == value; });
-    if (found == lengths.end()) found = lengths.insert(found, {value, 0.0});
-    found->second += step;
+    if (runs.empty() || runs.back().value != value) runs.push_back({value, line.arc_length(k)});
+    runs.back().length += step;
   }
-  std::string text;
-  for (const auto& [value, length] : lengths) {
-    if (length < std::min(kLeastMm, kLeastPart * all)) continue;
-    text += (text.empty() ? "" : ", then ") + names.at(value - 1).at("name").get<std::string>();
+  std::erase_if(runs,
+                [&](const Run& r) { return r.length < std::min(kLeastMm, kLeastPart * all); });
+  std::vector<preprocess::NamedPart> parts;
+  for (const Run& run : runs) {
+    const std::string name = words_of_class(names.at(run.value - 1).at("name").get<std::string>());
+    if (!parts.empty() && parts.back().name == name) continue;
+    parts.push_back({parts.empty() ? 0.0 : run.from, name});
   }
-  std::replace(text.begin(), text.end(), '_', ' ');
-  return text;
+  return parts;
 }
 
 }  // namespace
@@ -309,8 +327,7 @@ void name_branches(const Workspace& work, std::vector<preprocess::Branch>& tree)
       preprocess::read_image(work.artifact("segment").folder / "classes.nrrd");
   const Json told = work.figures("segment").at("classes");
   for (std::size_t k = 0; k < tree.size(); ++k) {
-    const std::string along = classes_along(classes, told, tree[k].line, start_of_own(tree, k));
-    if (!along.empty()) tree[k].name = branch_name(tree, static_cast<int>(k)) + ": " + along;
+    tree[k].parts = classes_along(classes, told, tree[k].line, start_of_own(tree, k));
   }
 }
 

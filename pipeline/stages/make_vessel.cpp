@@ -194,10 +194,15 @@ Json write_tree(const std::vector<preprocess::Branch>& tree, const fs::path& fol
   for (std::size_t k = 0; k < tree.size(); ++k) {
     const Centerline& line = tree[k].line;
     const std::string name = branch_name(tree, static_cast<int>(k));
+    Json parts = Json::array();
+    for (const preprocess::NamedPart& part : tree[k].parts) {
+      parts.push_back({{"from_mm", part.from}, {"name", part.name}});
+    }
     lines.push_back(line);
     curves.push_back({name, line.points});
     Json branch = {
         {"name", name},
+        {"parts", std::move(parts)},
         {"parent", tree[k].parent < 0 ? Json(nullptr) : Json(branch_name(tree, tree[k].parent))},
         {"parent_arc_mm", tree[k].parent_arc},
         {"start_mm", to_json(Vec3(line.points.col(0)))},

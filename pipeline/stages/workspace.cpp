@@ -45,11 +45,15 @@ std::vector<preprocess::Branch> read_tree(const Workspace& work) {
     const auto parent = std::find_if(branches.begin(), branches.end(), [&](const Json& other) {
       return other.at("name") == branches[k].at("parent");
     });
+    std::vector<preprocess::NamedPart> parts;
+    for (const Json& part : branches[k].at("parts")) {
+      parts.push_back({part.at("from_mm").get<double>(), part.at("name").get<std::string>()});
+    }
     tree.push_back(
         {.line = std::move(lines[k]),
          .parent = parent == branches.end() ? -1 : static_cast<int>(parent - branches.begin()),
          .parent_arc = branches[k].at("parent_arc_mm").get<double>(),
-         .name = branches[k].at("name").get<std::string>()});
+         .parts = std::move(parts)});
   }
   return tree;
 }

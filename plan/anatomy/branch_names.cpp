@@ -3,6 +3,8 @@
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 
+#include "plan/anatomy/passage.h"
+#include "preprocess/centerline/path_place.h"
 #include "simulate/insertion/vessel_tree.h"
 
 namespace wireplan::plan {
@@ -46,6 +48,25 @@ double last_stem_before(const std::vector<Branch>& tree, int branch, double arc)
   return end;
 }
 
+/// Whether a place of a branch's line is in its parent's lumen still.
+bool is_in_parent(const std::vector<Branch>& tree, const Branch& branch, double arc) {
+  if (branch.parent < 0) return false;
+  const Centerline& parent = tree[static_cast<std::size_t>(branch.parent)].line;
+  return preprocess::is_on_path(preprocess::find_place(point_at(branch.line, arc), parent));
+}
+
+/// Where the vessel begins that a place is in, along its branch [mm]: not before another part of
+/// the line, as labels name it, nor in a stem that it shares.
+double vessel_from(const std::vector<Branch>& tree, const simulate::BranchPlace& place) {
+  const Branch& branch = tree[static_cast<std::size_t>(place.branch)];
+  double from = own_vessel_from(branch.line, place.arc);
+  if (is_in_parent(tree, branch, from)) from = 0.0;
+  for (const preprocess::NamedPart& part : branch.parts) {
+    if (part.from <= place.arc) from = std::max(from, part.from);
+  }
+  return std::max(from, last_stem_before(tree, place.branch, place.arc));
+}
+
 /// Calls branches by places in them, each by the first; keeps what it has called.
 class BranchNames {
  public:
@@ -58,9 +79,13 @@ class BranchNames {
     Branch& branch = tree_[index];
     if (named_[index] || (!root_too && branch.parent < 0)) return;
     named_[index] = true;
-    branch.end_name = place.name + " (" + branch_name(tree_, found.branch) + ")";
-    branch.end_from = std::max(own_vessel_from(branch.line, found.arc),
-                               last_stem_before(tree_, found.branch, found.arc));
+    const double from = vessel_from(tree_, found);
+    // In the place of what labels call that part, if they do.
+    std::vector<preprocess::NamedPart>& parts = branch.parts;
+    std::erase_if(parts, [&](const auto& part) { return part.from == from; });
+    const auto next = std::find_if(parts.begin(), parts.end(),
+                                   [&](const auto& part) { return part.from > from; });
+    parts.insert(next, {from, place.name});
   }
 
  private:
@@ -68,13 +93,24 @@ class BranchNames {
   std::vector<bool> named_;
 };
 
+/// Whether labels tell what vessel a place is in.
+bool is_named(const std::vector<Branch>& tree, const Vec3& point) {
+  if (tree.empty()) return false;
+  const simulate::BranchPlace place = simulate::find_branch(tree, point);
+  const std::vector<preprocess::NamedPart>& parts =
+      tree[static_cast<std::size_t>(place.branch)].parts;
+  return !parts.empty() && parts.front().from <= place.arc;
+}
+
 }  // namespace
 
 void name_branches(std::vector<Branch>& tree, const NamedPlace& target,
                    const std::vector<NamedPlace>& other_targets,
                    const std::vector<NamedPlace>& other_accesses) {
   BranchNames names(tree);
-  names.name({target.name.empty() ? "the target's branch" : target.name, target.point}, true);
+  NamedPlace own = target;
+  if (own.name.empty() && !is_named(tree, target.point)) own.name = "the target's branch";
+  names.name(own, true);
   for (const NamedPlace& place : other_targets) names.name(place, true);
   for (const NamedPlace& place : other_accesses) names.name(place, false);
 }

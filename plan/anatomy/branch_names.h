@@ -14,12 +14,12 @@ struct NamedPlace {
   Vec3 point = Vec3::Zero();  //                                                          [mm]
 };
 
-/// Names branches by what lies in them, with what they were called before in brackets: "left renal
-/// (branch 6)". The target's branch is called after the target, "the target's branch" where that
-/// has no name; others after the other targets and accesses, those that come first before the rest.
-/// The root, from which the tree starts, is called after no access: it goes on far beyond it. Of a
-/// branch that runs through a clearly wider vessel before the place, or shares a stem with another
-/// vessel that goes on from it (simulate::goes_on), what lies beyond is named.
+/// Names branches by what lies in them: "left renal (branch 6)". The target's branch is called
+/// after the target, "the target's branch" where neither that nor labels have a name; others after
+/// the other targets and accesses, those that come first before the rest. The root, from which the
+/// tree starts, is called after no access: it goes on far beyond it. Of a branch that runs through
+/// a clearly wider vessel before the place, through what labels call otherwise, or shares a stem
+/// with another vessel that goes on from it (simulate::goes_on), what lies beyond is named.
 void name_branches(std::vector<preprocess::Branch>& tree, const NamedPlace& target,
                    const std::vector<NamedPlace>& other_targets,
                    const std::vector<NamedPlace>& other_accesses);

@@ -225,9 +225,11 @@ double turn_of(const Junction& junction) {
 }
 
 std::string leaving_name(const std::vector<preprocess::Branch>& tree, const Junction& junction) {
-  const preprocess::Branch& trunk = tree[static_cast<std::size_t>(junction.trunk)];
+  const Branch& trunk = tree[static_cast<std::size_t>(junction.trunk)];
+  const bool before = trunk.parent == junction.branch;  // the line comes from before the ostium
   return branch_name(tree, junction.branch,
-                     trunk.parent == junction.branch ? trunk.parent_arc : 0.0);
+                     before ? trunk.parent_arc + simulate::own_start(trunk)
+                            : simulate::own_start(tree[static_cast<std::size_t>(junction.branch)]));
 }
 
 Vec3 point_at(const Centerline& line, double arc) {

@@ -1,7 +1,6 @@
 #pragma once
 /// Closed surface -> line along the middle of the lumen from access to target, with inscribed
 /// radius.
-#include <cmath>
 #include <optional>
 #include <string>
 #include <vector>
@@ -40,24 +39,39 @@ Centerline find_centerline(const Surface& surface, const Vec3& access, const Vec
 std::optional<Vec3> find_shortcut(const Surface& surface, const Centerline& line,
                                   const std::vector<Vec3>& guide);
 
-/// A vessel of the tree: from where it leaves its parent to its end.
-struct Branch {
-  Centerline line;        // its arc length counts from the parent's middle               [mm]
-  int parent = -1;        // index of the branch it leaves; -1: it starts at the root
-  double parent_arc = 0;  // where on the parent                                          [mm]
-  std::string name = {};  // as people call it; empty where nobody said
-  /// As people call its further part, where its line runs through a wider vessel first, as from a
-  /// groin through the aorta into a renal artery; empty where nobody said.
-  std::string end_name = {};
-  double end_from = 0.0;  // where that part begins                                       [mm]
+/// A part of a branch's line, up to the next part or the end, as people call the vessel there.
+struct NamedPart {
+  double from = 0.0;  // where it begins                                                  [mm]
+  std::string name;
 };
 
-/// How messages, reports and viewers call a branch of a tree, or its part that is so far along it
-/// [mm]: by its name, or "branch 3".
-inline std::string branch_name(const std::vector<Branch>& tree, int k, double arc = HUGE_VAL) {
-  const Branch& branch = tree.at(static_cast<std::size_t>(k));
-  if (!branch.end_name.empty() && arc >= branch.end_from) return branch.end_name;
-  return branch.name.empty() ? "branch " + std::to_string(k + 1) : branch.name;
+/// A line of the tree from where it leaves its parent to its end. It may run through several
+/// vessels, as from a groin through the aorta into a renal artery.
+struct Branch {
+  Centerline line;                    // its arc length counts from the parent's middle   [mm]
+  int parent = -1;                    // index of the branch it leaves; -1: from the root
+  double parent_arc = 0;              // where on the parent                              [mm]
+  std::vector<NamedPart> parts = {};  // in order along it; empty where nobody said
+};
+
+/// How messages, reports and viewers call a branch of a tree: "iliac artery, then aorta (branch 1)"
+/// by its parts, "branch 3" without.
+inline std::string branch_name(const std::vector<Branch>& tree, int k) {
+  const std::string number = "branch " + std::to_string(k + 1);
+  std::string names;
+  for (const NamedPart& part : tree.at(static_cast<std::size_t>(k)).parts) {
+    names += (names.empty() ? "" : ", then ") + part.name;
+  }
+  return names.empty() ? number : names + " (" + number + ")";
+}
+
+/// The same of what is so far along it [mm]: "aorta (branch 1)", or "branch 1" before all parts.
+inline std::string branch_name(const std::vector<Branch>& tree, int k, double arc) {
+  std::string name = "branch " + std::to_string(k + 1);
+  for (const NamedPart& part : tree.at(static_cast<std::size_t>(k)).parts) {
+    if (part.from <= arc) name = part.name + " (branch " + std::to_string(k + 1) + ")";
+  }
+  return name;
 }
 
 /// The middle of the whole lumen that is connected to `root`. Ends are found, not given:

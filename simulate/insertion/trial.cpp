@@ -245,8 +245,8 @@ void Trial::check_place(std::size_t goal) {
   if (image_end) {
     end_where_it_is(goal, Outcome::kLeftImage,
                     "the tip came to the end of the imaged vessel, " +
-                        branch_name(own.way->tree(), *image_end) + ", at " + place_text(push.tip) +
-                        " mm" + after + "; the artery goes on there, the image does not");
+                        own.way->name_of_end(*image_end) + ", at " + place_text(push.tip) + " mm" +
+                        after + "; the artery goes on there, the image does not");
   }
 }
 

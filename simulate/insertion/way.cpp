@@ -178,6 +178,9 @@ std::optional<Astray> Way::find_astray(const Vec3& tip) const {
   const bool in_branch_of_way = on_way.branch == here.branch;
   const bool in_targets = on_way.branch == target_branch_;
   const std::string name = branch_name(tree_, here.branch, here.arc);
+  const auto name_of_start = [&](int k) {
+    return branch_name(tree_, k, own_start(tree_[static_cast<std::size_t>(k)]));
+  };
   if (is_across(here, on_way, left)) {
     return Astray{false, "it is in " + name + ", across the bifurcation"};
   }
@@ -186,7 +189,7 @@ std::optional<Astray> Way::find_astray(const Vec3& tip) const {
   }
   if (on_way.arc > leaves) {
     const int taken = next_branch(on_way.branch);
-    const std::string next = branch_name(tree_, taken);
+    const std::string next = name_of_start(taken);
     if (goes_on(tree_, taken)) {
       return Astray{
           false, "it is in " + name + ", where the way goes on in " + next + ", the wider vessel"};
@@ -198,14 +201,15 @@ std::optional<Astray> Way::find_astray(const Vec3& tip) const {
   }
   if (in_branch_of_way) return std::nullopt;
   if (goes_on(tree_, left)) {
+    const Branch& wider = tree_[static_cast<std::size_t>(left)];
     return Astray{true, "it went on in " + name + ", the wider vessel where the way turns into " +
-                            branch_name(tree_, on_way.branch)};
+                            branch_name(tree_, on_way.branch, wider.parent_arc + own_start(wider))};
   }
-  return Astray{false, "it is in " + name + ", which leaves the way " +
-                           whole_millimetres(leaves - on_way.arc) + " before " +
-                           (in_targets ? "the target"
-                                       : "the way turns into " +
-                                             branch_name(tree_, next_branch(on_way.branch)))};
+  return Astray{
+      false, "it is in " + name + ", which leaves the way " +
+                 whole_millimetres(leaves - on_way.arc) + " before " +
+                 (in_targets ? "the target"
+                             : "the way turns into " + name_of_start(next_branch(on_way.branch)))};
 }
 
 std::optional<int> Way::find_image_end(const Vec3& tip, const Lumen& lumen) const {
@@ -231,6 +235,11 @@ std::string Way::name_at(const Vec3& point) const {
   if (tree_.empty()) return {};
   const BranchPlace place = find_branch(tree_, point);
   return branch_name(tree_, place.branch, place.arc);
+}
+
+std::string Way::name_of_end(int branch) const {
+  const Centerline& line = tree_.at(static_cast<std::size_t>(branch)).line;
+  return branch_name(tree_, branch, line.arc_length[line.arc_length.size() - 1]);
 }
 
 }  // namespace wireplan::simulate

@@ -69,6 +69,9 @@ class Way {
   /// Of the vessel that a point is in, "branch 3" for one; empty without a tree.
   std::string name_at(const Vec3& point) const;
 
+  /// Of the vessel that a branch ends in.
+  std::string name_of_end(int branch) const;
+
  private:
   /// The branch of the way that it goes on in from another.
   int next_branch(int branch) const;

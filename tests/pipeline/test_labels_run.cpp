@@ -136,7 +136,7 @@ TEST_F(LabelsRun, EndsInAReportThatFollowsItsSchema) {
   const Json& vessel = report.at("vessel");
   EXPECT_TRUE(vessel.at("image").is_null());
   EXPECT_EQ(vessel.at("segmentation").at("left_out").size(), 1u);
-  EXPECT_EQ(vessel.at("branches").at(1).at("name"), "the target's branch (branch 1: tube)");
+  EXPECT_EQ(vessel.at("branches").at(1).at("name"), "tube (branch 1)");
   EXPECT_TRUE(holds(read_text(folder_ / "out/tree.mrk.json"), "\"branch 1: tube\""));
   // On voxels of 1 mm the tube's volume is that of its voxels.
   const double expected =
@@ -242,6 +242,9 @@ TEST_F(LabelsRun, OfTheDissectionGiveItsBranchesByName) {
         preprocess::read_surface_artifact(folder_ / ("out/brachiocephalic_trunk/surface.vtp"));
     const double agreement = dice(surface, grid, merged);
     EXPECT_GT(agreement, 0.97);
+    const std::string curves = read_text(folder_ / "out/common_carotid_artery_left/tree.mrk.json");
+    EXPECT_NE(curves.find("brachiocephalic trunk, then left common carotid artery (branch 2)"),
+              std::string::npos);
     RecordProperty(in_volume ? "dice_in_volume" : "dice", std::to_string(agreement));
   }
 }

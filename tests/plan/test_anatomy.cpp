@@ -309,9 +309,8 @@ TEST(BranchNames, AreThoseOfTheTargetsAndAccessesInThem) {
   EXPECT_EQ(branch_name(named, 3), "left arm (branch 4)");
 
   named = tree();
-  named[1].name = "branch 2: aorta > renal";  // by labels
   name_branches(named, {"", left}, {}, {});
-  EXPECT_EQ(branch_name(named, 1), "the target's branch (branch 2: aorta > renal)");
+  EXPECT_EQ(branch_name(named, 1), "the target's branch (branch 2)");
   EXPECT_EQ(branch_name(named, 2), "branch 3");
 }
 
@@ -337,6 +336,81 @@ TEST(BranchNames, OfAVesselThatSharesAStemBeginBehindIt) {
   EXPECT_EQ(leaving_name(tree, found[1]), "carotid (branch 2)");
 }
 
+TEST(BranchNames, OfLabelsStandWhereNoPlaceHasAnother) {
+  const auto tree = [] {
+    Branch first{.line = line_through({Vec3::Zero(), Vec3(0, 0, 200)}, 5.0)};
+    first.parts = {{0.0, "iliac artery"}, {60.0, "aorta"}, {150.0, "subclavian artery"}};
+    return std::vector<Branch>{first};
+  };
+  std::vector<Branch> named = tree();
+  EXPECT_EQ(branch_name(named, 0), "iliac artery, then aorta, then subclavian artery (branch 1)");
+  EXPECT_EQ(branch_name(named, 0, 59.0), "iliac artery (branch 1)");
+  name_branches(named, {"", Vec3(0, 0, 100)}, {}, {});
+  EXPECT_EQ(branch_name(named, 0, 100.0), "aorta (branch 1)");
+  named = tree();
+  name_branches(named, {"renal level", Vec3(0, 0, 100)}, {}, {});
+  EXPECT_EQ(branch_name(named, 0, 59.0), "iliac artery (branch 1)");
+  EXPECT_EQ(branch_name(named, 0, 61.0), "renal level (branch 1)");
+  EXPECT_EQ(branch_name(named, 0, 180.0), "subclavian artery (branch 1)");
+}
+
+/// A trunk with a stem of 3.5 mm radius, out of it at 100 mm, that parts 40 mm on: the tree's line
+/// goes on in an artery of 2.5 mm, and the wider vessel is a branch of that.
+std::vector<Branch> tree_with_stem() {
+  Branch stem{.line = line_through({Vec3(0, 0, 100), Vec3(40, 0, 100), Vec3(40, 0, 160)}, 2.5),
+              .parent = 0,
+              .parent_arc = 100.0};
+  for (Eigen::Index k = 0; stem.line.arc_length(k) < 44.0; ++k) {
+    stem.line.radius(k) = stem.line.arc_length(k) < 10.0 ? 10.0 : 3.5;
+  }
+  return {{.line = line_through({Vec3::Zero(), Vec3(0, 0, 200)}, 10.0)},
+          stem,
+          {.line = line_through({Vec3(40, 0, 100), Vec3(100, 0, 100)}, 3.5),
+           .parent = 1,
+           .parent_arc = 40.0}};
+}
+
+TEST(BranchNames, ABranchHasItsNameFromWhereItLeaves) {
+  // The line of a branch begins in the middle of its trunk, with the trunk's radius.
+  for (const double lean : {0.0, 60.0}) {
+    SCOPED_TRACE(lean);
+    const double a = lean * kRadPerDeg;
+    TrunkAndBranch side(Vec3(std::cos(a), 0.0, std::sin(a)));
+    Centerline& line = side.tree[1].line;
+    for (Eigen::Index k = 0; k < line.radius.size(); ++k) {
+      const double off_axis = line.points(0, k);
+      if (off_axis < 10.0) line.radius(k) = std::max(3.0, 10.0 - off_axis);
+    }
+    name_branches(side.tree, {"left renal", line.points.rightCols<1>()}, {}, {});
+    const auto found = find_junctions(simulate::Way(side.way, side.tree));
+    ASSERT_EQ(found.size(), 1u);
+    EXPECT_EQ(leaving_name(side.tree, found[0]), "left renal (branch 2)");
+  }
+}
+
+TEST(BranchNames, AStemThatTwoVesselsShareHasTheNameOfNeither) {
+  std::vector<Branch> tree = tree_with_stem();
+  const Vec3 arm(80, 0, 100), carotid(40, 0, 150);
+  name_branches(tree, {"left carotid", carotid}, {{"right arm", arm}}, {});
+  Centerline path = line_through({Vec3::Zero(), Vec3(0, 0, 100), arm}, 3.5);
+  const auto to_arm = find_junctions(simulate::Way(path, tree));
+  ASSERT_EQ(to_arm.size(), 2u);
+  EXPECT_TRUE(to_arm[0].taken);
+  EXPECT_EQ(leaving_name(tree, to_arm[0]), "branch 2");
+  EXPECT_FALSE(to_arm[1].taken) << "it stays in the wider vessel";
+  EXPECT_EQ(leaving_name(tree, to_arm[1]), "left carotid (branch 2)");
+
+  path = line_through({Vec3::Zero(), Vec3(0, 0, 100), Vec3(40, 0, 100), carotid}, 2.5);
+  const simulate::Way way(path, tree);
+  const auto to_carotid = find_junctions(way);
+  ASSERT_EQ(to_carotid.size(), 2u);
+  EXPECT_EQ(leaving_name(tree, to_carotid[0]), "branch 2");
+  EXPECT_EQ(leaving_name(tree, to_carotid[1]), "left carotid (branch 2)");
+  const auto astray = way.find_astray(Vec3(0, 0, 180));
+  ASSERT_TRUE(astray);
+  EXPECT_NE(astray->text.find("turns into branch 2"), std::string::npos) << astray->text;
+}
+
 TEST(BranchNames, OfALineThatRunsThroughTheAortaAreOfItsEndAlone) {
   std::vector<Branch> tree = {{.line = right_renal_way(3.0)},
                               {.line = line_through({Vec3(0, 0, 100), Vec3(0, 0, 200)}, 10.0),
@@ -346,7 +420,7 @@ TEST(BranchNames, OfALineThatRunsThroughTheAortaAreOfItsEndAlone) {
   name_branches(tree, {"", Vec3(0, 0, 180)}, {{"right renal", line.points.rightCols<1>()}}, {});
   EXPECT_EQ(branch_name(tree, 0), "right renal (branch 1)");
   EXPECT_EQ(branch_name(tree, 0, 60.0), "branch 1") << "the aorta";
-  EXPECT_NEAR(tree[0].end_from, 110.0, 1.0) << "at its wall";
+  EXPECT_NEAR(tree[0].parts[0].from, 110.0, 1.0) << "at its wall";
   const simulate::Way up(line_through({Vec3::Zero(), Vec3(0, 0, 180)}, 10.0), tree);
   EXPECT_EQ(up.name_at(Vec3(1, 0, 50)), "branch 1");
   EXPECT_EQ(up.name_at(line.points.rightCols<1>()), "right renal (branch 1)");
@@ -364,11 +438,11 @@ TEST(BranchNames, ATaperAndAStenosisBeginNoOtherVessel) {
   for (const double at : {120.0, 135.0, 149.0}) {  // the second in the stenosis
     std::vector<Branch> tree = {first};
     name_branches(tree, {"renal", point_at(line, at)}, {}, {});
-    EXPECT_NEAR(tree[0].end_from, 110.0, 1.0) << at;
+    EXPECT_NEAR(tree[0].parts[0].from, 110.0, 1.0) << at;
   }
   std::vector<Branch> tree = {first};
   name_branches(tree, {"aorta", point_at(line, 60.0)}, {}, {});
-  EXPECT_EQ(tree[0].end_from, 0.0) << "named whole, by a place in the aorta";
+  EXPECT_EQ(tree[0].parts[0].from, 0.0) << "named whole, by a place in the aorta";
 }
 
 TEST(TrunkAxis, IsThatOfTheWideVessels) {
