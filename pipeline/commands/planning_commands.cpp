@@ -202,7 +202,7 @@ int print_answer(const fs::path& output) {
   const Json report = read_report(output / "report.json");
   std::cout << describe_verdict(report) << describe_best(report) << "\n";
   print_files(output);
-  return report.at("ranking").empty() ? kNoPlan : kDone;
+  return report.at("ranking").empty() || answer_of(report) == "not feasible" ? kNoPlan : kDone;
 }
 
 // The answer of a case of several, whose reports are published below.

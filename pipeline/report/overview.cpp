@@ -9,7 +9,11 @@
 #include "pipeline/files/disk.h"
 #include "pipeline/files/text.h"
 #include "pipeline/files/viewer_files.h"
+#include "pipeline/report/page.h"
 #include "pipeline/report/report.h"
+#include "pipeline/report/sheet_csv.h"
+#include "pipeline/report/verdict_json.h"
+#include "plan/number_text.h"
 
 namespace wireplan::pipeline {
 namespace {
@@ -135,8 +139,14 @@ std::string describe_plan(const Json& best) {
     text += ", safe in " + best.at("repeats_safe").dump() + " of " + best.at("repeats").dump() +
             " repeats";
   }
-  return text +
-         format(", at most %.3g N on the wall", best.at("peak_contact_force_n").get<double>());
+  return text + ", at most " + plan::two_digits(best.at("peak_contact_force_n").get<double>()) +
+         " N on the wall";
+}
+
+/// Whether there is a plan from there, and the answer is not that it is not feasible, as where a
+/// device does not pass though the wire does.
+bool serves_target(const Json& row) {
+  return !row.at("best_plan").is_null() && answer_of(row) != "not feasible";
 }
 
 std::string describe_target(const Json& target) {
@@ -149,7 +159,9 @@ std::string describe_target(const Json& target) {
   }
   const std::string where =
       from(first) + (rows.size() > 1 ? ", the best of " + std::to_string(rows.size()) : "");
-  return name + ":" + (where.empty() ? "" : where + ":") + " " +
+  const bool serves = serves_target(first);
+  return name + ":" + (serves ? "" : " not feasible") + where +
+         (serves ? where.empty() ? "" : ":" : "; the wire alone would reach it:") + " " +
          describe_plan(first.at("best_plan"));
 }
 
@@ -274,7 +286,7 @@ std::string describe_overview(const Json& overview) {
 bool serves_all_targets(const Json& overview) {
   const Json& targets = overview.at("targets");
   return std::all_of(targets.begin(), targets.end(), [](const Json& target) {
-    return !target.at("sections").front().at("best_plan").is_null();
+    return serves_target(target.at("sections").front());
   });
 }
 

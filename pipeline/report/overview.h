@@ -34,7 +34,8 @@ std::vector<std::filesystem::path> reports_in(const std::filesystem::path& file)
 /// A line per target: the access to take, or that none has a safe plan.
 std::string describe_overview(const Json& overview);
 
-/// Whether every target has a safe plan from one access at least.
+/// Whether every target has a safe plan, and is not told to be not feasible, from one access at
+/// least.
 bool serves_all_targets(const Json& overview);
 
 }  // namespace wireplan::pipeline

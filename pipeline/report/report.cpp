@@ -564,12 +564,13 @@ std::string describe_best(const Json& report) {
   const auto reached = std::count_if(trials.begin(), trials.end(), [](const Json& trial) {
     return trial.at("reached").get<bool>();
   });
-  return "best of " + std::to_string(ranking.size()) +
-         (ranking.size() == 1 ? " safe plan" : " safe plans") + " (reach, no limit broken); " +
-         std::to_string(reached) + " of " + std::to_string(trials.size()) +
-         " tried reach: " + describe_tools(best) + ", inclination " +
-         best.at("inclination_deg").dump() + " deg, azimuth " + best.at("azimuth_deg").dump() +
-         " deg, roll " + best.at("roll_deg").dump() + " deg, " +
+  const bool alone = answer_of(report) == "not feasible";  // a device does not pass
+  return std::string(alone ? "the wire alone would reach the target: " : "") + "best of " +
+         std::to_string(ranking.size()) + (ranking.size() == 1 ? " safe plan" : " safe plans") +
+         " (reach, no limit broken); " + std::to_string(reached) + " of " +
+         std::to_string(trials.size()) + " tried reach: " + describe_tools(best) +
+         ", inclination " + best.at("inclination_deg").dump() + " deg, azimuth " +
+         best.at("azimuth_deg").dump() + " deg, roll " + best.at("roll_deg").dump() + " deg, " +
          (script.empty() ? "" : script + ", ") + best.at("sentence").get<std::string>();
 }
 

@@ -87,6 +87,11 @@ TEST_F(CommandLine, ExitsWithOneWhereNoPlanReaches) {
   const Answer answer = call("run case.json --set insertion.length_mm=12");
   EXPECT_EQ(answer.code, 1) << answer.log;
   EXPECT_NE(answer.out.find("no plan reaches the target"), std::string::npos);
+  // Nor is a plan of the wire alone one where a device that is asked for does not pass.
+  const Answer device = call("run case.json --set access_limits.device_diameter_mm=9.5");
+  EXPECT_EQ(device.code, 1) << device.out;
+  EXPECT_NE(device.out.find("the wire alone would reach the target: best of"), std::string::npos)
+      << device.out;
 }
 
 TEST_F(CommandLine, StatusTellsWhyStagesWouldRun) {

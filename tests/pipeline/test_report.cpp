@@ -58,6 +58,7 @@ TEST(Report, AnswersWithAVerdictAndItsReasons) {
   const Json wide = run_to_report(folder / "case.json", folder / "cache", 0,
                                   {"access_limits.device_diameter_mm=9.5"});
   EXPECT_EQ(wide.at("verdict").at("answer"), "not_feasible");
+  EXPECT_EQ(describe_best(wide).find("the wire alone would reach the target: best of "), 0u);
   EXPECT_NE(describe_verdict(wide).find("the widest device, of 9.5 mm, does not pass"),
             std::string::npos);
   EXPECT_FALSE(wide.at("ranking").empty());

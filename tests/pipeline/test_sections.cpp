@@ -231,6 +231,13 @@ TEST(Overview, PutsTheBetterAnswerAndThenMoreSafeRepeatsFirst) {
   EXPECT_FALSE(serves_all_targets(none));
   EXPECT_EQ(describe_overview(none), "t: no safe plan from any access");
 
+  const Json device =
+      build_overview("case", {{"", "t", "a", report(16, 0.1, true, "not_feasible")}});
+  EXPECT_FALSE(serves_all_targets(device)) << "the wire reaches, a device does not pass";
+  EXPECT_EQ(describe_overview(device).find("t: not feasible; the wire alone would reach it: soft,"),
+            0u)
+      << describe_overview(device);
+
   SectionReport tools = {"", "", "a", report(12, 0.1)};
   tools.report["ranking"][0]["catheter"] = "cobra-c2";
   tools.report["anatomy"]["access"]["sheath"]["assumed_longer_than_way"] = true;
