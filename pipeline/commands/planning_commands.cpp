@@ -216,6 +216,7 @@ int print_overview(const Case& given, const std::vector<Case>& sections, const f
                        .report = read_report(output / folder / "report.json")});
   }
   const Json overview = build_overview(given.name, reports);
+  tell_sections(overview, output);
   write_json(overview, output / "report.json");
   write_whole(overview_csv(overview), output / "sections.csv");
   if (page_missing().empty()) write_whole(build_overview_page(overview), output / "report.html");

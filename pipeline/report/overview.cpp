@@ -203,6 +203,23 @@ Json build_overview(const std::string& name, const std::vector<SectionReport>& s
           {"targets", std::move(targets)}};
 }
 
+void tell_sections(const Json& overview, const std::filesystem::path& output) {
+  for (const Json& target : overview.at("targets")) {
+    for (const Json& row : target.at("sections")) {
+      if (row.at("other_access").is_null() || !row.contains("verdict")) continue;
+      const std::filesystem::path folder = output / row.at("folder").get<std::string>();
+      const Json before = read_report(folder / "report.json");
+      Json report = before;
+      report["verdict"]["changes"] = row.at("verdict").at("changes");
+      if (const std::string page = read_if_there(folder / "report.html"); !page.empty()) {
+        write_whole(with_report(page, before, report), folder / "report.html");
+      }
+      write_whole(sheet_csv(report), folder / "sheet.csv");
+      write_json(report, folder / "report.json");
+    }
+  }
+}
+
 std::string overview_csv(const Json& overview) {
   constexpr std::array kRow = {"access", "folder", "trials", "reached", "safe_plans"};
   std::vector<const char*> columns = {"wire",

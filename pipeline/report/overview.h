@@ -22,6 +22,11 @@ struct SectionReport {
 /// best plan's repeats is safe, then by its score. Expects sections of one case.
 Json build_overview(const std::string& name, const std::vector<SectionReport>& sections);
 
+/// Tells the sections that have a better access of it: puts that before what else would change
+/// their verdict, in the report.json, sheet.csv and report.html that lie below `output`. Expects
+/// them as the stages made them.
+void tell_sections(const Json& overview, const std::filesystem::path& output);
+
 /// The same as a table: a row per section, for spreadsheets.
 std::string overview_csv(const Json& overview);
 

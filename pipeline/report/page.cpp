@@ -178,6 +178,12 @@ void fill(std::string& page, const std::string& mark, const std::string& text) {
   page.replace(at, mark.size(), text);
 }
 
+/// Which stands in a block of its own.
+Json without_timing(Json report) {
+  report.erase("timing");
+  return report;
+}
+
 std::string fill_template(const Json& report, const Json& scene, const Json& timing) {
   std::string page = page_template();
   // The report, which holds names of others' choosing, comes last: no mark is looked for in it.
@@ -219,9 +225,12 @@ std::string page_template_sha256() { return hash_text(page_template()); }
 std::string build_page(const Json& report, const PageInput& input) {
   expects(page_missing().empty() && input.trials.size() == report.at("trials").size() &&
           static_cast<Eigen::Index>(input.peak_force.size()) == input.surface.triangles.cols());
-  Json rest = report;
-  rest.erase("timing");
-  return fill_template(rest, scene_json(input), report.at("timing"));
+  return fill_template(without_timing(report), scene_json(input), report.at("timing"));
+}
+
+std::string with_report(std::string page, const Json& before, const Json& report) {
+  fill(page, embed_json(without_timing(before)), embed_json(without_timing(report)));
+  return page;
 }
 
 std::string build_overview_page(const Json& overview) {

@@ -62,6 +62,9 @@ std::string page_template_sha256();
 /// The page of a report (report.h). Expects page_missing() to be empty.
 std::string build_page(const Json& report, const PageInput& input);
 
+/// A page that build_page() made of one report, with another one in its place.
+std::string with_report(std::string page, const Json& before, const Json& report);
+
 /// The page of an overview (overview.h): no vessel and no trials, but links to the sections' pages.
 std::string build_overview_page(const Json& overview);
 

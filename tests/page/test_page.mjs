@@ -318,6 +318,8 @@ if (!given.length) {
       assert.deepEqual(links.map(([text]) => text).sort(), ["from above", "from above", "from below", "from below"]);
       for (const [, address] of links) assert.ok(statSync(new URL(address)).size > 1e5, address);
       assert.match(await page.textContent("main"), /Research use only/);
+      const heads = await page.locator("main thead").first().locator("th").allTextContents();
+      assert.ok(heads.includes("Sheath") && heads.includes("Calcium"), heads.join());
       const wide = await page.evaluate(() => document.documentElement.scrollWidth - document.documentElement.clientWidth);
       assert.ok(wide <= 0, `${wide} px too wide`);
       if (width > 1000) assert.equal(pageCount(await page.pdf({preferCSSPageSize: true})), 1);

@@ -12,6 +12,7 @@
 
 #include "pipeline/report/compare.h"
 #include "pipeline/report/overview.h"
+#include "pipeline/report/page.h"
 #include "pipeline/report/report.h"
 #include "pipeline/stages/sections.h"
 #include "tests/pipeline/program.h"
@@ -148,6 +149,23 @@ TEST_F(Sections, ARunGivesOneOverviewWithAllAccessesOfEachTarget) {
   EXPECT_EQ(std::count(csv.begin(), csv.end(), '\n'), 5) << "heads and four sections";
   EXPECT_NE(csv.find("\n\"far\",\"from above\",\"from-above--far\","), std::string::npos) << csv;
   EXPECT_EQ(compare_reports({out / "report.json"}), compare_reports(files));
+
+  // A better access is told in all that its own section has, too.
+  const std::string better = "From <above> it is feasible.";
+  Json told = *overview;
+  Json& row = told["targets"][0]["sections"][1];
+  row["other_access"] = better;
+  row["verdict"]["changes"] = Json::array({better});
+  const std::string other = read_text(files[0]);
+  tell_sections(told, out);
+  const fs::path folder = files[1].parent_path();
+  EXPECT_EQ(read_report(files[1]).at("verdict").at("changes"), Json::array({better}));
+  EXPECT_NE(read_text(folder / "sheet.csv").find(better), std::string::npos);
+  if (page_missing().empty()) {
+    EXPECT_NE(read_text(folder / "report.html").find("From \\u003cabove\\u003e it is feasible."),
+              std::string::npos);
+  }
+  EXPECT_EQ(read_text(files[0]), other);
   expect_follows_schemas(out);
 }
 
@@ -191,7 +209,8 @@ TEST(Overview, PutsTheBetterAnswerAndThenMoreSafeRepeatsFirst) {
          {{"device", {{"lumen_diameter_mm", 5.0}, {"fits", true}}},
           {"sheath", {{"lumen_diameter_mm", 5.0}, {"fits", true}}},
           {"tortuosity", {{"index", 1.1}, {"grade", "below mild"}}},
-          {"sharpest_bend", {{"angle_deg", 170.0}, {"grade", "below mild"}, {"at_ostium_of", nullptr}}},
+          {"sharpest_bend",
+           {{"angle_deg", 170.0}, {"grade", "below mild"}, {"at_ostium_of", nullptr}}},
           {"calcium", {{"volume_mm3", nullptr}}}}}};
     return json;
   };

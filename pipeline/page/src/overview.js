@@ -8,7 +8,7 @@ const mm = (value) => `${number(value)}\u00a0mm`;
 const two = (value) => number(Number(value.toPrecision(2)));
 const link = (row, text) => el("a", {href: `${row.folder.split("/").map(encodeURIComponent).join("/")}/report.html`}, text);
 
-const heads = ["Access", "Answer", "Best plan", "Safe repeats", "Largest force on wall", "Way", "Narrowest lumen", "Tortuosity", "Sharpest bend"];
+const heads = ["Access", "Answer", "Best plan", "Safe repeats", "Largest force on wall", "Way", "Narrowest lumen", "Sheath", "Tortuosity", "Sharpest bend", "Calcium"];
 
 const planText = (plan) => {
   if (!plan) return "no safe plan";
@@ -28,10 +28,12 @@ const cells = (row) => {
     plan && plan.peak_contact_force_n !== null ? `${two(plan.peak_contact_force_n)}\u00a0N` : "\u2013",
     mm(Math.round(table.way_mm)),
     `${mm(table.least_diameter_mm)}${table.device_fits ? "" : ": the device does not fit"}`,
+    table.sheath_fits === null ? "not weighed" : `${table.sheath_fits ? "fits" : "does not fit"} in ${mm(table.least_diameter_at_sheath_mm)}`,
     graded(table.tortuosity === null ? null : number(table.tortuosity), table.tortuosity_grade),
     table.sharpest_bend_at_ostium_of === null
       ? graded(degrees(Math.round(table.sharpest_bend_deg)), table.sharpest_bend_grade)
-      : `${degrees(Math.round(table.sharpest_bend_deg))}, the turn into ${table.sharpest_bend_at_ostium_of}`,
+      : `${degrees(Math.round(table.sharpest_bend_deg))}, the turn into ${shown(table.sharpest_bend_at_ostium_of)}`,
+    table.calcium_mm3 === null ? "not known" : `${number(table.calcium_mm3)}\u00a0mm\u00b3`,
   ];
 };
 
