@@ -260,8 +260,8 @@ void extend_beyond(const NearestWall& wall, Points& line, double length, double 
   });
   if (gone >= length) return;
   throw Error("the vessel ends " + number_text(std::floor(gone)) +
-              " mm beyond the target, expected target.beyond_mm, " + number_text(length) +
-              " mm, or more; give a smaller one");
+              " mm beyond the target; give a target.beyond_mm below that (" + number_text(length) +
+              " mm was asked)");
 }
 
 /// The same straight on to the wall ahead: for an end that lies in a corner of a cap, to which the

@@ -132,8 +132,10 @@ TEST(Centerline, GoesOnBeyondTheTargetAsFarAsAsked) {
     find_centerline(bend, access, target, {.beyond_mm = 120.0});
     FAIL() << "the vessel is not that long";
   } catch (const Error& error) {
-    EXPECT_NE(std::string(error.what()).find("the vessel ends 9"), std::string::npos)
-        << error.what();
+    const std::string text = error.what();
+    EXPECT_EQ(text.find("the vessel ends 9"), 0u) << text;
+    EXPECT_NE(text.find("give a target.beyond_mm below that (120 mm was asked)"), std::string::npos)
+        << text;
   }
 }
 

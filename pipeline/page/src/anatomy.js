@@ -21,12 +21,15 @@ const passageRow = (what, row) => [
   shown(row.source),
 ];
 
+const tortuosityText = (index) =>
+  index < 1.005 ? "the way is straight (1.00 times the straight line)" : `the way is ${number(index)} times as long as the straight line between its ends`;
+
 const accessTable = ({device, sheath, tortuosity, sharpest_bend: bend, calcium}) =>
   table("Access", ["What", "Found", "Held against", "Verdict", "Source"], [
     passageRow("Widest device, along the whole way", device),
     passageRow(`Sheath, in the first ${mm(sheath.length_mm)}`, sheath),
     ["Tortuosity",
-     tortuosity.index === null ? shown(tortuosity.null_reasons.index) : `the way is ${number(tortuosity.index)} times as long as the straight line between its ends`,
+     tortuosity.index === null ? shown(tortuosity.null_reasons.index) : tortuosityText(tortuosity.index),
      thresholds("from", tortuosity.thresholds.map(number)),
      tortuosity.grade, shown(tortuosity.source)],
     ["Sharpest bend",
