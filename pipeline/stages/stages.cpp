@@ -190,7 +190,7 @@ std::vector<Stage> stages_from_labels(const Case& given) {
   const bool in_volume = given.volume.has_value();
   std::vector<Stage> stages;
   if (in_volume) {
-    stages.push_back({.name = "volume", .version = 4, .reads_input = true, .make = make_volume});
+    stages.push_back({.name = "volume", .version = 5, .reads_input = true, .make = make_volume});
   }
   stages.push_back({.name = "segment",
                     .version = 8,
@@ -222,7 +222,7 @@ std::vector<Stage> stages_to_surface(const Case& given) {
                       .make = make_surface});
     return stages;
   }
-  stages.push_back({.name = "volume", .version = 4, .reads_input = true, .make = make_volume});
+  stages.push_back({.name = "volume", .version = 5, .reads_input = true, .make = make_volume});
   stages.push_back({.name = "segment",
                     .version = 14,
                     .reads_input = true,

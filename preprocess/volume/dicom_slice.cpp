@@ -313,6 +313,9 @@ void ask_itk(Slice& slice, const std::string& path) {
     if (!io->CanReadFile(path.c_str())) return;
     io->SetFileName(path);
     io->ReadImageInformation();
+    // The step from image to image is that of their places: ITK's is negative where frames run
+    // down.
+    io->SetSpacing(2, 1.0);
     slice.grid = header_grid(*io, slice.file);
     slice.io = io;
   } catch (const Error&) {

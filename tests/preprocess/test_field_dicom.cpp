@@ -322,6 +322,27 @@ TEST_F(FieldDicom, FramesOfAnEnhancedCtAreSortedAndEachScaledByItsOwnSlope) {
   }
 }
 
+TEST_F(FieldDicom, FramesInAnyOrderOfTheirPlacesGiveTheSameVolume) {
+  for (const std::vector<int>& order : {std::vector<int>{0, 1, 2, 3, 4, 5},
+                                        {5, 4, 3, 2, 1, 0},
+                                        {3, 0, 5, 1, 4, 2},
+                                        {5, 2, 4, 3, 1, 0}}) {
+    std::vector<Frame> frames;
+    for (const int k : order) {  // of frame n the values are 10 n and more: now those of its place
+      const int shift = 10 * (k - static_cast<int>(frames.size()));
+      frames.push_back({.place = 1.5 * k - 4.0, .intercept = std::to_string(shift)});
+    }
+    write("ct.dcm", enhanced(frames));
+    const Image image = read_image(folder_);
+    ASSERT_EQ(image.grid.size, (std::array<int, 3>{3, 2, 6}));
+    EXPECT_LT((image.grid.spacing - Vec3(0.6, 0.8, 1.5)).norm(), 1e-6);  // decimals of a float
+    EXPECT_LT((image.grid.origin - Vec3(5, 6, -4)).norm(), 1e-6);
+    for (std::size_t n = 0; n < image.values.size(); ++n) {
+      EXPECT_EQ(image.values[n], static_cast<float>(10 * (n / 6) + n % 6));
+    }
+  }
+}
+
 TEST_F(FieldDicom, FramesWithoutPlacesUnevenOrNotInHounsfieldUnitsAreRefused) {
   write("ct.dcm", enhanced({{.place = 0}, {.place = 1}, {.place = 2}}, /*placed=*/false));
   EXPECT_TRUE(has(read_error(folder_), "3 frames that does not tell where each lies"));
