@@ -1,7 +1,6 @@
 #include <vtkCellArray.h>
 #include <vtkFieldData.h>
 #include <vtkPointLocator.h>
-#include <vtkSTLReader.h>
 #include <vtkStringArray.h>
 #include <vtkTriangleFilter.h>
 #include <vtkXMLPolyDataReader.h>
@@ -55,29 +54,34 @@ bool next_line(std::istream& stream, std::string& line) {
   return !line.empty();
 }
 
-// ---- STL: VTK tells text from binary by its first 256 bytes, which a name may spoil -------------
+// ---- STL by hand: VTK tells text from binary by its first 256 bytes, which a name may spoil, and
+// reads a binary file to its end, whatever the header says ----------------------------------------
 
 enum class StlForm { kText, kBinary };
 
+constexpr std::size_t kStlHead = 84, kStlTriangle = 50;  // bytes
+
+/// A number of a binary file, which is little endian.
+std::uint32_t stl_number(const char* bytes) {
+  std::uint32_t number = 0;
+  for (std::size_t k = 4; k-- > 0;) number = number << 8U | static_cast<unsigned char>(bytes[k]);
+  return number;
+}
+
 /// By the number of triangles in the header of a binary file, which fit into it: read as a number,
-/// four letters are more than 10^8. What does not and begins as text is text. VTK takes room for as
-/// many as the header promises, whatever the file holds.
+/// four letters are more than 10^8. What does not and begins as text is text.
 StlForm stl_form(const std::filesystem::path& path) {
-  constexpr std::size_t kHead = 84, kTriangle = 50;
   std::ifstream stream(path, std::ios::binary);
-  std::array<char, kHead> head{};
+  std::array<char, kStlHead> head{};
   stream.read(head.data(), head.size());
   const std::string_view text(head.data(), static_cast<std::size_t>(stream.gcount()));
-  std::uint32_t triangles = 0;
-  for (std::size_t k = 4; k-- > 0;) {
-    triangles = triangles << 8U | static_cast<unsigned char>(head[kHead - 4 + k]);
-  }
+  const std::uint32_t triangles = stl_number(&head[kStlHead - 4]);
   const std::uintmax_t bytes = std::filesystem::file_size(path),
-                       expected = kHead + kTriangle * std::uintmax_t{triangles};
+                       expected = kStlHead + kStlTriangle * std::uintmax_t{triangles};
   const std::size_t mark = text.starts_with(kByteOrderMark) ? kByteOrderMark.size() : 0;
   const std::size_t first = text.find_first_not_of(" \t\r\n", mark);
   const bool solid = first != std::string_view::npos && text.substr(first).starts_with("solid");
-  if (text.size() == kHead && expected <= bytes) return StlForm::kBinary;
+  if (text.size() == kStlHead && expected <= bytes) return StlForm::kBinary;
   const bool is_text = std::all_of(text.begin(), text.end(), [](char c) {
     return static_cast<unsigned char>(c) >= 0x20 || c == '\n' || c == '\r' || c == '\t';
   });
@@ -87,7 +91,35 @@ StlForm stl_form(const std::filesystem::path& path) {
               " triangles of its header; copy or export the surface again");
 }
 
-/// Three lines "vertex x y z" for each facet, in a file that begins with "solid" and any name.
+/// As many triangles as the header says, a normal, three corners and two bytes each; what lies
+/// behind them is none of them.
+vtkSmartPointer<vtkPolyData> read_binary_stl(const std::filesystem::path& path) {
+  std::ifstream stream(path, std::ios::binary);
+  std::array<char, kStlHead> head{};
+  stream.read(head.data(), head.size());
+  vtkNew<vtkPoints> points;
+  points->SetDataTypeToFloat();
+  vtkNew<vtkCellArray> triangles;
+  std::array<char, kStlTriangle> bytes{};
+  for (std::uint32_t left = stl_number(&head[kStlHead - 4]); left > 0; --left) {
+    stream.read(bytes.data(), bytes.size());
+    triangles->InsertNextCell(3);
+    for (std::size_t corner = 1; corner <= 3; ++corner) {
+      std::array<float, 3> p{};
+      for (std::size_t axis = 0; axis < 3; ++axis) {
+        p[axis] = std::bit_cast<float>(stl_number(&bytes[12 * corner + 4 * axis]));
+      }
+      triangles->InsertCellPoint(points->InsertNextPoint(p.data()));
+    }
+  }
+  vtkNew<vtkPolyData> result;
+  result->SetPoints(points);
+  result->SetPolys(triangles);
+  return result;
+}
+
+/// Three lines "vertex x y z" for each facet, in solids that begin with "solid" and any name; what
+/// stands behind "endsolid" is none of them.
 vtkSmartPointer<vtkPolyData> read_text_stl(const std::filesystem::path& path) {
   vtkNew<vtkPoints> points;
   points->SetDataTypeToFloat();  // as VTK has it
@@ -100,17 +132,18 @@ vtkSmartPointer<vtkPolyData> read_text_stl(const std::filesystem::path& path) {
     throw Error(path.string() + ": cannot be read as a surface (line " + std::to_string(number) +
                 ": " + what + "); expected STL, PLY, OBJ or VTP as the file's ending says");
   };
-  vtkIdType corners = 0;  // of the facet so far
-  bool solid = false, ended = false;
+  vtkIdType corners = 0;               // of the facet so far
+  bool begun = false, inside = false;  // a solid
   while (next_line(stream, line)) {
     if (++number == 1 && line.starts_with(kByteOrderMark)) line.erase(0, kByteOrderMark.size());
     std::istringstream words(line);
     if (!(words >> word)) continue;
     std::transform(word.begin(), word.end(), word.begin(),
                    [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-    require(solid || word == "solid", "no \"solid\" at its begin");
-    if (word == "solid") solid = true;
-    ended = ended || word == "endsolid";
+    require(begun || word == "solid", "no \"solid\" at its begin");
+    if (word == "solid") begun = inside = true;
+    if (word == "endsolid") inside = false;
+    if (!inside) continue;
     if (word == "vertex") {
       Vec3 p;
       require(static_cast<bool>(words >> p.x() >> p.y() >> p.z()),
@@ -125,8 +158,8 @@ vtkSmartPointer<vtkPolyData> read_text_stl(const std::filesystem::path& path) {
       corners = 0;
     }
   }
-  require(solid, "no \"solid\" at its begin");
-  require(ended && corners == 0, "the file breaks off");
+  require(begun, "no \"solid\" at its begin");
+  require(!inside && corners == 0, "the file breaks off");
   vtkNew<vtkPolyData> result;
   result->SetPoints(points);
   result->SetPolys(triangles);
@@ -381,7 +414,7 @@ vtkSmartPointer<vtkPolyData> read_any(const std::filesystem::path& path) {
   std::transform(ending.begin(), ending.end(), ending.begin(),
                  [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
   if (ending == ".stl") {
-    return stl_form(path) == StlForm::kText ? read_text_stl(path) : read_with<vtkSTLReader>(path);
+    return stl_form(path) == StlForm::kText ? read_text_stl(path) : read_binary_stl(path);
   }
   if (ending == ".ply") return read_ply(path);
   if (ending == ".obj") return read_obj(path);

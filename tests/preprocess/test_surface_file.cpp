@@ -251,6 +251,30 @@ TEST_F(SurfaceFile, AnStlIsReadWhateverItsHeaderHolds) {
       std::string::npos);
 }
 
+TEST_F(SurfaceFile, WhatLiesBehindTheTrianglesOfAnStlIsNoneOfThem) {
+  const Surface box = shapes::box({0, 0, 0}, {1, 2, 4});
+  const std::string more = binary_stl(shapes::box({500, 500, 500}, {600, 600, 600})).substr(84);
+  for (const std::string& behind :
+       {std::string(400, '\0'), more, "written by a scanner\n" + std::string(200, 'x'),
+        std::string("\nvertex 9 9 9\nvertex 9 8 9\nendfacet\n"), std::string("facet\0\xff", 7)}) {
+    for (const fs::path& path : {write("binary.stl", binary_stl(box) + behind),
+                                 write("text.stl", ascii_stl(box) + behind)}) {
+      const Surface read = read_triangles(path, "mm", "LPS");
+      EXPECT_EQ(read.triangles.cols(), box.triangles.cols()) << path << behind.size();
+      EXPECT_EQ(read.vertices.cols(), box.vertices.cols()) << path << behind.size();
+      EXPECT_EQ(read.vertices.rowwise().maxCoeff(), Vec3(1, 2, 4)) << path << behind.size();
+    }
+  }
+  // Several solids in one file are all of it, and the last of them may break off.
+  const Surface other = shapes::box({5, 0, 0}, {6, 2, 4});
+  const std::string two = ascii_stl(box) + ascii_stl(other);
+  EXPECT_EQ(read_triangles(write("two.stl", two), "mm", "LPS").triangles.cols(), 24);
+  const std::string cut = two.substr(0, two.rfind("endsolid"));
+  EXPECT_NE(
+      message_of([&] { read_triangles(write("cut.stl", cut), "mm", "LPS"); }).find("breaks off"),
+      std::string::npos);
+}
+
 TEST_F(SurfaceFile, LinesMayEndAsOnAnySystem) {
   const Surface box = shapes::box({0, 0, 0}, {1, 2, 4});
   std::string binary = binary_ply(box);  // with a byte of data that is a line's end behind it
