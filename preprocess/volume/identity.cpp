@@ -1,5 +1,6 @@
 #include "preprocess/volume/identity.h"
 
+#include <algorithm>
 #include <array>
 #include <cctype>
 #include <cstddef>
@@ -69,25 +70,78 @@ int month_of(const std::string& word) {
   return 0;
 }
 
+/// A text's runs of letters and of digits, in small letters.
+std::vector<std::string> runs_of(const std::string& text) {
+  const auto is_digit = [](char c) { return c >= '0' && c <= '9'; };
+  std::vector<std::string> runs;
+  std::istringstream words(only(text, std::isalnum, ' '));
+  for (std::string word; words >> word;) {
+    for (std::size_t k = 0; k < word.size(); ++k) {
+      if (k == 0 || is_digit(word[k]) != is_digit(word[k - 1])) runs.emplace_back();
+      runs.back() += word[k];
+    }
+  }
+  return runs;
+}
+
+bool is_number(const std::string& text) { return only(text, std::isdigit, '\0') == text; }
+
 /// The digits of a text, each number and each month's name with two digits at least: "2-Jan-2024"
 /// has "02012024".
-std::string digits_of_named_date(const std::string& text) {
-  std::string parted;
-  for (const char c : only(text, std::isalnum, ' ')) {  // letters and digits are words of their own
-    const auto is_digit = [](char one) { return one >= '0' && one <= '9'; };
-    if (!parted.empty() && is_digit(parted.back()) != is_digit(c)) parted += ' ';
-    parted += c;
-  }
+std::string digits_of_named_date(const std::vector<std::string>& runs) {
   std::string digits;
-  std::istringstream words(parted);
-  for (std::string word; words >> word;) {
-    const bool number = word[0] >= '0' && word[0] <= '9';
-    const int month = number ? 0 : month_of(word);
+  for (const std::string& run : runs) {
+    const bool number = is_number(run);
+    const int month = number ? 0 : month_of(run);
     if (!number && month == 0) continue;
-    const std::string found = number ? word : std::to_string(month);
+    const std::string found = number ? run : std::to_string(month);
     digits += (found.size() == 1 ? "0" : "") + found;
   }
   return digits;
+}
+
+/// Whether runs that follow one another are this together: "MRN 123-4567" holds "mrn1234567".
+bool holds_joined(const std::vector<std::string>& runs, const std::string& sought) {
+  for (std::size_t first = 0; first < runs.size(); ++first) {
+    std::string joined;
+    for (std::size_t k = first; k < runs.size() && joined.size() < sought.size(); ++k) {
+      joined += runs[k];
+    }
+    if (joined == sought) return true;
+  }
+  return false;
+}
+
+/// What of a tag must not be shown: its words, all of it and each of its components (parted by ^)
+/// without what parts their words, and numbers of these.
+std::vector<std::string> secrets_of(const std::string& tag) {
+  constexpr std::size_t kLong = 4, kShort = 2;  // characters
+  std::vector<std::string> secrets;
+  const auto add = [&](const std::string& one) {
+    if (one.size() >= (is_number(one) ? kLong : kShort)) secrets.push_back(one);
+  };
+  std::istringstream parts(only(tag, std::isalnum, ' '));
+  for (std::string part; parts >> part;) add(part);
+  std::vector<std::string> joined = {only(tag, std::isalnum, '\0')};
+  std::istringstream components(tag);
+  for (std::string one; std::getline(components, one, '^');) {
+    joined.push_back(only(one, std::isalnum, '\0'));
+  }
+  for (const std::string& all : joined) {
+    add(all);
+    for (const std::string& run : runs_of(all)) {
+      if (is_number(run)) add(run);
+    }
+  }
+  return secrets;
+}
+
+/// A short one, as the name Li, counts as a word of its own alone.
+bool holds_secret(const std::string& words, const std::vector<std::string>& runs,
+                  const std::string& secret) {
+  constexpr std::size_t kLong = 4;  // characters
+  if (secret.size() < kLong) return words.find(" " + secret + " ") != std::string::npos;
+  return words.find(secret) != std::string::npos || holds_joined(runs, secret);
 }
 
 /// Whether two letters that stand alone behind one another are the first ones of two words of the
@@ -109,25 +163,22 @@ bool holds_initials(const std::string& words, const std::string& tag) {
 }  // namespace
 
 std::string without_identity(const std::string& text, const std::vector<std::string>& tags) {
-  constexpr std::size_t kDate = 8, kLong = 4, kShort = 2;  // characters
-  const std::string digits = only(text, std::isdigit, '\0'), named = digits_of_named_date(text);
+  constexpr std::size_t kDate = 8;  // characters
+  const std::vector<std::string> runs = runs_of(text);
+  const std::string digits = only(text, std::isdigit, '\0'), named = digits_of_named_date(runs);
   const std::string words = words_of(text);
   for (const std::string& tag : tags) {
-    if (tag.size() == kDate && only(tag, std::isdigit, '\0') == tag) {
+    if (tag.size() == kDate && is_number(tag)) {
       for (const std::string& date : orders_of_date(tag)) {
         if (digits.find(date) != std::string::npos) return {};
         if (named.find(date) != std::string::npos) return {};
       }
     }
     if (holds_initials(words, tag)) return {};
-    std::istringstream parts(only(tag, std::isalnum, ' '));
-    for (std::string part; parts >> part;) {
-      // A short part, as the name Li, counts as a word of its own alone; a short number, not at
-      // all.
-      const bool number = only(part, std::isdigit, '\0') == part;
-      if (part.size() < (number ? kLong : kShort)) continue;
-      const std::string sought = part.size() < kLong ? " " + part + " " : part;
-      if (words.find(sought) != std::string::npos) return {};
+    const std::vector<std::string> secrets = secrets_of(tag);
+    if (std::any_of(secrets.begin(), secrets.end(),
+                    [&](const std::string& secret) { return holds_secret(words, runs, secret); })) {
+      return {};
     }
   }
   return text;
@@ -135,7 +186,7 @@ std::string without_identity(const std::string& text, const std::vector<std::str
 
 std::string without_date(const std::string& number) {
   constexpr std::size_t kDate = 8;  // characters
-  const bool dated = number.size() == kDate && only(number, std::isdigit, '\0') == number &&
+  const bool dated = number.size() == kDate && is_number(number) &&
                      (number.starts_with("19") || number.starts_with("20"));
   return dated ? std::string() : number;
 }

@@ -384,6 +384,30 @@ TEST_F(DicomVolume, ASegmentationIsRefusedByNameAsAVolumeAndAsLabels) {
   EXPECT_TRUE(has(error, expected)) << error;
 }
 
+TEST_F(DicomVolume, WhatIdentifiesThePatientIsNotShownHoweverItIsSplitOrParted) {
+  const auto shown = [&](const std::string& id, const std::string& name,
+                         const std::string& description) {
+    write_slices(
+        [&](const std::string& bytes, int) {
+          return with_element(with_element(bytes, 0x10, 0x20, "LO", id), 0x10, 0x10, "PN", name);
+        },
+        {.description = description});
+    return describe_volume(folder_).series.at(0).description;
+  };
+  for (const char* told :
+       {"MRN 1234567 arterial 1.0 B30f", "MRN-123-4567 thin", "art 1234567", "art 12 345 67 1.0",
+        "mrn_1_2_3_4_5_6_7", "LOVE-LACE thin", "L O V E L A C E", "thin VAN DER BERG",
+        "vander berg", "id1234567x", "AUGU STA"}) {
+    EXPECT_EQ(shown("MRN1234567", "LOVELACE-VAN DER BERG^AUGUSTA", told), "") << told;
+  }
+  for (const char* told : {"id AB 1234", "AB1234", "A B-12.34", "jo_ann"}) {
+    EXPECT_EQ(shown("AB-12-34", "SMITH^JO ANN", told), "") << told;
+  }
+  for (const char* told : {"Thorax 1.0 B30f", "MR arterial 123 kV", "CTA 1234 mm", "love 1 lac"}) {
+    EXPECT_EQ(shown("MRN1234567", "LOVELACE^AUGUSTA", told), told) << told;
+  }
+}
+
 TEST_F(DicomVolume, ACtIsReadBesideADoseASegmentationAPictureAndItsProjection) {
   write_slices(as_they_are);
   write("dose", other_object("1.2.840.10008.5.1.4.1.1.481.2", "RTDOSE"));
