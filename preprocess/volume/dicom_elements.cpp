@@ -1,6 +1,7 @@
 #include "preprocess/volume/dicom_elements.h"
 
 #include <algorithm>
+#include <cctype>
 #include <cmath>
 #include <cstdlib>
 #include <sstream>
@@ -8,6 +9,20 @@
 #include <utility>
 
 namespace wireplan::preprocess {
+namespace {
+
+/// "HU", "hu" and "Hounsfield units", which people write.
+bool is_hounsfield(const std::string& unit) {
+  std::string letters;
+  for (const char c : unit) {
+    const auto byte = static_cast<unsigned char>(c);
+    if (c != ' ' && c != '_') letters += static_cast<char>(std::tolower(byte));
+  }
+  return letters == "hu" || letters == "hounsfield" || letters == "hounsfieldunit" ||
+         letters == "hounsfieldunits";
+}
+
+}  // namespace
 
 std::string without_padding(std::string text) {
   const std::string_view padding(" \t\r\n\0", 5);
@@ -27,7 +42,7 @@ std::string dicom_text(const gdcm::DataSet& data, const gdcm::Tag& tag) {
 }
 
 std::vector<double> read_numbers(const gdcm::DataSet& data, const NamedTag& named,
-                                 NoNumber& wrong) {
+                                 WrongValue& wrong) {
   const std::string text = dicom_text(data, named.tag());
   std::vector<double> numbers;
   std::istringstream parts(text);
@@ -38,7 +53,7 @@ std::vector<double> read_numbers(const gdcm::DataSet& data, const NamedTag& name
     const bool is_decimal =
         !part.empty() && part.find_first_not_of("0123456789+-.eE") == std::string::npos;
     if (!is_decimal || end != part.c_str() + part.size() || !std::isfinite(number)) {
-      if (wrong.name.empty()) wrong = {named.name, text};
+      wrong.tell(named.name, text, "numbers with decimal points, parted by backslashes");
       return {};
     }
     numbers.push_back(number);
@@ -46,7 +61,7 @@ std::vector<double> read_numbers(const gdcm::DataSet& data, const NamedTag& name
   return numbers;
 }
 
-void read_scale(const gdcm::DataSet& data, DicomScale& scale, NoNumber& wrong) {
+void read_scale(const gdcm::DataSet& data, DicomScale& scale, WrongValue& wrong) {
   const auto read = [&](const NamedTag& named, double& to, bool& has) {
     const std::vector<double> numbers = read_numbers(data, named, wrong);
     if (numbers.empty()) return;
@@ -55,8 +70,12 @@ void read_scale(const gdcm::DataSet& data, DicomScale& scale, NoNumber& wrong) {
   };
   read(kSlope, scale.slope, scale.has_slope);
   read(kIntercept, scale.intercept, scale.has_intercept);
+  if (scale.slope == 0.0) {
+    wrong.tell(kSlope.name, dicom_text(data, kSlope.tag()),
+               "another number than 0, at which all values are one");
+  }
   if (std::string unit = dicom_text(data, {0x28, 0x1054}); !unit.empty()) {
-    scale.unit = std::move(unit);
+    scale.unit = is_hounsfield(unit) ? "HU" : std::move(unit);
   }
 }
 

@@ -24,9 +24,13 @@ inline constexpr NamedTag kThickness{0x18, 0x50, "Slice Thickness (0018,0050)"};
 inline constexpr NamedTag kIntercept{0x28, 0x1052, "Rescale Intercept (0028,1052)"};
 inline constexpr NamedTag kSlope{0x28, 0x1053, "Rescale Slope (0028,1053)"};
 
-/// A decimal string that holds something else than numbers; no name where there is none.
-struct NoNumber {
-  std::string name, value;
+/// A decimal string that holds something else than is expected; no name where there is none.
+struct WrongValue {
+  std::string name, value, expected;
+  /// Unless another is told.
+  void tell(const std::string& of, const std::string& is, const std::string& wanted) {
+    if (name.empty()) *this = {of, is, wanted};
+  }
 };
 
 /// A text without the blanks and zeros that fill it up (PS3.5 section 6.2).
@@ -40,7 +44,8 @@ std::string dicom_text(const gdcm::DataSet& data, const gdcm::Tag& tag);
 
 /// All numbers of a decimal string (PS3.5 section 6.2). None where it is absent, or where something
 /// else stands between them, as a decimal comma: told in `wrong`, unless that tells of another.
-std::vector<double> read_numbers(const gdcm::DataSet& data, const NamedTag& named, NoNumber& wrong);
+std::vector<double> read_numbers(const gdcm::DataSet& data, const NamedTag& named,
+                                 WrongValue& wrong);
 
 /// Calls `use` with the first item of a sequence, where there is one.
 template <typename Use>
@@ -54,10 +59,10 @@ void in_first_item(const gdcm::DataSet& data, const gdcm::Tag& sequence, Use use
 struct DicomScale {
   double slope = 1.0, intercept = 0.0;
   bool has_slope = false, has_intercept = false;
-  std::string unit;  // of the value, "HU"; empty where not told
+  std::string unit;  // of the value, "HU" in whatever spelling; empty where not told
 };
 
 /// Changes what the elements tell.
-void read_scale(const gdcm::DataSet& data, DicomScale& scale, NoNumber& wrong);
+void read_scale(const gdcm::DataSet& data, DicomScale& scale, WrongValue& wrong);
 
 }  // namespace wireplan::preprocess

@@ -1,5 +1,7 @@
 #include "preprocess/volume/dicom_frames.h"
 
+#include <cmath>
+
 namespace wireplan::preprocess {
 namespace {
 
@@ -18,13 +20,21 @@ void read_position(const gdcm::DataSet& data, DicomFrame& frame, Told& told) {
 void read_orientation(const gdcm::DataSet& data, DicomFrame& frame, Told& told) {
   const std::vector<double> axes = read_numbers(data, kOrientation, frame.wrong);
   if (axes.size() < 6) return;
-  frame.right = Vec3(axes[0], axes[1], axes[2]);
-  frame.down = Vec3(axes[3], axes[4], axes[5]);
+  const Vec3 right(axes[0], axes[1], axes[2]), down(axes[3], axes[4], axes[5]);
+  constexpr double kRounding = 0.01;  // of decimals
+  const auto is_one = [](double length) { return std::abs(length - 1.0) <= kRounding; };
+  if (!is_one(right.norm()) || !is_one(down.norm())) {
+    frame.wrong.tell(kOrientation.name, dicom_text(data, kOrientation.tag()),
+                     "two directions of length 1, of a row and a column");
+    return;
+  }
+  frame.right = right.normalized();
+  frame.down = down.normalized();
   told.orientation = true;
 }
 
 void read_measures(const gdcm::DataSet& data, DicomFrame& frame, Told& told) {
-  NoNumber passed_over;  // images are read without a thickness
+  WrongValue passed_over;  // images are read without a thickness
   const std::vector<double> thickness = read_numbers(data, kThickness, passed_over);
   if (!thickness.empty()) frame.thickness = thickness[0];
   // Between rows, then between columns (PS3.3 section 10.7.1.3).

@@ -12,7 +12,7 @@ namespace wireplan::preprocess {
 
 struct DicomFrame {
   std::string lacks;  // what the file does not tell of where it lies; empty where it does
-  NoNumber wrong;
+  WrongValue wrong;
   Vec3 position = Vec3::Zero();  // centre of its first pixel, LPS                        [mm]
   Vec3 right = Vec3::UnitX(), down = Vec3::UnitY();  // unit vectors of a row and a column
   double along_row = 1.0, along_column = 1.0;        // spacing of pixels                  [mm]

@@ -186,20 +186,20 @@ bool is_ct(const std::string& sop_class) {
   return std::find(kClasses.begin(), kClasses.end(), sop_class) != kClasses.end();
 }
 
-/// Why decimals of a file are not read; empty where they are.
-std::string find_no_number(const Slice& slice, const std::vector<std::string>& patient) {
-  const auto tell = [&](const NoNumber& wrong, const std::string& where) {
+/// Why a file whose decimals are not what is expected is not read; empty where they are.
+std::string find_wrong_value(const Slice& slice, const std::vector<std::string>& patient) {
+  const auto tell = [&](const WrongValue& wrong, const std::string& where) {
     constexpr std::size_t kMost = 64;
     std::string value = without_identity(wrong.value.substr(0, kMost), patient);
     std::replace_if(
         value.begin(), value.end(), [](char c) { return c < ' ' || c > '~'; }, '?');
     return "its " + wrong.name + where + " is " +
-           (value.empty() ? "not shown" : "\"" + value + "\"") +
-           ", expected numbers with decimal points, parted by backslashes; export the series again";
+           (value.empty() ? "not shown" : "\"" + value + "\"") + ", expected " + wrong.expected +
+           "; export the series again";
   };
   if (!slice.image.wrong.name.empty()) return tell(slice.image.wrong, "");
   for (std::size_t k = 0; k < slice.frames.size(); ++k) {
-    const NoNumber& wrong = slice.frames[k].wrong;
+    const WrongValue& wrong = slice.frames[k].wrong;
     if (!wrong.name.empty()) return tell(wrong, " of frame " + std::to_string(k + 1));
   }
   return {};
@@ -249,7 +249,7 @@ void read_elements(Slice& slice, const gdcm::DataSet& data) {
   slice.grid.size = {read_count<0x11>(data), read_count<0x10>(data), images};
   slice.refused = other_kind(slice, sop_class);
   slice.aside = !slice.refused.empty() || (images > 1 && !is_scan(sop_class, slice.modality));
-  if (slice.refused.empty()) slice.refused = find_no_number(slice, patient);
+  if (slice.refused.empty()) slice.refused = find_wrong_value(slice, patient);
 }
 
 /// True where the fragments of compressed pixels that start at `at` are all there (DICOM part 5,

@@ -262,6 +262,31 @@ TEST_F(DicomVolume, DecimalsOfFramesThatAreNoNumbersAreToldWithTheFrame) {
   expect_refused({"its Pixel Spacing (0028,0030) of frame 1 is \"0,8\\0,6\""});
 }
 
+TEST_F(DicomVolume, AScaleOfZeroAndDirectionsWithoutLengthAreRefusedWithTagAndValue) {
+  for (const char* zero : {"0", "0.0", "-0"}) {
+    write_slices([&](const std::string& bytes, int k) {
+      return k == 5 ? with_element(bytes, 0x28, 0x1053, "DS", zero) : bytes;
+    });
+    expect_refused({"3_5: its ", std::string("Rescale Slope (0028,1053) is \"") + zero +
+                                     "\", expected another number than 0"});
+  }
+  for (const char* none : {"0\\0\\0\\0\\0\\0", "1\\0\\0\\0\\0.5\\0"}) {
+    write_told(0x20, 0x37, "DS", [&](int) { return std::string(none); });
+    expect_refused({"3_0: its ", std::string("Image Orientation (Patient) (0020,0037) is \"") +
+                                     none + "\", expected two directions of length 1"});
+  }
+  for (int k = 0; k < 8; ++k) fs::remove(folder_ / ("3_" + std::to_string(k)));
+  write("ct.dcm", enhanced({{.place = 0}, {.place = 1, .slope = "0"}, {.place = 2}}));
+  expect_refused({"its Rescale Slope (0028,1053) of frame 2 is \"0\", expected another number"});
+  std::string bytes = enhanced({{.place = 0}, {.place = 1}, {.place = 2}});
+  const std::string axes = "1\\0\\0\\0\\1\\0";
+  bytes.replace(bytes.find(axes), axes.size(), "0\\0\\0\\0\\0\\0");
+  write("ct.dcm", bytes);
+  expect_refused(
+      {"its Image Orientation (Patient) (0020,0037) of frame 1 is "
+       "\"0\\0\\0\\0\\0\\0\", expected two directions of length 1"});
+}
+
 // ---- Values -------------------------------------------------------------------------------------
 
 /// As many columns as rows of soft tissue with air around it.

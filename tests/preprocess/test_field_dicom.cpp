@@ -264,8 +264,11 @@ TEST_F(FieldDicom, TheRescaleTypeOfEachSliceIsAskedAndThatOfNearlyHounsfieldUnit
   const std::string error = read_error(folder_);
   EXPECT_TRUE(has(error, "3_3: a CT whose values are not in HU but, by its rescale type, OD"))
       << error;
-  typed("HU", "HU");
-  EXPECT_EQ(read_image(folder_).unit, "HU");
+  for (const char* unit : {"HU", "hu", "Hu", "Hounsfield", "HOUNSFIELD UNITS", "hounsfield_unit"}) {
+    typed("HU", unit);
+    expect_whole();
+    EXPECT_EQ(read_image(folder_).unit, "HU") << unit;
+  }
   for (const char* unit : {"HU_MOD", "US"}) {
     typed("HU", unit);
     expect_whole();
