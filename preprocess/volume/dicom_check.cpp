@@ -23,6 +23,15 @@ constexpr std::uint32_t kFirstOfData = 8;  // group
 constexpr std::size_t kPreamble = 128, kMagic = 4;
 constexpr int kDeepest = 16;
 
+constexpr std::string_view kOfImages = "1.2.840.10008.5.1.4.1.1.";  // how their classes begin
+
+// Images of CT and MR, each slice for itself or all in one file (PS3.4 section B.5).
+bool is_image_class(std::string_view uid) {
+  if (!uid.starts_with(kOfImages)) return false;
+  uid.remove_prefix(kOfImages.size());
+  return uid == "2" || uid == "2.1" || uid == "4" || uid == "4.1";
+}
+
 // Tag as group * 65536 + element.
 class Walker {
  public:
@@ -112,19 +121,20 @@ class Walker {
       if (!read_head(is_explicit(at_), element) || element.length > left()) return false;
       const std::string_view value = bytes_.substr(at_, element.length);
       if (element.tag == kTransferSyntax) look_.syntax = value;
-      if (element.tag == kClassOfFile) look_.image = is_image_class(value);
+      if (element.tag == kClassOfFile) note_class(value);
       at_ += element.length;
     }
-    std::string& syntax = look_.syntax;
-    syntax = syntax.substr(0, syntax.find_last_not_of(std::string_view("\0 ", 2)) + 1);
+    look_.syntax = unpadded(look_.syntax);
     return true;
   }
 
-  // Images of CT and MR, each slice for itself or all in one file (PS3.4 section B.5).
-  static bool is_image_class(std::string_view uid) {
-    uid = uid.substr(0, uid.find_last_not_of(std::string_view("\0 ", 2)) + 1);
-    return uid == "1.2.840.10008.5.1.4.1.1.2" || uid == "1.2.840.10008.5.1.4.1.1.2.1" ||
-           uid == "1.2.840.10008.5.1.4.1.1.4" || uid == "1.2.840.10008.5.1.4.1.1.4.1";
+  static std::string unpadded(std::string_view uid) {
+    return std::string(uid.substr(0, uid.find_last_not_of(std::string_view("\0 ", 2)) + 1));
+  }
+
+  void note_class(std::string_view value) {
+    look_.sop_class = unpadded(value);
+    look_.image = look_.image || is_image_class(look_.sop_class);
   }
 
   bool is_capital(std::size_t at) const { return bytes_[at] >= 'A' && bytes_[at] <= 'Z'; }
@@ -232,9 +242,8 @@ class Walker {
   // What matters of an element of the data set itself, whose value lies from `start` to here.
   void note(const Element& element, std::size_t start) {
     const std::string_view value = bytes_.substr(start, at_ - start);
-    if (element.tag == kRows || (element.tag == kClass && is_image_class(value))) {
-      look_.image = true;
-    }
+    if (element.tag == kClass) note_class(value);
+    if (element.tag == kRows) look_.image = true;
     if (element.tag == kPixelData || element.tag == kFloatPixels || element.tag == kDoublePixels) {
       look_.pixels = true;
       look_.end = at_;
@@ -294,6 +303,18 @@ DicomLook look_at_dicom(const std::filesystem::path& path) {
   }
   bytes.append(std::istreambuf_iterator<char>(stream), {});
   return Walker(bytes).look();
+}
+
+bool is_segmentation(const std::string& sop_class) {
+  return sop_class.starts_with(std::string(kOfImages) + "66.");
+}
+
+DicomKind kind_of(const DicomLook& look) {
+  if (is_segmentation(look.sop_class)) return {kSegmentation, true};
+  if (look.sop_class == std::string(kOfImages) + "481.3") {
+    return {"a DICOM structure set (RTSTRUCT)", true};
+  }
+  return {is_image_class(look.sop_class) ? "a DICOM image (CT or MR)" : "a DICOM file", false};
 }
 
 DicomForm check_dicom(const std::filesystem::path& path) { return look_at_dicom(path).form; }

@@ -30,6 +30,7 @@ struct DicomLook {
   bool explicit_vr = true;
   bool followed = true;             // false: of an unknown syntax, in which elements are not found
   bool pixels = false;              // whether it has some of its own; true where it may have
+  std::string sop_class;            // UID of what it is; empty where the file does not tell
   bool image = false;               // whether it says that it is one, with pixels or without
   std::size_t begin = 0, end = 0;   // of the data set, up to its pixels' end
   std::vector<DicomPatch> patches;  // of an otherwise sound file
@@ -41,6 +42,18 @@ struct DicomLook {
 /// zeros), as old scanners write them, and for MONOCHROME1, at which ITK turns the values upside
 /// down although it tells how they are shown alone (PS3.3 section C.7.6.3.1.2).
 DicomLook look_at_dicom(const std::filesystem::path& path);
+
+inline constexpr const char* kSegmentation = "a DICOM segmentation (SEG)";
+
+/// Whether labels are of this class, of voxels or of surfaces.
+bool is_segmentation(const std::string& sop_class);
+
+/// What an object is called, and whether one draws organs by it.
+struct DicomKind {
+  std::string name;
+  bool labels = false;
+};
+DicomKind kind_of(const DicomLook& look);
 
 DicomForm check_dicom(const std::filesystem::path& path);
 

@@ -122,7 +122,8 @@ Series find_wanted(const fs::path& path, const std::string& wanted, const At& at
   std::vector<Series> all;
   find_series(path, at, all);
   if (all.empty() && !fs::is_directory(path)) {
-    throw Error(path.string() + ": a DICOM file without an image; " + kFormats);
+    throw Error(path.string() + ": " + kind_of(look_at_dicom(path)).name + " without an image; " +
+                kFormats);
   }
   Series slices = choose_series(path, wanted, std::move(all));
   if (!fs::is_directory(path) && !is_enhanced(slices)) {

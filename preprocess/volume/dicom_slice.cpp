@@ -101,7 +101,7 @@ std::vector<std::string> patient_of(const gdcm::DataSet& data) {
   return values;
 }
 
-/// A count of pixels, rows or columns.
+/// A count of rows, columns or values of a pixel.
 template <std::uint16_t kElement>
 int read_count(const gdcm::DataSet& data) {
   gdcm::Attribute<0x0028, kElement> attribute;
@@ -159,9 +159,18 @@ std::string projection_of(std::string type) {
 }
 
 /// Of what kind an image is that is no slice, nor frames, of a scan; empty where it is of one.
-std::string other_kind(const Slice& slice, const std::string& sop_class) {
-  if (sop_class.starts_with("1.2.840.10008.5.1.4.1.1.66.") || slice.modality == "SEG") {
-    return "a DICOM segmentation (SEG) is not read; export it as NIfTI or NRRD";
+std::string other_kind(const Slice& slice, const gdcm::DataSet& data) {
+  if (is_segmentation(dicom_text(data, {0x08, 0x16})) || slice.modality == "SEG") {
+    return kSegmentation + std::string(" is not read; export it as NIfTI or NRRD");
+  }
+  const int samples = read_count<0x02>(data);
+  const bool palette = dicom_text(data, {0x28, 0x04}).starts_with("PALETTE");
+  if (samples > 1 || palette) {
+    return "a colour image (" +
+           (palette ? std::string("Photometric Interpretation (0028,0004) is PALETTE COLOR")
+                    : "Samples per Pixel (0028,0002) is " + std::to_string(samples)) +
+           "), as pictures of a screen are, expected one grey value per pixel; give the series of "
+           "slices";
   }
   std::string projection = projection_of(slice.image.type);
   for (const DicomFrame& frame : slice.frames) {
@@ -247,7 +256,7 @@ void read_elements(Slice& slice, const gdcm::DataSet& data) {
   if (images > 1 || !slice.frames.empty()) slice.image.lacks.clear();
   slice.grid = told_grid(slice.image);
   slice.grid.size = {read_count<0x11>(data), read_count<0x10>(data), images};
-  slice.refused = other_kind(slice, sop_class);
+  slice.refused = other_kind(slice, data);
   slice.aside = !slice.refused.empty() || (images > 1 && !is_scan(sop_class, slice.modality));
   if (slice.refused.empty()) slice.refused = find_wrong_value(slice, patient);
 }

@@ -11,6 +11,7 @@
 #include <sstream>
 #include <utility>
 
+#include "preprocess/volume/dicom_check.h"
 #include "preprocess/volume/label_frame.h"
 #include "preprocess/volume/volume_file.h"
 
@@ -64,12 +65,25 @@ std::optional<std::size_t> find_no_label(const std::vector<float>& values) {
   return static_cast<std::size_t>(bad - values.begin());
 }
 
+/// Why a file that holds no labels of ours, but is DICOM, is refused; empty where it is none.
+std::string find_dicom(const fs::path& file) {
+  const DicomLook look = look_at_dicom(file);
+  if (look.form == DicomForm::kNone) return {};
+  const auto [name, labels] = kind_of(look);
+  return name + (labels ? " is not read; export it as NIfTI or NRRD"
+                        : " holds no labels that are read; export the segmentation as NIfTI or "
+                          "NRRD");
+}
+
 /// The layers of a file, seen to hold labels.
 std::vector<Image> read_checked(const fs::path& path, VolumeHeader& told) {
   if (!fs::exists(path)) {
     throw Error(path.string() +
                 ": no such file or folder; expected a volume of labels (.nii, .nii.gz, .nrrd, "
                 ".nhdr, .mha or .mhd), or a folder with one such file per class");
+  }
+  if (const std::string dicom = find_dicom(path); !dicom.empty()) {
+    throw Error(path.string() + ": " + dicom);
   }
   std::vector<Image> layers = read_layers(path, told);
   for (const Image& layer : layers) {
@@ -439,11 +453,17 @@ void read_class_file(const fs::path& file, std::size_t index, const std::string&
 /// The volumes of a folder by the names of their classes.
 std::map<std::string, std::vector<fs::path>> find_class_files(const fs::path& folder) {
   std::map<std::string, std::vector<fs::path>> files;
+  std::string dicom;  // why the first such file is refused
   std::error_code refused;
   for (const fs::directory_entry& entry : fs::directory_iterator(folder, refused)) {
     const std::string name = class_name(entry.path());
     std::error_code unknown;
-    if (!name.empty() && entry.is_regular_file(unknown)) files[name].push_back(entry.path());
+    if (!entry.is_regular_file(unknown)) continue;
+    if (!name.empty()) {
+      files[name].push_back(entry.path());
+    } else if (dicom.empty()) {
+      dicom = find_dicom(entry.path());
+    }
   }
   if (refused) {
     throw Error(folder.string() + ": cannot be read (" + refused.message() +
@@ -451,7 +471,9 @@ std::map<std::string, std::vector<fs::path>> find_class_files(const fs::path& fo
   }
   if (files.empty()) {
     throw Error(folder.string() +
-                ": holds no volumes, expected one file per class (.nii.gz, .nii, .nrrd, .mha)");
+                ": holds no volumes, expected one file per class (.nii.gz, .nii, "
+                ".nrrd, .mha)" +
+                (dicom.empty() ? "" : "; " + dicom));
   }
   return files;
 }

@@ -409,6 +409,55 @@ TEST_F(DicomVolume, ASegmentationIsRefusedByNameAsAVolumeAndAsLabels) {
   EXPECT_TRUE(has(error, expected)) << error;
 }
 
+/// A file of a CT that holds a picture in colours.
+std::string in_colours(const std::string& bytes) {
+  std::string colour = with_element(bytes, 0x28, 0x02, "US", dicom_files::short_value(3));
+  colour = with_element(colour, 0x28, 0x04, "CS", "RGB");
+  colour = with_element(colour, 0x28, 0x06, "US", dicom_files::short_value(0));
+  colour = with_element(colour, 0x28, 0x100, "US", dicom_files::short_value(8));
+  colour = with_element(colour, 0x28, 0x101, "US", dicom_files::short_value(8));
+  colour = with_element(colour, 0x28, 0x102, "US", dicom_files::short_value(7));
+  colour = with_element(colour, 0x28, 0x103, "US", dicom_files::short_value(0));
+  colour = with_element(colour, 0x28, 0x1052, "DS", std::nullopt);
+  colour = with_element(colour, 0x28, 0x1053, "DS", std::nullopt);
+  const std::size_t pixels = elements_of(colour).back().at;
+  return colour.substr(0, pixels) + of(0x7fe0, 0x10, "OW", std::string(18, '\x70'));
+}
+
+TEST_F(DicomVolume, PicturesInColoursAreRefusedAsSuchAndPassedOverBesideACt) {
+  const auto paint = [](const std::string& bytes, int) { return in_colours(bytes); };
+  write_slices(paint, {.series = "1.2.88", .number = "88"});
+  expect_refused({"a colour image (Samples per Pixel (0028,0002) is 3)"});
+  write_slices(as_they_are);
+  expect_read();
+}
+
+TEST_F(DicomVolume, AStructureSetIsRefusedByNameAsAVolumeAndDicomOfAnyKindAsLabels) {
+  const auto labels_error = [](const fs::path& path) {
+    return error_of([&] { read_labels(path, {.names = {"aorta"}}, nullptr); });
+  };
+  const std::string rtstruct =
+      std::string(128, '\0') + "DICM" + of(2, 0, "UL", std::string("\x1c\0\0\0", 4)) +
+      of(2, 0x10, "UI", "1.2.840.10008.1.2.1") +
+      of(8, 0x16, "UI", "1.2.840.10008.5.1.4.1.1.481.3") + of(8, 0x60, "CS", "RTSTRUCT");
+  const fs::path file = write("rs.dcm", rtstruct);
+  EXPECT_TRUE(has(read_error(file), "a DICOM structure set (RTSTRUCT) without an image"));
+  const std::string expected =
+      "a DICOM structure set (RTSTRUCT) is not read; export it as NIfTI or NRRD";
+  EXPECT_TRUE(has(labels_error(file), "rs.dcm: " + expected)) << labels_error(file);
+  EXPECT_TRUE(has(labels_error(folder_), "holds no volumes") &&
+              has(labels_error(folder_), expected))
+      << labels_error(folder_);
+  fs::remove(file);
+  write_slices(as_they_are);
+  const std::string no_labels =
+      "a DICOM image (CT or MR) holds no labels that are read; export the segmentation as NIfTI or "
+      "NRRD";
+  for (const fs::path& path : {folder_, folder_ / "3_0"}) {
+    EXPECT_TRUE(has(labels_error(path), no_labels)) << labels_error(path);
+  }
+}
+
 TEST_F(DicomVolume, WhatIdentifiesThePatientIsNotShownHoweverItIsSplitOrParted) {
   const auto shown = [&](const std::string& id, const std::string& name,
                          const std::string& description) {
