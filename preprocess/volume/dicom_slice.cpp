@@ -214,6 +214,16 @@ std::string find_wrong_value(const Slice& slice, const std::vector<std::string>&
   return {};
 }
 
+/// Why a file tells more or fewer places than it has frames; empty where it does not.
+std::string find_miscount(const Slice& slice, int images) {
+  const std::size_t places = slice.frames.size();
+  if (places == 0 || places == static_cast<std::size_t>(images)) return {};
+  return "its Number of Frames (0028,0008) is " + std::to_string(images) +
+         ", but it tells the places of " + std::to_string(places) +
+         " (Per-frame Functional Groups Sequence (5200,9230)), expected one for each; export the "
+         "series again";
+}
+
 /// Why a file whose header is read cannot lie in a volume; empty where it can.
 std::string find_refusal(const Slice& slice, bool inverse) {
   if (!is_known(slice.look)) return not_read(slice.look.syntax);
@@ -238,6 +248,7 @@ std::string find_refusal(const Slice& slice, bool inverse) {
 /// Fills in what the elements tell, with why images of its kind are not read.
 void read_elements(Slice& slice, const gdcm::DataSet& data) {
   slice.series_uid = dicom_text(data, {0x20, 0x0e});
+  slice.instance_uid = dicom_text(data, {0x08, 0x18});
   slice.series_number = dicom_text(data, {0x20, 0x11});
   const std::vector<std::string> patient = patient_of(data);
   slice.shown_number = without_date(without_identity(slice.series_number, patient));
@@ -259,6 +270,7 @@ void read_elements(Slice& slice, const gdcm::DataSet& data) {
   slice.refused = other_kind(slice, data);
   slice.aside = !slice.refused.empty() || (images > 1 && !is_scan(sop_class, slice.modality));
   if (slice.refused.empty()) slice.refused = find_wrong_value(slice, patient);
+  if (slice.refused.empty()) slice.refused = find_miscount(slice, images);
 }
 
 /// True where the fragments of compressed pixels that start at `at` are all there (DICOM part 5,
@@ -420,8 +432,9 @@ void append_slice(const Slice& slice, const fs::path& folder, std::vector<float>
     const Packing packing = packing_of(slice);
     if (!packing.packed) throw;
     throw Error(slice.file.string() + ": its pixels are packed as " + packing.name + " (" +
-                packing.uid + ") and are all there, but GDCM does not unpack them" +
-                decoder.text() + "; export the series again, uncompressed");
+                packing.uid + "), but GDCM does not unpack them" + decoder.text() +
+                ": their bytes are damaged, or of a kind that it does not know; copy the file "
+                "again, or export the series uncompressed");
   }
 }
 

@@ -19,9 +19,9 @@ struct Slice {
   DicomFrame image;                // what the file tells of all, or of its one frame
   std::vector<DicomFrame> frames;  // of an enhanced file, which has groups of them
   std::string refused;             // why it is no slice of a volume; empty where it can be one
-  std::string series_uid;          // to compare with, never shown
-  std::string series_number;       // to compare with
-  std::string shown_number;        // nothing where it may be a date
+  std::string series_uid, instance_uid;  // to compare with, never shown
+  std::string series_number;             // to compare with
+  std::string shown_number;              // nothing where it may be a date
   std::string description, modality;
   bool localizer = false;  // by its image type
   bool aside = false;      // a dose, a segmentation or a projection: passed over beside a scan

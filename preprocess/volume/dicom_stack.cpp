@@ -11,9 +11,10 @@
 namespace wireplan::preprocess {
 namespace {
 
-/// What is wrong with the places [mm, sorted] of slices along their normal; empty where they form a
-/// regular stack. Scanners round positions, so a slice may lie a tenth of the step from its place.
-std::string find_uneven(const std::vector<double>& positions) {
+/// Tells what is wrong with the places [mm, sorted] of slices along their normal, and between which
+/// two; nothing where they form a regular stack. Scanners round positions, so a slice may lie a
+/// tenth of the step from its place.
+void find_uneven(const std::vector<double>& positions, Stack& stack) {
   const std::size_t gaps = positions.size() - 1;
   const double step = (positions.back() - positions.front()) / static_cast<double>(gaps);
   bool even = step > 0.0;
@@ -21,7 +22,7 @@ std::string find_uneven(const std::vector<double>& positions) {
     const double place = positions.front() + static_cast<double>(k) * step;
     even = even && std::abs(positions[k] - place) <= 0.1 * step;
   }
-  if (even) return {};
+  if (even) return;
 
   std::vector<double> sizes(gaps);
   for (std::size_t k = 0; k < gaps; ++k) sizes[k] = positions[k + 1] - positions[k];
@@ -38,7 +39,8 @@ std::string find_uneven(const std::vector<double>& positions) {
          << "; contrast tracking, or several phases), expected one at each; keep one phase "
             "or "
             "reconstruction in the folder";
-    return text.str();
+    stack.problem = text.str();
+    return;
   }
 
   // Name the gap that differs most from the usual one.
@@ -56,7 +58,8 @@ std::string find_uneven(const std::vector<double>& positions) {
   } else {
     text << "; export the series again, with all its slices and one spacing, or resample it";
   }
-  return text.str();
+  stack.problem = text.str();
+  stack.images = {stack.order[k], stack.order[k + 1]};
 }
 
 /// The parts of steps from one image to the next that lie in their plane, less the usual one.
@@ -94,7 +97,7 @@ void find_shift(const std::vector<Vec3>& origins, double most, Stack& stack) {
   const auto widest = std::max_element(
       steps.begin(), steps.end(), [](const Vec3& a, const Vec3& b) { return a.norm() < b.norm(); });
   const double shift = widest->norm();
-  stack.image = stack.order[static_cast<std::size_t>(widest - steps.begin()) + 1];
+  stack.images = {stack.order[static_cast<std::size_t>(widest - steps.begin()) + 1]};
   stack.problem = "this slice is shifted by " + one_decimal(shift) +
                   " mm in its plane against the one before, and slices lie up to " +
                   one_decimal(off_line) +
@@ -118,7 +121,7 @@ Stack stack(const std::vector<Vec3>& origins, const Grid& first) {
   });
   std::vector<double> positions;
   for (const std::size_t k : stack.order) positions.push_back(normal.dot(origins[k]));
-  stack.problem = find_uneven(positions);
+  find_uneven(positions, stack);
 
   Grid& grid = stack.grid;
   grid.origin = origins[stack.order.front()];

@@ -2,7 +2,6 @@
 /// Images at their places -> a regular stack of slices, or why they form none; for the .cpp files
 /// here.
 #include <cstddef>
-#include <optional>
 #include <string>
 #include <vector>
 
@@ -13,8 +12,8 @@ namespace wireplan::preprocess {
 struct Stack {
   std::vector<std::size_t> order;  // of the images, along their normal
   Grid grid;
-  std::string problem = {};               // why they form no volume; empty where they do
-  std::optional<std::size_t> image = {};  // at which the problem is, where it is at one
+  std::string problem = {};              // why they form no volume; empty where they do
+  std::vector<std::size_t> images = {};  // at which the problem is, where it is at one or two
 };
 
 /// The grid of images that lie at `origins` and are else as `first`, which is one of them.

@@ -62,7 +62,7 @@ void require_hounsfield(const std::string& unit, const std::string& modality,
 /// Where the frames of an enhanced file lie.
 Stack stack_frames(const Slice& slice, const fs::path& folder) {
   const std::vector<DicomFrame>& frames = slice.frames;
-  if (frames.size() != static_cast<std::size_t>(slice.grid.size[2])) {
+  if (frames.empty()) {
     throw Error(folder.string() + ": a DICOM file of " + std::to_string(slice.grid.size[2]) +
                 " frames that does not tell where each lies, expected an enhanced CT with place, "
                 "orientation and spacing of every frame; export the series as one file per slice");
@@ -92,6 +92,22 @@ Stack stack_frames(const Slice& slice, const fs::path& folder) {
   grid.spacing = Vec3(first.along_row, first.along_column, 1.0);
   grid.direction = orthonormal_direction(axes_of(first), folder);
   return stack(origins, grid);
+}
+
+/// Which files are copies of one image at its place; empty where none are. `order` is that of their
+/// places. Where all images of a folder have one UID, they lie elsewhere and are others.
+std::string find_copies(const Series& series, const std::vector<std::size_t>& order) {
+  constexpr double kSamePlace = 0.01;  // [mm]
+  for (std::size_t n = 1; n < order.size() && order.size() == series.size(); ++n) {
+    const Slice& one = series[order[n - 1]];
+    const Slice& other = series[order[n]];
+    if (one.instance_uid.empty() || one.instance_uid != other.instance_uid) continue;
+    if ((one.grid.origin - other.grid.origin).norm() > kSamePlace) continue;
+    return other.file.string() + ": the same image as " + one.file.string() +
+           " (of one SOP Instance UID (0008,0018) and place), expected each image once; take one "
+           "of the two files out";
+  }
+  return {};
 }
 
 /// Why images are of several phases; empty where they are of one.
@@ -185,10 +201,12 @@ Stack stack_series(const Series& series, const fs::path& folder, const At& at) {
                        images.are_frames() ? first.file : series[k].file);
   }
   const std::string uneven = stacked.problem;
-  stacked.problem = find_several(images, stacked.order, folder);
+  stacked.problem = find_copies(series, stacked.order);
+  if (stacked.problem.empty()) stacked.problem = find_several(images, stacked.order, folder);
   if (stacked.problem.empty() && !uneven.empty()) {
-    stacked.problem =
-        (stacked.image ? images.place_of(*stacked.image) : folder.string() + ": ") + uneven;
+    const std::vector<std::size_t>& some = stacked.images;
+    stacked.problem = some.size() == 1 ? images.place_of(some.front()) : folder.string() + ": ";
+    stacked.problem += uneven + (some.size() > 1 ? "; it is at " + images.shown(some) : "");
   }
   if (stacked.problem.empty()) stacked.problem = find_slab(images, stacked.grid);
   if (stacked.problem.empty()) stacked.problem = find_unscaled(series, images, folder, at);

@@ -117,8 +117,8 @@ double nrrd_unit(const Fields& fields, const fs::path& path) {
   for (const std::string& unit : units) scales.insert(mm_of(unit));
   if (units.size() != 3 || scales.size() != 1 || *scales.begin() == 0.0) {
     throw Error(path.string() + ": " + key + " is " + text +
-                ", expected one of \"mm\", \"cm\", \"m\", \"um\", in quotes, for each of the three "
-                "axes; mend the header");
+                ", expected one of \"mm\", \"cm\", \"m\", \"um\", in quotes, and the same one for "
+                "each of the three axes; mend the header");
   }
   return *scales.begin();
 }

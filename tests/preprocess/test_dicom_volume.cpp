@@ -287,6 +287,34 @@ TEST_F(DicomVolume, AScaleOfZeroAndDirectionsWithoutLengthAreRefusedWithTagAndVa
        "\"0\\0\\0\\0\\0\\0\", expected two directions of length 1"});
 }
 
+TEST_F(DicomVolume, AnotherCountOfFramesThanOfTheirPlacesIsToldWithBoth) {
+  const std::string bytes = enhanced({{.place = 0}, {.place = 1}, {.place = 2}});
+  for (const char* count : {"2", "4", "1"}) {
+    std::string other = bytes;
+    const std::string three = of(0x28, 0x08, "IS", "3");
+    other.replace(other.find(three), three.size(), of(0x28, 0x08, "IS", count));
+    write("ct.dcm", other);
+    expect_refused({std::string("its Number of Frames (0028,0008) is ") + count +
+                    ", but it tells the places of 3 (Per-frame Functional Groups Sequence"});
+  }
+}
+
+TEST_F(DicomVolume, AFileThatIsThereTwiceAndTwoImagesOfOnePlaceAreNamed) {
+  write_slices(as_they_are);
+  for (const char* copy : {"3_3 (copy)", "a"}) {  // behind and before it
+    const fs::path file = write(copy, bytes_of(folder_ / "3_3"));
+    expect_refused({": the same image as ", "(of one SOP Instance UID (0008,0018) and place)"});
+    const std::string error = read_error(folder_);
+    EXPECT_TRUE(has(error, file.string()) && has(error, "/3_3")) << error;
+    fs::remove(file);
+  }
+  const fs::path other = write("b", dicom({.position = Vec3(0, 0, 4.5), .first_value = 77}));
+  const std::string error = read_error(folder_);
+  EXPECT_TRUE(has(error, "keep one phase or reconstruction in the folder; it is at 2 slices (") &&
+              has(error, other.string()) && has(error, "/3_3"))
+      << error;
+}
+
 // ---- Values -------------------------------------------------------------------------------------
 
 /// As many columns as rows of soft tissue with air around it.

@@ -393,7 +393,8 @@ TEST_F(FieldDicom, TheSeriesThatAloneIsAVolumeIsReadAmongScouts) {
 
 TEST_F(FieldDicom, ManyImagesOfOnePlaceAreNoVolume) {
   for (int k = 0; k < 5; ++k) {
-    write("slice" + std::to_string(k), dicom({.position = Vec3(0, 0, k == 4 ? 1.0 : 0.0)}));
+    write("slice" + std::to_string(k), dicom({.position = Vec3(0, 0, k == 4 ? 1.0 : 0.0),
+                                              .first_value = static_cast<std::int16_t>(k)}));
   }
   const std::string error = read_error(folder_);
   EXPECT_TRUE(has(error, "at the same place (5 images, places: 2;")) << error;
