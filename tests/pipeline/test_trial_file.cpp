@@ -1,0 +1,100 @@
+// What a trial's file keeps of it.
+#include <gtest/gtest.h>
+
+#include "pipeline/files/trial_file.h"
+#include "tests/pipeline/small_case.h"
+
+namespace wireplan::pipeline {
+namespace {
+
+namespace fs = std::filesystem;
+
+TEST(TrialFile, KeepsEveryBitAndMakesNullOfWhatIsNoNumber) {
+  const TemporaryFolder folder;
+  plan::Study study;
+  study.wires = {{.name = "soft", .radius = 0.4, .sections = {{.length = 100.0}}}};
+  simulate::TrialResult trial;
+  trial.outcome = simulate::Outcome::kNotConverged;
+  trial.reason = "push 2 has no equilibrium";
+  trial.terms = {"stretch", "bend"};
+  trial.pushes.resize(2);
+  trial.pushes[0].push_force = 0.1;  // no finite sum of powers of 2
+  trial.pushes[0].tip = Vec3(1.0 / 3.0, 1e-300, -2e17);
+  trial.pushes[1].residual = std::nan("");
+  trial.pushes[1].iterations = 200;
+  trial.nodes = Eigen::Matrix3Xd::Random(3, 5);
+  trial.pushes[1].wall_displacement = 0.3;
+  trial.pushes[1].wall_displacement_point = Vec3(0.1, 0.2, 0.3);
+  trial.pushes[1].friction_force = 0.7;
+  trial.pushes[1].push_work = 1.1;
+  trial.pushes[1].stored_energy = 1.3;
+  trial.pushes[1].friction_work = 1.7;
+  trial.contacts = {{.node = 3,
+                     .part = 0.1,
+                     .triangle = 17,
+                     .point = Vec3(1, 2, 3),
+                     .normal_force = Vec3(0.1, 0.2, 0.3),
+                     .friction_force = Vec3(0.7, 0.1, 0.2),
+                     .penetration = 0.7,
+                     .wall_displacement = 0.9}};
+  trial.peak_forces = {{3, 0.1}, {17, 1.0 / 3.0}};
+  fs::create_directories(folder / "trials");
+  const fs::path file = folder / trial_file_name(12);
+  EXPECT_EQ(file.filename(), "0012.json");
+  write_text(trial_text(study, {}, trial), file);
+
+  const std::optional<simulate::TrialResult> read = find_trial(file);
+  ASSERT_TRUE(read);
+  EXPECT_EQ(read->outcome, trial.outcome);
+  EXPECT_EQ(read->reason, trial.reason);
+  EXPECT_EQ(read->terms, trial.terms);
+  ASSERT_EQ(read->pushes.size(), 2u);
+  EXPECT_EQ(read->pushes[0].push_force, 0.1);
+  EXPECT_EQ(read->pushes[0].tip, trial.pushes[0].tip);
+  EXPECT_TRUE(std::isnan(read->pushes[1].residual));
+  EXPECT_EQ(read->pushes[1].iterations, 200);
+  EXPECT_EQ(read->pushes[1].wall_displacement, 0.3);
+  EXPECT_EQ(read->pushes[1].wall_displacement_point, Vec3(0.1, 0.2, 0.3));
+  EXPECT_EQ(read->pushes[1].friction_force, 0.7);
+  EXPECT_EQ(read->pushes[1].push_work, 1.1);
+  EXPECT_EQ(read->pushes[1].stored_energy, 1.3);
+  EXPECT_EQ(read->pushes[1].friction_work, 1.7);
+  EXPECT_EQ(read->nodes, trial.nodes);
+  ASSERT_EQ(read->contacts.size(), 1u);
+  const simulate::WireContact &contact = read->contacts[0], &written = trial.contacts[0];
+  EXPECT_EQ(contact.node, 3);
+  EXPECT_EQ(contact.part, 0.1);
+  EXPECT_EQ(contact.triangle, 17);
+  EXPECT_EQ(contact.point, written.point);
+  EXPECT_EQ(contact.normal_force, written.normal_force);
+  EXPECT_EQ(contact.friction_force, written.friction_force);
+  EXPECT_EQ(contact.penetration, 0.7);
+  EXPECT_EQ(contact.wall_displacement, 0.9);
+  ASSERT_EQ(read->peak_forces.size(), 2u);
+  EXPECT_EQ(read->peak_forces[1].triangle, 17);
+  EXPECT_EQ(read->peak_forces[1].force, 1.0 / 3.0);
+
+  write_text(read_text(file).substr(0, 200), file);
+  EXPECT_FALSE(find_trial(file));
+  EXPECT_FALSE(find_trial(folder / "absent.json"));
+}
+
+TEST(TrialFile, StepsOfAScriptAreReadAsTheyAreWritten) {
+  using simulate::Until;
+  const std::vector<simulate::ToolStep> steps = {
+      {.tool = 1, .push = 320.0, .steers = 8},
+      {.tool = 0, .push = 302.5},
+      {.tool = 0, .turn = -180.0 * kRadPerDeg, .until = Until::kFacing, .at = 25.0 * kRadPerDeg},
+      {.tool = simulate::kBothTools, .push = -22.0, .until = Until::kLevel, .at = -5.0},
+      {.tool = 1,
+       .push = 60.0,
+       .until = Until::kInBranch,
+       .at = 18.0,
+       .tries = 8,
+       .try_pull = 3.0,
+       .try_turn = -15.0 * kRadPerDeg}};
+  EXPECT_EQ(steps_of(steps_json(steps)), steps);
+}
+
+}  // namespace
+}  // namespace wireplan::pipeline
