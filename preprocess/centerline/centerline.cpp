@@ -16,10 +16,12 @@
 namespace wireplan::preprocess {
 namespace {
 
-// The search grid starts with about this many nodes in the lumen, within these spacings [mm], and
-// is halved where the lumen is too thin for it. That of the tree, which is not, starts finer.
-constexpr double kNodesWanted = 20e3, kTreeNodesWanted = 80e3;
-constexpr double kCoarsestGrid = 1.0, kFirstGrid = 0.25, kFinestGrid = 0.12;
+// The search grid starts with about this many nodes in the lumen, and is halved down to this
+// spacing [mm] where the lumen is too thin for it. That of the tree, which is not, starts finer.
+constexpr double kNodesWanted = 20e3, kTreeNodesWanted = 80e3, kFinestGrid = 0.12;
+// A search of so many nodes is not made again at half the spacing: it would need eight times as
+// many, more than kMostNodes.
+constexpr std::size_t kTooManyToHalve = 1'000'000;
 constexpr std::size_t kFewPoints = 5;  // fewer have no direction
 constexpr int kRounds = 2;             // of moving to the ridge and smoothing
 // Smoothing along the line, as part of the inscribed radius. It shortens the radius r of a bend by
@@ -79,11 +81,12 @@ RawPath search_path(const NearestWall& wall, const Surface& surface, const Vec3&
           GridSearch along = search_on(finer, target, access);
           along.follow(guide);
           if (along.run(Cost::kRoute)) return middle_of(along);
+          if (along.count() > kTooManyToHalve) break;
         }
       }
       return middle_of(search);
     }
-    if (0.5 * spacing < kFinestGrid) break;
+    if (0.5 * spacing < kFinestGrid || search.count() > kTooManyToHalve) break;
   }
 
   // Not connected: the user sees how far one comes from the access, on the first grid.
@@ -345,10 +348,8 @@ Centerline measured(const NearestWall& wall, const Points& line) {
 
 double first_spacing(const Surface& surface, double nodes_wanted,
                      const CenterlineOptions& options) {
-  return options.grid_mm > 0.0
-             ? options.grid_mm
-             : std::clamp(std::cbrt(std::abs(signed_volume(surface)) / nodes_wanted), kFirstGrid,
-                          kCoarsestGrid);
+  return options.grid_mm > 0.0 ? options.grid_mm
+                               : grid_spacing(std::abs(signed_volume(surface)), nodes_wanted);
 }
 
 // ---------------------------------------------------------------------------------- the tree
@@ -359,9 +360,21 @@ struct Twig {
   int parent = -1;         // twig of that node
 };
 
+void refuse_bush(const GridSearch& search, const std::vector<Twig>& twigs) {
+  const auto end_of = [&](const Twig& twig) {
+    return place_text(search.at(static_cast<std::size_t>(twig.nodes.back())).point);
+  };
+  throw Error("the lumen has over " + std::to_string(twigs.size() - 1) + " dead ends, from " +
+              end_of(twigs.front()) + " to " + end_of(twigs.back()) +
+              " mm: an organ, the skin of a body or noise, expected a tree of vessels; take a "
+              "narrower band (segmentation.lower_hu, upper_hu), raise segmentation.smoothing_mm or "
+              "neck_opening_mm, or smooth the surface, so that arteries alone are left");
+}
+
 /// The ends of the lumen and the ways there, the farthest first.
 std::vector<Twig> find_twigs(GridSearch& search) {
-  constexpr double kCovered = 1.5;  // radii round a line that belong to it
+  constexpr double kCovered = 1.5;         // radii round a line that belong to it
+  constexpr std::size_t kMostTwigs = 500;  // real trees have up to 50; each costs some 0.05 s
   search.run_everywhere(Cost::kRoute);
   std::vector<std::pair<double, int>> farthest_first;
   for (std::size_t i = 2; i < search.count(); ++i) {
@@ -392,15 +405,17 @@ std::vector<Twig> find_twigs(GridSearch& search) {
 
     // What it covers is no end again; whether it is long enough to be a vessel is another question.
     double length = 0.0;
+    GridBall before;
     for (std::size_t k = 0; k < twig.nodes.size(); ++k) {
       const Node& n = search.at(static_cast<std::size_t>(twig.nodes[k]));
       if (k > 0) {
         length += (n.point - search.at(static_cast<std::size_t>(twig.nodes[k - 1])).point).norm();
       }
-      const double reach = kCovered * n.wall.distance + 2.0 * search.spacing();
-      for (const int near : search.nodes_near(n.point, reach)) {
-        covered[static_cast<std::size_t>(near)] = 1;
-      }
+      const GridBall ball{.center = n.point,
+                          .radius = kCovered * n.wall.distance + 2.0 * search.spacing()};
+      search.visit_ball(ball, before,
+                        [&](int near) { covered[static_cast<std::size_t>(near)] = 1; });
+      before = ball;
     }
     const double from = search.at(static_cast<std::size_t>(twig.nodes.front())).wall.distance;
     std::vector<double> radii;
@@ -415,6 +430,7 @@ std::vector<Twig> find_twigs(GridSearch& search) {
       owner[static_cast<std::size_t>(twig.nodes[k])] = number;
     }
     twigs.push_back(std::move(twig));
+    if (twigs.size() > kMostTwigs) refuse_bush(search, twigs);
   }
   return twigs;
 }

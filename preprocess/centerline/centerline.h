@@ -84,8 +84,9 @@ inline std::string branch_name(const std::vector<Branch>& tree, int k, double ar
 /// the line there, to its end, have the parent's line in them too.
 /// Lines are moved to the ridge as in `find_centerline`, and end in the middle, 0.2 radii before
 /// the wall ahead. A loop is cut where its two ways meet. Vessels thinner than about the search
-/// grid (0.25 to 1 mm by the size of the lumen) are not followed. Throws `Error` when the root lies
-/// outside the surface.
+/// grid (0.25 to 1 mm by the size of the lumen, wider from 400 ml on) are not followed. The time is
+/// bounded by the grid's nodes and the number of ends. Throws `Error` when the root lies outside
+/// the surface or the lumen has over 500 ends, as a body has and no vessels.
 std::vector<Branch> find_tree(const Surface& surface, const Vec3& root,
                               const CenterlineOptions& options = {});
 

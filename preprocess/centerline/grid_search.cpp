@@ -17,6 +17,12 @@ Vec3 leave_wall(const NearestWall& wall, Vec3 point, double depth) {
   return point;
 }
 
+double grid_spacing(double volume, double nodes_wanted) {
+  constexpr double kFinest = 0.25, kCoarsest = 1.0, kMostNodesWanted = 400e3;
+  const double coarsest = std::max(kCoarsest, std::cbrt(volume / kMostNodesWanted));
+  return std::clamp(std::cbrt(volume / nodes_wanted), kFinest, coarsest);
+}
+
 void GridSearch::stay_near(const Points& route) {
   // Balls in the middle of the vessel: the route itself may run along the wall.
   std::vector<std::pair<Vec3, double>> balls;  // centre, squared radius

@@ -1,5 +1,6 @@
 #pragma once
 /// Cheapest paths through the lumen on a grid; for use in this folder.
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <functional>
@@ -18,7 +19,12 @@ using Points = std::vector<Vec3>;
 
 inline constexpr double kInfinite = std::numeric_limits<double>::infinity();
 inline constexpr std::size_t kMostNodes =
-    3'000'000;  // bounds memory (0.25 GB) and time (about 10 s)
+    3'000'000;  // bounds memory (0.5 GB) and time (about 30 s)
+
+/// Spacing [mm] of a grid that has about `nodes_wanted` nodes in a lumen of this volume [mm^3], but
+/// 0.25 to 1 mm, and wider where a lumen is so large that it would have over 400 thousand nodes
+/// (the arteries from groin to head have 300): so a first search is never much longer than theirs.
+double grid_spacing(double volume, double nodes_wanted);
 
 /// Moves a point near the wall straight away from it, as long as its distance from the wall grows
 /// and until that is `depth`. Its inscribed ball is then large enough to reach points of the grid.
@@ -67,6 +73,12 @@ class Guide {
     double radius, arc;  //                                                                [mm]
   };
   std::vector<Ball> balls_;
+};
+
+/// A ball round nodes of a grid, by default an empty one.
+struct GridBall {
+  Vec3 center = Vec3::Zero();
+  double radius = -1.0;  //                                                                [mm]
 };
 
 /// Cheapest paths on a grid whose points are made, and their wall distance computed, when first
@@ -126,22 +138,29 @@ class GridSearch {
   const Node& at(std::size_t i) const { return nodes_[i]; }
   double spacing() const { return spacing_; }
 
-  /// Numbers of the grid's nodes that are made within `reach` of a point.
-  std::vector<int> nodes_near(const Vec3& point, double reach) const {
-    std::vector<int> near;
-    const Vec3 place = (point - origin_) / spacing_;
-    const Eigen::Vector3i low = (place.array() - reach / spacing_).ceil().cast<int>().max(0);
-    const Eigen::Vector3i high =
-        (place.array() + reach / spacing_).floor().cast<int>().min(size_.array() - 1);
+  /// Calls `visit` with the numbers of the nodes that are made in a ball, but for those that lie
+  /// well inside another one, `before`. Along a line of balls that is a shell of each: the time is
+  /// that of their surfaces, where the balls themselves hold up to hundreds of thousands of nodes.
+  template <class Visit>
+  void visit_ball(const GridBall& ball, const GridBall& before, const Visit& visit) const {
+    const Vec3 place = (ball.center - origin_) / spacing_;
+    const double reach = ball.radius / spacing_;
+    const Eigen::Vector3i low = (place.array() - reach).ceil().cast<int>().max(0);
+    const Eigen::Vector3i high = (place.array() + reach).floor().cast<int>().min(size_.array() - 1);
     for (int k = low.z(); k <= high.z(); ++k) {
       for (int j = low.y(); j <= high.y(); ++j) {
-        for (int i = low.x(); i <= high.x(); ++i) {
+        const auto [first, last] = row_in(ball, j, k, /*margin=*/1);  // of rounding
+        const auto [skip, skip_to] = row_in(before, j, k, /*margin=*/-1);
+        for (int i = std::max(low.x(), first); i <= std::min(high.x(), last); ++i) {
+          if (i >= skip && i <= skip_to) {
+            i = skip_to;
+            continue;
+          }
           const int n = made({i, j, k});
-          if (n != kUntouched && (node(n).point - point).norm() <= reach) near.push_back(n);
+          if (n != kUntouched && (node(n).point - ball.center).norm() <= ball.radius) visit(n);
         }
       }
     }
-    return near;
   }
 
   /// From now on paths stay in the vessel round `route`: within 1.5 radii of its middle.
@@ -180,6 +199,17 @@ class GridSearch {
 
   const Node& node(int i) const { return nodes_[static_cast<std::size_t>(i)]; }
 
+  /// First and last grid point of a row within a ball, and so many more; first > last where none.
+  std::pair<int, int> row_in(const GridBall& ball, int j, int k, int margin) const {
+    const Vec3 place = (ball.center - origin_) / spacing_;
+    const double reach = ball.radius / spacing_, dy = place.y() - j, dz = place.z() - k;
+    const double squared = reach * reach - dy * dy - dz * dz;
+    if (ball.radius < 0.0 || (margin < 0 && squared < 0.0)) return {1, 0};
+    const double half = std::sqrt(std::max(0.0, squared));
+    return {static_cast<int>(std::ceil(place.x() - half)) - margin,
+            static_cast<int>(std::floor(place.x() + half)) + margin};
+  }
+
   void visit_neighbours(int here) {
     const Eigen::Vector3i center = node(here).ijk;
     for (int k = -1; k <= 1; ++k) {
@@ -216,6 +246,7 @@ class GridSearch {
   void relax(int here, int there) {
     const Node& a = node(here);
     Node& b = nodes_[static_cast<std::size_t>(there)];
+    if (a.cost >= b.cost) return;  // half of all, without a root
     const double length = (a.point - b.point).norm();
     const double r_a = a.wall.distance, r_b = b.wall.distance;
     if (!b.allowed || r_a + r_b < kOverlap * length) return;  // the wall may be between them

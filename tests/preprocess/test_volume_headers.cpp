@@ -180,7 +180,9 @@ TEST_F(VolumeHeaders, OfNoPatientsSizeAreRefusedWithTheKeyOfTheUnit) {
                                            "space units: \"m\" \"m\" \"m\"\n")),
                  "it is 2.0 x 2.0 x 4.0 m across by its space units and space directions");
   expect_refusal(write("mixed.nrrd", nrrd_with("spacings: 1 1 2\nunits: \"cm\" \"cm\" \"mm\"\n")),
-                 "in quotes, and the same one for each of the three axes");
+                 "units is \"cm\" \"cm\" \"mm\", expected one of \"mm\", \"cm\", \"m\", \"um\", in "
+                 "quotes, and the "
+                 "same one for each of the three axes");
   expect_refusal(write("um.nrrd", nrrd_with("spacings: 1 1 2\nunits: \"um\" \"um\" \"um\"\n")),
                  "it is 0.002 x 0.002 x 0.004 mm across by its units and spacings");
   expect_refusal(write("um.mha", meta_with("ElementSpacing = 1 2 3\nDistanceUnits = um\n")),
