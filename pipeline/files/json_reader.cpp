@@ -357,8 +357,7 @@ double JsonReader::number(const std::string& key, std::optional<double> fallback
   }
   const double number = value->get<double>();
   if (lies_in(number, range)) return number;
-  problems_->add(path_of(key), shown(*value), expected,
-                 number < 0.0 && range.min >= 0.0 ? "" : hint);
+  problems_->add(path_of(key), shown(*value), expected, hint);
   return otherwise;
 }
 

@@ -13,7 +13,7 @@ struct Size {
 };
 
 struct AccessLimits {
-  Size device_diameter = {1.667};   // of the widest that goes along the whole way; a 5 F catheter,
+  Size device_diameter = {1.667};  // of the widest that goes along the whole way; a 5 F catheter,
                                    // 1 F being a third of a millimetre
   Size sheath_diameter = {2.7};    // outer; a 6 F introducer: 2 F more than it takes
   Size sheath_length = {110.0};    // of the way that it lies in: a short introducer

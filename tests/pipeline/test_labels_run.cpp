@@ -137,7 +137,7 @@ TEST_F(LabelsRun, EndsInAReportThatFollowsItsSchema) {
   EXPECT_TRUE(vessel.at("image").is_null());
   EXPECT_EQ(vessel.at("segmentation").at("left_out").size(), 1u);
   EXPECT_EQ(vessel.at("branches").at(1).at("name"), "tube (branch 1)");
-  EXPECT_TRUE(holds(read_text(folder_ / "out/tree.mrk.json"), "\"branch 1: tube\""));
+  EXPECT_TRUE(holds(read_text(folder_ / "out/tree.mrk.json"), "\"tube (branch 1)\""));
   // On voxels of 1 mm the tube's volume is that of its voxels.
   const double expected =
       36.0 * static_cast<double>(std::count(values_.begin(), values_.begin() + 1600, 1));

@@ -67,7 +67,7 @@ TEST(Report, AnswersWithAVerdictAndItsReasons) {
   EXPECT_TRUE(way_findings(anatomy).device.assumed);
   EXPECT_FALSE(way_findings(wide.at("anatomy")).device.assumed);
   const Json equal = run_to_report(folder / "case.json", folder / "cache", 0,
-                                   {"access_limits.device_diameter_mm=1.67"});
+                                   {"access_limits.device_diameter_mm=1.667"});
   EXPECT_EQ(equal.at("anatomy").at("access").at("device").at("device_diameter_mm"),
             anatomy.at("access").at("device").at("device_diameter_mm"));
   EXPECT_FALSE(way_findings(equal.at("anatomy")).device.assumed);
