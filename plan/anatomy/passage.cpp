@@ -225,12 +225,11 @@ double turn_of(const Junction& junction) {
 }
 
 std::string leaving_name(const std::vector<preprocess::Branch>& tree, const Junction& junction) {
-  constexpr double kBehindMouth = 8.0;  // where both are one no longer                    [mm]
-  const Branch& trunk = tree[static_cast<std::size_t>(junction.trunk)];
-  const bool before = trunk.parent == junction.branch;  // the line comes from before the ostium
+  const bool from_before = tree[static_cast<std::size_t>(junction.trunk)].parent == junction.branch;
   return branch_name(tree, junction.branch,
-                     before ? trunk.parent_arc + simulate::own_start(trunk) + kBehindMouth
-                            : simulate::own_start(tree[static_cast<std::size_t>(junction.branch)]));
+                     from_before
+                         ? simulate::begins_behind(tree, junction.trunk)
+                         : simulate::own_start(tree[static_cast<std::size_t>(junction.branch)]));
 }
 
 Vec3 point_at(const Centerline& line, double arc) {

@@ -40,6 +40,12 @@ double width_beyond(const Branch& branch) {
 
 double own_start(const Branch& branch) { return branch.parent < 0 ? 0.0 : branch.line.radius(0); }
 
+double begins_behind(const std::vector<Branch>& tree, int child) {
+  const Branch& branch = branch_of(tree, child);
+  const double out = branch.parent_arc + own_start(branch);
+  return out + std::max(6.0, 3.0 * radius_at(branch_of(tree, branch.parent).line, out));
+}
+
 BranchPlace find_branch(const std::vector<Branch>& tree, const Vec3& point) {
   constexpr double kClearlyNearer = 0.98;  // at a fork the branch that was found first counts
   BranchPlace best{.part = std::numeric_limits<double>::infinity()};

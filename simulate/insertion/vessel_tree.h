@@ -20,6 +20,11 @@ BranchPlace find_branch(const std::vector<preprocess::Branch>& tree, const Vec3&
 /// Where a branch's own vessel begins: beyond the ball in its parent that its line starts in [mm].
 double own_start(const preprocess::Branch& branch);
 
+/// Where the vessel that a line goes on in has begun behind a child that leaves it there and is the
+/// wider of the two, along the line [mm]: three radii beyond the ball in which they part, 6 mm at
+/// least, since labels do not end at an ostium to the millimetre.
+double begins_behind(const std::vector<preprocess::Branch>& tree, int child);
+
 inline constexpr double kAortaRadius = 6.0;  // of what is taken for an aorta, at least    [mm]
 
 /// Whether a vessel ends within two of its diameters beyond that place of its line [mm]: the sac of

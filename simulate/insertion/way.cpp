@@ -201,9 +201,8 @@ std::optional<Astray> Way::find_astray(const Vec3& tip) const {
   }
   if (in_branch_of_way) return std::nullopt;
   if (goes_on(tree_, left)) {
-    const Branch& wider = tree_[static_cast<std::size_t>(left)];
     return Astray{true, "it went on in " + name + ", the wider vessel where the way turns into " +
-                            branch_name(tree_, on_way.branch, wider.parent_arc + own_start(wider))};
+                            branch_name(tree_, on_way.branch, begins_behind(tree_, left))};
   }
   return Astray{
       false, "it is in " + name + ", which leaves the way " +

@@ -409,6 +409,16 @@ TEST(BranchNames, AStemThatTwoVesselsShareHasTheNameOfNeither) {
   const auto astray = way.find_astray(Vec3(0, 0, 180));
   ASSERT_TRUE(astray);
   EXPECT_NE(astray->text.find("turns into branch 2"), std::string::npos) << astray->text;
+
+  // Labels part the two 8 mm behind the place where the lines do.
+  std::vector<Branch> labelled = tree_with_stem();
+  labelled[1].parts = {{0.0, "stem"}, {48.0, "carotid artery"}};
+  EXPECT_EQ(leaving_name(labelled, to_carotid[0]), "stem (branch 2)");
+  EXPECT_EQ(leaving_name(labelled, to_carotid[1]), "carotid artery (branch 2)");
+  const auto past = simulate::Way(path, labelled).find_astray(arm);
+  ASSERT_TRUE(past);
+  EXPECT_NE(past->text.find("the way turns into carotid artery (branch 2)"), std::string::npos)
+      << past->text;
 }
 
 TEST(BranchNames, OfALineThatRunsThroughTheAortaAreOfItsEndAlone) {
