@@ -9,6 +9,7 @@
 
 #include <cmath>
 #include <iterator>
+#include <stdexcept>
 
 #include "preprocess/surface/cgal_mesh.h"
 
@@ -33,8 +34,10 @@ std::vector<std::pair<int, int>> cutting_pairs(const Surface& surface) {
   return pairs;
 }
 
-Surface remesh_parts(const Surface& surface, const std::vector<int>& part_of_triangle,
-                     const std::vector<double>& edge_length, double crease_deg, int iterations) {
+std::optional<Surface> remesh_parts(const Surface& surface,
+                                    const std::vector<int>& part_of_triangle,
+                                    const std::vector<double>& edge_length, double crease_deg,
+                                    int iterations) {
   CgalMesh mesh = cgal_mesh_from(surface);
   auto crease = mesh.add_property_map<Edge, bool>("e:crease", false).first;
   auto part = mesh.add_property_map<Face, int>("f:part", 0).first;
@@ -46,10 +49,14 @@ Surface remesh_parts(const Surface& surface, const std::vector<int>& part_of_tri
       if (part[f] == static_cast<int>(k)) faces.push_back(f);
     }
     if (faces.empty()) continue;
-    pmp::isotropic_remeshing(faces, edge_length[k], mesh,
-                             CGAL::parameters::number_of_iterations(iterations)
-                                 .edge_is_constrained_map(crease)
-                                 .face_patch_map(part));
+    try {
+      pmp::isotropic_remeshing(faces, edge_length[k], mesh,
+                               CGAL::parameters::number_of_iterations(iterations)
+                                   .edge_is_constrained_map(crease)
+                                   .face_patch_map(part));
+    } catch (const std::out_of_range&) {  // of its own table of patches
+      return {};
+    }
   }
   return surface_from(mesh);
 }

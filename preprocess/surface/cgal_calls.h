@@ -17,9 +17,12 @@ std::vector<std::pair<int, int>> cutting_pairs(const Surface& surface);
 
 /// Isotropic remeshing of part after part, part k to edges of edge_length[k] mm; parts without
 /// triangles are passed over. Borders of parts stay, and edges at which the surface turns by more
-/// than an angle.
-Surface remesh_parts(const Surface& surface, const std::vector<int>& part_of_triangle,
-                     const std::vector<double>& edge_length, double crease_deg, int iterations);
+/// than an angle. None where CGAL loses its way on the mesh that it makes of them, as of thin
+/// parts.
+std::optional<Surface> remesh_parts(const Surface& surface,
+                                    const std::vector<int>& part_of_triangle,
+                                    const std::vector<double>& edge_length, double crease_deg,
+                                    int iterations);
 
 /// What at least one of two closed surfaces encloses; empty where CGAL finds no manifold one, as
 /// where a surface cuts itself. Numbered by where its triangles are, so that the same bits come out

@@ -2,6 +2,7 @@
 #include <cmath>
 #include <functional>
 #include <numbers>
+#include <optional>
 #include <queue>
 #include <sstream>
 #include <utility>
@@ -110,7 +111,8 @@ std::vector<int> classes_of(const Surface& surface, const Eigen::VectorXd& edge,
 }
 
 /// Each part of the surface to its own edge length, the coarsest first.
-Surface remesh_once(const Surface& surface, const std::vector<int>& classes, double longest) {
+std::optional<Surface> remesh_once(const Surface& surface, const std::vector<int>& classes,
+                                   double longest) {
   const int finest = *std::max_element(classes.begin(), classes.end());
   std::vector<double> edges;
   for (int k = 0; k <= finest; ++k) edges.push_back(class_edge(k, longest));
@@ -184,18 +186,22 @@ Surface remesh(const Surface& surface, double edge_length_mm) {
       tried << "; " << longest << " mm: more than " << kMaxTriangles << " triangles";
       break;
     }
-    Surface result = remesh_once(surface, classes, longest);
-    SurfaceCheck after = check_surface(result);
-    if (k + 1 >= kLocalTries && after.self_intersections > 0) {
-      std::vector<Mend> mends;
-      result = without_intersections(result, mends);
-      after = check_surface(result);
+    std::optional<Surface> result = remesh_once(surface, classes, longest);
+    if (result) {
+      SurfaceCheck after = check_surface(*result);
+      if (k + 1 >= kLocalTries && after.self_intersections > 0) {
+        std::vector<Mend> mends;
+        result = without_intersections(*result, mends);
+        after = check_surface(*result);
+      }
+      if (is_sound(after) && after.euler_number == before.euler_number) return *result;
+      tried << "; " << longest << " mm: " << after.self_intersections
+            << " pairs of triangles cut each other, Euler number " << after.euler_number;
+    } else {
+      tried << "; " << longest << " mm: no mesh came of it";
     }
-    if (is_sound(after) && after.euler_number == before.euler_number) return result;
-    tried << "; " << longest << " mm: " << after.self_intersections
-          << " pairs of triangles cut each other, Euler number " << after.euler_number;
-    if (k + 1 < kLocalTries) {
-      refine_near(result, find_self_intersections(result), surface, edge, longest);
+    if (result && k + 1 < kLocalTries) {
+      refine_near(*result, find_self_intersections(*result), surface, edge, longest);
     } else {
       longest *= kFiner;
       edge.setConstant(longest);
