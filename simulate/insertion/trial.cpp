@@ -43,9 +43,13 @@ const char* outcome_name(Outcome outcome) {
 std::string describe_balance(const std::vector<Push>& pushes) {
   if (pushes.empty()) return "";
   const Push& last = pushes.back();
+  constexpr double kNoForce = 1e-5;   // a hand feels a thousand times as much, and residuals are
+                                      // a tenth of it                                     [N]
   constexpr double kRounding = 1e-6;  // of what forces do on short pushes              [N mm]
+  const double unbalanced =
+      std::abs(last.unbalanced) - kNoForce * std::abs(last.insertion) - kRounding;
   const std::string text =
-      describe_balance(std::max(0.0, std::abs(last.unbalanced) - kRounding),
+      describe_balance(std::max(0.0, unbalanced),
                        std::max(std::abs(last.push_work), last.stored_energy + last.friction_work));
   return text.empty() ? text : "; " + text;
 }

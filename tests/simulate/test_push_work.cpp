@@ -106,6 +106,17 @@ TEST(PushWork, ForcesAddUpToTheWork) {
   }
 }
 
+TEST(PushWork, ThatIsNoneIsNotOutOfBalance) {
+  const auto told = [](double unbalanced, double work) {
+    return describe_balance(
+        {{.insertion = 200.0, .push_work = work, .stored_energy = work, .unbalanced = unbalanced}});
+  };
+  EXPECT_EQ(told(1e-3, 3e-3), "");  // a straight wire in a straight tube
+  EXPECT_NE(told(1e-2, 2e-2), "");
+  EXPECT_NE(told(0.3, 10.0), "");
+  EXPECT_EQ(told(0.09, 10.0), "");
+}
+
 TEST(PushBalance, ASteadyRippleReleasesNothing) {
   PushBalance balance;
   for (int k = 0; k < 40; ++k) {
