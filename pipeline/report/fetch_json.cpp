@@ -46,11 +46,13 @@ Json wire_row(const char* what, const simulate::Wire& wire, double needed) {
 }
 
 Json sheath_row(const Json& sheath, double inside) {
+  constexpr double kRounding = 0.005;  // 5 F are 1.667 mm, and written 1.67                [mm]
   const double most =
       sheath.at("max_ratio").get<double>() * sheath.at("lumen_diameter_mm").get<double>();
   std::vector<std::string> names;
   for (const Sheath& known : catalogue().sheaths) {
-    if (known.outer_diameter < most && known.inner_diameter >= inside) names.push_back(known.name);
+    const bool takes_it = known.inner_diameter >= inside - kRounding;
+    if (known.outer_diameter < most && takes_it) names.push_back(known.name);
   }
   const double taken = sheath.at("device_diameter_mm");
   return fetch_row(
