@@ -439,7 +439,8 @@ class Weighing {
     text += surely     ? "does not pass"
             : too_wide ? "passes only if the lumen is wider than it seems, which it may be by " +
                              two_digits(off) + " mm"
-                       : "passes";
+            : passage.oval ? "passes where the lumen, oval there, gives way"
+                           : "passes";
     const bool decides = surely && !passage.assumed;
     if (decides) narrow_ = text + ".";
     find(decides    ? Answer::kNotFeasible
@@ -467,7 +468,9 @@ class Weighing {
              " times as wide as the narrowest lumen in the first " +
              whole_millimetres(way.sheath_length) + " (" + three_digits(sheath.lumen) + " mm); " +
              (too_wide ? "it must be below " : "below ") + four_digits(sheath.max_ratio) +
-             (too_wide ? "." : " it passes."));
+             (too_wide      ? "."
+              : sheath.oval ? " it passes where the lumen, oval there, gives way."
+                            : " it passes."));
     if (too_wide) {
       change("A sheath thinner than " + three_digits(sheath.max_ratio * sheath.lumen) +
              " mm, or another access.");

@@ -26,6 +26,7 @@ struct Passage {
   double device = 0.0;           // diameter                                                [mm]
   double max_ratio = 1.0;        // of device over lumen; at it, the device does not pass
   bool assumed = false;          // the device is a default; nobody said that it is to pass
+  bool oval = false;  // the lumen is wide one way alone, the device thicker than the other
 };
 
 /// What is known of the way before a wire is pushed (anatomy/passage.h), with its grades.

@@ -32,6 +32,8 @@ Json passage_json(const Centerline& way, const Eigen::VectorXd& diameters, doubl
   const plan::Narrowest lumen = plan::find_narrowest(sections, length);
   const double inscribed = plan::find_narrowest(way, length).diameter;
   const double ratio = device.value / lumen.diameter;
+  constexpr double kRound = 0.95;  // sphere over section: in a round lumen a few per cent less
+  const bool oval = inscribed < std::min(kRound * lumen.diameter, device.value);
   return {{"lumen_diameter_mm", lumen.diameter},
           {"inscribed_diameter_mm", inscribed},
           {"at_mm", lumen.arc},
@@ -41,6 +43,7 @@ Json passage_json(const Centerline& way, const Eigen::VectorXd& diameters, doubl
           {"ratio", ratio},
           {"max_ratio", max_ratio},
           {"fits", ratio < max_ratio},
+          {"oval", oval},
           {"source", source}};
 }
 
@@ -231,9 +234,7 @@ std::string describe_fit(const Json& passage) {
     return "not weighed: assumed, and longer than the way";
   }
   if (!passage.at("fits").get<bool>()) return "does not fit";
-  return passage.at("inscribed_diameter_mm") < passage.at("device_diameter_mm")
-             ? "fits where the lumen, oval there, gives way"
-             : "fits";
+  return passage.at("oval").get<bool>() ? "fits where the lumen, oval there, gives way" : "fits";
 }
 
 std::string describe_anatomy(const Json& figures) {

@@ -13,7 +13,8 @@ plan::Passage passage(const Json& row) {
           .at = row.at("at_mm"),
           .device = row.at("device_diameter_mm"),
           .max_ratio = row.at("max_ratio"),
-          .assumed = row.at("assumed")};
+          .assumed = row.at("assumed"),
+          .oval = row.at("oval")};
 }
 
 }  // namespace

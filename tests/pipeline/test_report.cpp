@@ -90,6 +90,7 @@ TEST(Report, TellsAccessViewsAndLengthsOfTheTube) {
   EXPECT_NEAR(access.at("sheath").at("lumen_diameter_mm"), 8.0, 0.4);
   EXPECT_TRUE(access.at("sheath").at("fits"));
   EXPECT_FALSE(access.at("device").at("fits"));
+  EXPECT_FALSE(access.at("sheath").at("oval")) << "a round tube";
   EXPECT_NEAR(access.at("tortuosity").at("index"), 1.0, 0.01);
   EXPECT_EQ(access.at("tortuosity").at("grade"), "below mild");
   EXPECT_NEAR(access.at("sharpest_bend").at("angle_deg"), 180.0, 2.0);
@@ -120,9 +121,9 @@ TEST(Report, TellsAccessViewsAndLengthsOfTheTube) {
 }
 
 TEST(Report, ADeviceThatPassesAnOvalLumenByItsAreaAloneIsTold) {
-  Json row = {{"fits", true}, {"inscribed_diameter_mm", 0.584}, {"device_diameter_mm", 0.6}};
+  Json row = {{"fits", true}, {"oval", true}};
   EXPECT_EQ(describe_fit(row), "fits where the lumen, oval there, gives way");
-  row["device_diameter_mm"] = 0.5;
+  row["oval"] = false;
   EXPECT_EQ(describe_fit(row), "fits");
   row["fits"] = false;
   EXPECT_EQ(describe_fit(row), "does not fit");

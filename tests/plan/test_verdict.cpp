@@ -212,6 +212,18 @@ TEST(Verdict, ADeviceIsHeldAgainstTheNarrowestPlaceAndWhatItsWidthIsUnknownBy) {
   }
 }
 
+TEST(Verdict, WhatPassesAnOvalLumenByItsAreaAloneIsTold) {
+  WhatIsKnown known = WhatIsKnown::good();
+  known.way = wide_way();
+  known.way->device.oval = known.way->sheath.oval = true;
+  const Verdict verdict = known.verdict();
+  EXPECT_EQ(verdict.answer, Answer::kFeasible);
+  for (const char* device : {"device, of 1.67 mm, ", "below 1.05 it "}) {
+    const std::string told = std::string(device) + "passes where the lumen, oval there, gives way.";
+    EXPECT_TRUE(tells(verdict.reasons, told)) << told;
+  }
+}
+
 TEST(Verdict, ADeviceThatIsOnlyAssumedForbidsNothing) {
   WhatIsKnown known = WhatIsKnown::good();
   known.way = wide_way();

@@ -11,7 +11,7 @@ const thresholds = (from, [mild, moderate, severe]) =>
 
 /** Whether a device passes: a lumen may be wide enough one way alone. */
 export const fitText = (row) =>
-  !row.fits ? "does not fit" : row.inscribed_diameter_mm < row.device_diameter_mm ? "fits where the lumen, oval there, gives way" : "fits";
+  !row.fits ? "does not fit" : row.oval ? "fits where the lumen, oval there, gives way" : "fits";
 
 const passageRow = (what, row) => [
   what,
