@@ -4,6 +4,7 @@
 #include <memory>
 
 #include "pipeline/commands/scene_sensitivity.h"
+#include "pipeline/commands/scene_support.h"
 #include "pipeline/files/result_file.h"
 #include "pipeline/files/text.h"
 #include "pipeline/files/trial_file.h"
@@ -25,9 +26,10 @@ namespace fs = std::filesystem;
 /// A scene's vessel, read, checked and ready for a wire.
 struct LoadedVessel {
   Surface surface;
-  Wall wall;                      // of a rigid vessel too: forces are shown on it
-  std::vector<std::string> told;  // of the file and the entry, in sentences
-  std::unique_ptr<const simulate::VesselModel> model;
+  Wall wall;                             // of a rigid vessel too: forces are shown on it
+  std::vector<std::string> told;         // of the file and the entry, in sentences
+  std::vector<preprocess::Branch> tree;  // of one that moves as a whole
+  std::unique_ptr<simulate::VesselModel> model;
 };
 
 /// Where tools or a wire that are pushed in become free.
@@ -129,8 +131,8 @@ LoadedVessel load_vessel(const SceneFile& scene) {
                    : std::make_unique<simulate::VesselModel>(vessel.surface, options);
   if (given.wall.support) {
     const Vec3& entry = entry_of(scene);
-    model->sections = make_section_chain(given.wall, preprocess::find_tree(vessel.surface, entry),
-                                         entry, vessel.wall.young_modulus);
+    vessel.tree = preprocess::find_tree(vessel.surface, entry);
+    model->sections = make_section_chain(given.wall, vessel.tree, entry, vessel.wall.young_modulus);
   }
   vessel.model = std::move(model);
   return vessel;
@@ -159,14 +161,15 @@ Json vessel_json(const SceneVessel& given, const LoadedVessel& vessel) {
   return json;
 }
 
-Json warnings_json(const SceneVessel& given, const LoadedVessel& vessel) {
+/// `fitted`: the support is that of a measured wire.
+Json warnings_json(const SceneVessel& given, const LoadedVessel& vessel, bool fitted) {
   Json warnings = Json::array();
   for (const std::string& line : vessel.told) warnings.push_back(line);
   if (given.friction == 0.0) {
     warnings.push_back("frictionless (friction is 0): push forces are lower bounds");
   }
   if (!given.wall.elastic) warnings.push_back("rigid wall: contact forces are upper bounds");
-  if (given.wall.support) warnings.push_back(support_warning(*given.wall.support));
+  if (given.wall.support) warnings.push_back(support_warning(*given.wall.support, fitted));
   return warnings;
 }
 
@@ -175,7 +178,8 @@ void write_result(Json result, const SceneFile& scene, const LoadedVessel* vesse
                   const fs::path& folder) {
   if (vessel) {
     result["vessel"] = vessel_json(*scene.vessel, *vessel);
-    result["warnings"] = warnings_json(*scene.vessel, *vessel);
+    result["warnings"] = warnings_json(*scene.vessel, *vessel,
+                                       scene.insertion && scene.insertion->measured.has_value());
   }
   write_json(result, folder / "result.json");
 }
@@ -307,8 +311,10 @@ SceneAnswer run_tools(const SceneFile& file, const LoadedVessel* vessel, const f
   return {result.outcome == simulate::SceneOutcome::kConverged, line};
 }
 
+/// `support_fit` is what a measured wire told of the vessel's support, or null.
 SceneAnswer run_insertion_scene(const SceneFile& file, const InsertionScene& scene,
-                                const LoadedVessel& vessel, const fs::path& folder) {
+                                const LoadedVessel& vessel, const Json& support_fit,
+                                const fs::path& folder) {
   fs::create_directories(folder);
   const double start = plan::thread_cpu_seconds();
   simulate::TrialResult result = run_hand(scene, *vessel.model, scene.options);
@@ -335,6 +341,7 @@ SceneAnswer run_insertion_scene(const SceneFile& file, const InsertionScene& sce
   }
   json["sensitivity"] = sensitivity.json;
   if (!sensitivity.reason.empty()) json["sensitivity_reason"] = sensitivity.reason;
+  if (!support_fit.is_null()) json["support_fit"] = support_fit;
   const std::string told = scene.start ? tell_start(json.at("start")) : "";
   write_result(std::move(json), file, &vessel, folder);
   write_forces(vessel, result.peak_forces, folder);
@@ -375,11 +382,26 @@ SceneAnswer run_rolls(const SceneFile& file, const LoadedVessel& vessel, const f
     InsertionScene scene = *file.insertion;
     scene.introducer.roll = roll;
     const std::string name = roll_name(*file.insertion, roll);
-    const SceneAnswer one = run_insertion_scene(file, scene, vessel, folder / name);
+    const SceneAnswer one = run_insertion_scene(file, scene, vessel, nullptr, folder / name);
     all.solved = all.solved && one.solved;
     all.line += (all.line.empty() ? "" : "\n") + name + ": " + one.line;
   }
   return all;
+}
+
+/// With the support that explains the measured wire best.
+SceneAnswer run_measured(const SceneFile& file, LoadedVessel& vessel, const fs::path& folder) {
+  const InsertionScene& scene = *file.insertion;
+  const SceneSupport found = find_scene_support(scene, file.vessel->wall, vessel.tree,
+                                                vessel.wall.young_modulus, *vessel.model);
+  SceneFile fitted = file;
+  WallInput& wall = fitted.vessel->wall;
+  wall.support = found.support;
+  vessel.model->sections =
+      make_section_chain(wall, vessel.tree, entry_of(file), vessel.wall.young_modulus);
+  SceneAnswer answer = run_insertion_scene(fitted, scene, vessel, found.json, folder);
+  answer.line += "\n" + found.line;
+  return answer;
 }
 
 }  // namespace
@@ -399,7 +421,8 @@ SceneAnswer run_scene_file(const SceneFile& scene, const fs::path& folder) {
   if (scene.tools) return run_tools(scene, vessel ? &*vessel : nullptr, folder);
   if (scene.bench) return run_bench_scene(scene, vessel ? &*vessel : nullptr, folder);
   if (!scene.insertion->rolls.empty()) return run_rolls(scene, *vessel, folder);
-  return run_insertion_scene(scene, *scene.insertion, *vessel, folder);
+  if (scene.insertion->measured) return run_measured(scene, *vessel, folder);
+  return run_insertion_scene(scene, *scene.insertion, *vessel, nullptr, folder);
 }
 
 }  // namespace wireplan::pipeline

@@ -428,9 +428,11 @@ WallInput read_wall(JsonReader& reader, const std::string& model) {
   return wall;
 }
 
-std::string support_warning(double support) {
+std::string support_warning(double support, bool fitted) {
   return "the vessel moves as a whole on a support of " + number_text(support / kMpaPerKpa) +
-         " kPa/mm, not measured on the patient (published: 0.01 to 10); no layers, no prestress. "
+         " kPa/mm, " +
+         (fitted ? "which explains the measured wire best" : "not measured on the patient") +
+         " (published: 0.01 to 10); no layers, no prestress. "
          "With the same idea others came within 2.3 mm after fitting one value, 4.6 mm without";
 }
 

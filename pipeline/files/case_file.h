@@ -55,7 +55,7 @@ struct WallInput {
 };
 
 /// What a report tells of a vessel whose cross-sections move.
-std::string support_warning(double support);
+std::string support_warning(double support, bool fitted = false);
 
 using plan::Manoeuvring;
 

@@ -12,7 +12,8 @@ namespace {
 constexpr Range kMoreThanNothing{.min = 0.0, .open_min = true};
 constexpr Range kHubTurn{.min = -36000.0, .max = 36000.0};
 constexpr Range kHubRoll{.min = -360.0, .max = 360.0};
-constexpr double kFarFromEntry = 10.0;  // that a line to start from may pass it by          [mm]
+constexpr double kFarFromEntry = 10.0;   // that a line of the scene may pass it by           [mm]
+constexpr double kLeastMeasured = 30.0;  // of wire that tells how a vessel is held; chosen    [mm]
 constexpr std::size_t kMostRolls = 360, kMostMoves = 10000;
 
 /// One roll, or a list of them; none where a wire that starts from a line is to tell its own.
@@ -121,21 +122,56 @@ void read_moves(JsonReader& insertion, InsertionScene& scene) {
   }
 }
 
-/// The line that the wire starts from; what it is to the entry is checked once that is known.
+/// "nodes_mm"; what the line is to the entry is checked once that is known.
+Eigen::Matrix3Xd read_line(JsonReader& reader) {
+  const std::vector<Vec3> nodes = reader.points("nodes_mm", true);
+  Eigen::Matrix3Xd line(3, static_cast<Eigen::Index>(nodes.size()));
+  for (std::size_t k = 0; k < nodes.size(); ++k) line.col(static_cast<Eigen::Index>(k)) = nodes[k];
+  if (nodes.size() == 1) {
+    reader.problems().add(reader.path_of("nodes_mm"), "one point",
+                          "two points at least, proximal to distal");
+  }
+  return line;
+}
+
+/// The line that the wire starts from.
 simulate::StartLine read_start(JsonReader& root) {
   simulate::StartLine line;
   JsonReader start = root.object("start", true);
-  const std::vector<Vec3> nodes = start.points("nodes_mm", true);
-  line.nodes.resize(3, static_cast<Eigen::Index>(nodes.size()));
-  for (std::size_t k = 0; k < nodes.size(); ++k)
-    line.nodes.col(static_cast<Eigen::Index>(k)) = nodes[k];
+  line.nodes = read_line(start);
   if (start.has("length_mm"))
     line.length = start.number("length_mm", std::nullopt, kMoreThanNothing);
   start.finish();
-  if (nodes.size() == 1) {
-    root.problems().add("start.nodes_mm", "one point", "two points at least, proximal to distal");
-  }
   return line;
+}
+
+MeasuredWire read_measured(JsonReader& root) {
+  MeasuredWire wire;
+  JsonReader measured = root.object("measured", true);
+  wire.line = read_line(measured);
+  wire.sigma = measured.number("sigma_mm", wire.sigma, {.min = 0.01, .max = 100.0});
+  measured.finish();
+  return wire;
+}
+
+/// The part of a line of the scene ("start", "measured") from the entry on; empty, and told, where
+/// it does not come by there.
+Eigen::Matrix3Xd line_from(const Eigen::Matrix3Xd& nodes, const Vec3& entry, const char* key,
+                           double least, Problems& problems) {
+  const double off = (simulate::nearest_on_line(nodes, entry) - entry).norm();
+  if (off > kFarFromEntry) {
+    problems.add(key, format("%.1f mm from insertion.point_mm at the nearest", off),
+                 format("a line that comes within %.0f mm of it", kFarFromEntry),
+                 "the wire goes from there on along the line; move the point onto it");
+    return {};
+  }
+  Eigen::Matrix3Xd line = simulate::line_from_entry(nodes, entry);
+  const double length = simulate::arc_length(line);
+  if (length >= least) return line;
+  problems.add(key, format("%.3g mm long from insertion.point_mm on", length),
+               format("at least %.3g mm", least),
+               "points go from proximal to distal; give the other order?");
+  return {};
 }
 
 /// Makes the length that is in the vessel at the start sure.
@@ -147,23 +183,10 @@ void check_start(Problems& problems, InsertionScene& scene) {
                  "at most the wire's length, " + Json(whole).dump());
   }
   if (!problems.empty()) return;
-  const Vec3& entry = scene.introducer.point;
-  const double off = (simulate::nearest_on_line(start.nodes, entry) - entry).norm();
-  if (off > kFarFromEntry) {
-    problems.add("start.nodes_mm", format("%.1f mm from insertion.point_mm at the nearest", off),
-                 format("a line that comes within %.0f mm of it", kFarFromEntry),
-                 "the wire goes from there on along the line; move the point onto it");
-    return;
-  }
-  const Eigen::Matrix3Xd line = simulate::line_from_entry(start.nodes, entry);
+  const Eigen::Matrix3Xd line = line_from(start.nodes, scene.introducer.point, "start.nodes_mm",
+                                          4.0 * scene.options.step, problems);
+  if (line.cols() == 0) return;
   const double length = simulate::arc_length(line);
-  const double least = 4.0 * scene.options.step;
-  if (length < least) {
-    problems.add("start.nodes_mm", format("%.3g mm long from insertion.point_mm on", length),
-                 format("at least four steps, %.3g mm", least),
-                 "points go from proximal to distal; give the other order?");
-    return;
-  }
   if (start.length == 0.0) start.length = length;
   if (start.length > whole) {
     problems.add("start.nodes_mm", format("%.6g mm long from insertion.point_mm on", length),
@@ -173,6 +196,24 @@ void check_start(Problems& problems, InsertionScene& scene) {
     problems.add("start.length_mm", Json(start.length).dump(),
                  format("the line's length from insertion.point_mm on, %.6g, within 5 %%", length),
                  "leave it out to take that");
+  }
+}
+
+/// Expects to know where the wire is in the end.
+void check_measured(Problems& problems, double depth, InsertionScene& scene) {
+  MeasuredWire& wire = *scene.measured;
+  wire.line =
+      line_from(wire.line, scene.introducer.point, "measured.nodes_mm", kLeastMeasured, problems);
+  if (wire.line.cols() == 0) return;
+  const double length = simulate::arc_length(wire.line);
+  if (std::abs(length - depth) > 0.05 * depth) {
+    problems.add("measured.nodes_mm", format("%.6g mm long from insertion.point_mm on", length),
+                 format("as much as is in the vessel in the end, %.6g mm, within 5 %%", depth),
+                 "push in as much of the wire as was measured");
+  }
+  if (!scene.rolls.empty()) {
+    problems.add("insertion.roll_deg", std::to_string(scene.rolls.size()) + " rolls",
+                 "one roll where \"measured\" is given", "the support is sought for one wire");
   }
 }
 
@@ -188,6 +229,7 @@ double roll_of_anterior(const Vec3& direction) {
 
 void read_hand(JsonReader& root, InsertionScene& scene) {
   if (root.has("start")) scene.start = read_start(root);
+  if (root.has("measured")) scene.measured = read_measured(root);
   JsonReader insertion = root.object("insertion", true);
   scene.introducer.point = insertion.point("point_mm", std::nullopt);
   scene.introducer.direction = insertion.direction("direction", std::nullopt);
@@ -207,14 +249,19 @@ void read_hand(JsonReader& root, InsertionScene& scene) {
     root.problems().add("insertion.length_mm", Json(scene.options.length).dump(),
                         "at most the wire's length, " + Json(scene.wire.length()).dump());
   }
-  const double depth = scene.start ? scene.start->length : 0.0;
+  double depth = scene.start ? scene.start->length : 0.0;
   if (moves) {
     scene.options.length = 0.0;
     check_moves(insertion, depth, scene);
+    for (const simulate::Move& move : scene.moves) depth += move.push;
   } else if (scene.start) {
     scene.depth = pushed ? scene.options.length : depth;
     scene.options.length = std::max(depth, *scene.depth);
+    depth = *scene.depth;
+  } else {
+    depth = scene.options.length;
   }
+  if (scene.measured) check_measured(root.problems(), depth, scene);
 }
 
 }  // namespace wireplan::pipeline

@@ -1,5 +1,6 @@
 #pragma once
-/// What the hand does in a scene: where the wire enters or lies at the start, its rolls and moves.
+/// What the hand does in a scene: where the wire enters or lies at the start, its rolls and moves;
+/// and how it was measured to lie in the end.
 #include "pipeline/files/json_reader.h"
 #include "pipeline/files/scene_file.h"
 
@@ -11,7 +12,7 @@ namespace wireplan::pipeline {
 /// choice is without a jump.
 double roll_of_anterior(const Vec3& direction);
 
-/// Reads "insertion" and "start" of a scene whose wire is known already.
+/// Reads "insertion", "start" and "measured" of a scene whose wire is known already.
 void read_hand(JsonReader& root, InsertionScene& scene);
 
 }  // namespace wireplan::pipeline

@@ -215,19 +215,45 @@ class PointFinder {
     return to_json(Vec3(1000.0 * static_cast<double>(problems_.count()), 0.0, 0.0));
   }
 
- private:
-  std::optional<Vec3> find_markup(JsonReader& reader, std::size_t problems_before) {
+  /// All points of the file {"markups": FILE} in their order, along a curve or as they were placed.
+  Json find_line(const Json& given, const std::string& key) {
+    const std::size_t before = problems_.count();
+    JsonReader reader(given, key, problems_);
     const std::string name = reader.text("markups", std::nullopt);
-    const std::string label = reader.text("label", "");
     reader.finish();
+    const std::optional<Markups> read = read_file(reader, name, before);
+    Json line = Json::array();
+    if (read && (read->points.size() < 2 || !read->unplaced.empty())) {
+      problems_.add(reader.path_of("markups"),
+                    name + ", with " + std::to_string(read->points.size()) + " points and " +
+                        std::to_string(read->unplaced.size()) + " that have no position",
+                    "a line of two points at least, proximal to distal, all of them placed");
+    } else if (read) {
+      for (const MarkupPoint& point : read->points) line.push_back(to_json(point.point));
+    }
+    // After a problem some line, so that all else can be told too.
+    return line.empty() ? Json{{0, 0, 0}, {0, 0, 1}} : line;
+  }
+
+ private:
+  std::optional<Markups> read_file(JsonReader& reader, const std::string& name,
+                                   std::size_t problems_before) {
     if (problems_.count() > problems_before) return {};
-    Markups read;
     try {
-      read = read_markups(resolve_path(name, folder_));
+      return read_markups(resolve_path(name, folder_));
     } catch (const Error& error) {
       problems_.add(reader.path_of("markups"), name, "a file of markups", error.what());
       return {};
     }
+  }
+
+  std::optional<Vec3> find_markup(JsonReader& reader, std::size_t problems_before) {
+    const std::string name = reader.text("markups", std::nullopt);
+    const std::string label = reader.text("label", "");
+    reader.finish();
+    const std::optional<Markups> file = read_file(reader, name, problems_before);
+    if (!file) return {};
+    const Markups& read = *file;
     const std::vector<MarkupPoint>& points = read.points;
     std::vector<MarkupPoint> named = points;
     std::erase_if(named, [&](const MarkupPoint& point) {
@@ -346,6 +372,12 @@ void resolve_scene_points(Json& file, const fs::path& folder, Problems& problems
     if (file.contains(one)) resolve(file[one], one);
   }
   for_each_in(file, "supports", "", resolve);
+  for (const char* one : {"start", "measured"}) {
+    if (!file.contains(one) || !file[one].is_object()) continue;
+    Json& owner = file[one];
+    if (!owner.contains("nodes_mm") || !owner["nodes_mm"].is_object()) continue;
+    owner["nodes_mm"] = finder.find_line(owner["nodes_mm"], std::string(one) + ".nodes_mm");
+  }
   if (!file.contains("vessel") || !file["vessel"].is_object()) return;
   if (file["vessel"].contains("wall")) {
     for_each_in(file["vessel"]["wall"], "held", "vessel.wall.", resolve);

@@ -33,7 +33,8 @@ Markups read_markups(const std::filesystem::path& path);
 void resolve_points(Json& file, const std::filesystem::path& folder, Problems& problems);
 
 /// The same in a scene: of its supports, its insertion and its target, under "point" as in a case
-/// or in the place of the three numbers of "point_mm".
+/// or in the place of the three numbers of "point_mm"; and all points of {"markups": FILE}, in
+/// their order, in the place of the "nodes_mm" of its lines.
 void resolve_scene_points(Json& file, const std::filesystem::path& folder, Problems& problems);
 
 }  // namespace wireplan::pipeline

@@ -444,6 +444,19 @@ simulate::Goal read_goal(JsonReader& root, const simulate::Introducer& introduce
   return goal;
 }
 
+/// A support is sought only of a vessel that has one, for a wire that goes in as it was measured.
+void check_fit(JsonReader& root, const SceneVessel& vessel) {
+  if (!vessel.wall.support) {
+    root.problems().add("vessel.wall.support_kpa_per_mm", "null",
+                        "a number where \"measured\" is given",
+                        "it is sought from 0.01 to 100; give 1, which is a guess as good as any");
+  }
+  if (root.has("target")) {
+    root.problems().add("target", "given beside measured", "no such key",
+                        "a trial ends at its target, and the wire was measured where it lay");
+  }
+}
+
 InsertionScene read_insertion_scene(JsonReader& root, const simulate::Scene& wire,
                                     const SceneVessel& vessel) {
   InsertionScene scene;
@@ -489,6 +502,7 @@ InsertionScene read_insertion_scene(JsonReader& root, const simulate::Scene& wir
     scene.check_sensitivity = root.boolean("check_sensitivity", true);
   }
   scene.has_target = root.has("target");
+  if (scene.measured) check_fit(root, vessel);
   scene.goal = read_goal(root, scene.introducer);
   return scene;
 }

@@ -23,6 +23,12 @@ struct SceneVessel {
   simulate::ContactLaw contact_law = {};
 };
 
+/// The wire as it was seen in the patient, which tells how the vessel is held.
+struct MeasuredWire {
+  Eigen::Matrix3Xd line;  // (3, k) proximal to distal, from the introducer's point on       [mm]
+  double sigma = 1.0;     // one standard deviation of its places                            [mm]
+};
+
 /// A wire pushed into a vessel: what run_trial asks for.
 struct InsertionScene {
   simulate::Wire wire;
@@ -36,8 +42,9 @@ struct InsertionScene {
   double roll_zero = 0.0;  // of the scene, in the introducer's roll: see roll_of_anterior()  [rad]
   simulate::Goal goal;     // where the scene gives none: one so far away that no tip reaches it
   bool has_target = false;
-  simulate::InsertionOptions options;     // edges as long as the wire's elements
-  std::optional<bool> check_sensitivity;  // see scene_sensitivity.h; empty: if it costs little
+  simulate::InsertionOptions options;         // edges as long as the wire's elements
+  std::optional<MeasuredWire> measured = {};  // the vessel's support is the one that explains it
+  std::optional<bool> check_sensitivity;      // see scene_sensitivity.h; empty: if it costs little
 };
 
 /// Exactly one of bench, tools and insertion is there, the last with a vessel.

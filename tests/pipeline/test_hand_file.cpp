@@ -123,5 +123,42 @@ TEST_F(SceneMistakes, OfMovesRollsAndStartsAreTold) {
   expect_each_told(mistakes);
 }
 
+/// In a vessel that moves as a whole, with the line along which the wire was seen.
+Json measured_wire() {
+  Json json = slid_wire();
+  json["vessel"]["wall"]["support_kpa_per_mm"] = 1;
+  json["measured"] = {{"nodes_mm", {{0, 0, -5}, {0, 0, 10}, {0, 0, 30}}}, {"sigma_mm", 0.5}};
+  return json;
+}
+
+TEST_F(SceneMistakes, OfAMeasuredWireAreTold) {
+  const InsertionScene scene = *read_scene(write("scene.json", measured_wire().dump())).insertion;
+  ASSERT_TRUE(scene.measured);
+  EXPECT_EQ(scene.measured->sigma, 0.5);
+  EXPECT_TRUE(scene.measured->line.col(0).isZero(1e-12));
+  EXPECT_EQ(scene.measured->line.cols(), 3);
+
+  const std::vector<Mistake> mistakes = {
+      {measured_wire(), "/measured/sigma_mm", 0, {"measured.sigma_mm is 0", "0.01"}},
+      {measured_wire(), "/measured/nodes_mm", {{0, 0, 0}}, {"measured.nodes_mm is one point"}},
+      {measured_wire(),
+       "/measured/nodes_mm",
+       {{0, 0, 0}, {0, 0, 35}},
+       {"measured.nodes_mm is 35 mm long", "30 mm, within 5 %"}},
+      {measured_wire(),
+       "/measured/nodes_mm",
+       {{0, 0, 30}, {0, 0, 0}},
+       {"measured.nodes_mm is 0 mm long", "the other order"}},
+      {measured_wire(), "/measured/nodes", 1, {"measured.nodes is not a known key"}},
+      {measured_wire(),
+       "/vessel/wall/support_kpa_per_mm",
+       nullptr,
+       {"vessel.wall.support_kpa_per_mm is null", "measured"}},
+      {measured_wire(), "/insertion/roll_deg", {0, 90}, {"insertion.roll_deg is 2 rolls"}},
+      {measured_wire(), "/target", {{"point_mm", {0, 0, 9}}}, {"target is given beside measured"}},
+  };
+  expect_each_told(mistakes);
+}
+
 }  // namespace
 }  // namespace wireplan::pipeline

@@ -114,6 +114,29 @@ TEST_F(Markups, AnyPointOfASceneMayBeOne) {
             std::string::npos);
 }
 
+TEST_F(Markups, ALineOfASceneMayBeAllPointsOfAFile) {
+  write("line.mrk.json", markups("RAS", {{"", {0, 0, 0}}, {"", {-2, 0, 10}}, {"", {-3, -1, 20}}}));
+  Json scene = {{"schema", "wireplan.scene/1"},
+                {"wire",
+                 {{"sections", Json::array({{{"length_mm", 40},
+                                             {"element_length_mm", 1},
+                                             {"bending_stiffness_n_mm2", 50},
+                                             {"radius_mm", 0.4}}})}}}};
+  scene["vessel"] = {{"surface", {{"path", "tube.stl"}, {"unit", "mm"}, {"frame", "LPS"}}}};
+  scene["insertion"] = {{"point_mm", {0, 0, 0}}, {"direction", {0, 0, 1}}};
+  scene["start"]["nodes_mm"] = {{"markups", "line.mrk.json"}};
+  write("scene.json", scene);
+  const SceneFile read = read_scene(folder_ / "scene.json");
+  EXPECT_EQ(read.insertion->start->nodes.col(1), Vec3(2.0, 0.0, 10.0));
+  EXPECT_EQ(read.insertion->start->nodes.col(2), Vec3(3.0, 1.0, 20.0));
+
+  write("line.mrk.json", markups("RAS", {{"", {0, 0, 0}}}));
+  EXPECT_NE(message_of([&] {
+              read_scene(folder_ / "scene.json");
+            }).find("start.nodes_mm.markups is line.mrk.json, with 1 points"),
+            std::string::npos);
+}
+
 TEST_F(Markups, FrameAndUnitMayBeListsAndNothingElse) {
   const Vec3 target(4.0, -5.0, 6.0);
   const auto with = [&](const char* key, const Json& value) {
