@@ -23,16 +23,19 @@ step() {
   echo "== $name: ok, $((SECONDS - start)) s"
 }
 
-# beside NAME COMMAND...: starts a step that waits for most of its time, to be ended by `step NAME of_beside`.
+# beside NAME COMMAND...: starts a step that waits for most of its time, or fills what others leave of the cores (files that
+# compile last and alone, tests and cases on one thread), to be ended by `step NAME of_beside NAME`.
+declare -A beside_jobs
 beside() {
   echo "== $1: begun, beside what follows"
-  "${@:2}" >build/beside.log 2>&1 &
-  beside_job=$!
+  mkdir -p build
+  "${@:2}" >"build/$1.log" 2>&1 &
+  beside_jobs[$1]=$!
 }
 of_beside() {
   local status=0
-  wait "$beside_job" || status=$?
-  cat build/beside.log
+  wait "${beside_jobs[$1]}" || status=$?
+  cat "build/$1.log"
   return "$status"
 }
 
@@ -52,7 +55,7 @@ check_formatting() {
     -exec clang-format --dry-run -Werror {} +
 }
 
-# Each folder as one file, in two processes: most of the time goes to headers of libraries, which are read once for all files
+# Each folder as one file: most of the time goes to headers of libraries, which are read once for all files
 # then. One text and no #include, or clang's analyzer would leave it out; #line makes it tell the place of each finding.
 # The analyzer follows 30 000 states of a function, not 225 000: it takes half as long or less.
 check_tidy() {
@@ -66,7 +69,7 @@ check_tidy() {
     done >"build/tidy/$folder.cpp"
   done
   printf 'build/tidy/%s.cpp\0' simulate plan |
-    xargs -0 -I{} -P "$(nproc)" clang-tidy --quiet --warnings-as-errors='*' {} -- \
+    xargs -0 -I{} nice -n 19 clang-tidy --quiet --warnings-as-errors='*' {} -- \
       -std=c++20 -I. -isystem /usr/include/eigen3 -Xclang -analyzer-config -Xclang max-nodes=30000
 }
 
@@ -152,7 +155,9 @@ run_cluster() {
 
 step "install packages" bash tests/install.sh
 step "formatting" check_formatting
+beside "clang-tidy on simulate and plan" check_tidy
 step "release build" bash tests/build.sh release
+beside "thread sanitizer build of simulate and plan" nice -n 19 bash tests/build.sh tsan
 step "tests" run_suite release
 step "bundled case" run_bundled_case
 step "cases on real data" run_real_cases
@@ -160,10 +165,10 @@ step "pages in a browser" check_pages
 step "without ITK and Node" check_surface_only
 beside "cluster" run_cluster
 step "build with Clang and sanitizers" bash tests/build.sh dev
-step "cluster" of_beside
+step "cluster" of_beside "cluster"
 step "tests under address and undefined behaviour sanitizers" run_suite dev
-step "clang-tidy on simulate and plan" check_tidy
+step "clang-tidy on simulate and plan" of_beside "clang-tidy on simulate and plan"
 step "fuzz the parsers" fuzz_parsers
-step "thread sanitizer build of simulate and plan" bash tests/build.sh tsan
+step "thread sanitizer build of simulate and plan" of_beside "thread sanitizer build of simulate and plan"
 step "tests under thread sanitizer" run_suite tsan
 echo "== all steps ok, $SECONDS s"
