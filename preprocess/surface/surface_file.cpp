@@ -68,23 +68,35 @@ std::uint32_t stl_number(const char* bytes) {
   return number;
 }
 
+/// Refuses text of two bytes for each character, as some editors on Windows save it.
+void require_utf8_text(std::string_view beginning, const std::filesystem::path& path) {
+  if (!beginning.starts_with("\xff\xfe") && !beginning.starts_with("\xfe\xff")) return;
+  throw Error(path.string() + ": is UTF-16 text, expected UTF-8 or ASCII; save it as UTF-8");
+}
+
 /// By the number of triangles in the header of a binary file, which fit into it: read as a number,
-/// four letters are more than 10^8. What does not and begins as text is text.
+/// four letters are more than 10^8. What does not and begins as text, or with a solid of facets, is
+/// text.
 StlForm stl_form(const std::filesystem::path& path) {
+  constexpr std::size_t kBeginning = 4096;  // bytes, in which a solid has a facet
   std::ifstream stream(path, std::ios::binary);
-  std::array<char, kStlHead> head{};
-  stream.read(head.data(), head.size());
-  const std::string_view text(head.data(), static_cast<std::size_t>(stream.gcount()));
-  const std::uint32_t triangles = stl_number(&head[kStlHead - 4]);
+  std::array<char, kBeginning> beginning{};
+  stream.read(beginning.data(), beginning.size());
+  const std::string_view all(beginning.data(), static_cast<std::size_t>(stream.gcount())),
+      text = all.substr(0, kStlHead);
+  const std::uint32_t triangles = stl_number(&beginning[kStlHead - 4]);
   const std::uintmax_t bytes = std::filesystem::file_size(path),
                        expected = kStlHead + kStlTriangle * std::uintmax_t{triangles};
   const std::size_t mark = text.starts_with(kByteOrderMark) ? kByteOrderMark.size() : 0;
   const std::size_t first = text.find_first_not_of(" \t\r\n", mark);
-  const bool solid = first != std::string_view::npos && text.substr(first).starts_with("solid");
-  if (text.size() == kStlHead && expected <= bytes) return StlForm::kBinary;
+  const bool solid = first != std::string_view::npos && text.substr(first).starts_with("solid") &&
+                     all.find("facet") != std::string_view::npos;
+  const bool fits = text.size() == kStlHead && expected <= bytes;
+  if (fits && (triangles > 0 || bytes < kStlHead + kStlTriangle)) return StlForm::kBinary;
   const bool is_text = std::all_of(text.begin(), text.end(), [](char c) {
     return static_cast<unsigned char>(c) >= 0x20 || c == '\n' || c == '\r' || c == '\t';
   });
+  require_utf8_text(text, path);
   if (solid || is_text) return StlForm::kText;
   throw Error(path.string() + ": a binary STL of " + std::to_string(bytes) + " bytes, expected " +
               std::to_string(expected) + " for the " + std::to_string(triangles) +
@@ -206,8 +218,15 @@ PlyType ply_type(const std::string& name, const std::filesystem::path& path) {
 /// The values of a PLY file one after another, as doubles, which hold all of its types exactly.
 class PlyStream {
  public:
-  explicit PlyStream(const std::filesystem::path& path)
-      : path_(path), in_(path, std::ios::binary) {}
+  explicit PlyStream(const std::filesystem::path& path) : path_(path), in_(path, std::ios::binary) {
+    std::array<char, kByteOrderMark.size()> mark{};
+    in_.read(mark.data(), mark.size());
+    const std::string_view beginning(mark.data(), static_cast<std::size_t>(in_.gcount()));
+    require_utf8_text(beginning, path);
+    if (beginning == kByteOrderMark) begin_ = kByteOrderMark.size();
+    in_.clear();
+    in_.seekg(begin_);
+  }
 
   std::vector<PlyElement> read_header() {
     std::vector<PlyElement> elements;
@@ -224,7 +243,7 @@ class PlyStream {
                                                 : PlyFormat::kLittleEndian;
       } else if (word == "element") {
         PlyElement element;
-        if (!(words >> element.name >> element.count)) refuse("bad header line \"" + line + "\"");
+        if (!(words >> element.name >> element.count)) refuse("an element without its count");
         elements.push_back(element);
       } else if (word == "property") {
         PlyProperty property;
@@ -235,8 +254,7 @@ class PlyStream {
           words >> type;
         }
         property.type = ply_type(type, path_);
-        if (!(words >> property.name) || elements.empty())
-          refuse("bad header line \"" + line + "\"");
+        if (!(words >> property.name) || elements.empty()) refuse("a property of no element");
         elements.back().properties.push_back(property);
       }
     }
@@ -260,7 +278,7 @@ class PlyStream {
       std::getline(in_, line, '\r');
       line_end_ = line.find('\n') == std::string::npos && in_.peek() != '\n' ? '\r' : '\n';
       in_.clear();
-      in_.seekg(0);
+      in_.seekg(begin_);
     }
     return static_cast<bool>(std::getline(in_, line, line_end_));
   }
@@ -305,6 +323,7 @@ class PlyStream {
 
   std::filesystem::path path_;
   std::ifstream in_;
+  std::streamoff begin_ = 0;  // of the header
   PlyFormat format_ = PlyFormat::kAscii;
   char line_end_ = 0;
 };
@@ -360,7 +379,10 @@ vtkSmartPointer<vtkPolyData> read_obj(const std::filesystem::path& path) {
                 "); expected an OBJ file with vertices \"v x y z\" and faces \"f 1 2 3\"");
   };
   for (std::string line, more; next_line(stream, line);) {
-    ++number;
+    if (++number == 1) {
+      require_utf8_text(line, path);
+      if (line.starts_with(kByteOrderMark)) line.erase(0, kByteOrderMark.size());
+    }
     for (; !line.empty() && line.back() == '\\' && next_line(stream, more); ++number) {
       line.back() = ' ';
       line += more;

@@ -251,6 +251,43 @@ TEST_F(SurfaceFile, AnStlIsReadWhateverItsHeaderHolds) {
       std::string::npos);
 }
 
+TEST_F(SurfaceFile, AMarkOfUtf8BeforeTheTextIsNoPartOfIt) {
+  const Surface box = shapes::box({0, 0, 0}, {1, 2, 4});
+  const std::string mark = "\xef\xbb\xbf", vertices_first = obj(box);
+  ASSERT_TRUE(vertices_first.starts_with("v "));  // which would be passed over with the mark
+  for (const auto& [name, text] :
+       std::vector<std::pair<std::string, std::string>>{{"a.obj", vertices_first},
+                                                        {"b.ply", ascii_ply(box)},
+                                                        {"c.ply", binary_ply(box)},
+                                                        {"d.stl", ascii_stl(box)}}) {
+    const Surface read = read_triangles(write(name, mark + text), "mm", "LPS");
+    EXPECT_EQ(read.triangles.cols(), box.triangles.cols()) << name;
+    EXPECT_NEAR(signed_volume(read), 8.0, 1e-12) << name;
+    std::string wide = "\xff\xfe";
+    for (const char c : text) wide += {c, '\0'};
+    EXPECT_NE(message_of([&] {
+                read_triangles(write(name, wide), "mm", "LPS");
+              }).find(name + ": is UTF-16 text"),
+              std::string::npos)
+        << name;
+  }
+}
+
+TEST_F(SurfaceFile, ABinaryStlThatIsCutOrCountsNoneIsToldAsSuchThoughItsHeaderSaysSolid) {
+  const Surface box = shapes::box({0, 0, 0}, {1, 2, 4});
+  std::string bytes = binary_stl(box);
+  bytes.replace(0, 10, "solid name");
+  EXPECT_NE(message_of([&] {
+              read_triangles(write("cut.stl", bytes.substr(0, 300)), "mm", "LPS");
+            }).find("cut.stl: a binary STL of 300 bytes, expected 684 for the 12 triangles"),
+            std::string::npos);
+  bytes.replace(80, 4, 4, '\0');
+  EXPECT_NE(message_of([&] {
+              read_triangles(write("none.stl", bytes), "mm", "LPS");
+            }).find("none.stl: a binary STL of 684 bytes, expected 84 for the 0 triangles"),
+            std::string::npos);
+}
+
 TEST_F(SurfaceFile, WhatLiesBehindTheTrianglesOfAnStlIsNoneOfThem) {
   const Surface box = shapes::box({0, 0, 0}, {1, 2, 4});
   const std::string more = binary_stl(shapes::box({500, 500, 500}, {600, 600, 600})).substr(84);
