@@ -6,14 +6,18 @@
 #include <cctype>
 #include <cmath>
 #include <cstdint>
+#include <fstream>
 #include <iomanip>
 #include <limits>
 #include <sstream>
+#include <utility>
 
 namespace wireplan::preprocess {
 namespace {
 
 namespace fs = std::filesystem;
+
+constexpr std::int64_t kLargestSize = 100000;  // voxels along an axis
 
 std::string to_text(const Vec3& v) {
   std::ostringstream text;
@@ -57,6 +61,56 @@ std::string damaged(const std::string& format) {
   return "its header reads as " + format +
          ", but its voxels cannot be read; the file is damaged or cut short: copy or export it "
          "again";
+}
+
+Error wrong_field(const std::string& field, const std::string& value, const std::string& expected,
+                  const fs::path& path) {
+  return Error(path.string() + ": its " + field + " is " + (value.empty() ? "empty" : value) +
+               ", expected " + expected +
+               "; mend the header, or save it again from the program that made it");
+}
+
+Error not_of_format(const std::string& format, const std::string& beginning,
+                    const std::string& seen, const fs::path& path) {
+  static const std::vector<std::pair<std::string, std::string>> kKinds = {
+      {"\x1f\x8b", "is packed by gzip as a whole"},
+      {"BZh", "is packed by bzip2"},
+      {"PK\x03\x04", "is packed by zip"},
+      {std::string("\xfd") + "7zXZ", "is packed by xz"},
+      {"\x28\xb5\x2f\xfd", "is packed by zstd"},
+      {"NRRD", "begins as an NRRD image"},
+      {"ObjectType", "begins as a MetaImage"},
+      {"NDims", "begins as a MetaImage"},
+      {"\x89HDF", "begins as an HDF5 file"},
+      {"version https://git-lfs", "is a pointer of Git LFS; fetch the file itself (git lfs pull)"},
+      {"<", "is a page of HTML or XML, as a download that failed leaves it"},
+      {"\xff\xfe", "is UTF-16 text; save it as UTF-8"}};
+  std::string what = seen;
+  for (const auto& [start, kind] : kKinds) {
+    if (beginning.starts_with(start)) what = "it " + kind;
+  }
+  if (beginning.substr(std::min<std::size_t>(128, beginning.size()), 4) == "DICM") {
+    what = "it is a DICOM file";
+  }
+  const bool text = std::all_of(beginning.begin(), beginning.end(), [](char c) {
+    return static_cast<unsigned char>(c) >= 0x20 || c == '\n' || c == '\r' || c == '\t';
+  });
+  if (what == seen && text) what = beginning.empty() ? "it is empty" : "it is text of another kind";
+  return Error(path.string() + ": not a " + format + " image: " + what + "; " + kFormats);
+}
+
+std::string beginning_of(const fs::path& path) {
+  std::string bytes(256, '\0');
+  std::ifstream stream(path, std::ios::binary);
+  stream.read(bytes.data(), static_cast<std::streamsize>(bytes.size()));
+  bytes.resize(static_cast<std::size_t>(std::max<std::streamsize>(0, stream.gcount())));
+  return bytes;
+}
+
+void require_size(std::int64_t size, const std::string& field, const fs::path& path) {
+  if (size >= 1 && size <= kLargestSize) return;
+  throw wrong_field(field, std::to_string(size),
+                    "a number of voxels from 1 to " + std::to_string(kLargestSize), path);
 }
 
 std::string without_path(const std::string& message, const fs::path& path) {
@@ -111,7 +165,14 @@ double shear_degrees(const Mat3& axes) {
 Mat3 orthonormal_direction(const Mat3& direction, const fs::path& path) {
   const Eigen::JacobiSVD<Mat3> svd(direction, Eigen::ComputeFullU | Eigen::ComputeFullV);
   const Mat3 nearest = svd.matrixU() * svd.matrixV().transpose();
-  if (!((direction - nearest).cwiseAbs().maxCoeff() < 1e-3)) {
+  constexpr double kRounding = 1e-3, kUpright = 0.1;  // degrees
+  const Vec3 lengths = direction.colwise().norm().transpose();
+  const bool upright = shear_degrees(direction) < kUpright || lengths.minCoeff() == 0.0;
+  if (upright && !((lengths.array() - 1.0).abs().maxCoeff() < kRounding)) {
+    throw wrong_field("TransformMatrix", "of directions with the lengths " + to_text(lengths),
+                      "lengths of 1", path);
+  }
+  if (!((direction - nearest).cwiseAbs().maxCoeff() < kRounding)) {
     throw Error(path.string() + ": the axes of the image are not at right angles (sheared by " +
                 one_decimal(shear_degrees(direction)) +
                 " degrees), expected an orthogonal grid; resample it, e.g. in 3D Slicer");
@@ -125,10 +186,7 @@ Grid header_grid(const itk::ImageIOBase& io, const fs::path& path, double mm_per
   for (unsigned axis = 0; axis < 3; ++axis) {
     const bool exists = axis < io.GetNumberOfDimensions();
     const auto size = exists ? io.GetDimensions(axis) : 1;
-    if (size > static_cast<itk::SizeValueType>(std::numeric_limits<int>::max())) {
-      throw Error(path.string() + ": the header gives an axis of " + std::to_string(size) +
-                  " voxels; the file is damaged");
-    }
+    require_size(static_cast<std::int64_t>(size), std::string("size along ") + "ijk"[axis], path);
     grid.size[axis] = static_cast<int>(size);
     grid.spacing[axis] = mm_per_unit * (exists ? io.GetSpacing(axis) : 1.0);
     grid.origin[axis] = mm_per_unit * (exists ? io.GetOrigin(axis) : 0.0);
@@ -206,7 +264,17 @@ double count_values(const itk::ImageIOBase& io) {
 
 void require_room(double needed, double stored, double most_packed, const std::string& format,
                   const fs::path& path) {
-  if (needed > most_packed * stored) throw Error(path.string() + ": " + damaged(format));
+  if (needed <= most_packed * stored) return;
+  const auto bytes = [](double count) {
+    std::ostringstream text;
+    text << std::fixed << std::setprecision(0) << std::max(0.0, count);
+    return text.str();
+  };
+  throw Error(path.string() + ": its header reads as " + format + " and promises " + bytes(needed) +
+              " bytes of voxels by its sizes and their type, but " + bytes(stored) +
+              (most_packed > 1.0 ? " packed" : "") +
+              " bytes are there; the file is damaged or cut short, or its sizes are wrong: copy or "
+              "export it again");
 }
 
 double size_beside(const fs::path& header, const std::string& name) {
@@ -228,13 +296,15 @@ Error voxels_in_list(const fs::path& path, const std::string& ending) {
 
 void tell_header(const itk::ImageIOBase& io, VolumeHeader& told) {
   told.stored_as = name_of_stored(io);
+  bool sound = true;
   for (unsigned axis = 0; axis < 3; ++axis) {
     const bool exists = axis < io.GetNumberOfDimensions();
     const auto size = exists ? io.GetDimensions(axis) : 1;
-    told.size[axis] =
-        static_cast<int>(std::min<itk::SizeValueType>(size, std::numeric_limits<int>::max()));
+    sound = sound && size <= static_cast<itk::SizeValueType>(kLargestSize);
+    told.size[axis] = sound ? static_cast<int>(size) : 0;
     told.spacing[axis] = told.mm_per_unit * (exists ? io.GetSpacing(axis) : 1.0);
   }
+  if (!sound) told.size = {0, 0, 0};
 }
 
 void require_volume(const Grid& grid, const fs::path& path) {
@@ -253,6 +323,12 @@ Error several_values(unsigned count, const fs::path& path) {
 Error several_volumes(std::int64_t count, const fs::path& path) {
   return Error(path.string() + ": a series of " + std::to_string(count) +
                " volumes (4D), expected one; export the phase to plan on as a 3D image");
+}
+
+Error slices_as_times(std::int64_t count, const fs::path& path) {
+  return Error(path.string() + ": " + std::to_string(count) +
+               " volumes of one slice each (4D), as where slices are stored as times, expected one "
+               "volume; save it as a 3D image");
 }
 
 Error unknown_values(const fs::path& path) {

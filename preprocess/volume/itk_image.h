@@ -31,6 +31,21 @@ auto call_itk(const std::filesystem::path& path, const std::string& problem, Cal
 /// What is wrong where a header of this format reads but the voxels do not.
 std::string damaged(const std::string& format);
 
+/// Of a field of a header that holds what no volume has, with what is expected.
+Error wrong_field(const std::string& field, const std::string& value, const std::string& expected,
+                  const std::filesystem::path& path);
+
+/// Of a file that does not begin as the format that its ending names. `beginning` is the first of
+/// its bytes, unpacked; `seen` says what is wrong with them where they are of no other known kind.
+Error not_of_format(const std::string& format, const std::string& beginning,
+                    const std::string& seen, const std::filesystem::path& path);
+
+/// The first bytes of a file.
+std::string beginning_of(const std::filesystem::path& path);
+
+/// Refuses sizes of a header that no volume has, told by the header's own names.
+void require_size(std::int64_t size, const std::string& field, const std::filesystem::path& path);
+
 /// The message of an Error about that path, without the path at its beginning.
 std::string without_path(const std::string& message, const std::filesystem::path& path);
 
@@ -56,6 +71,7 @@ Mat3 orthonormal_direction(const Mat3& direction, const std::filesystem::path& p
 void require_volume(const Grid& grid, const std::filesystem::path& path);
 Error several_values(unsigned count, const std::filesystem::path& path);
 Error several_volumes(std::int64_t count, const std::filesystem::path& path);
+Error slices_as_times(std::int64_t count, const std::filesystem::path& path);
 Error unknown_values(const std::filesystem::path& path);
 
 /// Size and placement from a header that has been read; axes beyond the third are ignored.

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <cstdint>
 #include <cstdlib>
+#include <limits>
 #include <map>
 #include <utility>
 #include <vector>
@@ -28,6 +29,9 @@ struct Layout {
 };
 constexpr Layout kFirst{348, 344, 40, 70, 76, 108, 112, 123, 252, 256, 280, false};
 constexpr Layout kSecond{540, 4, 16, 12, 104, 168, 176, 500, 344, 352, 400, true};
+
+constexpr double kFarthestMm = 1e6, kShortestMm = 1e-6;  // a kilometre, a nanometre [mm]
+constexpr std::int64_t kMostValues = 1000000;            // of a voxel, as told
 
 /// The numbers of a header, in the order of bytes that its first one tells.
 class Header {
@@ -64,35 +68,71 @@ class Header {
   bool swapped_;
 };
 
-Error not_nifti(const fs::path& path) {
-  return Error(path.string() + ": not a NIfTI image, or damaged; " + kFormats);
-}
-
 Error damaged_nifti(const fs::path& path) { return Error(path.string() + ": " + damaged("NIfTI")); }
 
+/// Of a file that ends within its header.
+Error no_whole_header(const ByteStream& file, const fs::path& path) {
+  if (file.packed()) {
+    return Error(path.string() +
+                 ": its packed bytes end, or are damaged, within the header of a NIfTI image; copy "
+                 "or export it again");
+  }
+  return not_of_format("NIfTI", beginning_of(path),
+                       "its " + std::to_string(fs::file_size(path)) +
+                           " bytes are fewer than its header has, " +
+                           std::to_string(kFirst.header) + " or more",
+                       path);
+}
+
+/// Of a header whose size is known, but not the letters that name the format.
+Error no_magic(const Header& header, const fs::path& path) {
+  std::string letters;
+  for (std::size_t k = 0; k < 3; ++k) {
+    const auto c = static_cast<char>(header.byte(header.layout().magic + k));
+    letters += c > ' ' && c <= '~' ? std::string(1, c) : c == 0 ? "" : "?";
+  }
+  return wrong_field("magic", letters.empty() ? "" : "\"" + letters + "\"",
+                     std::string(header.layout().wide ? "\"n+2\"" : "\"n+1\"") +
+                         " (a header without it is of Analyze 7.5, which does not tell "
+                         "left from right)",
+                     path);
+}
+
+/// With what lies behind its `first` bytes in a longer version of the format.
+Header read_whole_header(ByteStream& file, const std::vector<unsigned char>& first,
+                         const Layout& layout, bool swapped, const fs::path& path) {
+  std::vector<unsigned char> bytes(static_cast<std::size_t>(layout.header));
+  std::copy(first.begin(), first.end(), bytes.begin());
+  if (!file.read(bytes.data() + first.size(), bytes.size() - first.size())) {
+    throw no_whole_header(file, path);
+  }
+  Header header(std::move(bytes), layout, swapped);
+  const std::size_t m = layout.magic;
+  const bool named = header.byte(m) == 'n' && header.byte(m + 2) == (layout.wide ? '2' : '1');
+  if (named && header.byte(m + 1) == 'i') {
+    throw Error(path.string() +
+                ": the header of a NIfTI pair (.hdr and .img), expected header and voxels in "
+                "one file; save it as .nii.gz");
+  }
+  if (!named || header.byte(m + 1) != '+') throw no_magic(header, path);
+  return header;
+}
+
 Header read_header(ByteStream& file, const fs::path& path) {
-  std::vector<unsigned char> bytes(static_cast<std::size_t>(kFirst.header));
-  if (!file.read(bytes.data(), bytes.size())) throw not_nifti(path);
+  std::vector<unsigned char> first(static_cast<std::size_t>(kFirst.header));
+  if (!file.read(first.data(), first.size())) throw no_whole_header(file, path);
   // The first number is the header's size, which tells the version and the order of bytes too.
   for (const Layout& layout : {kFirst, kSecond}) {
     for (const bool swapped : {false, true}) {
-      Header header(bytes, layout, swapped);
-      if (header.get<std::int32_t>(0) != layout.header) continue;
-      const std::size_t more = static_cast<std::size_t>(layout.header) - bytes.size();
-      bytes.resize(static_cast<std::size_t>(layout.header));
-      if (!file.read(bytes.data() + kFirst.header, more)) throw not_nifti(path);
-      header = Header(bytes, layout, swapped);
-      const std::size_t m = layout.magic;
-      const bool named = header.byte(m) == 'n' && header.byte(m + 2) == (layout.wide ? '2' : '1');
-      if (named && header.byte(m + 1) == 'i') {
-        throw Error(path.string() +
-                    ": the header of a NIfTI pair (.hdr and .img), expected header and voxels in "
-                    "one file; save it as .nii.gz");
-      }
-      if (named && header.byte(m + 1) == '+') return header;
+      if (Header(first, layout, swapped).get<std::int32_t>(0) != layout.header) continue;
+      return read_whole_header(file, first, layout, swapped, path);
     }
   }
-  throw not_nifti(path);
+  throw not_of_format("NIfTI", std::string(first.begin(), first.end()),
+                      "its sizeof_hdr is " +
+                          std::to_string(Header(first, kFirst, false).get<std::int32_t>(0)) +
+                          ", expected 348 or 540",
+                      path);
 }
 
 double mm_per_unit(const Header& header, const fs::path& path) {
@@ -189,6 +229,44 @@ void require_told_spacing(const Header& header, const Form& sform, double unit,
   }
 }
 
+/// Refuses numbers of a transform that place no volume, by the names of their fields.
+void require_sound_sform(const Header& header, double unit, const fs::path& path) {
+  const auto number = [&](std::size_t row, std::size_t column) {
+    return header.real(header.layout().sform, 4 * row + column);
+  };
+  for (std::size_t k = 0; k < 12; ++k) {
+    const double value = number(k / 4, k % 4);
+    if (std::abs(unit * value) <= kFarthestMm) continue;
+    throw wrong_field(std::string("srow_") + "xyz"[k / 4] + "[" + std::to_string(k % 4) + "]",
+                      number_text(value), "a number within a kilometre", path);
+  }
+  for (std::size_t column = 0; column < 3; ++column) {
+    const Vec3 step(number(0, column), number(1, column), number(2, column));
+    if (unit * step.norm() >= kShortestMm) continue;
+    const std::string of = "[" + std::to_string(column) + "]";
+    throw wrong_field("srow_x" + of + ", srow_y" + of + " and srow_z" + of,
+                      "a step of " + number_text(step.norm()) + " along " + "ijk"[column],
+                      "one from voxel to voxel", path);
+  }
+}
+
+void require_sound_qform(const Header& header, double unit, const fs::path& path) {
+  constexpr double kLongest = 1.01;  // of a quaternion; more than rounding makes
+  Vec3 imaginary;
+  for (std::size_t k = 0; k < 6; ++k) {
+    const double value = header.real(header.layout().quaternion, k);
+    if (k < 3) imaginary[static_cast<Eigen::Index>(k)] = value;
+    if (k < 3 ? std::isfinite(value) : std::abs(unit * value) <= kFarthestMm) continue;
+    throw wrong_field(
+        k < 3 ? std::string("quatern_") + "bcd"[k] : std::string("qoffset_") + "xyz"[k - 3],
+        number_text(value), k < 3 ? "a number" : "a number within a kilometre", path);
+  }
+  if (imaginary.norm() <= kLongest) return;
+  throw wrong_field("quatern_b, quatern_c and quatern_d",
+                    "of the length " + number_text(imaginary.norm()), "at most 1, as of a rotation",
+                    path);
+}
+
 /// The transform to go by. Both forms of a file may differ by rounding, not by a place.
 Form choose_form(const Header& header, const Grid& grid, double unit, const fs::path& path,
                  std::vector<std::string>& remarks) {
@@ -204,6 +282,8 @@ Form choose_form(const Header& header, const Grid& grid, double unit, const fs::
                 "to place the volume; save it again from the program that made it, or set both "
                 "codes to 0 if it lies upright at the origin");
   }
+  if (by_qform) require_sound_qform(header, unit, path);
+  if (by_sform) require_sound_sform(header, unit, path);
   const Form qform = qform_of(header, grid.spacing, unit), sform = sform_of(header, unit);
   if (by_qform && by_sform) {
     const double apart = largest_distance(qform, sform, grid.size);
@@ -228,9 +308,11 @@ Form choose_form(const Header& header, const Grid& grid, double unit, const fs::
 /// The name that nifti1.h gives a type of voxel.
 std::string name_of_type(int code) {
   static const std::map<int, std::string> kNames = {
-      {2, "uint8"},    {4, "int16"},     {8, "int32"},         {16, "float32"}, {32, "complex64"},
-      {64, "float64"}, {128, "rgb24"},   {256, "int8"},        {512, "uint16"}, {768, "uint32"},
-      {1024, "int64"}, {1280, "uint64"}, {1792, "complex128"}, {2304, "rgba32"}};
+      {0, "unknown"},       {1, "bits"},     {1536, "float128"}, {2048, "complex256"},
+      {2, "uint8"},         {4, "int16"},    {8, "int32"},       {16, "float32"},
+      {32, "complex64"},    {64, "float64"}, {128, "rgb24"},     {256, "int8"},
+      {512, "uint16"},      {768, "uint32"}, {1024, "int64"},    {1280, "uint64"},
+      {1792, "complex128"}, {2304, "rgba32"}};
   const auto known = kNames.find(code);
   return known == kNames.end() ? "type " + std::to_string(code) : known->second;
 }
@@ -246,32 +328,51 @@ void tell_nifti(const Header& header, VolumeHeader& told) {
   const auto known = kUnits.find(unit);
   told.length_unit = known == kUnits.end() ? "code " + std::to_string(unit) : known->second.first;
   if (known != kUnits.end()) told.mm_per_unit = known->second.second;
+  bool sound = true;
   for (std::size_t axis = 0; axis < 3; ++axis) {
     const bool exists = static_cast<std::int64_t>(axis) < header.dimension(0);
-    told.size[axis] = exists ? static_cast<int>(header.dimension(axis + 1)) : 1;
+    const std::int64_t size = exists ? header.dimension(axis + 1) : 1;
+    sound = sound && size >= 0 && size <= std::numeric_limits<int>::max();
+    told.size[axis] = sound ? static_cast<int>(size) : 0;
     told.spacing[static_cast<Eigen::Index>(axis)] =
         told.mm_per_unit * std::abs(header.real(layout.spacing, axis + 1));
   }
+  if (!sound) told.size = {0, 0, 0};
   told.placed_by = has_sform(header) ? "sform" : has_qform(header) ? "qform" : "";
+}
+
+/// Sizes of one volume of one value per voxel.
+std::array<int, 3> sizes_of(const Header& header, const fs::path& path) {
+  const std::int64_t axes = header.dimension(0);
+  if (axes < 1 || axes > 7) {
+    throw wrong_field("dim[0]", std::to_string(axes), "a number of axes from 1 to 7", path);
+  }
+  std::array<int, 3> sizes = {1, 1, 1};
+  for (std::size_t axis = 1; axis <= static_cast<std::size_t>(axes); ++axis) {
+    const std::int64_t size = header.dimension(axis);
+    if (axis <= 3) {
+      require_size(size, "dim[" + std::to_string(axis) + "]", path);
+      sizes[axis - 1] = static_cast<int>(size);
+    } else if (size > 1 && axis == 4 && sizes[2] == 1) {
+      throw slices_as_times(size, path);
+    } else if (size > 1 && axis == 5) {  // nifti1.h: of vectors
+      throw several_values(static_cast<unsigned>(std::min<std::int64_t>(size, kMostValues)), path);
+    } else if (size > 1) {
+      throw several_volumes(size, path);
+    }
+  }
+  return sizes;
 }
 
 Grid grid_of(const Header& header, const std::string& told_unit, const fs::path& path,
              std::vector<std::string>& remarks) {
   const double unit = mm_per_unit(header, path);
   Grid grid;
-  const std::int64_t axes = header.dimension(0);
+  grid.size = sizes_of(header, path);
   for (std::size_t axis = 0; axis < 3; ++axis) {
-    const std::int64_t size =
-        static_cast<std::int64_t>(axis) < axes ? header.dimension(axis + 1) : 1;
-    if (size < 1 || size > 100000) throw damaged_nifti(path);
-    grid.size[axis] = static_cast<int>(size);
     grid.spacing[static_cast<Eigen::Index>(axis)] = unit * pixdim_of(header, axis);
   }
   require_volume(grid, path);
-  for (std::size_t axis = 4; axis <= static_cast<std::size_t>(std::min<std::int64_t>(axes, 7));
-       ++axis) {
-    if (header.dimension(axis) > 1) throw several_volumes(header.dimension(axis), path);
-  }
 
   const bool by_sform = has_sform(header) && !has_qform(header);
   for (std::size_t axis = 0; axis < 3 && !by_sform; ++axis) {
@@ -281,16 +382,8 @@ Grid grid_of(const Header& header, const std::string& told_unit, const fs::path&
                         "write the voxels' size there", path);
   }
   const Form form = choose_form(header, grid, unit, path, remarks);
-  const Vec3 spacing = form.axes.colwise().norm().transpose();
-  if (spacing.allFinite()) {
-    require_extent(grid.size, spacing, "xyzt_units (" + told_unit + "), pixdim and sform", path);
-  }
-  constexpr double kFar = 1e6;  // a kilometre
-  if (!form.axes.allFinite() || !form.origin.allFinite() || !(grid.spacing.maxCoeff() < kFar) ||
-      form.axes.cwiseAbs().maxCoeff() > kFar || form.origin.cwiseAbs().maxCoeff() > kFar ||
-      form.axes.colwise().norm().minCoeff() < 1e-6) {
-    throw damaged_nifti(path);
-  }
+  require_extent(grid.size, form.axes.colwise().norm().transpose(),
+                 "xyzt_units (" + told_unit + "), pixdim and sform", path);
   const Vec3 lps(-1.0, -1.0, 1.0);  // of RAS
   const Mat3 steps = lps.asDiagonal() * form.axes;
   grid.spacing = steps.colwise().norm().transpose();
@@ -320,6 +413,24 @@ bool read_as(ByteStream& file, bool swapped, std::vector<float>& values) {
     done += count;
   }
   return true;
+}
+
+Error wrong_type(const Header& header, const fs::path& path) {
+  const int code = header.get<std::int16_t>(header.layout().type);
+  const std::string name = name_of_type(code);
+  return wrong_field("datatype",
+                     std::to_string(code) + (name.starts_with("type") ? "" : " (" + name + ")"),
+                     "integers of 8 to 64 bits, float32 or float64", path);
+}
+
+/// How many bytes a voxel has.
+double bytes_of_type(const Header& header, const fs::path& path) {
+  static const std::map<int, double> kBytes = {{2, 1},    {4, 2},    {8, 4},     {16, 4},  {32, 8},
+                                               {64, 8},   {128, 3},  {256, 1},   {512, 2}, {768, 4},
+                                               {1024, 8}, {1280, 8}, {1792, 16}, {2304, 4}};
+  const auto known = kBytes.find(header.get<std::int16_t>(header.layout().type));
+  if (known == kBytes.end()) throw wrong_type(header, path);
+  return known->second;
 }
 
 /// By the codes of nifti1.h.
@@ -354,7 +465,7 @@ bool read_values(const Header& header, ByteStream& file, const fs::path& path,
     case 2304:
       throw several_values(4, path);
     default:
-      throw unknown_values(path);
+      throw wrong_type(header, path);
   }
 }
 
@@ -397,15 +508,21 @@ Image read_nifti(const fs::path& path, VolumeHeader& told) {
   const double start = std::max(offset, static_cast<double>(header.layout().header + 4));
   constexpr double kFarthest = 1e8, kLongestNames = 1e6;
   const auto between = start - static_cast<double>(header.layout().header);
-  if (!(start < kFarthest)) throw damaged_nifti(path);
+  const auto stored = static_cast<double>(fs::file_size(path));
+  if (!(start < kFarthest) || (!file.packed() && start > stored)) {
+    const std::string size = std::to_string(fs::file_size(path));
+    throw wrong_field(
+        "vox_offset", one_decimal(offset),
+        "a place in the file" + (file.packed() ? "" : ", which has " + size + " bytes"), path);
+  }
   std::string extensions(static_cast<std::size_t>(std::min(between, kLongestNames)), '\0');
   if (!file.read(extensions.data(), extensions.size()) ||
       !file.skip(static_cast<std::size_t>(between) - extensions.size())) {
     throw damaged_nifti(path);
   }
   told.label_names = names_in(extensions, path);
-  require_room(static_cast<double>(image.grid.voxels()),  // of a byte at least
-               static_cast<double>(fs::file_size(path)), file.packed() ? kMostDeflated : 1.0,
+  require_room(static_cast<double>(image.grid.voxels()) * bytes_of_type(header, path),
+               file.packed() ? stored : stored - start, file.packed() ? kMostDeflated : 1.0,
                "NIfTI", path);
   image.values.resize(image.grid.voxels());
   if (!read_values(header, file, path, image.values) || !file.ends_whole()) {
@@ -415,7 +532,8 @@ Image read_nifti(const fs::path& path, VolumeHeader& told) {
   // A slope of 0 means none, and so does one that is no number, as nibabel writes it.
   const double slope = header.real(header.layout().slope),
                shift = header.real(header.layout().slope, 1);
-  if (!std::isfinite(slope) || slope == 0.0) return image;
+  if (std::isinf(slope)) throw wrong_field("scl_slope", number_text(slope), "a number", path);
+  if (std::isnan(slope) || slope == 0.0) return image;
   if (!std::isfinite(shift)) {
     throw Error(path.string() +
                 ": its scl_inter is no number, expected one beside a scl_slope of " +

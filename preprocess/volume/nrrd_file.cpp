@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdint>
 #include <cstdio>
 #include <cstdlib>
 #include <fstream>
@@ -16,51 +17,14 @@
 
 #include "itkNrrdImageIO.h"
 #include "preprocess/volume/itk_image.h"
+#include "preprocess/volume/nrrd_fields.h"
 
 namespace wireplan::preprocess {
 namespace {
 
 namespace fs = std::filesystem;
 
-using Fields = std::map<std::string, std::string>;
-
-/// Empty where the header has no such field.
-std::string value_of(const Fields& fields, const std::string& key) {
-  const auto found = fields.find(key);
-  return found == fields.end() ? std::string() : found->second;
-}
-
-/// The fields of an NRRD's header, "name: value", in small letters but for the name of a file; none
-/// where it is no NRRD. NrrdIO writes a line that it does not understand into 1024 characters of
-/// its stack, so long ones are refused: all but comments, what somebody adds as "key:=value", and
-/// "content", which is taken as it is.
-Fields nrrd_fields(const fs::path& path, const std::string& no_image) {
-  constexpr std::size_t kMost = 10000, kLongest = 500;  // lines, characters
-  Fields fields;
-  std::ifstream file(path, std::ios::binary);
-  std::string line;
-  const auto require = [&](bool sound) {
-    if (!sound) throw Error(path.string() + ": " + no_image);
-  };
-  if (!std::getline(file, line) || !line.starts_with("NRRD")) return fields;
-  require(line.size() <= kLongest);
-  while (std::getline(file, line) && !trimmed(line).empty()) {
-    const std::size_t colon = line.find(": ");
-    const bool added = line.find(":=") < colon;
-    if (line.front() == '#') continue;
-    std::string name = lower_case(trimmed(line.substr(0, colon)));
-    require(fields.size() < kMost && (line.size() <= kLongest || added || name == "content"));
-    if (colon == std::string::npos) continue;
-    static const std::map<std::string, std::string> kOther = {{"datafile", "data file"},
-                                                              {"axismins", "axis mins"},
-                                                              {"axismaxs", "axis maxs"},
-                                                              {"centerings", "centers"}};
-    if (const auto other = kOther.find(name); other != kOther.end()) name = other->second;
-    const std::string value = trimmed(line.substr(colon + 2));
-    fields[name] = name == "data file" ? value : lower_case(value);
-  }
-  return fields;
-}
+using Fields = NrrdFields;
 
 /// "cm" of "\"cm\" \"cm\" \"cm\"": the words of a field of units; none where one is not in quotes.
 std::vector<std::string> quoted_words(const std::string& text) {
@@ -145,31 +109,6 @@ Vec3 lps_signs(const Fields& fields, const fs::path& path) {
               "that holds behind \"space:\"");
 }
 
-/// The vectors "(1,0,0) (0,1,0) none" of a field; empty ones of axes that have none.
-std::vector<std::vector<double>> vectors_of(std::string text) {
-  std::replace(text.begin(), text.end(), ',', ' ');
-  std::vector<std::vector<double>> vectors;
-  std::size_t at = 0;
-  while ((at = text.find_first_of("(n", at)) != std::string::npos) {
-    const std::size_t end = text.find(')', at);
-    std::vector<double>& vector = vectors.emplace_back();
-    if (text[at] == 'n' || end == std::string::npos) {
-      at += 4;  // "none"
-      continue;
-    }
-    std::istringstream numbers(text.substr(at + 1, end - at - 1));
-    for (double number = 0.0; numbers >> number;) vector.push_back(number);
-    at = end;
-  }
-  return vectors;
-}
-
-/// The words of a field that has one for each axis.
-std::vector<std::string> axis_words(const Fields& fields, const std::string& key) {
-  std::istringstream text(value_of(fields, key));
-  return {std::istream_iterator<std::string>(text), {}};
-}
-
 /// An axis of space without a direction, as the fields of all axes tell it: NaN where they do not
 /// (https://teem.sourceforge.net/nrrd/format.html, "per-axis").
 struct UprightAxis {
@@ -205,7 +144,7 @@ std::vector<UprightAxis> upright_axes(const Fields& fields) {
 /// Refuses a header that does not tell how large its voxels are. NrrdIO takes 1 mm for it, and
 /// calls spacings of a space damaged.
 void require_spacing(const Fields& fields, const fs::path& path) {
-  if (fields.empty() || fields.count("space directions") > 0) return;
+  if (fields.count("space directions") > 0) return;
   const bool ends = fields.count("axis mins") > 0 || fields.count("axis maxs") > 0;
   const std::string told = fields.count("spacings") > 0 ? "spacings" : ends ? "axis mins" : "";
   for (const char* space : {"space", "space dimension"}) {
@@ -301,18 +240,6 @@ Grid nrrd_grid(const itk::ImageIOBase& io, const Fields& fields, const fs::path&
   return grid;
 }
 
-/// NrrdIO asks for the order of bytes where values have several, and says no more than that the
-/// header is wrong.
-void require_endian(const Fields& fields, const std::string& encoding, const fs::path& path) {
-  static const std::set<std::string> kOneByte = {"char",  "signed char",   "int8",  "int8_t",
-                                                 "uchar", "unsigned char", "uint8", "uint8_t"};
-  static const std::set<std::string> kText = {"ascii", "text", "txt"};
-  const std::string type = value_of(fields, "type");
-  if (fields.count("endian") > 0 || kOneByte.count(type) > 0 || kText.count(encoding) > 0) return;
-  throw Error(path.string() + ": endian is missing, expected little or big for values of type " +
-              type + "; add the line \"endian: little\" (what nearly all programs write)");
-}
-
 /// Refuses places beyond any patient's: where an axis is longer than a number can be, ITK says 1
 /// mm.
 void require_near(const Fields& fields, const fs::path& path) {
@@ -361,7 +288,6 @@ std::vector<NamedSegment> nrrd_segments(const fs::path& path) {
 
 /// What the fields of a header tell, sound or not, before ITK is asked.
 void tell_nrrd(const Fields& fields, const fs::path& path, VolumeHeader& told) {
-  if (fields.empty()) return;
   told.format = "NRRD";
   told.stored_as = value_of(fields, "type");
   const std::string units = value_of(fields, "space units");
@@ -369,7 +295,9 @@ void tell_nrrd(const Fields& fields, const fs::path& path, VolumeHeader& told) {
   words >> std::quoted(told.length_unit);
   std::istringstream sizes(value_of(fields, "sizes"));
   std::array<int, 3> size{};
-  if (sizes >> size[0] >> size[1] >> size[2]) told.size = size;
+  if (sizes >> size[0] >> size[1] >> size[2] && *std::min_element(size.begin(), size.end()) > 0) {
+    told.size = size;
+  }
   told.segments = nrrd_segments(path);
 }
 
@@ -411,8 +339,10 @@ void require_whole_nrrd(const itk::ImageIOBase& io, const std::string& encoding,
 }  // namespace
 
 std::vector<Image> read_nrrd(const fs::path& path, VolumeHeader& told, bool layered) {
-  const std::string no_image = std::string("not a NRRD image, or damaged; ") + kFormats;
-  const Fields fields = nrrd_fields(path, no_image);
+  const std::string no_image =
+      "its header reads as NRRD, but NrrdIO does not understand it; save it again from the program "
+      "that made it";
+  const Fields fields = read_nrrd_fields(path);
   tell_nrrd(fields, path, told);
   static const std::set<std::string> kEncodings = {"raw",  "gzip", "gz", "ascii",
                                                    "text", "txt",  "hex"};
@@ -422,11 +352,9 @@ std::vector<Image> read_nrrd(const fs::path& path, VolumeHeader& told, bool laye
     throw Error(path.string() + ": its voxels are packed with \"" + encoding +
                 "\", expected raw or gzip; save it again with gzip, as 3D Slicer does");
   }
-  if (!fields.empty()) {
-    require_endian(fields, encoding, path);
-    lps_signs(fields, path);
-  }
   require_near(fields, path);
+  require_sound_fields(fields, path);
+  lps_signs(fields, path);
   require_spacing(fields, path);
   const std::string beside = nrrd_data_file(fields, path);
   const double stored =  // bytes; NrrdIO would wait for a pipe

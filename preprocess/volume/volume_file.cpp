@@ -30,15 +30,15 @@ namespace {
 namespace fs = std::filesystem;
 
 /// What stands behind a key that MetaIO knows (metaImage.cxx, metaObject.cxx).
-enum class MetaValue { kText, kOne, kVector, kMatrix };
+enum class MetaValue { kText, kTruth, kOne, kVector, kMatrix };
 
 const std::map<std::string, MetaValue>& meta_keys() {
   using enum MetaValue;
   static const std::map<std::string, MetaValue> kKeys = {{"ObjectType", kText},
-                                                         {"BinaryData", kText},
-                                                         {"BinaryDataByteOrderMSB", kText},
-                                                         {"ElementByteOrderMSB", kText},
-                                                         {"CompressedData", kText},
+                                                         {"BinaryData", kTruth},
+                                                         {"BinaryDataByteOrderMSB", kTruth},
+                                                         {"ElementByteOrderMSB", kTruth},
+                                                         {"CompressedData", kTruth},
                                                          {"ElementType", kText},
                                                          {"ElementDataFile", kText},
                                                          {"DistanceUnits", kText},
@@ -85,7 +85,10 @@ std::string as_meta_key(const std::string& key) {
 /// How many numbers stand behind a key; -1 where it is text, or a key of somebody's own.
 int count_meta_numbers(const std::string& key, int dimensions) {
   const auto known = meta_keys().find(key);
-  if (known == meta_keys().end() || known->second == MetaValue::kText) return -1;
+  if (known == meta_keys().end() || known->second == MetaValue::kText ||
+      known->second == MetaValue::kTruth) {
+    return -1;
+  }
   if (known->second == MetaValue::kOne) return 1;
   return known->second == MetaValue::kVector ? dimensions : dimensions * dimensions;
 }
@@ -155,19 +158,69 @@ MetaLine meta_line(std::string text) {
   return line;
 }
 
-/// Refuses keys that mean the same and tell different numbers, of which MetaIO takes one.
+/// Whether the text means true; MetaIO takes what is none of these for false.
+std::optional<bool> truth_of(const std::string& text) {
+  static const std::set<std::string> kTrue = {"true", "t", "1"}, kFalse = {"false", "f", "0"};
+  if (kTrue.count(lower_case(text)) > 0) return true;
+  if (kFalse.count(lower_case(text)) > 0) return false;
+  return {};
+}
+
+/// Refuses values that MetaIO would take for something else in silence, or knows nothing to do
+/// with.
+void require_sound_meta(MetaLine& line, const fs::path& path) {
+  const auto known = meta_keys().find(line.key);
+  if (known != meta_keys().end() && known->second == MetaValue::kTruth && !truth_of(line.value)) {
+    throw wrong_field(line.key, line.value, "True or False", path);
+  }
+  if (line.key == "ElementDataFile" && line.value.empty()) {
+    throw wrong_field(line.key, "", "LOCAL, or the name of the file that holds the voxels", path);
+  }
+  if (line.key == "ElementType") {
+    static const std::set<std::string> kTypes = {
+        "MET_CHAR", "MET_UCHAR", "MET_SHORT",     "MET_USHORT",     "MET_INT",   "MET_UINT",
+        "MET_LONG", "MET_ULONG", "MET_LONG_LONG", "MET_ULONG_LONG", "MET_FLOAT", "MET_DOUBLE"};
+    std::transform(line.value.begin(), line.value.end(), line.value.begin(),
+                   [](unsigned char c) { return static_cast<char>(std::toupper(c)); });
+    std::string type = line.value;
+    const std::string array = "_ARRAY";
+    if (type.ends_with(array)) type.resize(type.size() - array.size());
+    if (kTypes.count(type) > 0) return;
+    throw wrong_field(line.key, line.value,
+                      "MET_SHORT, MET_UCHAR, MET_FLOAT or another type of integers or floats",
+                      path);
+  }
+  const bool sizes = line.key == "DimSize";
+  if (!sizes && line.key != "ElementSpacing" && line.key != "ElementSize") return;
+  std::istringstream numbers(line.value);
+  for (double number = 0.0; numbers >> number;) {
+    if (sizes && number == std::floor(number)) {
+      require_size(static_cast<std::int64_t>(number), line.key, path);
+    } else if (sizes || !(number > 0.0)) {
+      throw wrong_field(line.key, line.value, sizes ? "whole numbers" : "lengths of more than 0",
+                        path);
+    }
+  }
+}
+
+/// Refuses keys that mean the same and tell different values, of which MetaIO takes one.
 void require_one_meaning(const std::vector<MetaLine>& lines, const fs::path& path) {
   static const std::vector<std::set<std::string>> kSame = {
-      {"Offset", "Position", "Origin"}, {"TransformMatrix", "Rotation", "Orientation"}};
+      {"Offset", "Position", "Origin"},
+      {"TransformMatrix", "Rotation", "Orientation"},
+      {"BinaryDataByteOrderMSB", "ElementByteOrderMSB"}};
   constexpr double kRounding = 1e-3;  // mm, or a cosine
   for (const std::set<std::string>& same : kSame) {
     const MetaLine* first = nullptr;
     for (const MetaLine& line : lines) {
       if (same.count(line.key) == 0) continue;
       if (first == nullptr) first = &line;
+      bool differ = truth_of(line.value) != truth_of(first->value);
       std::istringstream numbers(line.value), others(first->value);
       for (double a = 0.0, b = 0.0; numbers >> a && others >> b;) {
-        if (std::abs(a - b) <= kRounding) continue;
+        differ = differ || std::abs(a - b) > kRounding;
+      }
+      if (differ) {
         throw Error(path.string() + ": its " + first->key + " is " + first->value + ", its " +
                     line.key + " is " + line.value +
                     ", expected the same by both; delete the one that does not hold");
@@ -209,22 +262,45 @@ std::vector<MetaLine> read_meta_lines(std::istream& file, const fs::path& path,
   return known;
 }
 
+/// Refuses a file without the keys that tell what the voxels are.
+void require_meta_keys(const std::vector<MetaLine>& lines, const fs::path& path) {
+  const auto is_there = [&](const std::string& key) {
+    return std::any_of(lines.begin(), lines.end(),
+                       [&](const MetaLine& line) { return line.key == key; });
+  };
+  std::string lacks;
+  int found = 0;
+  for (const char* key : {"NDims", "DimSize", "ElementType", "ElementDataFile"}) {
+    if (is_there(key)) {
+      ++found;
+    } else {
+      lacks += (lacks.empty() ? "" : ", ") + std::string(key);
+    }
+  }
+  if (lacks.empty()) return;
+  if (found == 0)
+    throw not_of_format("MetaImage", beginning_of(path), "it has none of its keys", path);
+  throw Error(path.string() + ": its header lacks " + lacks +
+              ", expected NDims, DimSize, ElementType and last ElementDataFile; add what lacks, or "
+              "save it again from the program that made it");
+}
+
 /// MetaIO writes past its arrays where a header is not what it expects, and frees what it read
 /// twice where it breaks off, so the lines are looked through first: 2 to 4 dimensions, which it is
 /// told before what has as many numbers; as many numbers as there should be; no list of files. It
 /// is not told the file of the voxels, which it does not read.
-MetaHeader read_meta_header(const fs::path& path, const std::string& no_image) {
-  const auto require = [&](bool sound) {
-    if (!sound) throw Error(path.string() + ": " + no_image);
-  };
+MetaHeader read_meta_header(const fs::path& path) {
   std::ifstream file(path, std::ios::binary);
   MetaHeader header;
   std::vector<MetaLine> lines = read_meta_lines(file, path, header);
+  require_meta_keys(lines, path);
   const auto told = std::find_if(lines.begin(), lines.end(),
                                  [](const MetaLine& line) { return line.key == "NDims"; });
-  require(told != lines.end());
   const int dimensions = std::atoi(told->value.c_str());
-  require(dimensions >= 2 && dimensions <= 4);
+  if (dimensions < 2 || dimensions > 4) {
+    throw wrong_field("NDims", is_plain(told->value) ? told->value : "no number",
+                      "3 (or 2 or 4 of which the last has a size of 1)", path);
+  }
   const auto vector = std::find_if(lines.begin(), told, [&](const MetaLine& line) {
     return count_meta_numbers(line.key, dimensions) > 1;
   });
@@ -239,14 +315,24 @@ MetaHeader read_meta_header(const fs::path& path, const std::string& no_image) {
     if (numbers >= 0 && !holds_numbers(line.value, numbers)) {
       throw Error(path.string() + ": its " + line.key + " is no text of " +
                   std::to_string(numbers) + (numbers == 1 ? " number" : " numbers") +
-                  " up to 1e12, expected so many; mend the header, or the file is damaged");
+                  " up to 1e12 (with a decimal point, not a comma), expected so many; mend the "
+                  "header, or save it again from the program that made it");
     }
+    if (!is_plain(line.key + " = " + line.value) && line.key != "ElementDataFile") {
+      throw wrong_field(line.key, "over 250 characters long, or holds letters that are not ASCII",
+                        "what MetaImage knows", path);
+    }
+    require_sound_meta(line, path);
     if (line.key == "ElementDataFile") {
       header.data_file = line.value;
       if (line.value.starts_with("LIST") || line.value.find('%') != std::string::npos) {
         throw voxels_in_list(path, ".mha");
       }
       if (!is_plain(line.text) || line.value.find(' ') != std::string::npos) header.has_more = true;
+      std::error_code unknown;
+      if (!fs::exists(path.parent_path() / header.data_file, unknown)) {  // as Windows has it
+        std::replace(header.data_file.begin(), header.data_file.end(), '\\', '/');
+      }
       line.value = "LOCAL";
     }
     if (line.key == "CompressedDataSize") {
@@ -257,12 +343,9 @@ MetaHeader read_meta_header(const fs::path& path, const std::string& no_image) {
       if (line.value != "?") header.unit = line.value;
     }
     const std::string text = line.key + " = " + line.value;
-    require(is_plain(text));
     header.has_more = header.has_more || (text != line.text && line.key != "ElementDataFile");
     header.lines += text + "\n";
   }
-  for (const char* key : {"DimSize", "ElementType", "ElementDataFile"})
-    require(keys.count(key) > 0);
   require_one_meaning(lines, path);
   header.has_spacing = keys.count("ElementSpacing") + keys.count("ElementSize") > 0;
   header.has_place = keys.count("Offset") + keys.count("Position") + keys.count("Origin") > 0;
@@ -285,6 +368,16 @@ void require_whole_meta(const itk::MetaImageIO& io, const MetaHeader& header, co
   require_room(bytes, stored, kMostDeflated, "MetaImage", path);
 }
 
+/// Whether bytes begin as zlib (RFC 1950) or gzip has them.
+bool begins_packed(const fs::path& file, std::streamoff start) {
+  std::ifstream stream(file, std::ios::binary);
+  stream.seekg(start);
+  const int first = stream.get(), second = stream.get();
+  constexpr int kDeflate = 8;
+  return (first == 0x1f && second == 0x8b) ||
+         ((first & 0x0f) == kDeflate && second >= 0 && (256 * first + second) % 31 == 0);
+}
+
 /// Reads the voxels of a header that was read. MetaIO prints a line where they are cut short or
 /// damaged, or where it is not told the size of what is compressed, and returns zeros.
 Image read_meta_voxels(const itk::MetaImageIO& io, const MetaHeader& header, const MetaImage& meta,
@@ -298,6 +391,10 @@ Image read_meta_voxels(const itk::MetaImageIO& io, const MetaHeader& header, con
   const fs::path file = local ? path : path.parent_path() / header.data_file;
   std::vector<char> bytes(static_cast<std::size_t>(io.GetImageSizeInBytes()));
   std::streamoff start = local ? header.end : 0;
+  if (meta.HeaderSize() < -1 || meta.HeaderSize() > static_cast<double>(fs::file_size(file))) {
+    throw wrong_field("HeaderSize", std::to_string(meta.HeaderSize()),
+                      "-1, or a number of bytes before the voxels in their file", path);
+  }
   if (meta.HeaderSize() > 0) start = meta.HeaderSize();
   if (meta.HeaderSize() == -1) {  // the voxels end the file
     start = static_cast<std::streamoff>(fs::file_size(file)) -
@@ -318,6 +415,10 @@ Image read_meta_voxels(const itk::MetaImageIO& io, const MetaHeader& header, con
     return image;
   }
   ByteStream stream(file, start, meta.CompressedData());
+  if (meta.CompressedData() && !begins_packed(file, start)) {
+    throw wrong_field("CompressedData", "True",
+                      "False, as its voxels do not begin as zlib or gzip packs them", path);
+  }
   require(stream.read(bytes.data(), bytes.size()) && stream.ends_whole());
   if (meta.BinaryDataByteOrderMSB() != (std::endian::native == std::endian::big)) {
     const auto size = static_cast<std::ptrdiff_t>(io.GetComponentSize());
@@ -351,9 +452,10 @@ class TemporaryFile {
 };
 
 Image read_meta(const fs::path& path, VolumeHeader& told) {
-  const std::string no_image = std::string("not a MetaImage image, or damaged; ") + kFormats;
-  const MetaHeader header =
-      call_itk(path, no_image, [&] { return read_meta_header(path, no_image); });
+  const std::string no_image =
+      "its header reads as MetaImage, but MetaIO does not understand it; save it again from the "
+      "program that made it";
+  const MetaHeader header = call_itk(path, no_image, [&] { return read_meta_header(path); });
   std::optional<TemporaryFile> copy;  // of the lines that MetaIO is to see, where it must be
   if (header.has_more) {
     copy.emplace(path.extension().string());
@@ -379,6 +481,7 @@ Image read_meta(const fs::path& path, VolumeHeader& told) {
                         "add the line \"ElementSpacing = a b c\" with the voxels' sizes", path);
   });
   const MetaImage& meta = *io->GetMetaImagePointer();
+  if (io->GetNumberOfComponents() != 1) throw several_values(io->GetNumberOfComponents(), path);
   require_whole_meta(*io, header, meta, path);
   Image image = call_itk(path, damaged("MetaImage"),
                          [&] { return read_meta_voxels(*io, header, meta, path); });

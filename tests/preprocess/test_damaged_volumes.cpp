@@ -52,8 +52,9 @@ TEST_F(DamagedVolume, OfAHugeSizeTakesNoMemoryForIt) {
     EXPECT_TRUE(has(read_error(write("huge.nrrd", nrrd(sizes, encoding, "", few))), "cut short"));
   }
   // Sizes whose product passes 64 bits.
-  EXPECT_TRUE(has(read_error(write("huge.nrrd", nrrd("2147483647 2147483647 8", "raw", "", few))),
-                  "NRRD image, or damaged"));
+  EXPECT_TRUE(
+      has(read_error(write("huge.nrrd", nrrd("2147483647 2147483647 8", "raw", "", few))),
+          "its sizes (2147483647 2147483647 8) is 2147483647, expected a number of voxels"));
   const std::string packed = "CompressedData = True\nBinaryData = True\n";
   for (const std::string& more :
        {packed, packed + "CompressedDataSize = 10\n", std::string("BinaryData = False\n"),
@@ -74,7 +75,8 @@ TEST_F(DamagedVolume, OfAMetaImageThatDoesNotInflateIsNotReadAsZeros) {
   for (const std::string& told : {size, std::string()}) {  // MetaIO reads zeros without the size
     EXPECT_EQ(read_image(of(whole, told)).values[7], static_cast<float>('h'));
   }
-  EXPECT_TRUE(has(read_error(of(std::string(whole.size(), 'x'))), "cut short"));
+  EXPECT_TRUE(has(read_error(of(std::string(whole.size(), 'x'))),
+                  "its CompressedData is True, expected False"));
   EXPECT_TRUE(has(read_error(of(whole.substr(0, whole.size() - 5))), "cut short"));
   EXPECT_TRUE(has(read_error(of(deflated("a few bytes"))), "cut short"));
   std::string changed = whole;
@@ -118,7 +120,8 @@ TEST_F(DamagedVolume, OfAnNrrdWhoseHeaderHasLongLinesEndsNotTheProgram) {
   for (const char* start : {"kinds: ", "units: ", "labels: ", "endian: ", "", "odd: "}) {
     SCOPED_TRACE(start);
     const std::string bytes = nrrd("2 2 2", "raw", start + text + "\n", voxels);
-    EXPECT_TRUE(has(read_error(write("long.nrrd", bytes)), "not a NRRD image, or damaged"));
+    EXPECT_TRUE(has(read_error(write("long.nrrd", bytes)),
+                    " of its header has over 500 characters, expected fewer"));
   }
   for (const char* start : {"# ", "Segment0_Tags:=a: ", "content: "}) {
     SCOPED_TRACE(start);

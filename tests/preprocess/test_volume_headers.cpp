@@ -2,6 +2,10 @@
 // tell it twice.
 #include <gtest/gtest.h>
 
+#include <cmath>
+#include <cstring>
+#include <limits>
+
 #include "preprocess/volume/image.h"
 #include "preprocess/volume/labels.h"
 #include "tests/preprocess/image_file.h"
@@ -90,7 +94,102 @@ TEST_F(VolumeHeaders, NiftiNamesItsLabelsInAnExtension) {
       "the name of label 1 is no UTF-8"));
 }
 
+/// With a value at a place, by the offsets of nifti1.h.
+template <typename Value>
+std::string with_value(std::string bytes, std::size_t at, Value value) {
+  std::memcpy(bytes.data() + at, &value, sizeof value);
+  return bytes;
+}
+
+TEST_F(VolumeHeaders, NiftiFieldsThatNoVolumeHasAreNamedWithTheirValue) {
+  const std::string sound = nifti({}), by_qform = nifti({.codes = {1, 0}});
+  const float none = std::nanf(""), far = 1e9F;
+  const auto size = [&](std::size_t axis, std::int16_t value) {
+    return with_value(sound, 40 + 2 * axis, value);
+  };
+  for (const auto& [bytes, reason] : std::vector<std::pair<std::string, std::string>>{
+           {size(0, 0), "its dim[0] is 0, expected a number of axes from 1 to 7"},
+           {size(1, -8), "its dim[1] is -8, expected a number of voxels from 1"},
+           {size(2, 0), "its dim[2] is 0"},
+           {nifti({.dim = {5, 2, 3, 4, 1, 3, 1, 1}}), "3 values per voxel"},
+           {nifti({.dim = {4, 2, 3, 1, 9, 1, 1, 1}}), "9 volumes of one slice each (4D)"},
+           {with_value(sound, 344, '\0'), "its magic is \"+1\", expected \"n+1\" (a header"},
+           {with_value(sound, 344, 0),
+            "its magic is empty, expected \"n+1\" (a header "
+            "without it is of Analyze"},
+           {with_value(sound, 0, 0), "not a NIfTI image: its sizeof_hdr is 0, expected 348 or 540"},
+           {with_value(sound, 280, none), "its srow_x[0] is nan, expected a number within a kilo"},
+           {with_value(sound, 308, far), "its srow_y[3] is 1e+09, expected a number within a kilo"},
+           {with_value(sound, 280, 0.0F),
+            "its srow_x[0], srow_y[0] and srow_z[0] is a step of 0 along i"},
+           {with_value(by_qform, 256, none), "its quatern_b is nan, expected a number"},
+           {with_value(by_qform, 260, 3.0F),
+            "its quatern_b, quatern_c and quatern_d is of the "
+            "length 3, expected at most 1"},
+           {with_value(by_qform, 272, far), "its qoffset_y is 1e+09"},
+           {with_value(sound, 108, none), "its vox_offset is nan, expected a place in the file"},
+           {with_value(sound, 108, 5000.0F),
+            "its vox_offset is 5000.0, expected a place in the file, which has 400 bytes"},
+           {with_value(sound, 70, std::int16_t{1536}), "its datatype is 1536 (float128), expected"},
+           {with_value(sound, 112, std::numeric_limits<float>::infinity()),
+            "its scl_slope is inf, expected a number"}}) {
+    expect_refusal(write("a.nii", bytes), reason);
+  }
+  const std::string few = read_error(write("few.nii", sound.substr(0, 390)));
+  EXPECT_TRUE(has(few, "promises 48 bytes of voxels by its sizes and their type, but 38 bytes are"))
+      << few;
+}
+
+TEST_F(VolumeHeaders, OfFilesOfOtherKindsTheKindIsTold) {
+  for (const auto& [bytes, kind] : std::vector<std::pair<std::string, std::string>>{
+           {"", "it is empty"},
+           {"version https://git-lfs.github.com/spec/v1\n", "it is a pointer of Git LFS"},
+           {"<!DOCTYPE html><html></html>", "it is a page of HTML or XML"},
+           {"BZh91AY&SY\x01\x02", "it is packed by bzip2"},
+           {std::string("PK\x03\x04\0\0", 6), "it is packed by zip"},
+           {std::string(128, '\0') + "DICM", "it is a DICOM file"},
+           {"something else\n", "it is text of another kind"}}) {
+    for (const auto& [name, format] : {std::pair("a.nii", "NIfTI"), std::pair("a.nrrd", "NRRD"),
+                                       std::pair("a.mha", "MetaImage")}) {
+      expect_refusal(write(name, bytes), std::string("not a ") + format + " image: " + kind);
+    }
+  }
+}
+
 // ---- NRRD ---------------------------------------------------------------------------------------
+
+TEST_F(VolumeHeaders, NrrdFieldsThatContradictOneAnotherAreNamedWithTheirValue) {
+  const std::string sound =
+      "NRRD0004\ntype: short\ndimension: 3\nspace: LPS\nsizes: 2 2 2\n"
+      "space directions: (1,0,0) (0,1,0) (0,0,1)\nkinds: domain domain domain\nendian: little\n"
+      "encoding: raw\nspace origin: (0,0,0)\n\n0123456789abcdef";
+  EXPECT_EQ(read_image(write("sound.nrrd", sound)).grid.spacing, Vec3(1, 1, 1));
+  const auto with = [&](const std::string& before, const std::string& after) {
+    std::string bytes = sound;
+    return bytes.replace(bytes.find(before), before.size(), after);
+  };
+  for (const auto& [bytes, reason] : std::vector<std::pair<std::string, std::string>>{
+           {with("NRRD0004", "NRRD0009"), "its first line is NRRD0009, expected NRRD0001"},
+           {with("type: short", "type: half"), "its type is half, expected one of integers"},
+           {with("type: short\n", ""), "its header lacks type, expected type, dimension, sizes"},
+           {with("dimension: 3", "dimension: 4"),
+            "its sizes is 2 2 2, expected one for each of its 4"},
+           {with("sizes: 2 2 2", "sizes: 2 0 2"),
+            "its sizes (2 0 2) is 0, expected a number of vo"},
+           {with("(0,0,1)\n", "\n"), "its space directions is (1,0,0) (0,1,0), expected a vector"},
+           {with("(0,1,0)", "(0,x,0)"),
+            "its space directions is (1,0,0) (0,x,0) (0,0,1), expected"},
+           {with("(0,0,0)", "0 0 0"), "its space origin is 0 0 0, expected one place, as (a,b,c)"},
+           {with("kinds: domain ", "kinds: "), "its kinds is domain domain, expected one for each"},
+           {with("little", "middle"), "its endian is middle, expected little or big"},
+           {with("encoding", "type: float\nencoding"), "line 9 of its header tells type again"},
+           {with("kinds", "patient name: LOVELACE\nkinds"),
+            "line 7 of its header is none that NRRD"}}) {
+    const fs::path file = write("a.nrrd", bytes);
+    expect_refusal(file, reason);
+    EXPECT_FALSE(has(read_error(file), "LOVELACE"));
+  }
+}
 
 /// Of 2 x 2 x 2 values, with these lines.
 std::string nrrd_with(const std::string& lines) {
@@ -154,6 +253,45 @@ TEST_F(VolumeHeaders, MetaImageWithoutSpacingIsRefusedAndOfOtherLettersRead) {
       Vec3(1, 2, 3));
   const std::string words = read_error(write("d.mha", meta_with("orientation = axial\n")));
   EXPECT_TRUE(has(words, "its Orientation is no text of 9 numbers")) << words;
+}
+
+TEST_F(VolumeHeaders, MetaImageKeysThatNoVolumeHasAreNamedWithTheirValue) {
+  const std::string sound = meta_with("ElementSpacing = 1 2 3\nPatientName = LOVELACE\n");
+  const auto with = [&](const std::string& before, const std::string& after) {
+    std::string bytes = sound;
+    return bytes.replace(bytes.find(before), before.size(), after);
+  };
+  const auto more = [&](const std::string& line) { return with("DimSize", line + "\nDimSize"); };
+  for (const auto& [bytes, reason] : std::vector<std::pair<std::string, std::string>>{
+           {with("NDims = 3\n", ""),
+            "its header lacks NDims, expected NDims, DimSize, ElementType"},
+           {with("ElementType = MET_UCHAR\n", ""), "its header lacks ElementType"},
+           {with("NDims = 3", "NDims = 7"), "its NDims is 7, expected 3"},
+           {with("MET_UCHAR", "MET_FOO"), "its ElementType is MET_FOO, expected MET_SHORT"},
+           {with("2 2 2", "2 0 2"), "its DimSize is 0, expected a number of voxels from 1"},
+           {with("2 2 2", "2 2.5 2"), "its DimSize is 2 2.5 2, expected whole numbers"},
+           {with("1 2 3", "1 0 3"), "its ElementSpacing is 1 0 3, expected lengths of more than 0"},
+           {more("BinaryData = maybe"), "its BinaryData is maybe, expected True or False"},
+           {more("CompressedData = yes"), "its CompressedData is yes, expected True or False"},
+           {more("BinaryData = True\nCompressedData = True"),
+            "its CompressedData is True, expected False, as its voxels do not begin as zlib"},
+           {more("ElementByteOrderMSB = True\nBinaryDataByteOrderMSB = False"),
+            "its ElementByteOrderMSB is True, its BinaryDataByteOrderMSB is False"},
+           {more("ElementNumberOfChannels = 3"), "3 values per voxel"},
+           {more("TransformMatrix = 2 0 0 0 2 0 0 0 2"),
+            "its TransformMatrix is of directions with the lengths (2, 2, 2), expected"},
+           {more("HeaderSize = 99999"), "its HeaderSize is 99999, expected -1, or"},
+           {with("LOCAL", ""), "its ElementDataFile is empty, expected LOCAL"}}) {
+    const fs::path file = write("a.mha", bytes);
+    expect_refusal(file, reason);
+    EXPECT_FALSE(has(read_error(file), "LOVELACE"));
+  }
+  // As programs on Windows name it, and in small letters.
+  fs::create_directory(folder_ / "sub");
+  write("sub/a.raw", "abcdefgh");
+  std::string beside = with("LOCAL\nabcdefgh", "sub\\a.raw\n");
+  beside.replace(beside.find("MET_UCHAR"), 9, "met_uchar");
+  EXPECT_EQ(read_image(write("a.mhd", beside)).values.front(), static_cast<float>('a'));
 }
 
 TEST_F(VolumeHeaders, MetaImageOfTwoPlacesIsRefusedWithBoth) {
