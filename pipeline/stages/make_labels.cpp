@@ -59,6 +59,13 @@ void compare_with_volume(const Case& given, const preprocess::Image& image,
       if (one == 0) return;  // so will it of each
     }
   }
+  const auto near = preprocess::find_near_shift(image, labels.class_of);
+  if (!near) return;
+  figures["warnings"].push_back(
+      "segment: the volume shows the labels' edges more clearly with the labels " +
+      preprocess::describe_change(*near) +
+      ": were they exported with this volume, and is the place in their header rounded or that of "
+      "another crop? Look at the slices");
 }
 
 void tell_labels(const preprocess::LabelVolume& labels, const preprocess::LabelMask& made,

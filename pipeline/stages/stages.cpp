@@ -193,7 +193,7 @@ std::vector<Stage> stages_from_labels(const Case& given) {
     stages.push_back({.name = "volume", .version = 5, .reads_input = true, .make = make_volume});
   }
   stages.push_back({.name = "segment",
-                    .version = 8,
+                    .version = 9,
                     .reads_input = in_volume,
                     .reads_labels = true,
                     .parameters = {"/mask"},
@@ -216,7 +216,7 @@ std::vector<Stage> stages_to_surface(const Case& given) {
   std::vector<Stage> stages;
   if (!given.volume) {
     stages.push_back({.name = "surface",
-                      .version = 9,
+                      .version = 10,
                       .reads_input = true,
                       .parameters = {"/surface/unit", "/surface/frame", "/surface/edge_length_mm"},
                       .make = make_surface});
@@ -411,7 +411,8 @@ RunResult run_stages(const Case& given, const RunOptions& options,
       result.artifacts.push_back(*artifact);
     }
     outcome.seconds = seconds_since(start);
-    if (artifact && stage.name == "volume" && fs::exists(artifact->folder / kFiguresFile)) {
+    const bool warns = stage.name == "volume" || (stage.name == "segment" && given.labels);
+    if (artifact && warns && fs::exists(artifact->folder / kFiguresFile)) {
       outcome.warnings = work.figures(stage.name).at("warnings").get<std::vector<std::string>>();
     }
     result.stages.push_back(outcome);

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <iomanip>
 #include <limits>
+#include <map>
 #include <sstream>
 #include <utility>
 
@@ -14,8 +15,9 @@
 namespace wireplan::preprocess {
 namespace {
 
-constexpr double kTolerance = 0.1;  // of a voxel
-constexpr double kAside = 1e-6;     // of a voxel: to no side of a tie
+constexpr double kTolerance = 0.1;         // of a voxel
+constexpr double kAside = 1e-6;            // of a voxel: to no side of a tie
+constexpr std::size_t kFewestEdges = 100;  // of which chance may find enough elsewhere
 
 bool is_identity(const Mat3& m) { return (m - Mat3::Identity()).cwiseAbs().maxCoeff() < 1e-3; }
 
@@ -52,33 +54,55 @@ struct EdgePair {
   Vec3 inside, outside;
 };
 
-/// At most so many pairs, evenly taken from all of the edge; of one class where it is given.
-std::vector<EdgePair> edge_pairs(const Grid& grid, const std::vector<std::uint8_t>& classes,
-                                 std::uint8_t only) {
-  constexpr std::size_t kMost = 3000;
-  std::vector<EdgePair> all;
+/// The edges of labels: toward what is none of them, and between two classes, of which the first
+/// has the inside.
+struct Edges {
+  std::vector<EdgePair> outer;
+  std::map<std::pair<std::uint8_t, std::uint8_t>, std::vector<EdgePair>> inner;
+};
+
+/// At most so many pairs, evenly taken from all of an edge.
+std::vector<EdgePair> thinned_out(const std::vector<EdgePair>& pairs, std::size_t most) {
+  if (pairs.size() <= most) return pairs;
+  std::vector<EdgePair> some;
+  for (std::size_t k = 0; k < most; ++k) some.push_back(pairs[k * pairs.size() / most]);
+  return some;
+}
+
+/// Of all classes, or of one where it is given. A point lies one voxel from the edge, where that is
+/// still on its side: in a thin tube or gap, or where they are to lie `close`, it is at the edge.
+Edges find_edges(const Grid& grid, const std::vector<std::uint8_t>& classes, std::uint8_t only,
+                 bool close) {
+  Edges edges;
   const std::array<std::size_t, 3> stride = {1, grid.index(0, 1, 0), grid.index(0, 0, 1)};
   for (int k = 2; k + 3 < grid.size[2]; ++k) {
     for (int j = 2; j + 3 < grid.size[1]; ++j) {
       for (int i = 2; i + 3 < grid.size[0]; ++i) {
         const std::size_t n = grid.index(i, j, k);
         for (int axis = 0; axis < 3; ++axis) {
-          const bool here = classes[n] != 0, next = classes[n + stride[axis]] != 0;
-          if (here == next) continue;
-          if (only != 0 && (here ? classes[n] : classes[n + stride[axis]]) != only) continue;
+          const std::size_t step = stride[static_cast<std::size_t>(axis)];
+          const std::uint8_t here = classes[n], next = classes[n + step];
+          if (here == next || (only != 0 && here != only && next != only)) continue;
+          const bool outer = here == 0 || next == 0;
+          const auto same_side = [&](std::size_t at, std::uint8_t one) {
+            return outer ? (classes[at] == 0) == (one == 0) : classes[at] == one;
+          };
           Vec3 low(i, j, k), high(i, j, k);
-          low[axis] -= 1.0;
-          high[axis] += 2.0;
+          low[axis] -= !close && same_side(n - step, here) ? 1.0 : 0.0;
+          high[axis] += !close && same_side(n + 2 * step, next) ? 2.0 : 1.0;
           const Vec3 a = grid.lps_from_ijk(low), b = grid.lps_from_ijk(high);
-          all.push_back(here ? EdgePair{a, b} : EdgePair{b, a});
+          const bool first = outer ? here != 0 : here < next;
+          std::vector<EdgePair>& to =
+              outer ? edges.outer : edges.inner[{std::min(here, next), std::max(here, next)}];
+          to.push_back(first ? EdgePair{a, b} : EdgePair{b, a});
         }
       }
     }
   }
-  if (all.size() <= kMost) return all;
-  std::vector<EdgePair> some;
-  for (std::size_t k = 0; k < kMost; ++k) some.push_back(all[k * all.size() / kMost]);
-  return some;
+  constexpr std::size_t kMost = 3000;
+  edges.outer = thinned_out(edges.outer, kMost);
+  for (auto& [of, pairs] : edges.inner) pairs = thinned_out(pairs, kMost);
+  return edges;
 }
 
 /// The volume's values, held between what counts as dark and as bright: 0 to 600 HU in a CT, so
@@ -124,17 +148,15 @@ class Brightness {
   double low_ = 0.0, high_ = kScale;
 };
 
-/// Mirrored along the grid's axes round its middle; x, y or both negated.
-std::vector<FrameChange> mirrored(const Grid& grid) {
-  const Vec3 middle =
-      grid.lps_from_ijk(0.5 * Vec3(grid.size[0] - 1, grid.size[1] - 1, grid.size[2] - 1));
+/// Mirrored along the grid's axes round a place; x, y or both negated too where that is asked for.
+std::vector<FrameChange> mirrored(const Grid& grid, const Vec3& middle, bool negated) {
   std::vector<FrameChange> changes;
   for (int which = 1; which < 8; ++which) {
     const Vec3 signs((which & 1) != 0 ? -1 : 1, (which & 2) != 0 ? -1 : 1,
                      (which & 4) != 0 ? -1 : 1);
     const Mat3 m = grid.direction * signs.asDiagonal() * grid.direction.transpose();
     changes.push_back({.linear = m, .shift = middle - m * middle});
-    if (which < 4) changes.push_back({.linear = Mat3(signs.asDiagonal())});
+    if (negated && which < 4) changes.push_back({.linear = Mat3(signs.asDiagonal())});
   }
   return changes;
 }
@@ -157,40 +179,81 @@ std::vector<FrameChange> reordered(const Grid& grid) {
   return changes;
 }
 
-/// The best shift by up to 20 mm: on every second voxel at first, then round the best, to half a
-/// voxel.
-FrameChange best_shift(const Grid& grid, const Brightness& brightness,
-                       const std::vector<EdgePair>& pairs) {
-  constexpr double kReach = 20.0;
+/// Finds where pairs that are moved by shifts are seen best, all of them on a lattice round a
+/// place. Along a straight vessel all are alike: then the shortest.
+Vec3 best_on_lattice(const Brightness& brightness, const std::vector<EdgePair>& pairs,
+                     const Vec3& around, double reach, double step) {
   constexpr double kPerMm = 2.0;  // HU; half a voxel aside costs some 10
-  FrameChange best;
-  double most = brightness.contrast(pairs, best);
-  std::vector<EdgePair> few;
-  for (std::size_t k = 0; k < pairs.size(); k += 5) few.push_back(pairs[k]);
-  const auto try_shifts = [&](const Vec3& around, double reach, double step,
-                              const std::vector<EdgePair>& on) {
-    most = -std::numeric_limits<double>::infinity();
-    const int n = static_cast<int>(std::lround(reach / step));
-    Vec3 found = around;
-    for (int k = -n; k <= n; ++k) {
-      for (int j = -n; j <= n; ++j) {
-        for (int i = -n; i <= n; ++i) {
-          const FrameChange change{.shift = around + step * Vec3(i, j, k)};
-          // Along a straight vessel all are alike: then the shortest.
-          const double here = brightness.contrast(on, change) - kPerMm * change.shift.norm();
-          if (here <= most) continue;
-          most = here;
-          found = change.shift;
-        }
+  double most = -std::numeric_limits<double>::infinity();
+  Vec3 found = around;
+  const int n = static_cast<int>(std::lround(reach / step));
+  for (int k = -n; k <= n; ++k) {
+    for (int j = -n; j <= n; ++j) {
+      for (int i = -n; i <= n; ++i) {
+        const FrameChange change{.shift = around + step * Vec3(i, j, k)};
+        const double here = brightness.contrast(pairs, change) - kPerMm * change.shift.norm();
+        if (here <= most) continue;
+        most = here;
+        found = change.shift;
       }
     }
-    best.shift = found;
-  };
+  }
+  return found;
+}
+
+/// The best shift by up to 20 mm: on every second voxel at first, then round the best, to half a
+/// voxel.
+Vec3 best_shift(const Grid& grid, const Brightness& brightness,
+                const std::vector<EdgePair>& pairs) {
+  constexpr double kReach = 20.0;
+  const std::vector<EdgePair> few = thinned_out(pairs, 200);
   const double voxel = std::cbrt(grid.spacing.prod()), coarse = std::max(2.0, 2.0 * voxel);
-  try_shifts(Vec3::Zero(), kReach, coarse, few);
-  try_shifts(best.shift, coarse, 0.5 * coarse, pairs);
-  try_shifts(best.shift, 0.5 * coarse, 0.25 * coarse, pairs);
-  return best;
+  Vec3 shift = best_on_lattice(brightness, few, Vec3::Zero(), kReach, coarse);
+  shift = best_on_lattice(brightness, pairs, shift, coarse, 0.5 * coarse);
+  return best_on_lattice(brightness, pairs, shift, 0.5 * coarse, 0.25 * coarse);
+}
+
+/// The middle of the box round what is labelled, of all classes or of one.
+Vec3 middle_of(const Grid& grid, const std::vector<std::uint8_t>& classes, std::uint8_t only) {
+  Vec3 low = Vec3::Constant(std::numeric_limits<double>::infinity()), high = -low;
+  for (int k = 0; k < grid.size[2]; ++k) {
+    for (int j = 0; j < grid.size[1]; ++j) {
+      for (int i = 0; i < grid.size[0]; ++i) {
+        const std::uint8_t one = classes[grid.index(i, j, k)];
+        if (one == 0 || (only != 0 && one != only)) continue;
+        low = low.cwiseMin(Vec3(i, j, k));
+        high = high.cwiseMax(Vec3(i, j, k));
+      }
+    }
+  }
+  return grid.lps_from_ijk(0.5 * (low + high));
+}
+
+/// Mirrored round their own middle, as within a crop of their own, and shifted.
+std::vector<FrameChange> mirrored_and_shifted(const Grid& grid, const Vec3& middle,
+                                              const Brightness& brightness,
+                                              const std::vector<EdgePair>& pairs) {
+  std::vector<FrameChange> changes = mirrored(grid, middle, /*negated=*/false);
+  for (FrameChange& change : changes) {
+    std::vector<EdgePair> moved;
+    for (const EdgePair& pair : pairs) {
+      moved.push_back({change.linear * pair.inside + change.shift,
+                       change.linear * pair.outside + change.shift});
+    }
+    change.shift += best_shift(grid, brightness, moved);
+  }
+  return changes;
+}
+
+/// How clearly the volume shows edges between two classes, whichever of them is the brighter [HU].
+double inner_contrast(const Brightness& brightness, const Edges& edges) {
+  double most = 0.0;
+  for (const auto& [classes, pairs] : edges.inner) {
+    if (pairs.size() >= kFewestEdges) {
+      most = std::max(most, std::abs(brightness.contrast(pairs, {})));
+    }
+  }
+  return most;
 }
 
 }  // namespace
@@ -308,26 +371,61 @@ std::optional<FrameChange> find_better_frame(const Image& image,
                                              double& contrast, std::uint8_t only) {
   expects(classes.size() == image.grid.voxels());
   // Seen well: a mean step of a fifth of the usual contrast. As they lie: less than a third of it;
-  // half of it where they are seen too well for labels that are drawn too narrow or too wide.
-  constexpr double kSeen = 80.0, kPart = 0.35, kClear = 140.0, kPartOfClear = 0.5;
-  constexpr std::size_t kFewest = 100;  // edges, of which chance may find enough elsewhere
-  const std::vector<EdgePair> pairs = edge_pairs(image.grid, classes, only);
+  // half of it where they are seen too well for labels that are drawn too narrow or too wide. A
+  // mirror that is moved as well has more ways to fit by chance.
+  constexpr double kSeen = 80.0, kPart = 0.35, kClear = 140.0, kPartOfClear = 0.5, kByChance = 1.15;
+  const Grid& grid = image.grid;
+  const Edges edges = find_edges(grid, classes, only, /*close=*/false);
   const Brightness brightness(image);
-  contrast = brightness.contrast(pairs, {});
-  if (only != 0 && pairs.size() < kFewest) contrast = std::numeric_limits<double>::quiet_NaN();
+  contrast = brightness.contrast(edges.outer, {});
+  if (only != 0 && edges.outer.size() < kFewestEdges) {
+    contrast = std::numeric_limits<double>::quiet_NaN();
+  }
   if (!(contrast < kSeen)) return {};
-  std::vector<FrameChange> changes = mirrored(image.grid);
-  for (FrameChange& change : reordered(image.grid)) changes.push_back(std::move(change));
-  changes.push_back(best_shift(image.grid, brightness, pairs));
+  if (const double inner = inner_contrast(brightness, edges); inner >= kSeen) {
+    contrast = inner;  // a wall round its lumen
+    return {};
+  }
   std::optional<FrameChange> best;
   double most = kSeen;
-  for (const FrameChange& change : changes) {
-    const double here = brightness.contrast(pairs, change);
-    if (here < most || contrast > (here < kClear ? kPart : kPartOfClear) * here) continue;
+  const auto try_change = [&](const FrameChange& change, double least) {
+    const double here = brightness.contrast(edges.outer, change);
+    if (here < least || contrast > (here < kClear ? kPart : kPartOfClear) * here) return;
     most = here;
     best = change;
+  };
+  const Vec3 middle =
+      grid.lps_from_ijk(0.5 * Vec3(grid.size[0] - 1, grid.size[1] - 1, grid.size[2] - 1));
+  for (const FrameChange& change : mirrored(grid, middle, /*negated=*/true))
+    try_change(change, most);
+  for (const FrameChange& change : reordered(grid)) try_change(change, most);
+  try_change({.shift = best_shift(grid, brightness, edges.outer)}, most);
+  for (const FrameChange& change :
+       mirrored_and_shifted(grid, middle_of(grid, classes, only), brightness, edges.outer)) {
+    try_change(change, kByChance * most);
   }
   return best;
+}
+
+std::optional<FrameChange> find_near_shift(const Image& image,
+                                           const std::vector<std::uint8_t>& classes) {
+  expects(classes.size() == image.grid.voxels());
+  // By more than half a voxel, by which programs' habits differ, and more than noise makes; steps
+  // of less than half a voxel, as the nearest one tells the value; chosen.
+  constexpr double kReach = 3.0, kStep = 0.49, kLeast = 0.9, kGain = 1.15;
+  const Edges edges = find_edges(image.grid, classes, 0, /*close=*/true);
+  if (edges.outer.size() < kFewestEdges) return {};
+  const Brightness brightness(image);
+  const double voxel = std::cbrt(image.grid.spacing.prod());
+  FrameChange near;
+  near.shift = best_on_lattice(brightness, thinned_out(edges.outer, 1000), Vec3::Zero(),
+                               kReach * voxel, kStep * voxel);
+  const double here = brightness.contrast(edges.outer, {}),
+               there = brightness.contrast(edges.outer, near);
+  if (near.shift.norm() < kLeast * voxel || there < kGain * here) return {};
+  // Labels that are drawn too narrow or too wide are seen better moved to either side.
+  if (brightness.contrast(edges.outer, {.shift = -near.shift}) >= here) return {};
+  return near;
 }
 
 }  // namespace wireplan::preprocess

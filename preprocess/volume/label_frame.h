@@ -37,13 +37,20 @@ std::vector<std::uint8_t> onto_grid(const Grid& to, const Grid& from,
 
 /// Looks in the volume for the labels' edges: contrast is brighter inside. Returns the change under
 /// which they are seen well where they are not as they lie: mirrored along the grid's axes, their
-/// order changed, x and y negated (RAS and LPS mixed up), or shifted by up to 20 mm. Empty where
-/// they are seen as they lie and where they are seen nowhere. `contrast` is set to the mean step
-/// inward across the edge as they lie [HU]. Of all classes together, or of one (1 + its index)
-/// toward what is in none: the edges of a trunk hide where a small branch lies. One of less than
-/// 100 edges is not judged, and has no contrast (NaN).
+/// order changed, x and y negated (RAS and LPS mixed up), shifted by up to 20 mm, or mirrored round
+/// their own middle and shifted. Empty where they are seen as they lie, which may be by edges
+/// between two classes, as of a wall and its lumen, and where they are seen nowhere. `contrast` is
+/// set to the mean step inward across the edge as they lie [HU]. Of all classes together, or of one
+/// (1 + its index): the edges of a trunk hide where a small branch lies. One of less than 100 edges
+/// toward what is in none is not judged, and has no contrast (NaN).
 std::optional<FrameChange> find_better_frame(const Image& image,
                                              const std::vector<std::uint8_t>& classes,
                                              double& contrast, std::uint8_t only = 0);
+
+/// The shift by a voxel to three under which all labels are seen more clearly, by a seventh of
+/// their contrast, than as they lie: a header that was rounded, or cropped at another voxel. Empty
+/// where there is none.
+std::optional<FrameChange> find_near_shift(const Image& image,
+                                           const std::vector<std::uint8_t>& classes);
 
 }  // namespace wireplan::preprocess

@@ -175,6 +175,33 @@ TEST_F(LabelsRun, ThatDoNotFitTheVolumeAreRefused) {
   EXPECT_TRUE(holds(answer.log, "they would fit shifted by (0, -7, 0) mm")) << answer.log;
 }
 
+TEST_F(LabelsRun, ADoubtfulFrameIsToldByCheckAndRunAlike) {
+  // A crop whose first voxel is told 1.5 mm off.
+  const Grid crop{.size = {38, 40, 36}, .spacing = Vec3(1, 1, 1), .origin = Vec3(2.5, 0, 0)};
+  std::vector<std::uint8_t> values;
+  for (int k = 0; k < crop.size[2]; ++k) {
+    for (int j = 0; j < crop.size[1]; ++j) {
+      for (int i = 0; i < crop.size[0]; ++i) values.push_back(tube_label(i + 1, j));
+    }
+  }
+  write_text(preprocess::label_nifti(crop, values), folder_ / "crop.nii");
+  const Answer answer = run({{"path", "crop.nii"}, {"values", {1}}}, true, "--to segment -o out");
+  ASSERT_EQ(answer.code, 0) << answer.log;
+  const std::string told =
+      "mind: segment: the volume shows the labels' edges more clearly with the "
+      "labels shifted by (-1";
+  EXPECT_TRUE(holds(answer.log, told)) << answer.log;
+  const Answer again = run_program(folder_.path(), "run case.json --to segment -o out");
+  EXPECT_TRUE(holds(again.log, "cached") && holds(again.log, told)) << again.log;
+  const Answer check = run_program(folder_.path(), "check case.json");
+  EXPECT_TRUE(holds(check.out, told.substr(6))) << check.out;
+  // As it is told right there is nothing to mind of it.
+  Grid right = crop;
+  right.origin.x() = 1.0;
+  write_text(preprocess::label_nifti(right, values), folder_ / "crop.nii");
+  EXPECT_FALSE(holds(run_program(folder_.path(), "check case.json").out, "more clearly"));
+}
+
 TEST_F(LabelsRun, TellsEveryPointThatLiesOutside) {
   case_["access"]["point_mm"] = {20, 20, 8};
   case_["target"]["point_mm"] = {30, 20, 30};
