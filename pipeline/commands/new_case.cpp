@@ -91,6 +91,7 @@ class CaseMaker {
   explicit CaseMaker(const NewCase& given) : given_(given) {}
 
   NewCaseAnswer write() {
+    require_folder(given_.folder, "the case (DIR)");
     const fs::path file = given_.folder / "case.json";
     if (fs::exists(file)) {
       throw Error(file.string() + ": is there already; give another folder, or delete it");

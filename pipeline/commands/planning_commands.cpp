@@ -232,6 +232,7 @@ int run_case(const RunArguments& arguments) {
   const Case given = read_case(arguments.case_path, arguments.overrides);
   const fs::path output =
       arguments.output.empty() ? fs::path("wireplan-out") / given.name : fs::path(arguments.output);
+  require_folder(output, kResults);
 
   // The stages, each with a line in the log.
   const std::shared_ptr<spdlog::logger> log = make_log();
@@ -256,8 +257,9 @@ int run_case(const RunArguments& arguments) {
   for_each_section(given, options, [&](const Case& section, const RunOptions& own) {
     const std::string name = section_name(section);
     if (!name.empty()) log->info(name);
-    const RunResult result = run_stages(section, own);
     const fs::path folder = output / section_folder(section);
+    require_folder(folder, kResults);
+    const RunResult result = run_stages(section, own);
     publish(result.artifacts, folder);
     fs::remove(folder / kFirstPage);
     const fs::path look = folder / "slices.png";
@@ -301,6 +303,7 @@ int run_batch_command(const BatchArguments& arguments) {
   if (arguments.output.empty()) {
     throw Error("batch: no folder for batch.json and the results, expected --output DIR");
   }
+  require_folder(arguments.output, kResults);
   BatchRunOptions options{.output = arguments.output,
                           .cache = cache_folder(arguments.cache),
                           .threads = arguments.threads,

@@ -35,4 +35,7 @@ void add_bench(CLI::App& app, int& code);
 void add_cache_option(CLI::App& command, std::string& folder);
 std::filesystem::path cache_folder(const std::string& given);
 
+/// What a folder of --output is for, where it is refused (files/disk.h).
+inline constexpr const char* kResults = "the results (--output)";
+
 }  // namespace wireplan::pipeline

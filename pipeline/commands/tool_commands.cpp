@@ -9,6 +9,7 @@
 #include "pipeline/commands/scene_run.h"
 #include "pipeline/commands/subcommands.h"
 #include "pipeline/files/case_file.h"
+#include "pipeline/files/disk.h"
 #include "pipeline/files/phantom_file.h"
 #include "pipeline/files/text.h"
 #include "pipeline/report/compare.h"
@@ -100,6 +101,7 @@ int simulate_file(const std::string& path, const std::string& given_output) {
   const SceneFile scene = read_scene(path);
   const fs::path output =
       given_output.empty() ? fs::path("wireplan-out") / scene.name : fs::path(given_output);
+  require_folder(output, kResults);
   const SceneAnswer answer = run_scene_file(scene, output);
   const bool listed = scene.insertion && !scene.insertion->rolls.empty();
   std::cout << answer.line << "\n"
@@ -111,6 +113,7 @@ int simulate_file(const std::string& path, const std::string& given_output) {
 
 // Those of an overview's sections in folders named as theirs.
 int render_pictures(const fs::path& given, const fs::path& output, bool pdf) {
+  require_folder(output, kResults);
   for (const fs::path& report : reports_in(given)) {
     const fs::path folder =
         report == given ? output
@@ -123,12 +126,14 @@ int render_pictures(const fs::path& given, const fs::path& output, bool pdf) {
 
 int make_phantom_files(const std::string& path, const std::string& output) {
   const preprocess::PhantomSpec spec = read_phantom_spec(path);
+  require_folder(output, kResults);
   write_phantom(preprocess::make_phantom(spec), output);
   std::cout << "volume: " << (fs::path(output) / "ct.nrrd").string() << "\n";
   return kDone;
 }
 
 int make_patient_files(std::uint64_t seed, const std::string& output) {
+  require_folder(output, kResults);
   const preprocess::RandomPatient patient = preprocess::draw_patient(seed);
   write_patient(patient, output);
   std::string features;
@@ -159,7 +164,9 @@ int patient_count(const std::vector<std::string>& of) {
 }  // namespace
 
 fs::path cache_folder(const std::string& given) {
-  return given.empty() ? Store::default_root() : fs::path(given);
+  const fs::path folder = given.empty() ? Store::default_root() : fs::path(given);
+  require_no_file(folder, kCachePurpose);
+  return folder;
 }
 
 void add_cache_option(CLI::App& command, std::string& folder) {
@@ -365,6 +372,7 @@ void add_bench(CLI::App& app, int& code) {
     } else if (!arguments->of.empty()) {
       arguments->options.patients = patient_count(arguments->of);
     }
+    require_folder(arguments->output, kResults);
     run_bench(arguments->name, arguments->output, arguments->options);
     code = kDone;
   });

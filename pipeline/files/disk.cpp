@@ -32,7 +32,41 @@ int write_all(int file, std::string_view text) {
   return 0;
 }
 
+/// The folder, or what is there of those above it that it would be made in.
+fs::path find_there(const fs::path& folder, const std::string& purpose) {
+  for (fs::path place = fs::absolute(folder);; place = place.parent_path()) {
+    std::error_code refused;
+    const fs::file_status status = fs::status(place, refused),
+                          link = fs::symlink_status(place, refused);
+    const auto refuse = [&](const std::string& why) {
+      throw Error(folder.string() + ": " + why + ", expected a folder for " + purpose +
+                  "; give another, or move away what is there");
+    };
+    if (!fs::status_known(status)) refuse("cannot be reached (" + refused.message() + ")");
+    if (fs::is_symlink(link) && !fs::exists(status)) {
+      refuse(place.string() + " is a link that leads nowhere");
+    }
+    if (fs::is_directory(status) || !place.has_relative_path()) return place;
+    if (!fs::exists(status)) continue;
+    refuse(fs::equivalent(place, folder, refused)
+               ? std::string("is a file")
+               : "lies under " + place.string() + ", which is a file");
+  }
+}
+
 }  // namespace
+
+void require_no_file(const fs::path& folder, const std::string& purpose) {
+  find_there(folder, purpose);
+}
+
+void require_folder(const fs::path& folder, const std::string& purpose) {
+  const fs::path there = find_there(folder, purpose);
+  if (::access(there.c_str(), W_OK | X_OK) == 0) return;
+  throw Error(folder.string() + ": nothing may be written in " + there.string() + " (" +
+              std::strerror(errno) + "), expected a folder for " + purpose +
+              "; give another, or change its permissions");
+}
 
 std::string read_if_there(const fs::path& file) {
   std::ifstream stream(file, std::ios::binary);

@@ -25,6 +25,14 @@ void write_whole(std::string_view text, const std::filesystem::path& file,
 /// Brings a file or folder to the disk.
 void sync(const std::filesystem::path& path);
 
+/// Refuses a folder in whose place or way a file stands, or in which nothing may be written, before
+/// work is done that would be lost. `purpose` says what it is for and how another is given: "the
+/// results (--output)". Makes nothing. Throws `Error`, as who chose the folder can mend it.
+void require_folder(const std::filesystem::path& folder, const std::string& purpose);
+
+/// The same without asking whether something may be written: of a cache that may hold all.
+void require_no_file(const std::filesystem::path& folder, const std::string& purpose);
+
 /// A name in the same folder that no other process, of whatever machine, and no other call uses: so
 /// that a rename between the two is one step of the file system. It starts with kTemporaryPrefix.
 std::filesystem::path name_beside(const std::filesystem::path& place);

@@ -391,6 +391,7 @@ RunResult run_stages(const Case& given, const RunOptions& options,
 
     // Run it, unless another process just did; or in a dry run say so.
     if (!artifact && !options.dry_run) {
+      require_folder(store.root(), kCachePurpose);
       const std::optional<FileLock> lock = store.lock(stage.name, text, options.work.cancelled);
       if (!lock) throw Interrupted();
       if (forced) store.forget(stage.name, text);

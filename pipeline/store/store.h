@@ -14,6 +14,9 @@
 
 namespace wireplan::pipeline {
 
+/// What the store's folder is for, where it is refused (files/disk.h).
+inline constexpr const char* kCachePurpose = "the cache (--cache, or XDG_CACHE_HOME)";
+
 /// One thing that a key depends on: "parameter wall.thickness_mm", "1.0".
 struct KeyLine {
   std::string name, value;

@@ -185,5 +185,33 @@ TEST_F(CacheTest, CommandsTellWhatTheyFindAndDo) {
   EXPECT_EQ(run_program(folder_.path(), "cache").code, 2);
 }
 
+TEST(OutputFolders, InWhoseWayAFileStandsAreRefusedBeforeAnyWork) {
+  const TemporaryFolder folder;
+  write_tube_case(folder.path());
+  write_text("mine", folder / "taken");
+  fs::create_symlink("nowhere", folder / "dangling");
+  const std::string scene = std::string(WIREPLAN_SOURCE_DIR) + "/cases/cantilever/scene.json";
+  for (const std::string& command :
+       {std::string("run case.json -o "), std::string("report case.json -o "),
+        std::string("batch case.json -o "), "simulate " + scene + " -o ",
+        std::string("phantom --random 1 -o "), std::string("render report.json -o "),
+        std::string("bench accuracy --quick -o "), std::string("new --volume ct.nrrd "),
+        std::string("run case.json --cache "), std::string("trials case.json --shard 1/2 --cache "),
+        std::string("status case.json --cache "), std::string("cache list --cache ")}) {
+    for (const auto& [place, why] :
+         {std::pair("taken", "taken: is a file, expected a folder for "),
+          std::pair("taken/deep/er", "taken, which is a file, expected a folder for "),
+          std::pair("dangling", "is a link that leads nowhere, expected a folder for ")}) {
+      const Answer answer = run_program(folder.path(), command + place);
+      EXPECT_EQ(answer.code, 2) << command << place << "\n" << answer.log;
+      EXPECT_NE(answer.log.find(why), std::string::npos) << command << place << "\n" << answer.log;
+      EXPECT_EQ(answer.out, "") << command << place;
+    }
+  }
+  EXPECT_EQ(read_text(folder / "taken"), "mine");
+  EXPECT_FALSE(fs::exists(folder / "cache"));
+  EXPECT_FALSE(fs::exists(folder / "nowhere"));
+}
+
 }  // namespace
 }  // namespace wireplan::pipeline
