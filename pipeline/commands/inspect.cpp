@@ -20,7 +20,7 @@ void add_inspect(CLI::App& app, int& code) {
   command->add_flag("--json", arguments->as_json, "As JSON (wireplan.inspect/1)");
   command->footer(
       "Series, sizes, units, orientation, labels, extents; and why a case would refuse it.\n"
-      "Never who the patient is. Exits 2 where nothing can be told.\n"
+      "Never who the patient is. Exits 2 where a case refuses it, or nothing can be told.\n"
       "Example: wireplan inspect cases/abdomen/data/ct.nrrd");
   command->callback([&code, arguments] {
     const Json told = inspect(arguments->path);
@@ -28,7 +28,7 @@ void add_inspect(CLI::App& app, int& code) {
     std::cout << (arguments->as_json
                       ? told.dump(2, ' ', false, Json::error_handler_t::replace) + "\n"
                       : inspect_text(told));
-    code = kDone;
+    code = is_refused(told) ? kBadInput : kDone;
   });
 }
 

@@ -15,7 +15,11 @@ inline constexpr const char* kInspectSchema = "wireplan.inspect/1";
 /// the images were made.
 Json inspect(const std::filesystem::path& path);
 
-/// The same as lines of text.
+/// Whether a case refuses it whatever it says: not where it has to name one of several series, of
+/// which one is a volume.
+bool is_refused(const Json& told);
+
+/// What was told as lines of text, a refusal first.
 std::string inspect_text(const Json& told);
 
 }  // namespace wireplan::pipeline

@@ -8,6 +8,7 @@
 
 #include "pipeline/files/text.h"
 #include "pipeline/report/inspect.h"
+#include "preprocess/volume/describe.h"
 
 namespace wireplan::pipeline {
 namespace {
@@ -191,6 +192,17 @@ Lines surface_lines(const Json& surface) {
   return lines;
 }
 
+/// Why a case refuses it; empty where it does not.
+std::string refusal_text(const Json& told) {
+  if (!told.contains("refused")) return {};
+  const bool segments = told.contains("segments");
+  const char* start = segments           ? "as its volume a case refuses it: "
+                      : is_refused(told) ? "a case refuses it: "
+                                         : "a case refuses it as long as it names no series: ";
+  return start + told["refused"].get<std::string>() +
+         (segments ? "; its segments may be a case's labels" : "") + "\n";
+}
+
 std::string columns(const Lines& lines) {
   std::string text;
   for (const auto& [about, says] : lines) {
@@ -203,19 +215,26 @@ std::string columns(const Lines& lines) {
 
 }  // namespace
 
+bool is_refused(const Json& told) {
+  if (!told.contains("refused")) return false;
+  const std::string why = told["refused"];
+  const Json series = told.value("series", Json::array());
+  return why.find(preprocess::kSeveralSeries) == std::string::npos ||
+         std::all_of(series.begin(), series.end(),
+                     [](const Json& one) { return one.contains("problem"); });
+}
+
 std::string inspect_text(const Json& told) {
   const std::string kind = told["kind"];
+  const Json series = told.value("series", Json::array());
   std::string text = told["path"].get<std::string>() + ": " + told["format"].get<std::string>();
-  if (kind == "dicom") {
-    const Json series = told.value("series", Json::array());
-    text += ", " + std::to_string(series.size()) + " series\n";
-    for (const Json& one : series) text += series_text(one, series);
-  } else {
-    text += told["format"] == "folder" ? " of labels, one file per class\n"
-            : kind == "labels"         ? ", a volume of labels\n"
-            : kind == "image"          ? ", a volume\n"
+  text += kind == "dicom"              ? ", " + std::to_string(series.size()) + " series\n"
+          : told["format"] == "folder" ? " of labels, one file per class\n"
+          : kind == "labels"           ? ", a volume of labels\n"
+          : kind == "image"            ? ", a volume\n"
                                        : " surface\n";
-  }
+  text += refusal_text(told);  // before all that it holds
+  for (const Json& one : series) text += series_text(one, series);
   if (told.contains("volume")) text += columns(volume_lines(told));
   if (told.contains("labels")) text += labels_text(told["labels"]);
   if (told.contains("other_volumes")) {
@@ -232,12 +251,6 @@ std::string inspect_text(const Json& told) {
   for (const Json& remark : told.value("remarks", Json::array()))
     text += columns({{"note", remark}});
   if (told.contains("surface")) text += columns(surface_lines(told["surface"]));
-  if (told.contains("refused")) {
-    const bool segments = told.contains("segments");
-    text += (segments ? "as its volume a case refuses it: " : "a case refuses it: ") +
-            told["refused"].get<std::string>() +
-            (segments ? "; its segments may be a case's labels" : "") + "\n";
-  }
   return text;
 }
 

@@ -55,6 +55,9 @@ struct LabelDescription {
   std::size_t voxels = 0;
 };
 
+/// Behind their number, where a folder is refused as long as none of its series is named.
+inline constexpr const char* kSeveralSeries = " DICOM series, expected one";
+
 struct VolumeDescription {
   VolumeHeader header;                    // of a file; format "DICOM" alone of a folder
   std::vector<SeriesDescription> series;  // of a DICOM folder or file

@@ -142,12 +142,9 @@ Error several_series(const fs::path& folder, const std::string& wanted, std::vec
   std::stable_sort(all.begin(), all.end(),
                    [](const Series& a, const Series& b) { return a.size() > b.size(); });
   std::ostringstream text;
-  text << folder.string() << ": " << all.size() << " DICOM series, ";
-  if (wanted.empty()) {
-    text << "expected one:";
-  } else {
-    text << "expected one of the number or description \"" << wanted << "\":";
-  }
+  text << folder.string() << ": " << all.size() << kSeveralSeries;
+  if (!wanted.empty()) text << " of the number or description \"" << wanted << "\"";
+  text << ":";
   for (const Series& series : all) {
     const Slice& first = series.front();
     text << " number " << (first.shown_number.empty() ? "unknown" : first.shown_number);

@@ -1,6 +1,8 @@
 // `wireplan inspect`: what a file or folder holds, as text and JSON, and never whose it is.
 #include <gtest/gtest.h>
 
+#include <algorithm>
+
 #include "pipeline/report/inspect.h"
 #include "preprocess/volume/image.h"
 #include "tests/dicom.h"
@@ -121,7 +123,7 @@ TEST_F(Inspect, NobodyIsNamed) {
   // and by the program, with its log
   for (const char* arguments : {"inspect ct", "inspect ct --json", "inspect ct/0-0"}) {
     const Answer answer = run_program(folder_.path(), arguments);
-    EXPECT_EQ(answer.code, 0) << answer.log;
+    EXPECT_EQ(answer.code, holds(arguments, "0-0") ? 2 : 0) << answer.log;
     expect_nobody(answer.out + answer.log);
   }
 }
@@ -357,7 +359,7 @@ TEST_F(Inspect, WhatCannotBeToldIsOneErrorOfExitCodeTwo) {
   const std::vector<std::pair<std::string, std::string>> expected = {
       {"missing", "missing: no such file or folder; expected a folder of DICOM files"},
       {"notes.txt", "notes.txt: not a file that wireplan reads; expected a folder of DICOM files"},
-      {"broken.nii.gz", "not a NIfTI image, or damaged"},
+      {"broken.nii.gz", "not a NIfTI image: it is text of another kind"},
       {"broken.stl", "broken.stl"},
       {"labels", "it holds other files that are read one by one: 2 .nii.gz"}};
   for (const auto& [name, words] : expected) {
@@ -366,6 +368,27 @@ TEST_F(Inspect, WhatCannotBeToldIsOneErrorOfExitCodeTwo) {
     EXPECT_EQ(answer.out, "");
     EXPECT_TRUE(holds(answer.log, words)) << answer.log;
   }
+}
+
+TEST_F(Inspect, WhatACaseRefusesIsToldFirstAndEndsWithTwo) {
+  write("cut.nii", preprocess::nifti({}).substr(0, 360));
+  write("ct.nii", preprocess::nifti({}));
+  write_series("one", {}, 6);
+  write("one/bad", dicom_files::dicom({}).substr(0, 400));
+  write_series("two", {}, 6);
+  write_series("two", {.series = "1.2.3.6", .number = "4"}, 6);
+  for (const char* name : {"cut.nii", "one"}) {
+    const Answer answer = run_program(folder_.path(), std::string("inspect ") + name);
+    EXPECT_EQ(answer.code, 2) << answer.log;
+    const std::size_t second = answer.out.find('\n') + 1;
+    EXPECT_TRUE(answer.out.substr(second).starts_with("a case refuses it: ")) << answer.out;
+    EXPECT_GT(std::count(answer.out.begin(), answer.out.end(), '\n'), 3) << answer.out;
+  }
+  EXPECT_EQ(run_program(folder_.path(), "inspect ct.nii").code, 0);
+  // A choice that a case can make.
+  const Answer several = run_program(folder_.path(), "inspect two");
+  EXPECT_EQ(several.code, 0) << several.out;
+  EXPECT_TRUE(holds(several.out, "as long as it names no series: 2 DICOM series")) << several.out;
 }
 
 TEST_F(Inspect, ItsJsonKeepsToTheSchema) {
