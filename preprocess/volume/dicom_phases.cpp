@@ -134,9 +134,8 @@ void read_phase(const gdcm::DataSet& data, const std::vector<gdcm::Tag>& pointer
   });
 }
 
-std::string find_phases(
-    const std::vector<const DicomPhase*>& images, const std::vector<std::size_t>& order,
-    const std::function<std::string(const std::vector<std::size_t>& some)>& tell) {
+DicomParts find_parts(const std::vector<const DicomPhase*>& images,
+                      const std::vector<std::size_t>& order) {
   DicomPhase all;
   for (const DicomPhase* image : images) all.insert(image->begin(), image->end());
   for (const bool may_follow : {false, true}) {  // what parts them in any order first
@@ -144,18 +143,12 @@ std::string find_phases(
       const Parting& parting = parting_of(name);
       if (parting.may_follow != may_follow) continue;
       const std::vector<std::string> values = values_of(images, order, name);
-      const std::vector<std::vector<std::size_t>> parts = parts_of(values);
+      std::vector<std::vector<std::size_t>> parts = parts_of(values);
       if (parts.size() == 1 || parts.size() == images.size()) continue;
       if (may_follow && count_changes(values, order) == parts.size() - 1) continue;
-      std::string told = std::to_string(parts.size()) + " " + parting.parts + " (" + name + ")" +
-                         (may_follow ? " that lie between one another" : "") + ", expected one:";
-      constexpr std::size_t kShown = 4;
-      for (std::size_t k = 0; k < std::min(kShown, parts.size()); ++k) {
-        told += (k == 0 ? " " : "; ") + tell(parts[k]);
-      }
-      return told + (parts.size() > kShown
-                         ? "; and " + std::to_string(parts.size() - kShown) + " more"
-                         : "");
+      return {.what = std::to_string(parts.size()) + " " + parting.parts + " (" + name + ")" +
+                      (may_follow ? " that lie between one another" : ""),
+              .images = std::move(parts)};
     }
   }
   return {};

@@ -2,7 +2,6 @@
 /// Whether images are of one stack, phase and acquisition: put half a step apart, two of them look
 /// as one volume of thinner slices; for the .cpp files here.
 #include <cstddef>
-#include <functional>
 #include <map>
 #include <string>
 #include <vector>
@@ -22,11 +21,16 @@ void read_phase(const gdcm::DataSet& data, const std::vector<gdcm::Tag>& pointer
 /// What the dimension indices of a file's frames are of, in their order.
 std::vector<gdcm::Tag> read_dimensions(const gdcm::DataSet& data);
 
-/// Of which stacks, phases or acquisitions these images are: empty where they are of one, where
+/// Images of several stacks, phases or acquisitions.
+struct DicomParts {
+  std::string what;  // "2 acquisitions (Acquisition Number (0020,0012)) that lie ..."
+  std::vector<std::vector<std::size_t>> images;  // of each; none where all are of one
+};
+
+/// Of which stacks, phases or acquisitions these images are: of none where they are of one, where
 /// each is of its own, or where they are of acquisitions one behind the other in this `order` along
-/// their normal, as a scan of several parts is. `tell` names some of the images.
-std::string find_phases(
-    const std::vector<const DicomPhase*>& images, const std::vector<std::size_t>& order,
-    const std::function<std::string(const std::vector<std::size_t>& some)>& tell);
+/// their normal, as a scan of several parts is.
+DicomParts find_parts(const std::vector<const DicomPhase*>& images,
+                      const std::vector<std::size_t>& order);
 
 }  // namespace wireplan::preprocess

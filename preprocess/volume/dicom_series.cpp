@@ -3,6 +3,7 @@
 #include <Eigen/Eigenvalues>  // before ITK, which would bring in its own older copy
 #include <algorithm>
 #include <cmath>
+#include <cstdlib>
 #include <string>
 #include <utility>
 #include <vector>
@@ -125,7 +126,13 @@ Series find_wanted(const fs::path& path, const std::string& wanted, const At& at
     throw Error(path.string() + ": " + kind_of(look_at_dicom(path)).name + " without an image; " +
                 kFormats);
   }
-  Series slices = choose_series(path, wanted, std::move(all));
+  // "#1f3a90c2.2" is the second part of a series.
+  const std::size_t point = wanted.starts_with("#") ? wanted.find('.') : std::string::npos;
+  Series slices = choose_series(path, wanted.substr(0, point), std::move(all));
+  if (point != std::string::npos) {
+    const int part = std::atoi(wanted.c_str() + point + 1);
+    keep_part(slices, static_cast<std::size_t>(std::max(0, part)), wanted, path);
+  }
   if (!fs::is_directory(path) && !is_enhanced(slices)) {
     throw Error(path.string() +
                 ": a single DICOM file; give the folder that holds the whole series");

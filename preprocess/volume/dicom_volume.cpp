@@ -110,17 +110,29 @@ std::string find_copies(const Series& series, const std::vector<std::size_t>& or
   return {};
 }
 
-/// Why images are of several phases; empty where they are of one.
-std::string find_several(const Images& images, const std::vector<std::size_t>& order,
-                         const fs::path& folder) {
+DicomParts parts_of_images(const Images& images, const std::vector<std::size_t>& order) {
   std::vector<const DicomPhase*> phases;
   for (std::size_t k = 0; k < images.count(); ++k) phases.push_back(&images[k].phase);
-  const std::string found = find_phases(
-      phases, order, [&](const std::vector<std::size_t>& some) { return images.shown(some); });
-  if (found.empty()) return {};
-  return folder.string() + ": images of " + found + "; " +
-         (images.are_frames() ? "export the one to plan on as a series of its own"
-                              : "put the files of the one to plan on into a folder of their own");
+  return find_parts(phases, order);
+}
+
+/// Why images are of several phases; empty where they are of one.
+std::string find_several(const Series& series, const Images& images,
+                         const std::vector<std::size_t>& order, const fs::path& folder) {
+  constexpr std::size_t kShown = 4;
+  const DicomParts parts = parts_of_images(images, order);
+  const std::size_t count = parts.images.size();
+  if (count == 0) return {};
+  std::string told = folder.string() + ": images of " + parts.what + ", expected one:";
+  for (std::size_t k = 0; k < std::min(kShown, count); ++k) {
+    told += (k == 0 ? " " : "; ") + images.shown(parts.images[k]);
+  }
+  if (count > kShown) told += "; and " + std::to_string(count - kShown) + " more";
+  if (images.are_frames()) return told + "; export the one to plan on as a series of its own";
+  const std::string key = key_of(series);
+  return told + "; name the one to plan on by \"series\" in the case's volume, from \"" + key +
+         ".1\" for the first of these to \"" + key + "." + std::to_string(count) +
+         "\", or put the files of the one to plan on into a folder of their own";
 }
 
 /// Why images are slabs that are much thicker than they are apart, as projections are; empty where
@@ -191,6 +203,25 @@ std::string find_unscaled(const Series& series, const Images& images, const fs::
 
 }  // namespace
 
+void keep_part(Series& series, std::size_t part, const std::string& wanted,
+               const fs::path& folder) {
+  const Images images(series);
+  DicomParts parts;
+  if (!images.are_frames()) {
+    parts = parts_of_images(images, stack(origins_of(series), series.front().grid).order);
+  }
+  if (part < 1 || part > parts.images.size()) {
+    throw Error(folder.string() + ": \"series\" is \"" + wanted + "\", expected a part from 1 to " +
+                std::to_string(parts.images.size()) +
+                (parts.images.empty() ? " (its images are of one acquisition); leave \".\" and "
+                                        "what is behind it out"
+                                      : " behind the point"));
+  }
+  Series kept;
+  for (const std::size_t k : parts.images[part - 1]) kept.push_back(std::move(series[k]));
+  series = std::move(kept);
+}
+
 Stack stack_series(const Series& series, const fs::path& folder, const At& at) {
   const Slice& first = series.front();
   const Images images(series);
@@ -202,7 +233,8 @@ Stack stack_series(const Series& series, const fs::path& folder, const At& at) {
   }
   const std::string uneven = stacked.problem;
   stacked.problem = find_copies(series, stacked.order);
-  if (stacked.problem.empty()) stacked.problem = find_several(images, stacked.order, folder);
+  if (stacked.problem.empty())
+    stacked.problem = find_several(series, images, stacked.order, folder);
   if (stacked.problem.empty() && !uneven.empty()) {
     const std::vector<std::size_t>& some = stacked.images;
     stacked.problem = some.size() == 1 ? images.place_of(some.front()) : folder.string() + ": ";

@@ -14,4 +14,9 @@ namespace wireplan::preprocess {
 /// `Error` where frames have no common grid.
 Stack stack_series(const Series& series, const std::filesystem::path& folder, const At& at);
 
+/// Leaves the images of one acquisition or phase of several, counted from 1 as the refusal of them
+/// all has them. Throws `Error` where there is none of that number.
+void keep_part(Series& series, std::size_t part, const std::string& wanted,
+               const std::filesystem::path& folder);
+
 }  // namespace wireplan::preprocess

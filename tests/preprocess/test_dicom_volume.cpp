@@ -184,6 +184,18 @@ TEST_F(DicomVolume, TwoAcquisitionsOfOneSeriesBetweenOneAnotherAreRefusedWithThe
        "expected one: 4 slices (",
        "3_2 and 2 more); 4 slices (", "3_1, ",
        "put the files of the one to plan on into a folder of their own"});
+  // One of them can be chosen by the key that the refusal gives.
+  const std::string error = read_error(folder_), key = error.substr(error.find("\"#") + 1, 9);
+  for (const int part : {1, 2}) {
+    const Image image = read_image(folder_, key + "." + std::to_string(part));
+    EXPECT_EQ(image.grid.size[2], 4);
+    EXPECT_EQ(image.grid.spacing[2], 3.0);
+    EXPECT_EQ(image.values.front(), static_cast<float>(10 * (part - 1)));
+  }
+  for (const char* none : {".3", ".0", ".x"}) {
+    EXPECT_TRUE(
+        has(error_of([&] { read_image(folder_, key + none); }), "expected a part from 1 to 2"));
+  }
   write_told(0x20, 0x100, "IS", [](int k) { return std::to_string(1 + k % 2); });
   expect_refused({"2 temporal positions (Temporal Position Identifier (0020,0100)), expected one"});
   write_told(0x20, 0x100, "IS", [](int k) { return std::to_string(1 + k / 4); });
