@@ -14,6 +14,7 @@
 
 #include "pipeline/files/case_file.h"
 #include "preprocess/segment/label_places.h"
+#include "preprocess/volume/identity.h"
 
 namespace wireplan::pipeline {
 namespace {
@@ -48,14 +49,16 @@ bool is_number(const std::string& text) {
   return !text.empty() && *end == '\0';
 }
 
-void add_name(std::map<int, std::string>& table, int value, const std::string& name,
+void add_name(std::map<int, std::string>& table, int value, const std::string& given,
               const fs::path& path) {
   try {
-    static_cast<void>(Json(name).dump());
+    static_cast<void>(Json(given).dump());
   } catch (const Json::exception&) {
     throw Error(path.string() + ": the name of value " + std::to_string(value) +
                 " is no UTF-8; save the table as UTF-8");
   }
+  const std::string name = preprocess::without_person(given);
+  if (name.empty()) return;
   const auto [place, is_new] = table.emplace(value, name);
   if (is_new || place->second == name) return;
   throw Error(path.string() + ": value " + std::to_string(value) + " is named \"" + place->second +
@@ -68,12 +71,21 @@ class NoTable : public Error {
   using Error::Error;
 };
 
+/// Takes names out that hold what else of the file is told of the patient, or nothing.
+void hide_patient(std::map<int, std::string>& table, std::vector<std::string> tags) {
+  std::erase(tags, "");
+  for (auto& [value, name] : table) name = preprocess::without_identity(name, tags);
+  std::erase_if(table, [](const auto& one) { return one.second.empty(); });
+}
+
 std::map<int, std::string> table_of_json(const std::string& text, const fs::path& path) {
   const Json file = parse_plain_json(text, path.string());
   if (!file.is_object()) throw NoTable(path.string() + ": no JSON object; " + kTables);
   const bool labels = file.contains("labels") && file.at("labels").is_object();
   std::map<int, std::string> table;
+  int entry = 0;
   for (const auto& [key, given] : (labels ? file.at("labels") : file).items()) {
+    ++entry;
     // A region of nnU-Net is a union of classes, and one only where it has one.
     if (given.is_array() && given.size() != 1) continue;
     const Json& value = given.is_array() ? given.front() : given;
@@ -84,14 +96,24 @@ std::map<int, std::string> table_of_json(const std::string& text, const fs::path
                value.get<std::int64_t>() <= kLargestValue) {
       add_name(table, value.get<int>(), key, path);
     } else {
-      // What is inside may be long, or tell who somebody is.
+      // What is inside may be long, or tell who somebody is; so may a key of something else.
       const std::string told = value.is_number() ? value.dump() : std::string(value.type_name());
-      const std::string what = path.string() + ": its \"" + (labels ? "labels." : "") + key +
-                               "\" is " + told + ", no whole number from 0; " + kTables;
+      const std::string shown = labels ? preprocess::without_person(key) : "";
+      const std::string what =
+          path.string() + ": its " +
+          (!shown.empty() ? "\"labels." + shown + "\""
+                          : (labels ? "labels, entry " : "entry ") + std::to_string(entry)) +
+          " is " + told + ", no whole number from 0; " + kTables;
       if (labels) throw Error(what);
       throw NoTable(what);
     }
   }
+  std::vector<std::string> tags;
+  for (const auto& [key, value] : file.items()) {
+    if (value.is_string())
+      tags.push_back(preprocess::told_of_patient(key + ":" + value.get<std::string>()));
+  }
+  hide_patient(table, tags);
   return table;
 }
 
@@ -241,10 +263,14 @@ std::map<int, std::string> table_of_lines(std::string text, const fs::path& path
   std::istringstream stream(text);
   std::vector<std::string> lines;  // with their numbers
   std::vector<int> numbers;
+  std::vector<std::string> tags;
   int number = 0;
   for (std::string line; std::getline(stream, line);) {
     ++number;
     const std::size_t first = line.find_first_not_of(" \t\r,;");
+    if (first != std::string::npos && line[first] == '#') {
+      tags.push_back(preprocess::told_of_patient(line));
+    }
     if (first == std::string::npos || line[first] == '#') continue;
     lines.push_back(line);
     numbers.push_back(number);
@@ -269,6 +295,7 @@ std::map<int, std::string> table_of_lines(std::string text, const fs::path& path
     }
     add_name(table, *row.value, row.name, path);
   }
+  hide_patient(table, tags);
   return table;
 }
 
@@ -302,7 +329,7 @@ std::vector<int> read_values(JsonReader& reader) {
   return values;
 }
 
-std::vector<std::string> read_names(JsonReader& reader) {
+std::vector<std::string> read_names(JsonReader& reader, bool of_files) {
   std::vector<std::string> names;
   if (!reader.has("names")) return names;
   const Json& list = reader.raw("names");
@@ -314,7 +341,9 @@ std::vector<std::string> read_names(JsonReader& reader) {
   std::set<std::string> taken;
   for (std::size_t k = 0; k < list.size(); ++k) {
     const std::string key = reader.path_of("names") + "[" + std::to_string(k) + "]";
-    const std::string name = list[k].is_string() ? list[k].get<std::string>() : "";
+    std::string name = list[k].is_string() ? list[k].get<std::string>() : "";
+    if (const auto shown = preprocess::without_person(name); !of_files && !shown.empty())
+      name = shown;
     if (name.empty() || name.find_first_of("/\\") != std::string::npos) {
       reader.problems().add(key, list[k].dump(), "the name of a class, a text without '/'");
     } else if (!taken.insert(name).second) {
@@ -355,7 +384,7 @@ struct NamedLumen {
 Json find_named_point(JsonReader& reader, const NamedLumen& lumen) {
   Problems& problems = reader.problems();
   const std::size_t before = problems.count();
-  const std::string name = reader.text("branch", std::nullopt);
+  const std::string name = preprocess::without_person(reader.text("branch", std::nullopt));
   std::vector<std::string> names;
   for (const preprocess::LabelClass& one : lumen.classes) names.push_back(one.name);
   const auto found = std::find(names.begin(), names.end(), name);
@@ -496,7 +525,7 @@ LabelsInput read_labels_input(JsonReader reader, const fs::path& folder) {
   expect_exists(reader, "path", labels.given, labels.path,
                 "a volume of labels or a folder with one file per class");
   labels.choice.values = read_values(reader);
-  labels.choice.names = read_names(reader);
+  labels.choice.names = read_names(reader, fs::is_directory(labels.path));
   const std::size_t values = labels.choice.values.size(), names = labels.choice.names.size();
   if (values > 0 && names > 0 && values != names) {
     reader.problems().add(reader.path_of("names"), std::to_string(names) + " names",

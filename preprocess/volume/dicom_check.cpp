@@ -306,7 +306,8 @@ DicomLook look_at_dicom(const std::filesystem::path& path) {
 }
 
 bool is_segmentation(const std::string& sop_class) {
-  return sop_class.starts_with(std::string(kOfImages) + "66.");
+  const std::string_view uid = sop_class;
+  return uid.starts_with(kOfImages) && uid.substr(kOfImages.size()).starts_with("66.");
 }
 
 DicomKind kind_of(const DicomLook& look) {

@@ -4,6 +4,7 @@
 #include <array>
 #include <cctype>
 #include <cstddef>
+#include <set>
 #include <sstream>
 
 namespace wireplan::preprocess {
@@ -182,6 +183,59 @@ std::string without_identity(const std::string& text, const std::vector<std::str
     }
   }
   return text;
+}
+
+std::string without_person(const std::string& name) {
+  constexpr std::size_t kManyInWord = 5, kMany = 6;  // digits
+  static const std::set<std::string> kOfPatient = {"patient", "pat",       "mrn",   "dob",
+                                                   "born",    "birthdate", "birth", "accession"};
+  if (name.find('^') != std::string::npos) return {};
+  const auto digits_of = [](const std::string& text) {
+    return only(text, std::isdigit, '\0').size();
+  };
+  const std::vector<std::string> runs = runs_of(name);
+  const bool month = std::any_of(runs.begin(), runs.end(),
+                                 [](const std::string& run) { return month_of(run) > 0; });
+  const bool many =
+      digits_of(name) >= kMany || (month && digits_of_named_date(runs).size() >= kMany);
+  std::string kept, word;
+  bool changed = false;
+  for (std::size_t k = 0; k <= name.size(); ++k) {
+    const bool parts = k == name.size() || name[k] == ' ' || name[k] == '_' || name[k] == '\t';
+    word += k < name.size() ? std::string(1, name[k]) : "";
+    if (!parts) continue;
+    const std::vector<std::string> of_word = runs_of(word);
+    const auto is_of_patient = [](const std::string& run) { return kOfPatient.count(run) > 0; };
+    if (std::any_of(of_word.begin(), of_word.end(), is_of_patient)) {
+      changed = true;
+      break;
+    }
+    const bool dated = month && many && of_word.size() == 1 && month_of(of_word[0]) > 0;
+    const std::size_t digits = digits_of(word);
+    if (digits >= kManyInWord || (many && digits > 0) || dated) {
+      changed = true;
+    } else {
+      kept += word;
+    }
+    word.clear();
+  }
+  if (!changed) return name;
+  const std::string marks = " _\t-,;:()[]/";
+  const std::size_t first = kept.find_first_not_of(marks), last = kept.find_last_not_of(marks);
+  return first == std::string::npos ? "" : kept.substr(first, last - first + 1);
+}
+
+std::string told_of_patient(const std::string& line) {
+  const std::size_t mark = line.find_first_of(":=");
+  if (mark == std::string::npos) return {};
+  const std::string key = only(line.substr(0, mark), std::isalnum, '\0');
+  const std::array<const char*, 8> words = {"patient", "birth",     "mrn",     "accession",
+                                            "00100",   "studydate", "studyid", "referring"};
+  const auto is_in_key = [&](const char* word) { return key.find(word) != std::string::npos; };
+  if (std::none_of(words.begin(), words.end(), is_in_key)) return {};
+  const std::size_t first = line.find_first_not_of(":= \t\"'", mark);
+  if (first == std::string::npos) return {};
+  return line.substr(first, line.find_last_not_of(" \t\r\"',") - first + 1);
 }
 
 std::string without_date(const std::string& number) {

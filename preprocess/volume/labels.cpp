@@ -128,8 +128,10 @@ std::vector<Known> known_classes(const VolumeHeader& told, const LabelChoice& ch
     const bool old = segment.value == 0;
     const auto renamed = choice.table.find(segment.value);
     const bool other = choice.table_wins && renamed != choice.table.end();
-    known.push_back({.name = other ? renamed->second : segment.name,
-                     .value = old ? 1 : segment.value,
+    const int value = old ? 1 : segment.value;
+    const std::string own = segment.name.empty() ? "label " + std::to_string(value) : segment.name;
+    known.push_back({.name = other ? renamed->second : own,
+                     .value = value,
                      .layer = old ? k : static_cast<std::size_t>(std::max(0, segment.layer))});
   }
   if (!known.empty()) return known;

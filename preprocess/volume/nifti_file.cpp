@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "preprocess/volume/byte_stream.h"
+#include "preprocess/volume/identity.h"
 #include "preprocess/volume/volume_file.h"
 
 namespace wireplan::preprocess {
@@ -488,6 +489,8 @@ std::map<int, std::string> names_in(const std::string& extensions, const fs::pat
     require_utf8(names[value], "the name of label " + std::to_string(value), path);
   }
   names.erase(0);  // what is around
+  for (auto& [value, name] : names) name = without_person(name);
+  std::erase_if(names, [](const auto& one) { return one.second.empty(); });
   return names;
 }
 

@@ -16,6 +16,7 @@
 #include <sstream>
 
 #include "itkNrrdImageIO.h"
+#include "preprocess/volume/identity.h"
 #include "preprocess/volume/itk_image.h"
 #include "preprocess/volume/nrrd_fields.h"
 
@@ -265,7 +266,9 @@ std::vector<NamedSegment> nrrd_segments(const fs::path& path) {
   std::ifstream file(path, std::ios::binary);
   constexpr std::size_t kLongest = 100000;  // lines
   std::string line;
+  std::vector<std::string> tags;  // of the patient
   for (std::size_t k = 0; k < kLongest && std::getline(file, line) && !trimmed(line).empty(); ++k) {
+    if (std::string told = told_of_patient(line); !told.empty()) tags.push_back(std::move(told));
     int number = 0, read = 0;
     if (std::sscanf(line.c_str(), "Segment%6d_%n", &number, &read) != 1 || read == 0) continue;
     const std::string field = trimmed(line.substr(static_cast<std::size_t>(read)));
@@ -282,7 +285,10 @@ std::vector<NamedSegment> nrrd_segments(const fs::path& path) {
     if (const auto layer = value_of("Layer")) segments[number].layer = std::atoi(layer->c_str());
   }
   std::vector<NamedSegment> result;
-  for (const auto& [number, segment] : segments) result.push_back(segment);
+  for (auto& [number, segment] : segments) {
+    segment.name = without_person(without_identity(segment.name, tags));
+    result.push_back(segment);
+  }
   return result;
 }
 

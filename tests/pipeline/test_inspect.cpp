@@ -128,6 +128,30 @@ TEST_F(Inspect, NobodyIsNamed) {
   }
 }
 
+TEST_F(Inspect, NobodyIsNamedByClassesOrTheirTables) {
+  const std::string header =
+      "DICOM.PatientName:=LOVELACE^AUGUSTA\n# Patient ID: PATIENT-4711\n"
+      "Segment0_LabelValue:=1\nSegment0_Name:=aorta 1954-03-21\n"
+      "Segment1_LabelValue:=2\nSegment1_Name:=Augusta renal\n";
+  write("l.seg.nrrd", label_nrrd(header));
+  write("t.nrrd", label_nrrd(""));
+  write("t.csv", "# Patient name: Lovelace, Augusta\n1,aorta 19540321\n2,renal LOVELACE\n");
+  write("j.nrrd", label_nrrd(""));
+  write("j.json", R"({"patient_name": "LOVELACE^AUGUSTA",
+                      "labels": {"aorta 21.03.1954": 1, "LOVELACE^AUGUSTA": 2}})");
+  write("b.nrrd", label_nrrd(""));
+  write("b.json", R"({"labels": {"aorta": 1}, "LOVELACE^AUGUSTA": {"PATIENT-4711": [1954}})");
+  for (const char* name : {"l.seg.nrrd", "t.nrrd", "j.nrrd", "b.nrrd"}) {
+    const Json told = inspect(folder_ / name);
+    EXPECT_EQ(told["kind"], "labels");
+    expect_nobody(told.dump());
+    expect_nobody(inspect_text(told));
+    EXPECT_TRUE(told["labels"][1]["name"].is_null() || told["labels"][1]["name"] == "") << told;
+    const bool named = told["labels"][0]["name"] == "aorta";
+    EXPECT_EQ(named, std::string(name) != "b.nrrd") << told;
+  }
+}
+
 TEST_F(Inspect, ANumberThatMayBeADateAndNamesOfFilesAreNotShown) {
   write_series("ct", {.number = "19540321"}, 6);  // in the names of its files too
   const Json whole = inspect(folder_ / "ct");

@@ -50,7 +50,7 @@ TEST_F(LabelTable, ThatIsNoneIsRefused) {
     return message_of([&] { read_label_table(write(name, text)); });
   };
   expect_mentions(refusal("a.json", "[1]"), {"a.json: no JSON object"});
-  expect_mentions(refusal("b.json", R"({"a": 0.5})"), {"\"a\" is 0.5"});
+  expect_mentions(refusal("b.json", R"({"a": 0.5})"), {"its entry 1 is 0.5"});
   const std::string deep = std::string(200000, '[') + std::string(200000, ']');
   expect_mentions(refusal("deep.json", R"({"a": {"b": )" + deep + "}}"),
                   {"deep.json: nested deeper"});
