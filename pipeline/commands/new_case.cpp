@@ -340,7 +340,7 @@ void add_new(CLI::App& app, int& code) {
   command->add_option("--series", given->series,
                       "Of a DICOM folder, by number, description or key");
   command->add_option("--markups", given->markups,
-                      "Points of 3D Slicer (.mrk.json, .fcsv), named access and target");
+                      "Points of 3D Slicer (.mrk.json, .fcsv, .csv), named access and target");
   command->add_option("--labels", given->labels,
                       "A volume of labels, a .seg.nrrd, or a folder with one file per class");
   command->footer(

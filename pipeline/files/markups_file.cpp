@@ -7,11 +7,15 @@
 #include <cstdlib>
 #include <fstream>
 #include <iterator>
+#include <map>
 #include <optional>
+#include <set>
 #include <sstream>
+#include <utility>
 
 #include "pipeline/files/case_file.h"
 #include "pipeline/files/labels_file.h"
+#include "preprocess/volume/identity.h"
 #include "preprocess/volume/image.h"
 
 namespace wireplan::pipeline {
@@ -19,7 +23,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr const char* kExpected = "expected markups of 3D Slicer (.mrk.json or .fcsv)";
+constexpr const char* kExpected =
+    "expected markups of 3D Slicer (.mrk.json, .fcsv, or their table as .csv or .tsv)";
 constexpr double kFarthestMm = 1e6;
 
 /// What turns a point of the frame into LPS. Old files number them.
@@ -32,7 +37,7 @@ Vec3 signs_of_frame(const std::string& frame, const std::string& place) {
 
 void require_place(const Vec3& point, const std::string& label, const std::string& place) {
   if (point.allFinite() && point.cwiseAbs().maxCoeff() <= kFarthestMm) return;
-  throw Error(place + ": the point \"" + label +
+  throw Error(place + ": the point \"" + preprocess::without_person(label) +
               "\" has no three numbers of a place in mm; save it again from 3D Slicer");
 }
 
@@ -97,8 +102,11 @@ void append_markup(const Json& markup, const std::string& place, Markups& read) 
 Markups read_markups_json(const std::string& text, const std::string& place) {
   const Json file = Json::parse(text, nullptr, /*allow_exceptions=*/false);
   const auto markups = file.is_object() ? file.find("markups") : file.end();
+  if (file.is_discarded()) {
+    throw Error(place + ": no JSON, or broken or cut short; " + kExpected);
+  }
   if (!file.is_object() || markups == file.end() || !markups->is_array()) {
-    throw Error(place + ": no markups, or damaged; " + kExpected);
+    throw Error(place + ": has no list \"markups\"; " + kExpected);
   }
   Markups read;
   for (const Json& markup : *markups) {
@@ -108,19 +116,22 @@ Markups read_markups_json(const std::string& text, const std::string& place) {
   return read;
 }
 
-/// A line of a table that holds nothing, but for the commas that Excel leaves.
+/// A line of a table that holds nothing, but for the marks that Excel leaves.
 bool is_blank_row(const std::string& line) {
-  return line.find_first_not_of(",\r") == std::string::npos;
+  return line.find_first_not_of(",;\t\r ") == std::string::npos;
 }
 
-/// The cells of a line of a table, with quotes taken off.
-std::vector<std::string> cells_of(const std::string& line) {
+/// The cells of a line of a table, with quotes taken off; two of them in a quoted cell are one.
+std::vector<std::string> cells_of(const std::string& line, char separator) {
   std::vector<std::string> cells(1);
   bool quoted = false;
-  for (const char c : line) {
-    if (c == '"') {
+  for (std::size_t k = 0; k < line.size(); ++k) {
+    const char c = line[k];
+    if (c == '"' && quoted && k + 1 < line.size() && line[k + 1] == '"') {
+      cells.back() += line[++k];
+    } else if (c == '"') {
       quoted = !quoted;
-    } else if (c == ',' && !quoted) {
+    } else if (c == separator && !quoted) {
       cells.emplace_back();
     } else if (c != '\r') {
       cells.back() += c;
@@ -129,46 +140,178 @@ std::vector<std::string> cells_of(const std::string& line) {
   return cells;
 }
 
-/// id, x, y, z, orientation (4), visible, selected, locked, label, description, node; the frame in
-/// a comment above, RAS where it is not told. 3D Slicer 3 wrote label, x, y, z, selected, visible,
-/// in RAS. Excel fills every line up with commas, and may put a mark of UTF-8 before the first.
-std::vector<MarkupPoint> read_fcsv(const std::string& text, const std::string& place) {
-  std::size_t label_at = 11;
-  std::istringstream lines(text);
-  std::string frame = "RAS";
-  std::vector<MarkupPoint> points;
-  bool known = false;
-  for (std::string line; std::getline(lines, line);) {
-    if (line.starts_with("\xef\xbb\xbf")) line.erase(0, 3);
-    if (is_blank_row(line)) continue;
-    if (line.front() == '#') {
-      const bool old = line.find("Fiducial List file") != std::string::npos;
-      if (old) label_at = 0;
-      known = known || old || line.find("Markups fiducial file") != std::string::npos;
-      const std::size_t key = line.find("CoordinateSystem"), equals = line.find('=');
-      if (key == std::string::npos || equals == std::string::npos) continue;
-      std::istringstream(line.substr(equals + 1, line.find(',', equals) - equals - 1)) >> frame;
-      continue;
+/// In small letters, without blanks around it.
+std::string small_word(const std::string& text) {
+  const std::size_t first = text.find_first_not_of(" \t"), last = text.find_last_not_of(" \t");
+  if (first == std::string::npos) return {};
+  std::string word = text.substr(first, last - first + 1);
+  std::transform(word.begin(), word.end(), word.begin(),
+                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  return word;
+}
+
+/// Where a table of points has what, by the words that head its columns.
+struct PointColumns {
+  std::map<std::string, std::size_t> of;  // by their names in small letters
+  std::array<std::size_t, 3> place = {};
+  std::string frame;  // "LPS" or "RAS" where the names of x, y, z tell it
+  bool sound = false;
+
+  /// The cell under the first of the names that there is; empty where there is none.
+  std::string cell(const std::vector<std::string>& row,
+                   const std::vector<const char*>& names) const {
+    for (const char* name : names) {
+      const auto found = of.find(name);
+      if (found != of.end()) return found->second < row.size() ? row[found->second] : "";
     }
-    const std::vector<std::string> cells = cells_of(line);
-    if (!known || cells.size() <= std::max<std::size_t>(label_at, 3)) {
-      throw Error(place + ": no table of fiducials, or damaged; " + kExpected);
-    }
-    MarkupPoint point{.label = cells[label_at], .point = Vec3::Constant(NAN)};
-    for (std::size_t k = 0; k < 3; ++k) {
-      char* end = nullptr;
-      const double number = std::strtod(cells[k + 1].c_str(), &end);
-      if (end != cells[k + 1].c_str() && *end == '\0') {
-        point.point[static_cast<Eigen::Index>(k)] = number;
+    return {};
+  }
+};
+
+PointColumns point_columns(const std::vector<std::string>& heads) {
+  PointColumns columns;
+  for (std::size_t k = 0; k < heads.size(); ++k) columns.of.emplace(small_word(heads[k]), k);
+  const std::vector<std::pair<std::array<const char*, 3>, const char*>> places = {
+      {{"x", "y", "z"}, ""}, {{"r", "a", "s"}, "RAS"}, {{"l", "p", "s"}, "LPS"}};
+  for (const auto& [names, frame] : places) {
+    const auto is_there = [&](const char* name) { return columns.of.count(name) > 0; };
+    if (columns.sound || !std::all_of(names.begin(), names.end(), is_there)) continue;
+    for (std::size_t k = 0; k < 3; ++k) columns.place[k] = columns.of.at(names[k]);
+    columns.frame = frame;
+    columns.sound = true;
+  }
+  return columns;
+}
+
+/// Whether a row says that its point was never placed: by a column of its own, as 3D Slicer numbers
+/// it or has 0 and 1, by a word among the flags, or with no number in any of x, y, z.
+bool is_unplaced(const std::vector<std::string>& row, const PointColumns& columns) {
+  static const std::set<std::string> kWords = {"undefined", "unplaced", "missing", "preview",
+                                               "not placed"};
+  for (const char* name : {"positionstatus", "status", "defined", "sel", "selected", "vis"}) {
+    if (kWords.count(small_word(columns.cell(row, {name}))) > 0) return true;
+  }
+  const std::string status = small_word(columns.cell(row, {"positionstatus"}));
+  if (status == "0" || status == "1" || status == "3") return true;  // vtkMRMLMarkupsNode.h
+  for (const char* name : {"defined", "placed", "status"}) {
+    const std::string defined = small_word(columns.cell(row, {name}));
+    if (defined == "0" || defined == "false" || defined == "no") return true;
+  }
+  return std::all_of(columns.place.begin(), columns.place.end(), [&](std::size_t k) {
+    const std::string cell = k < row.size() ? small_word(row[k]) : "";
+    return cell.empty() || cell == "nan";
+  });
+}
+
+/// A number that fills the cell; NaN where it holds something else.
+double cell_value(const std::string& text) {
+  const std::string cell = small_word(text);
+  char* end = nullptr;
+  const double number = std::strtod(cell.c_str(), &end);
+  return cell.empty() || *end != '\0' ? NAN : number;
+}
+
+/// A table of points, line by line: .fcsv, whose comments tell frame and columns, or 3D Slicer's
+/// table of control points, whose first row does. Without a line of columns an .fcsv has those of
+/// 3D Slicer 4, or of 3 where its first comment is that of 3; without a frame it is in RAS. Excel
+/// fills every line up with marks, and may put one of UTF-8 before the first.
+class PointTable {
+ public:
+  PointTable(const std::string& text, std::string place, bool fiducials)
+      : place_(std::move(place)), fiducials_(fiducials), frame_(fiducials ? "RAS" : "not told") {
+    std::istringstream lines(text);
+    for (std::string line; std::getline(lines, line);) {
+      if (line.starts_with("\xef\xbb\xbf")) line.erase(0, 3);
+      if (is_blank_row(line)) continue;
+      if (line.front() == '#') {
+        take_comment(line);
+      } else {
+        take_row(line);
       }
     }
-    require_place(point.point, point.label, place);
-    points.push_back(std::move(point));
   }
-  const Vec3 signs = signs_of_frame(frame, place);
-  for (MarkupPoint& point : points) point.point = signs.cwiseProduct(point.point).eval();
-  return points;
-}
+
+  Markups finish() {
+    const std::string& told = columns_.frame.empty() ? frame_ : columns_.frame;
+    const Vec3 signs = signs_of_frame(told, place_);
+    for (MarkupPoint& point : read_.points) point.point = signs.cwiseProduct(point.point).eval();
+    return std::move(read_);
+  }
+
+ private:
+  void take_comment(const std::string& line) {
+    const bool old = line.find("Fiducial List file") != std::string::npos;
+    known_ = known_ || old || line.find("Markups fiducial file") != std::string::npos;
+    if (known_ && !columns_.sound) {
+      columns_ = point_columns(cells_of(old ? "label,x,y,z,sel,vis"
+                                            : "id,x,y,z,ow,ox,oy,oz,vis,sel,lock,label,desc,"
+                                              "associatedNodeID,positionStatus",
+                                        ','));
+    }
+    const std::size_t equals = line.find('=');
+    if (equals == std::string::npos) return;
+    const std::string key = small_word(line.substr(1, equals - 1)), value = line.substr(equals + 1);
+    if (key == "coordinatesystem") {
+      frame_.clear();
+      std::istringstream(value.substr(0, value.find(','))) >> frame_;
+    }
+    if (key != "columns") return;
+    PointColumns told = point_columns(cells_of(value, ','));
+    if (!told.sound) {
+      throw Error(place_ + ": its columns lack x, y or z, expected these three beside label; " +
+                  kExpected);
+    }
+    // 3D Slicer 5 writes it behind the last of them without a name.
+    const auto last = told.of.find("associatednodeid");
+    if (last != told.of.end() && last->second + 1 == told.of.size()) {
+      told.of.emplace("positionstatus", told.of.size());
+    }
+    columns_ = std::move(told);
+    known_ = true;
+  }
+
+  void take_row(const std::string& line) {
+    if (!begun_) {
+      begun_ = true;
+      for (const char mark : {';', '\t'}) {
+        if (!fiducials_ && line.find(mark) != std::string::npos) separator_ = mark;
+      }
+      const PointColumns told = point_columns(cells_of(line, separator_));
+      if (told.sound) {
+        columns_ = told;
+        known_ = true;
+        return;
+      }
+    }
+    if (!known_ || !columns_.sound) {
+      throw Error(place_ +
+                  ": no table of fiducials: no comment of 3D Slicer, and no first line that heads "
+                  "label and x, y, z (or r, a, s, or l, p, s); " +
+                  kExpected);
+    }
+    const std::vector<std::string> cells = cells_of(line, separator_);
+    const std::string label = columns_.cell(cells, {"label", "name", "id"});
+    if (is_unplaced(cells, columns_)) {
+      read_.unplaced.push_back(label);
+      return;
+    }
+    MarkupPoint point{.label = label, .point = Vec3::Constant(NAN)};
+    for (std::size_t k = 0; k < 3; ++k) {
+      const std::size_t at = columns_.place[k];
+      if (at < cells.size()) point.point[static_cast<Eigen::Index>(k)] = cell_value(cells[at]);
+    }
+    require_place(point.point, point.label, place_);
+    read_.points.push_back(std::move(point));
+  }
+
+  std::string place_;
+  bool fiducials_;
+  bool known_ = false, begun_ = false;
+  char separator_ = ',';
+  std::string frame_;
+  PointColumns columns_;
+  Markups read_;
+};
 
 /// The labels of a file, for a message.
 std::string list_labels(const std::vector<MarkupPoint>& points) {
@@ -249,7 +392,7 @@ class PointFinder {
 
   std::optional<Vec3> find_markup(JsonReader& reader, std::size_t problems_before) {
     const std::string name = reader.text("markups", std::nullopt);
-    const std::string label = reader.text("label", "");
+    const std::string label = preprocess::without_person(reader.text("label", ""));
     reader.finish();
     const std::optional<Markups> file = read_file(reader, name, problems_before);
     if (!file) return {};
@@ -355,8 +498,12 @@ Markups read_markups(const fs::path& path) {
   std::string ending = path.extension().string();
   std::transform(ending.begin(), ending.end(), ending.begin(),
                  [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  if (ending == ".fcsv") return {.points = read_fcsv(text, path.string()), .unplaced = {}};
-  return read_markups_json(text, path.string());
+  const bool table = ending == ".fcsv" || ending == ".csv" || ending == ".tsv";
+  Markups read = table ? PointTable(text, path.string(), ending == ".fcsv").finish()
+                       : read_markups_json(text, path.string());
+  for (MarkupPoint& point : read.points) point.label = preprocess::without_person(point.label);
+  for (std::string& label : read.unplaced) label = preprocess::without_person(label);
+  return read;
 }
 
 void resolve_scene_points(Json& file, const fs::path& folder, Problems& problems) {

@@ -1,6 +1,6 @@
 #pragma once
-/// Points where people place them: markups of 3D Slicer (.mrk.json, and .fcsv of before) and voxels
-/// of the volume, in the place of a case's numbers.
+/// Points where people place them: markups of 3D Slicer (.mrk.json, .fcsv of before, tables .csv
+/// and .tsv of control points) and voxels of the volume, in the place of a case's numbers.
 #include <filesystem>
 #include <string>
 #include <vector>
@@ -20,6 +20,7 @@ struct Markups {
 };
 
 /// The points of all lists, fiducials and curves alike; the frame is the file's own (LPS or RAS).
+/// Columns of a table are those that its header names; hidden and unselected points are points too.
 /// Throws `Error` where it is missing, no markups, damaged, or in another unit or frame.
 Markups read_markups(const std::filesystem::path& path);
 

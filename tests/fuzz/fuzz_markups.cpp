@@ -8,7 +8,7 @@
 using namespace wireplan;
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
-  constexpr std::array kNames = {"points.mrk.json", "points.fcsv"};
+  constexpr std::array kNames = {"points.mrk.json", "points.fcsv", "points.csv"};
   if (size == 0) return 0;
   const std::string name = kNames[data[0] % kNames.size()];
   const std::filesystem::path file = fuzz::folder().write(name, fuzz::view(data + 1, size - 1));

@@ -335,6 +335,10 @@ def markups_seeds():
     for name, frame in (("ras.fcsv", "RAS"), ("lps.fcsv", "LPS"), ("numbered.fcsv", "0")):
         seed("markups", name, "1# Markups fiducial file version = 4.11\n"
              f"# CoordinateSystem = {frame}\n{columns}" + row.format("entry") + row.format('"a, b"'))
+    seed("markups", "columns.fcsv", "1# Markups fiducial file version = 5.2\n# columns = label,z,y,x,sel\n"
+         "\"the \"\"entry\"\"\",3,2,1,1\nout,0,0,0,undefined\n")
+    seed("markups", "points.csv", "2label,r,a,s,defined,selected\nentry,1,2,3,1,1\nout,0,0,0,0,1\n")
+    seed("markups", "points.tsv", "2s\tp\tl\tlabel\n3\t2\t1\tentry\n")
     seed("markups", "bare.fcsv", "1# Markups fiducial file version = 4.6\n" + row.format("entry"))
 
 

@@ -209,6 +209,61 @@ TEST_F(Markups, OldTablesAreReadInTheirFrame) {
             std::string::npos);
 }
 
+TEST_F(Markups, TablesAreReadByTheirColumns) {
+  const auto read = [&](const std::string& name, const std::string& text) {
+    write_text(text, folder_ / name);
+    return read_markups(folder_ / name);
+  };
+  const std::string head = "# Markups fiducial file version = 5.2\n# CoordinateSystem = LPS\n";
+  const std::vector<std::pair<std::string, std::string>> tables = {
+      {"turned.fcsv", head + "# columns = label,z,y,x\n\"the \"\"left\"\"\",3,2,1\n"},
+      {"script.fcsv", "# columns = x,y,z,label\n# CoordinateSystem = LPS\n1,2,3,the left\n"},
+      {"hidden.fcsv", head +
+                          "# columns = id,x,y,z,ow,ox,oy,oz,vis,sel,lock,label,desc,"
+                          "associatedNodeID\n1,1,2,3,0,0,0,1,0,0,1,\"the \"\"left\"\"\",,,2,0\n"},
+      {"ras.csv", "label,r,a,s,defined,selected\n\"the \"\"left\"\"\",-1,-2,3,1,0\n"},
+      {"lps.csv", "\xef\xbb\xbflabel;l;p;s\r\n\"the \"\"left\"\"\";1;2;3\r\n"},
+      {"lps.tsv", "s\tp\tl\tlabel\n3\t2\t1\t\"the \"\"left\"\"\"\n"}};
+  for (const auto& [name, text] : tables) {
+    SCOPED_TRACE(name);
+    const auto found = read(name, text);
+    ASSERT_EQ(found.points.size(), 1U);
+    EXPECT_EQ(found.points[0].point, Vec3(1, 2, 3));
+    const bool plain = name == "script.fcsv";
+    EXPECT_EQ(found.points[0].label, plain ? "the left" : "the \"left\"");
+    EXPECT_TRUE(found.unplaced.empty());
+  }
+  EXPECT_NE(message_of([&] {
+              read("no.fcsv", head + "# columns = id,label\n1,a\n");
+            }).find("its columns lack x, y or z"),
+            std::string::npos);
+  EXPECT_NE(message_of([&] {
+              read("no.csv", "label,x,y,z\na,1,2,3\n");
+            }).find("its coordinate system is not told, expected LPS or RAS"),
+            std::string::npos);
+}
+
+TEST_F(Markups, RowsOfPointsThatWereNotPlacedAreNoPlaces) {
+  const std::string head =
+      "# Markups fiducial file version = 5.2\n# CoordinateSystem = LPS\n# columns = ";
+  const std::string columns = "id,x,y,z,ow,ox,oy,oz,vis,sel,lock,label,desc,associatedNodeID\n";
+  for (const auto& [name, text] : std::vector<std::pair<std::string, std::string>>{
+           {"status.fcsv", head + columns +
+                               "1,1,2,3,0,0,0,1,1,1,0,a,,,2,0\n"
+                               "2,0,0,0,0,0,0,1,1,1,0,b,,,0,0\n"},
+           {"word.fcsv", head + "label,x,y,z,sel\na,1,2,3,1\nb,0,0,0,undefined\n"},
+           {"named.fcsv", head + "label,x,y,z,positionStatus\na,1,2,3,2\nb,0,0,0,3\n"},
+           {"empty.fcsv", head + "label,x,y,z\na,1,2,3\nb,nan,nan,nan\n"},
+           {"defined.csv", "label,l,p,s,defined\na,1,2,3,1\nb,0,0,0,0\n"}}) {
+    SCOPED_TRACE(name);
+    write_text(text, folder_ / name);
+    const auto read = read_markups(folder_ / name);
+    ASSERT_EQ(read.points.size(), 1U);
+    EXPECT_EQ(read.points[0].point, Vec3(1, 2, 3));
+    EXPECT_EQ(read.unplaced, std::vector<std::string>{"b"});
+  }
+}
+
 TEST_F(Markups, WhatIsWrongIsToldWithFileAndLabels) {
   write("p.mrk.json",
         markups("LPS", {{"access", {0, 0, 6}}, {"twice", {1, 1, 1}}, {"twice", {2, 2, 2}}}));
@@ -226,16 +281,17 @@ TEST_F(Markups, WhatIsWrongIsToldWithFileAndLabels) {
   expect_refusal({{"markups", "p.mrk.json"}, {"label", "twice"}},
                  ".label is \"twice\", which 2 points have, expected the label of one point of "
                  "p.mrk.json (\"access\", \"twice\", \"twice\")");
-  expect_refusal({{"markups", "q.mrk.json"}},
-                 ".markups is q.mrk.json, expected a file of markups (" +
-                     (folder_ / "q.mrk.json").string() +
-                     ": no such file; expected markups of 3D Slicer (.mrk.json or .fcsv))");
+  expect_refusal(
+      {{"markups", "q.mrk.json"}},
+      ".markups is q.mrk.json, expected a file of markups (" + (folder_ / "q.mrk.json").string() +
+          ": no such file; expected markups of 3D Slicer (.mrk.json, .fcsv, or their table "
+          "as .csv or .tsv))");
   write_text("{", folder_ / "q.mrk.json");
   expect_refusal({{"markups", "q.mrk.json"}},
                  ".markups is q.mrk.json, expected a file of markups (" +
                      (folder_ / "q.mrk.json").string() +
-                     ": no markups, or damaged; expected markups of 3D Slicer (.mrk.json or "
-                     ".fcsv))");
+                     ": no JSON, or broken or cut short; expected markups of 3D Slicer (.mrk.json, "
+                     ".fcsv, or their table as .csv or .tsv))");
   case_["access"]["point_mm"] = {0, 0, 6};
   EXPECT_EQ(refusal(), key + " is given beside access.point_mm, expected one of the two");
 }
