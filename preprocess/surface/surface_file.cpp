@@ -68,10 +68,18 @@ std::uint32_t stl_number(const char* bytes) {
   return number;
 }
 
-/// Refuses text of two bytes for each character, as some editors on Windows save it.
-void require_utf8_text(std::string_view beginning, const std::filesystem::path& path) {
-  if (!beginning.starts_with("\xff\xfe") && !beginning.starts_with("\xfe\xff")) return;
-  throw Error(path.string() + ": is UTF-16 text, expected UTF-8 or ASCII; save it as UTF-8");
+/// Refuses what no file of these formats begins with: nothing, text of two bytes for each
+/// character, as some editors on Windows save it, or what packs files.
+void require_plain(std::string_view beginning, const std::filesystem::path& path) {
+  const auto refuse = [&](const char* why) {
+    throw Error(path.string() + ": " + why + "; expected a surface (STL, PLY, OBJ or VTP)");
+  };
+  if (beginning.empty()) refuse("is empty");
+  if (beginning.starts_with("\xff\xfe") || beginning.starts_with("\xfe\xff")) {
+    refuse("is UTF-16 text; save it as UTF-8");
+  }
+  if (beginning.starts_with("\x1f\x8b")) refuse("is packed by gzip; unpack it, e.g. by gunzip");
+  if (beginning.starts_with("PK\x03\x04")) refuse("is packed by zip; unpack it");
 }
 
 /// By the number of triangles in the header of a binary file, which fit into it: read as a number,
@@ -96,7 +104,7 @@ StlForm stl_form(const std::filesystem::path& path) {
   const bool is_text = std::all_of(text.begin(), text.end(), [](char c) {
     return static_cast<unsigned char>(c) >= 0x20 || c == '\n' || c == '\r' || c == '\t';
   });
-  require_utf8_text(text, path);
+  require_plain(text, path);
   if (solid || is_text) return StlForm::kText;
   throw Error(path.string() + ": a binary STL of " + std::to_string(bytes) + " bytes, expected " +
               std::to_string(expected) + " for the " + std::to_string(triangles) +
@@ -219,11 +227,11 @@ PlyType ply_type(const std::string& name, const std::filesystem::path& path) {
 class PlyStream {
  public:
   explicit PlyStream(const std::filesystem::path& path) : path_(path), in_(path, std::ios::binary) {
-    std::array<char, kByteOrderMark.size()> mark{};
+    std::array<char, 4> mark{};
     in_.read(mark.data(), mark.size());
     const std::string_view beginning(mark.data(), static_cast<std::size_t>(in_.gcount()));
-    require_utf8_text(beginning, path);
-    if (beginning == kByteOrderMark) begin_ = kByteOrderMark.size();
+    require_plain(beginning, path);
+    if (beginning.starts_with(kByteOrderMark)) begin_ = kByteOrderMark.size();
     in_.clear();
     in_.seekg(begin_);
   }
@@ -380,7 +388,7 @@ vtkSmartPointer<vtkPolyData> read_obj(const std::filesystem::path& path) {
   };
   for (std::string line, more; next_line(stream, line);) {
     if (++number == 1) {
-      require_utf8_text(line, path);
+      if (!line.empty()) require_plain(line, path);
       if (line.starts_with(kByteOrderMark)) line.erase(0, kByteOrderMark.size());
     }
     for (; !line.empty() && line.back() == '\\' && next_line(stream, more); ++number) {

@@ -263,6 +263,14 @@ TEST_F(SurfaceFile, AMarkOfUtf8BeforeTheTextIsNoPartOfIt) {
     const Surface read = read_triangles(write(name, mark + text), "mm", "LPS");
     EXPECT_EQ(read.triangles.cols(), box.triangles.cols()) << name;
     EXPECT_NEAR(signed_volume(read), 8.0, 1e-12) << name;
+    for (const auto& [start, why] : {std::pair("\x1f\x8b\x08", "is packed by gzip"),
+                                     std::pair("PK\x03\x04", "is packed by zip")}) {
+      EXPECT_NE(message_of([&] {
+                  read_triangles(write(name, start + text), "mm", "LPS");
+                }).find(name + ": " + why),
+                std::string::npos)
+          << name;
+    }
     std::string wide = "\xff\xfe";
     for (const char c : text) wide += {c, '\0'};
     EXPECT_NE(message_of([&] {
