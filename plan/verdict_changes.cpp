@@ -12,6 +12,7 @@ namespace {
 
 /// What fewer than one in so many end by is left out of what would change the verdict.
 constexpr int kOneIn = 10;
+constexpr double kSameLength = 1e-6;  // of wire                                          [mm]
 
 bool tried_angled(const Study& study) {
   return std::any_of(study.wires.begin(), study.wires.end(),
@@ -153,9 +154,9 @@ void add_ending(Endings& endings, const Measured& trial, const simulate::Wire& w
       return;
     case Outcome::kMissed: {
       const double most = simulate::longest_insertion(wire, insertion);
-      ++(m.insertion < most - 1e-6        ? endings.missed
-         : most < insertion.length - 1e-6 ? endings.whole_wire_in
-                                          : endings.all_wire_in);
+      ++(m.insertion < most - kSameLength     ? endings.missed
+         : most > wire.length() - kSameLength ? endings.whole_wire_in
+                                              : endings.all_wire_in);
       return;
     }
     case Outcome::kPassedBy:

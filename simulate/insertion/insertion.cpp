@@ -36,35 +36,46 @@ constexpr double kSmallestCut = 1.0 / 16.0;         // of a push, when one does 
 constexpr int kFollowed = 6;                        // solves more of a wire that jumps
 
 /// Edges of the part of the wire that goes in, proximal to distal, and two more, so that the
-/// innermost free node bends against a straight introducer; four at least.
+/// innermost free node bends against a straight introducer; four at least. Of a wire that goes in
+/// whole they are longer than it.
 Eigen::VectorXd layout(const Wire& wire, const InsertionOptions& options) {
+  const double longest = std::min(options.length, wire.length());
   std::vector<double> from_tip;
   double sum = 0.0;
   int beyond = 0;
   const auto lacks = [&] { return beyond < 2 || from_tip.size() < kFewestElements; };
   const auto add = [&](double l) {
-    if (sum >= options.length - 1e-9) ++beyond;
+    if (sum >= longest - 1e-9) ++beyond;
     sum += l;
     from_tip.push_back(l);
   };
   const std::vector<double>& asked = options.section_element_length;
-  if (asked.empty()) {
-    const double h = options.element_length;
-    const int available = static_cast<int>(std::floor(wire.length() / h + 1e-9));
-    for (int i = 0; i < available && lacks(); ++i) add(h);
-  } else {
-    expects(asked.size() == wire.sections.size());
-    for (std::size_t k = 0; k < asked.size(); ++k) {
-      const double length = wire.sections[k].length;
-      const double most = asked[k] > 0.0 ? asked[k] : options.element_length;
-      const int count = std::max(1, static_cast<int>(std::ceil(length / most - 1e-9)));
-      for (int i = 0; i < count && lacks(); ++i) add(length / count);
-    }
+  expects(asked.empty() || asked.size() == wire.sections.size());
+  for (std::size_t k = 0; k < asked.size(); ++k) {
+    const double length = wire.sections[k].length;
+    const double most = asked[k] > 0.0 ? asked[k] : options.element_length;
+    const int count = std::max(1, static_cast<int>(std::ceil(length / most - 1e-9)));
+    for (int i = 0; i < count && lacks(); ++i) add(length / count);
   }
-  expects(from_tip.size() >= kFewestElements);
+  while (lacks()) add(asked.empty() ? options.element_length : from_tip.back());
   std::reverse(from_tip.begin(), from_tip.end());
   return Eigen::Map<const Eigen::VectorXd>(from_tip.data(),
                                            static_cast<Eigen::Index>(from_tip.size()));
+}
+
+/// With so much more of what the wire is at its hub that the edges fit into it. That stays in the
+/// introducer, which holds it straight.
+Rod rod_of(Wire wire, const InsertionOptions& options) {
+  const Eigen::VectorXd edges = layout(wire, options);
+  const double more = edges.sum() - wire.length();
+  if (more > 1e-9 * wire.length()) {  // not of rounding
+    Section hub = wire.sections.back();
+    hub.bending_stiffness = hub.proximal_EI();
+    hub.proximal_bending_stiffness = 0.0;
+    hub.length = more;
+    wire.sections.push_back(hub);
+  }
+  return build_rod(wire, edges);
 }
 
 ContactOptions contact_options(const Wire& wire, const InsertionOptions& options) {
@@ -83,10 +94,7 @@ double friction_of(const Wire& wire, const InsertionOptions& options) {
 }
 
 double longest_insertion(const Wire& wire, const InsertionOptions& options) {
-  const Eigen::VectorXd edges = layout(wire, options);
-  double sum = 0.0;
-  for (Eigen::Index i = edges.size() - 1; i >= 2; --i) sum += edges[i];
-  return std::min(options.length, sum);
+  return std::min(options.length, wire.length());
 }
 
 Insertion::Insertion(const Wire& wire, const Introducer& introducer, const VesselModel& vessel,
@@ -94,7 +102,7 @@ Insertion::Insertion(const Wire& wire, const Introducer& introducer, const Vesse
     : introducer_(introducer),
       options_(options),
       vessel_(vessel),
-      rod_(build_rod(wire, layout(wire, options))),
+      rod_(rod_of(wire, options)),
       contact_(rod_, vessel, contact_options(wire, options)) {
   const int n = rod_.nodes();
   longest_ = longest_insertion(wire, options);

@@ -80,8 +80,8 @@ struct TriangleForce {
   double force = 0.0;  //                                                                 [N]
 };
 
-/// Most of a wire that can be brought into the body: up to `options.length`, and all but the last
-/// two elements of the wire [mm].
+/// Most of a wire that can be brought into the body: up to `options.length`, and no more than there
+/// is [mm].
 double longest_insertion(const Wire& wire, const InsertionOptions& options);
 
 /// The wire between two moves, always in equilibrium. Nodes in the introducer lie on its axis and

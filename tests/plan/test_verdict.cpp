@@ -402,12 +402,10 @@ TEST(Verdict, ChangesFollowFromWhatWasTried) {
 }
 
 TEST(Verdict, OfAWireThatIsTooShortAsksForALongerOne) {
-  // 120 mm, in elements of 3 mm: two of them stay out, which are four times as long in a scout.
   for (const Level level : {Level::kFull, Level::kScout}) {
     WhatIsKnown bench;
     bench.study.wires[0].sections[0].length = 120.0;
-    bench.study.insertion.element_length = 3.0;
-    bench.add(Outcome::kMissed, level).insertion = level == Level::kFull ? 114.0 : 96.0;
+    bench.add(Outcome::kMissed, level).insertion = 120.0;
     const Verdict verdict = bench.verdict();
     EXPECT_TRUE(tells(verdict.reasons, "The one trial ended with all wire in"));
     EXPECT_TRUE(tells(verdict.changes,

@@ -68,6 +68,32 @@ TEST(Moves, MayBeShorterThanAnElement) {
   }
 }
 
+TEST(Moves, BringInTheWholeWire) {
+  // As of a longer wire: what is in the introducer is straight.
+  Wire whole = curved_wire();
+  whole.sections.back() = {
+      .length = 58.0, .bending_stiffness = 20.0, .proximal_bending_stiffness = 50.0};
+  Wire longer = whole;
+  longer.sections.push_back({.length = 100.0, .bending_stiffness = 50.0});
+  InsertionOptions some = options(0.1);
+  some.length = 70.0;
+  for (const double element : {0.0, 2.0, 3.0, 15.0}) {  // 0: of each section its own
+    SCOPED_TRACE(element);
+    InsertionOptions some_whole = some, some_longer = some;
+    if (element > 0.0) some_whole.element_length = some_longer.element_length = element;
+    if (element == 0.0) some_whole.section_element_length = {1.0, 2.0};
+    if (element == 0.0) some_longer.section_element_length = {1.0, 2.0, 2.0};
+    EXPECT_EQ(longest_insertion(whole, some_whole), 70.0);
+    const std::vector<Move> moves = {{.push = 70.0}, {.push = -10.0}};
+    const TrialResult in = make_moves(whole, bend(), moves, some_whole);
+    EXPECT_NEAR(in.pushes[69].insertion, 70.0, 1e-9);
+    EXPECT_NEAR(in.pushes.back().insertion, 60.0, 1e-9);
+    EXPECT_LT(largest_difference(in, make_moves(longer, bend(), moves, some_longer)), 1e-6);
+  }
+  some.length = 200.0;
+  EXPECT_EQ(longest_insertion(whole, some), 70.0);
+}
+
 TEST(Moves, ComeBeforeTheLastPushOfATrial) {
   InsertionOptions some = options(0.1);
   some.length = 70.0;
