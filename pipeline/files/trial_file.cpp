@@ -400,44 +400,49 @@ TrialResult read_trial_file(const std::filesystem::path& path) {
 
 namespace {
 
-/// The catheter of each shape as FOLDER/NAME-catheter/K.vtp, and NAME-catheter.pvd.
-void write_catheter(const TrialResult& trial, const std::string& name,
-                    const std::filesystem::path& folder) {
-  const std::string own = name + "-catheter";
-  std::filesystem::create_directories(folder / own);
-  std::vector<std::filesystem::path> files;
-  std::vector<double> times;
-  for (const simulate::Shape& shape : trial.shapes) {
-    files.push_back(folder / own / (std::to_string(files.size()) + ".vtp"));
-    times.push_back(static_cast<double>(times.size()));
-    const Eigen::Matrix3Xd nodes = simulate::line_up_to(shape.nodes, shape.tools.front());
-    preprocess::write_polyline(nodes, {}, files.back());
+/// When each shape is shown: at its insertion. Where pulls, turns and tools by turns bring one up
+/// again, which a viewer would show as one, at its number.
+std::vector<double> times_of(const std::vector<simulate::Shape>& shapes) {
+  bool ascends = shapes.empty() || shapes.front().tools.empty();
+  for (std::size_t k = 1; k < shapes.size(); ++k) {
+    ascends = ascends && shapes[k].insertion > shapes[k - 1].insertion;
   }
-  preprocess::write_time_series(files, times, folder / (own + ".pvd"));
+  std::vector<double> times;
+  for (const simulate::Shape& shape : shapes) {
+    times.push_back(ascends ? shape.insertion : static_cast<double>(times.size()));
+  }
+  return times;
 }
 
 }  // namespace
 
-void write_shapes(const TrialResult& trial, const std::string& name,
-                  const std::filesystem::path& folder) {
-  const bool tools = !trial.shapes.empty() && !trial.shapes.front().tools.empty();
-  if (tools) write_catheter(trial, name, folder);
+void write_tool_shapes(const std::vector<simulate::Shape>& shapes, std::size_t tool,
+                       const std::string& name, const std::filesystem::path& folder) {
   std::filesystem::create_directories(folder / name);
   std::vector<std::filesystem::path> files;
-  std::vector<double> insertions;
+  for (const simulate::Shape& shape : shapes) {
+    files.push_back(folder / name / (std::to_string(files.size()) + ".vtp"));
+    preprocess::write_polyline(simulate::line_up_to(shape.nodes, shape.tools.at(tool)), {},
+                               files.back());
+  }
+  preprocess::write_time_series(files, times_of(shapes), folder / (name + ".pvd"));
+}
+
+void write_shapes(const TrialResult& trial, const std::string& name,
+                  const std::filesystem::path& folder) {
+  if (!trial.shapes.empty() && !trial.shapes.front().tools.empty()) {
+    write_tool_shapes(trial.shapes, 0, name + "-catheter", folder);
+    write_tool_shapes(trial.shapes, trial.shapes.front().tools.size() - 1, name, folder);
+    return;
+  }
+  std::filesystem::create_directories(folder / name);
+  std::vector<std::filesystem::path> files;
   for (const simulate::Shape& shape : trial.shapes) {
     const std::vector<double> force(shape.contact_force.begin(), shape.contact_force.end());
     files.push_back(folder / name / (std::to_string(files.size()) + ".vtp"));
-    // Tools go in and out by turns: their time is the number of the shape.
-    insertions.push_back(tools ? static_cast<double>(insertions.size()) : shape.insertion);
-    if (tools) {
-      preprocess::write_polyline(simulate::line_up_to(shape.nodes, shape.tools.back()), {},
-                                 files.back());
-      continue;
-    }
     preprocess::write_polyline(shape.nodes, {{"contact_force_n", force}}, files.back());
   }
-  preprocess::write_time_series(files, insertions, folder / (name + ".pvd"));
+  preprocess::write_time_series(files, times_of(trial.shapes), folder / (name + ".pvd"));
 }
 
 void write_moved_vessel(const std::vector<simulate::Shape>& shapes, const Surface& vessel,
@@ -445,7 +450,8 @@ void write_moved_vessel(const std::vector<simulate::Shape>& shapes, const Surfac
                         const std::filesystem::path& folder) {
   std::filesystem::create_directories(folder / name);
   std::vector<std::filesystem::path> files;
-  std::vector<double> insertions;
+  const std::vector<double> all_times = times_of(shapes);
+  std::vector<double> times;
   // The last, and so many before it at even steps.
   const std::size_t count = shapes.size(), step = std::max<std::size_t>(1, count / kVesselStates);
   for (std::size_t k = (count - 1) % step; k < count; k += step) {
@@ -455,9 +461,9 @@ void write_moved_vessel(const std::vector<simulate::Shape>& shapes, const Surfac
     moved.vertices = chain.carried(vessel.vertices, shape.sections);
     files.push_back(folder / name / (std::to_string(files.size()) + ".vtp"));
     preprocess::write_surface(moved, files.back());
-    insertions.push_back(shape.insertion);
+    times.push_back(all_times[k]);
   }
-  preprocess::write_time_series(files, insertions, folder / (name + ".pvd"));
+  preprocess::write_time_series(files, times, folder / (name + ".pvd"));
 }
 
 }  // namespace wireplan::pipeline

@@ -44,15 +44,20 @@ Json steps_json(const std::vector<simulate::ToolStep>& steps);
 std::vector<simulate::ToolStep> steps_of(const Json& list);
 
 /// The shapes on the way as FOLDER/NAME/K.vtp, with the contact force at each node, and
-/// FOLDER/NAME.pvd, a time series over the insertion [mm] that ParaView plays. Of catheter and wire
-/// the wire is told so, without forces and over the number of the shape, and the catheter beside it
-/// as NAME-catheter.
+/// FOLDER/NAME.pvd, a time series that ParaView plays: over the insertion [mm], or the number of
+/// the shape where a pull or a turn brings that up again. Of catheter and wire the wire is told so,
+/// without forces and over the number of the shape, and the catheter beside it as NAME-catheter.
 void write_shapes(const simulate::TrialResult& trial, const std::string& name,
                   const std::filesystem::path& folder);
 
+/// One of several tools in each shape, from the outside in, as FOLDER/NAME/K.vtp and
+/// FOLDER/NAME.pvd, over the number of the shape.
+void write_tool_shapes(const std::vector<simulate::Shape>& shapes, std::size_t tool,
+                       const std::string& name, const std::filesystem::path& folder);
+
 /// The vessel as such an insertion moves it, at most two dozen times from its start to its end:
-/// FOLDER/NAME/K.vtp and FOLDER/NAME.pvd, over the insertion [mm]. Shapes that do not know how it
-/// moves are left out. Expects a shape.
+/// FOLDER/NAME/K.vtp and FOLDER/NAME.pvd, at the times of write_shapes(). Shapes that do not know
+/// how it moves are left out. Expects a shape.
 void write_moved_vessel(const std::vector<simulate::Shape>& shapes, const Surface& vessel,
                         const simulate::SectionChain& chain, const std::string& name,
                         const std::filesystem::path& folder);

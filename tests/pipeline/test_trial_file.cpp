@@ -96,5 +96,41 @@ TEST(TrialFile, StepsOfAScriptAreReadAsTheyAreWritten) {
   EXPECT_EQ(steps_of(steps_json(steps)), steps);
 }
 
+/// The times in FOLDER/NAME.pvd.
+std::vector<double> times_in(const fs::path& series) {
+  const std::string text = read_text(series), key = "timestep=\"";
+  std::vector<double> times;
+  for (std::size_t at = text.find(key); at != std::string::npos; at = text.find(key, at + 1)) {
+    times.push_back(std::atof(text.c_str() + at + key.size()));
+  }
+  return times;
+}
+
+TEST(TrialFile, NoTwoShapesOfASeriesHaveOneTime) {
+  const TemporaryFolder folder;
+  simulate::TrialResult trial;
+  for (const double insertion : {5.0, 10.0, 15.0}) {
+    trial.shapes.push_back({.insertion = insertion,
+                            .nodes = Eigen::Matrix3Xd::Random(3, 4),
+                            .contact_force = Eigen::VectorXd::Zero(4)});
+  }
+  write_shapes(trial, "pushed", folder.path());
+  EXPECT_EQ(times_in(folder / "pushed.pvd"), std::vector<double>({5.0, 10.0, 15.0}));
+  trial.shapes.push_back(trial.shapes.back());  // a turn of the hub
+  trial.shapes.push_back(trial.shapes.front());
+  write_shapes(trial, "moved", folder.path());
+  EXPECT_EQ(times_in(folder / "moved.pvd"), std::vector<double>({0.0, 1.0, 2.0, 3.0, 4.0}));
+
+  // The vessel is shown at the times of the wires in it.
+  preprocess::Branch branch;
+  branch.line = shapes::line_through({{0, 0, 0}, {0, 0, 40}}, 4.0);
+  const simulate::SectionChain chain({branch}, {});
+  for (simulate::Shape& shape : trial.shapes) shape.sections.setZero(3, chain.nodes());
+  trial.shapes[1].sections.resize(3, 0);
+  write_moved_vessel(trial.shapes, shapes::box({-1, -1, -1}, {1, 1, 1}), chain, "vessel",
+                     folder.path());
+  EXPECT_EQ(times_in(folder / "vessel.pvd"), std::vector<double>({0.0, 2.0, 3.0, 4.0}));
+}
+
 }  // namespace
 }  // namespace wireplan::pipeline
