@@ -142,7 +142,8 @@ ToolBench::ToolBench(const ToolScene& scene)
   expects(scene.places.size() == scene.tools.size() && scene.loads.tip_torque == 0.0);
   place(scene.places, now_);
   now_.state = unloaded(now_);
-  lies_free(now_) ? settle_at(scene.places) : bring_in();
+  // Further back the tools would not come to a support.
+  lies_free(now_) || scene.distal ? settle_at(scene.places) : bring_in();
   const std::vector<double> none(scene.tools.size(), 0.0);
   report({none, none});
 }

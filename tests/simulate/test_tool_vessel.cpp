@@ -478,6 +478,19 @@ TEST(ToolVessel, ToolsTooLongToLieFreeAreBroughtInTogether) {
   }
 }
 
+TEST(ToolVessel, ToolsWithASupportAreNotTornOffIt) {
+  // They do not lie free, and from further back they would not come to the support.
+  const VesselModel vessel(aorta_with_a_branch(), {.grid_spacing = 0.8});
+  ToolScene scene = catheter_over_wire(cobra_tip(), vessel);
+  scene.point = Vec3(0.0, 0.0, 3.0);
+  scene.places = {{80.0, 0.0}, {100.0, 0.0}};
+  scene.distal =
+      Support{.at = WireEnd::kDistal, .kind = SupportKind::kPinned, .point = Vec3(4.0, 0.0, 85.0)};
+  const ToolBench bench(scene);
+  EXPECT_EQ(bench.places()[1].insertion, 100.0);
+  EXPECT_LT(bench.record().energy.stretch, 1e3);
+}
+
 TEST(ToolVessel, SimmonsIsFormedInTheArchAndPulledDownIntoABranch) {
   const VesselModel vessel(arch_with_a_branch(), {.grid_spacing = 0.8});
   ToolScene scene = catheter_over_wire(simmons_tip(), vessel);
