@@ -48,6 +48,12 @@ Eigen::VectorXd edge_lengths(const Scene& scene) {
                                            static_cast<Eigen::Index>(lengths.size()));
 }
 
+double residual_under(const Eigen::Matrix3Xd& load, double asked) {
+  constexpr double kPart = 1e-3;
+  const double largest = load.colwise().norm().maxCoeff();
+  return largest > 0.0 ? std::min(asked, kPart * largest) : asked;
+}
+
 bool hold_both_rolls(const std::vector<Support>& supports) {
   return supports.size() == 2 &&
          std::all_of(supports.begin(), supports.end(),
@@ -245,12 +251,16 @@ NewtonResult correct_rolls(const EndPath& path, Setup& s, NewtonResult found, co
   return found;
 }
 
+double tolerance_of(const Scene& scene, const Setup& s) {
+  return residual_under(s.full_load, scene.solver.residual_tolerance);
+}
+
 /// One solve, counted in the result.
 NewtonResult solve_counted(const Scene& scene, Statics& statics, Setup& s, int most_iterations,
                            SceneResult& result) {
   const NewtonResult found =
       statics.solve(s.problem, s.state,
-                    {.residual_tolerance = scene.solver.residual_tolerance,
+                    {.residual_tolerance = tolerance_of(scene, s),
                      .max_iterations = most_iterations,
                      .leave_saddles = may_leave_saddles(scene.loads, scene.plane)});
   result.iterations += found.iterations;
@@ -270,7 +280,7 @@ NewtonResult follow_path(const Scene& scene, const EndPath& path, Setup& s, Scen
     result.reason = format(
         "residual %.3g N after %d iterations at %.3g of the way to the distal support, asked for "
         "%.3g N%s",
-        found.residual, found.iterations, part, options.residual_tolerance,
+        found.residual, found.iterations, part, tolerance_of(scene, s),
         found.at_saddle ? kAtSaddle : "");
     return found;
   };
@@ -335,7 +345,7 @@ void run_newton(const Scene& scene, Setup& s, SceneResult& result) {
     result.reason =
         format("residual %.3g N after %d iterations of load step %d of %d, asked for %.3g N%s",
                solve.residual, solve.iterations, result.steps, options.load_steps,
-               options.residual_tolerance, solve.at_saddle ? kAtSaddle : "");
+               tolerance_of(scene, s), solve.at_saddle ? kAtSaddle : "");
   }
 }
 

@@ -35,6 +35,10 @@ struct Loads {
   double tip_torque = 0.0;         // about the wire's own axis; decoupled twist only   [N mm]
 };
 
+/// The residual that an equilibrium under nodal loads (3, n) [N] may have: as asked, but no more
+/// than a thousandth of the largest load, so that none is taken for out of balance and left out.
+double residual_under(const Eigen::Matrix3Xd& load, double asked);
+
 /// Whether saddles may be left for what lies lower: out of a plane a moment about a fixed axis
 /// spins an edge that leans toward the axis, without end.
 bool may_leave_saddles(const Loads& loads, const std::optional<Vec3>& plane);

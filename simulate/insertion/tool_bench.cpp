@@ -410,10 +410,12 @@ void ToolBench::carry_contact(const State& from, const Eigen::VectorXd& slides, 
 }
 
 bool ToolBench::solve(State& at) {
+  const double tolerance = contact_ == nullptr ? residual_under(at.load, scene_.residual_tolerance)
+                                               : scene_.residual_tolerance;
   NewtonResult found;
   for (int k = 0; k < kBench.most_solves && !found.converged; ++k) {
     found = statics_.solve(problem_of(at), at.state,
-                           {.residual_tolerance = scene_.residual_tolerance,
+                           {.residual_tolerance = tolerance,
                             .max_iterations = scene_.max_iterations,
                             .leave_saddles = may_leave_saddles(scene_.loads, scene_.plane)});
     record_.iterations += found.iterations;

@@ -56,6 +56,26 @@ TEST(Saddles, ColumnUnderMoreThanEulersLoadBendsAsTheElastica) {
   EXPECT_EQ(straight.nodes.bottomRows(2).cwiseAbs().maxCoeff(), 0.0);
 }
 
+TEST(Saddles, LoadsBelowTheToleranceBendASoftWire) {
+  // Not straight as at the start, where the load alone is less out of balance than is asked for.
+  const double EI = 1e-3, force = 3e-8, expected = force * kL * kL * kL / (3.0 * EI);
+  Scene scene = cantilever_along_x();
+  scene.wire.sections[0].bending_stiffness = EI;
+  scene.wire.sections[0].axial_stiffness = 0.0;
+  scene.loads.tip_force = Vec3(0.0, force, 0.0);
+  const SceneResult result = run_scene(scene);
+  EXPECT_EQ(result.outcome, SceneOutcome::kConverged) << result.reason;
+  EXPECT_NEAR(result.nodes(1, result.nodes.cols() - 1), expected, 0.03 * expected);
+
+  ToolScene tools = tools_along_x({uniform_tool(kL, EI)}, {{kL, 0.0}});
+  tools.tools[0].wire.sections[0].axial_stiffness = 0.0;
+  tools.loads = scene.loads;
+  tools.residual_tolerance = 1e-6;
+  const ToolBench bench(tools);
+  EXPECT_TRUE(bench.settled());
+  EXPECT_NEAR(bench.state().x(1, bench.state().x.cols() - 1), expected, 0.03 * expected);
+}
+
 TEST(Saddles, ClampsThatComeALittleNearerDoNotPressTheWireTogether) {
   for (const bool on_table : {false, true}) {
     for (const double shortening : {0.002, 0.01, 0.03, 0.045}) {
