@@ -15,6 +15,7 @@ constexpr Range kHubRoll{.min = -360.0, .max = 360.0};
 constexpr double kFarFromEntry = 10.0;   // that a line of the scene may pass it by           [mm]
 constexpr double kLeastMeasured = 30.0;  // of wire that tells how a vessel is held; chosen    [mm]
 constexpr std::size_t kMostRolls = 360, kMostMoves = 10000;
+constexpr double kMostSteps = 1e6;  // hours
 
 /// One roll, or a list of them; none where a wire that starts from a line is to tell its own.
 void read_rolls(JsonReader& insertion, bool starts, InsertionScene& scene) {
@@ -217,6 +218,16 @@ void check_measured(Problems& problems, double depth, InsertionScene& scene) {
   }
 }
 
+/// So many steps that nobody waits for their end are a slip in step_mm.
+void check_steps(Problems& problems, const InsertionScene& scene) {
+  double way = scene.depth ? std::abs(*scene.depth - scene.start->length) : 0.0;
+  if (scene.moves.empty() && !scene.start) way = scene.options.length;
+  for (const simulate::Move& move : scene.moves) way += std::abs(move.push);
+  if (way <= kMostSteps * scene.options.step) return;
+  problems.add("insertion.step_mm", Json(scene.options.step).dump(),
+               format("at least %.3g, of which a million make all moves", way / kMostSteps));
+}
+
 }  // namespace
 
 double roll_of_anterior(const Vec3& direction) {
@@ -262,6 +273,7 @@ void read_hand(JsonReader& root, InsertionScene& scene) {
     depth = scene.options.length;
   }
   if (scene.measured) check_measured(root.problems(), depth, scene);
+  check_steps(root.problems(), scene);
 }
 
 }  // namespace wireplan::pipeline

@@ -56,18 +56,26 @@ void check_strip(JsonReader& reader, const SectionInput& input) {
                           "with bending_stiffness_2_n_mm2 the wire is a strip, and there is no "
                           "solid round rod to take it from");
   };
+  if (input.section.tapered()) {
+    reader.problems().add(reader.path_of(kBend.value), reader.raw(kBend.value).dump(), "a number",
+                          "with bending_stiffness_2_n_mm2 the wire is a strip, which cannot taper");
+  }
   refuse_default(kStretch.value, input.section.axial_stiffness + input.stretch_coefficient);
   refuse_default("twist_stiffness_n_mm2", input.section.twist_stiffness);
 }
 
-SectionInput read_section(JsonReader& reader) {
+SectionInput read_section(JsonReader& reader, bool is_tip) {
   SectionInput input;
   simulate::Section& section = input.section;
   section.length = reader.number("length_mm", std::nullopt, kAboveZero);
-  if (check_one_form(reader, kBend, true)) {
-    const bool raw = reader.has(kBend.coefficient);
-    (raw ? input.bend_coefficient : section.bending_stiffness) =
-        reader.number(raw ? kBend.coefficient : kBend.value, std::nullopt, kAboveZero);
+  if (reader.has("tip_load_gf")) {
+    read_bending(reader, is_tip, section);
+  } else if (check_one_form(reader, kBend, true)) {
+    if (reader.has(kBend.coefficient)) {
+      input.bend_coefficient = reader.number(kBend.coefficient, std::nullopt, kAboveZero);
+    } else {
+      read_bending(reader, is_tip, section);
+    }
   }
   if (check_one_form(reader, kStretch, false)) {
     const bool raw = reader.has(kStretch.coefficient);
@@ -195,7 +203,7 @@ simulate::Scene read_wire_of_scene(JsonReader& root) {
   }
   std::vector<SectionInput> sections;
   for (JsonReader& section : reader.objects("sections", true)) {
-    sections.push_back(read_section(section));
+    sections.push_back(read_section(section, sections.empty()));
     scene.wire.sections.push_back(sections.back().section);
   }
   read_elements(reader, sections, scene);
@@ -521,6 +529,13 @@ double bending_stiffness_from_paper(double bend_coefficient, double edge_length)
 
 namespace {
 
+/// Of several tools.
+void refuse_contact_spacing(const Json& vessel, Problems& problems) {
+  if (!vessel.is_object() || !vessel.contains("contact_spacing_mm")) return;
+  problems.add("vessel.contact_spacing_mm", vessel["contact_spacing_mm"].dump(), "no such key",
+               "tools touch the wall at their nodes; give element_length_mm");
+}
+
 /// Of a bench with one wire.
 void refuse_support(const SceneVessel& vessel, Problems& problems) {
   if (!vessel.wall.support) return;
@@ -549,6 +564,7 @@ SceneFile read_scene(const std::filesystem::path& path) {
       simulate::ContactOptions& contact = scene.tools->scene.contact;
       contact.friction = scene.vessel->friction;
       contact.law = scene.vessel->contact_law;
+      refuse_contact_spacing(file["vessel"], problems);
     }
     root.finish();
     problems.throw_if_any();

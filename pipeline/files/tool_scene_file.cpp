@@ -7,6 +7,7 @@
 #include "pipeline/files/case_file.h"
 #include "pipeline/files/catalogue.h"
 #include "pipeline/files/hand_file.h"
+#include "pipeline/files/wire_file.h"
 
 namespace wireplan::pipeline {
 namespace {
@@ -19,10 +20,10 @@ std::string in_quotes(const std::string& text) { return "\"" + text + "\""; }
 
 std::string mm(double value) { return Json(value).dump(); }
 
-simulate::Section read_tool_section(JsonReader& reader) {
+simulate::Section read_tool_section(JsonReader& reader, bool is_tip) {
   simulate::Section section;
   section.length = reader.number("length_mm", std::nullopt, kMoreThanZero);
-  section.bending_stiffness = reader.number("bending_stiffness_n_mm2", std::nullopt, kMoreThanZero);
+  read_bending(reader, is_tip, section);
   section.axial_stiffness = reader.number("axial_stiffness_n", 0.0, kZeroOrMore);
   section.twist_stiffness = reader.number("twist_stiffness_n_mm2", 0.0, kZeroOrMore);
   section.mass_per_length =
@@ -51,10 +52,14 @@ void read_known_tool(JsonReader& reader, simulate::Tool& tool) {
   for (const CatalogueWire& wire : known.wires) names.push_back(wire.wire.name);
   for (const Catheter& catheter : known.catheters) names.push_back(catheter.tube.name);
   const std::string nearest = nearest_name(name, names);
-  reader.problems().add(reader.path_of("device"), in_quotes(name),
-                        "a wire or catheter of the catalogue",
-                        nearest.empty() ? "`wireplan devices` lists them"
-                                        : "did you mean " + in_quotes(nearest) + "?");
+  const bool sheath = std::any_of(known.sheaths.begin(), known.sheaths.end(),
+                                  [&](const Sheath& one) { return one.name == name; });
+  reader.problems().add(
+      reader.path_of("device"), in_quotes(name), "a wire or catheter of the catalogue",
+      sheath ? "of sheaths it knows no stiffness; give name, outer_diameter_mm, inner_diameter_mm "
+               "and sections"
+      : nearest.empty() ? "`wireplan devices` lists them"
+                        : "did you mean " + in_quotes(nearest) + "?");
   tool.wire = known.wires.front().wire;
 }
 
@@ -69,7 +74,7 @@ void read_own_tool(JsonReader& reader, simulate::Tool& tool) {
   }
   tool.inner_radius = 0.5 * inner;
   for (JsonReader& section : reader.objects("sections", true)) {
-    tool.wire.sections.push_back(read_tool_section(section));
+    tool.wire.sections.push_back(read_tool_section(section, tool.wire.sections.empty()));
   }
 }
 
@@ -96,7 +101,8 @@ void read_tool(JsonReader& reader, ToolBenchScene& into) {
 /// Each tool in the one before it.
 void check_stack(const ToolBenchScene& bench, Problems& problems) {
   const std::vector<simulate::Tool>& tools = bench.scene.tools;
-  if (tools.empty() || tools.size() > simulate::kMostTools) {
+  if (tools.empty()) return;  // told already
+  if (tools.size() > simulate::kMostTools) {
     problems.add("tools", "of " + std::to_string(tools.size()),
                  "1 to " + std::to_string(simulate::kMostTools) + ", from the outside in");
     return;
@@ -122,8 +128,13 @@ void check_stack(const ToolBenchScene& bench, Problems& problems) {
 void read_one_move(JsonReader& reader, const ToolBenchScene& bench, simulate::ToolMove& move) {
   const std::vector<simulate::Tool>& tools = bench.scene.tools;
   const std::string name = reader.text("tool", std::nullopt);
+  const std::size_t before = reader.problems().count();
   const double push = reader.number("push_mm", 0.0, {.min = -1e4, .max = 1e4}, "given in m?");
   const double turn = reader.number("turn_deg", 0.0, {.min = -36000.0, .max = 36000.0});
+  if (reader.has("pull_mm")) {
+    reader.problems().add(reader.path_of("pull_mm"), reader.raw("pull_mm").dump(), "no such key",
+                          "a push_mm below 0 pulls");
+  }
   const auto found = std::find_if(tools.begin(), tools.end(), [&](const simulate::Tool& tool) {
     return tool.wire.name == name;
   });
@@ -138,7 +149,7 @@ void read_one_move(JsonReader& reader, const ToolBenchScene& bench, simulate::To
     if (move.push[i] != 0.0 || move.turn[i] != 0.0) {
       reader.problems().add(reader.path_of("tool"), in_quotes(name), "each tool once in a move");
     }
-    if (push == 0.0 && turn == 0.0) {
+    if (push == 0.0 && turn == 0.0 && reader.problems().count() == before) {
       reader.problems().add(reader.path_of("push_mm"), "0, and turn_deg too",
                             "one of them other than 0");
     }
@@ -292,7 +303,7 @@ ToolBenchScene read_tool_bench(JsonReader& root) {
   bench.roll_zero = roll_of_anterior(scene.direction);
   for (JsonReader& reader : root.objects("tools", true)) read_tool(reader, bench);
   const bool sound = problems.empty();
-  check_stack(bench, problems);
+  if (sound) check_stack(bench, problems);
   read_moves(root, bench);
   read_distal(root, scene);
   scene.loads = read_loads(root);
@@ -316,6 +327,41 @@ ToolBenchScene read_tool_bench(JsonReader& root) {
     check_held(bench, problems);
   }
   return bench;
+}
+
+void read_bending(JsonReader& reader, bool is_tip, simulate::Section& section) {
+  constexpr const char *kEI = "bending_stiffness_n_mm2", *kTipLoad = "tip_load_gf";
+  section.bending_stiffness = 1.0;  // where what is given cannot be taken
+  if (reader.has(kTipLoad)) {
+    const double load =
+        reader.number(kTipLoad, std::nullopt, {.min = 0.01, .max = 1000.0}, "given in mN or N?");
+    section.bending_stiffness = stiffness_of_tip_load(load);
+    for (const char* other : {kEI, "bend_coefficient_n_per_m"}) {
+      if (!reader.has(other)) continue;
+      reader.problems().add(reader.path_of(other), std::string("given beside ") + kTipLoad,
+                            "one of them", "each gives the section's EI");
+    }
+    if (!is_tip || section.length < kTipLoadLength) {
+      reader.problems().add(reader.path_of(kTipLoad), mm(load),
+                            is_tip ? "a section of at least 10 mm" : "the first section's",
+                            "a tip load bends the last 10 mm; give " + std::string(kEI));
+    }
+    return;
+  }
+  if (!reader.raw(kEI).is_array()) {
+    section.bending_stiffness = reader.number(kEI, std::nullopt, kMoreThanZero);
+    return;
+  }
+  const std::size_t before = reader.problems().count(), given = reader.raw(kEI).size();
+  const std::vector<double> ends = reader.numbers(kEI, std::nullopt, kMoreThanZero);
+  if (reader.problems().count() > before) return;
+  if (given != 2) {
+    reader.problems().add(reader.path_of(kEI), reader.raw(kEI).dump(),
+                          "a number, or of a taper two: at the tip's end and at the other");
+    return;
+  }
+  section.bending_stiffness = ends[0];
+  section.proximal_bending_stiffness = ends[1];
 }
 
 simulate::Support read_support(JsonReader& reader) {

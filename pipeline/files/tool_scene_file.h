@@ -18,6 +18,8 @@ struct ToolBenchScene {
 /// faulty scene must not be run.
 ToolBenchScene read_tool_bench(JsonReader& root);
 
+/// EI of a section: a number, of a taper two, or of the first the load that bends its last 10 mm.
+void read_bending(JsonReader& reader, bool is_tip, simulate::Section& section);
 simulate::Support read_support(JsonReader& reader);
 simulate::Loads read_loads(JsonReader& root);
 

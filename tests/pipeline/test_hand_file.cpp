@@ -84,6 +84,8 @@ Json lying_wire() {
 TEST_F(SceneMistakes, OfMovesRollsAndStartsAreTold) {
   const std::vector<Mistake> mistakes = {
       {slid_wire(), "/loads/gravity_m_per_s2", {0, 0, -9.81}, {"gravity", "mass_kg_per_m"}},
+      {moved_wire(), "/insertion/step_mm", 1e-9, {"step_mm is 1e-09", "at least 4e-05"}},
+      {slid_wire(), "/insertion/step_mm", 1e-9, {"step_mm is 1e-09", "at least 3e-05"}},
       {moved_wire(), "/insertion/moves", Json::array(), {"insertion.moves is", "one move"}},
       {moved_wire(), "/insertion/moves", 30, {"insertion.moves is 30"}},
       {moved_wire(), "/insertion/length_mm", 30, {"length_mm is given beside moves", "delete"}},

@@ -125,6 +125,31 @@ TEST_F(CaseFile, ASceneMayNameAWireOfTheCatalogue) {
   expect_mentions(scene_problem(bench), {"wire.sections is not a known key"});
 }
 
+TEST_F(CaseFile, SectionsTaperOrAreGivenByTheirTipLoad) {
+  // The tip bends by P (L - x)^2 / EI(x), EI linear; a tip load of 1 gf is 1.567 N mm^2.
+  Json json = cantilever();
+  json["loads"] = {{"tip_force_n", {0, -1e-5, 0}}};
+  json["wire"]["sections"][0]["bending_stiffness_n_mm2"] = {1, 9};
+  const simulate::Section taper =
+      read_scene(write("scene.json", json.dump())).bench->wire.sections[0];
+  EXPECT_EQ(taper.EI(0.0), 1.0);
+  EXPECT_EQ(taper.EI(20.0), 5.0);
+  const simulate::SceneResult bent =
+      simulate::run_scene(*read_scene(write("scene.json", json.dump())).bench);
+  double expected = 0.0;
+  for (int k = 0; k < 4000; ++k) {
+    const double from_tip = (k + 0.5) * 0.01;
+    expected -= 1e-5 * from_tip * from_tip / (1.0 + 0.2 * from_tip) * 0.01;
+  }
+  EXPECT_NEAR(bent.nodes(1, bent.nodes.cols() - 1), expected, 0.01 * std::abs(expected));
+
+  json["wire"]["sections"][0].erase("bending_stiffness_n_mm2");
+  json["wire"]["sections"][0]["tip_load_gf"] = 2;
+  EXPECT_NEAR(
+      read_scene(write("scene.json", json.dump())).bench->wire.sections[0].bending_stiffness, 3.134,
+      2e-3);
+}
+
 TEST_F(CaseFile, PaperCoefficientsGiveTheSameWire) {
   // k_s = EA / (2 h^3) and k_b = EI / h^3 for h = 2 mm: EA = 160 N, EI = 0.8 N mm^2.
   EXPECT_NEAR(axial_stiffness_from_paper(1e10, 2.0), 160.0, 1e-12 * 160.0);
@@ -393,6 +418,18 @@ TEST_F(SceneMistakes, AreToldAndWhatIsNotInThisVersion) {
        "/wire/sections/0/stiffness",
        1,
        {"wire.sections[0].stiffness is not a known"}},
+      {cantilever(),
+       "/wire/sections/0/tip_load_gf",
+       1,
+       {"sections[0].bending_stiffness_n_mm2 is given beside tip_load_gf", "one of them"}},
+      {cantilever(),
+       "/wire/sections/0/bending_stiffness_n_mm2",
+       {1, 2, 3},
+       {"sections[0].bending_stiffness_n_mm2 is [1,2,3]", "of a taper two"}},
+      {cantilever(),
+       "/wire/sections/0/bending_stiffness_n_mm2",
+       {1, 0},
+       {"sections[0].bending_stiffness_n_mm2[1] is 0", "above 0"}},
       {cantilever(), "/target", {{"point_mm", {0, 0, 1}}}, {"target is not a known key"}},
       {pushed_wire(), "/vessel/friction", -0.1, {"vessel.friction is -0.1", "from 0"}},
       {pushed_wire(), "/vessel/wall/model", "soft", {"vessel.wall.model", "\"elastic\""}},
