@@ -1,5 +1,6 @@
 #include "pipeline/commands/scene_run.h"
 
+#include <algorithm>
 #include <map>
 #include <memory>
 
@@ -138,8 +139,35 @@ LoadedVessel load_vessel(const SceneFile& scene) {
   return vessel;
 }
 
+/// How the cross-sections of a vessel have moved, (3, n) [mm]; nothing where they do not.
+using Shifts = Eigen::Matrix3Xd;
+
+/// The surface as the sections carry it; at rest where they do not move.
+Surface carried_surface(const LoadedVessel& vessel, const Shifts& shifts) {
+  Surface surface = vessel.surface;
+  if (shifts.cols() > 0 && shifts.allFinite()) {
+    surface.vertices = vessel.model->sections->carried(surface.vertices, shifts);
+  }
+  return surface;
+}
+
+/// The vessel on the way, by insertion or number of moves, as vessel.pvd and vessel/K.vtp.
+void write_vessel(const LoadedVessel& vessel, const std::vector<simulate::Shape>& shapes,
+                  const fs::path& folder) {
+  if (!vessel.model->sections || shapes.empty()) return;
+  write_moved_vessel(shapes, vessel.surface, *vessel.model->sections, "vessel", folder);
+}
+
+/// The section that moved furthest, and where it is at rest.
+void put_largest_shift(Json& json, const simulate::SectionChain& chain, const Shifts& shifts) {
+  if (shifts.cols() == 0 || !shifts.allFinite()) return;
+  Eigen::Index most = 0;
+  json["largest_shift_mm"] = shifts.colwise().norm().maxCoeff(&most);
+  json["largest_shift_at_mm"] = to_json(Vec3(chain.places().col(most)));
+}
+
 /// What the result tells of the vessel.
-Json vessel_json(const SceneVessel& given, const LoadedVessel& vessel) {
+Json vessel_json(const SceneVessel& given, const LoadedVessel& vessel, const Shifts& shifts) {
   const simulate::Lumen& lumen = vessel.model->lumen;
   Json json = {{"triangles", vessel.surface.triangles.cols()},
                {"wall_model", given.wall.elastic ? "elastic" : "rigid"}};
@@ -158,14 +186,29 @@ Json vessel_json(const SceneVessel& given, const LoadedVessel& vessel) {
   json["lumen_max_deviation_mm"] = lumen.max_deviation();
   json["lumen_mean_deviation_mm"] = lumen.mean_deviation();
   json["openings"] = openings_json(lumen.openings());
+  if (given.wall.support) {
+    json["support_kpa_per_mm"] = clean(*given.wall.support / kMpaPerKpa);
+    put_largest_shift(json, *vessel.model->sections, shifts);
+  }
   return json;
 }
 
-/// `fitted`: the support is that of a measured wire.
-Json warnings_json(const SceneVessel& given, const LoadedVessel& vessel, bool fitted) {
+/// Whether nothing rubs on the wall; tools may by their own coefficients.
+bool is_frictionless(const SceneFile& scene) {
+  const double friction = scene.vessel->friction;
+  if (!scene.tools) return friction == 0.0;
+  const std::vector<simulate::Tool>& tools = scene.tools->scene.tools;
+  return std::all_of(tools.begin(), tools.end(), [&](const simulate::Tool& tool) {
+    return tool.wire.friction.value_or(friction) == 0.0;
+  });
+}
+
+Json warnings_json(const SceneFile& scene, const LoadedVessel& vessel) {
+  const SceneVessel& given = *scene.vessel;
+  const bool fitted = scene.insertion && scene.insertion->measured;  // the support
   Json warnings = Json::array();
   for (const std::string& line : vessel.told) warnings.push_back(line);
-  if (given.friction == 0.0) {
+  if (is_frictionless(scene)) {
     warnings.push_back("frictionless (friction is 0): push forces are lower bounds");
   }
   if (!given.wall.elastic) warnings.push_back("rigid wall: contact forces are upper bounds");
@@ -175,11 +218,10 @@ Json warnings_json(const SceneVessel& given, const LoadedVessel& vessel, bool fi
 
 /// The result with what the vessel adds to it.
 void write_result(Json result, const SceneFile& scene, const LoadedVessel* vessel,
-                  const fs::path& folder) {
+                  const Shifts& shifts, const fs::path& folder) {
   if (vessel) {
-    result["vessel"] = vessel_json(*scene.vessel, *vessel);
-    result["warnings"] = warnings_json(*scene.vessel, *vessel,
-                                       scene.insertion && scene.insertion->measured.has_value());
+    result["vessel"] = vessel_json(*scene.vessel, *vessel, shifts);
+    result["warnings"] = warnings_json(scene, *vessel);
   }
   write_json(result, folder / "result.json");
 }
@@ -195,13 +237,16 @@ void write_forces(const LoadedVessel& vessel, const std::vector<simulate::Triang
                          {{"peak_force_n", force}});
 }
 
-/// Nothing is drawn of a wire that has no place.
-void write_wire_picture(const LoadedVessel* vessel, const PictureWire& wire,
-                        const PictureMarks& marks, const fs::path& folder) {
-  const bool drawable = wire.nodes.cols() >= 2 && wire.nodes.allFinite();
-  if (!drawable && !vessel) return;
-  const std::vector<PictureWire> wires = drawable ? std::vector{wire} : std::vector<PictureWire>{};
-  write_picture(vessel ? vessel->surface : Surface(), wires, marks, folder / "wire.png");
+/// In the vessel as they leave it. Nothing is drawn of a wire that has no place.
+void write_wire_picture(const LoadedVessel* vessel, const Shifts& shifts,
+                        std::vector<PictureWire> wires, const PictureMarks& marks,
+                        const fs::path& folder) {
+  std::erase_if(wires, [](const PictureWire& wire) {
+    return wire.nodes.cols() < 2 || !wire.nodes.allFinite();
+  });
+  if (wires.empty() && !vessel) return;
+  write_picture(vessel ? carried_surface(*vessel, shifts) : Surface(), wires, marks,
+                folder / "wire.png");
 }
 
 /// Sum of the contacts on each triangle that has one, ascending.
@@ -229,13 +274,13 @@ SceneAnswer run_bench_scene(const SceneFile& file, const LoadedVessel* vessel,
     }
     write_forces(*vessel, sum_by_triangle(contacts), folder);
   }
-  write_result(result_json(result, contacts), file, vessel, folder);
+  write_result(result_json(result, contacts), file, vessel, {}, folder);
   preprocess::write_polyline(result.nodes, {}, folder / "wire.vtp");
-  write_wire_picture(vessel,
-                     {.name = scene.wire.name + ": " + outcome_name(result.outcome),
-                      .nodes = result.nodes,
-                      .contact_force = {},
-                      .radius = scene.wire.radius},
+  write_wire_picture(vessel, {},
+                     {{.name = scene.wire.name + ": " + outcome_name(result.outcome),
+                       .nodes = result.nodes,
+                       .contact_force = {},
+                       .radius = scene.wire.radius}},
                      {.title = file.name}, folder);
 
   const Vec3 tip = result.nodes.col(result.nodes.cols() - 1);
@@ -279,11 +324,14 @@ SceneAnswer run_tools(const SceneFile& file, const LoadedVessel* vessel, const f
     }
     write_forces(*vessel, sum_by_triangle(contacts), folder);
   }
+  const Shifts& shifts = result.shapes.back().sections;
   write_result(result_json(result, scene, contacts, file.tools->roll_zero, seconds), file, vessel,
-               folder);
+               shifts, folder);
+  if (vessel) write_vessel(*vessel, result.shapes, folder);
   std::vector<PictureWire> drawn;
   for (std::size_t i = 0; i < scene.tools.size(); ++i) {
     const simulate::Wire& tool = scene.tools[i].wire;
+    write_tool_shapes(result.shapes, i, "shapes-" + tool.name, folder);
     const Eigen::Matrix3Xd& nodes = result.tool_nodes[i];
     if (nodes.cols() < 2 || !nodes.allFinite()) continue;  // it is not out of the introducer
     preprocess::write_polyline(nodes, {}, folder / (tool.name + ".vtp"));
@@ -293,14 +341,9 @@ SceneAnswer run_tools(const SceneFile& file, const LoadedVessel* vessel, const f
                      .radius = tool.radius,
                      .color = wire_color(static_cast<int>(i))});
   }
-  if (!drawn.empty() || vessel) {
-    const std::string outcome = outcome_name(result.outcome);
-    write_picture(vessel ? vessel->surface : Surface(), drawn,
-                  {.title = file.name + ": " + outcome, .access = scene.point},
-                  folder / "wire.png");
-  }
-
   std::string line = outcome_name(result.outcome);
+  write_wire_picture(vessel, shifts, drawn,
+                     {.title = file.name + ": " + line, .access = scene.point}, folder);
   for (std::size_t i = 0; i < scene.tools.size(); ++i) {
     const simulate::ToolReport& tool = result.history.back().tools[i];
     line += format("%s %s %.1f mm in, tip (%.4f, %.4f, %.4f) mm, pushed by %.4g N",
@@ -321,9 +364,9 @@ SceneAnswer run_insertion_scene(const SceneFile& file, const InsertionScene& sce
   const double seconds = plan::thread_cpu_seconds() - start;
   for (simulate::PushTerms& terms : result.push_terms) terms.tip_roll -= scene.roll_zero;
   if (!scene.has_target && result.outcome == simulate::Outcome::kMissed) {
-    result.reason = std::string(!scene.moves.empty() ? "all moves were made"
-                                : scene.start ? "the wire went from its start to where it was to go"
-                                              : "all of the wire went in") +
+    result.reason = (!scene.moves.empty() ? "all moves were made"
+                     : scene.start        ? "the wire went from its start to where it was to go"
+                                   : format("all %.1f mm of wire went in", scene.options.length)) +
                     "; the scene has no target" + simulate::describe_balance(result.pushes);
   }
   for (const auto& [from, to] : result.stuck) {
@@ -343,10 +386,11 @@ SceneAnswer run_insertion_scene(const SceneFile& file, const InsertionScene& sce
   if (!sensitivity.reason.empty()) json["sensitivity_reason"] = sensitivity.reason;
   if (!support_fit.is_null()) json["support_fit"] = support_fit;
   const std::string told = scene.start ? tell_start(json.at("start")) : "";
-  write_result(std::move(json), file, &vessel, folder);
+  write_result(std::move(json), file, &vessel, result.sections, folder);
   write_forces(vessel, result.peak_forces, folder);
   preprocess::write_polyline(result.nodes, {}, folder / "wire.vtp");
   write_shapes(result, "shapes", folder);
+  write_vessel(vessel, result.shapes, folder);
   PictureWire wire{.name = scene.wire.name + ": " + outcome_name(result.outcome),
                    .nodes = result.nodes,
                    .contact_force = {},
@@ -359,7 +403,7 @@ SceneAnswer run_insertion_scene(const SceneFile& file, const InsertionScene& sce
     marks.target = scene.goal.point;
     marks.target_radius = scene.goal.radius;
   }
-  write_wire_picture(&vessel, wire, marks, folder);
+  write_wire_picture(&vessel, result.sections, {wire}, marks, folder);
 
   std::string line = outcome_name(result.outcome);
   if (!result.pushes.empty()) {

@@ -22,9 +22,11 @@ std::vector<std::string> check_scene_vessel(const SceneFile& scene);
 ///
 /// Writes into `folder`: result.json, wire.vtp, of several tools NAME.vtp of
 /// each that is out of the introducer, and wire.png; of
-/// an insertion also the shapes on the way, shapes.pvd; in a vessel also forces.vtu, the wall with
-/// the force that each triangle took
-/// (`peak_force_n`). Throws Error where check_scene_vessel() does or a file cannot be written.
+/// an insertion also the shapes on the way, shapes.pvd, of several tools shapes-NAME.pvd of each,
+/// at the start and after each move; in a vessel also forces.vtu, the wall with
+/// the force that each triangle took (`peak_force_n`), and of one that moves as a whole
+/// vessel.pvd, as it was on the way. Throws Error where check_scene_vessel() does or a file cannot
+/// be written.
 SceneAnswer run_scene_file(const SceneFile& scene, const std::filesystem::path& folder);
 
 }  // namespace wireplan::pipeline

@@ -456,12 +456,11 @@ simulate::Goal read_goal(JsonReader& root, const simulate::Introducer& introduce
 void check_fit(JsonReader& root, const SceneVessel& vessel) {
   if (!vessel.wall.support) {
     root.problems().add("vessel.wall.support_kpa_per_mm", "null",
-                        "a number where \"measured\" is given",
-                        "it is sought from 0.01 to 100; give 1, which is a guess as good as any");
+                        "a number, since the scene has \"measured\"",
+                        "it is sought from 0.01 to 100; give 1");
   }
   if (root.has("target")) {
-    root.problems().add("target", "given beside measured", "no such key",
-                        "a trial ends at its target, and the wire was measured where it lay");
+    root.problems().add("target", "given beside measured", "no such key", "a trial ends there");
   }
 }
 

@@ -40,6 +40,7 @@ std::vector<std::string> name_terms(const Rod& rod, const std::vector<std::strin
   terms.push_back("contact");
   if (friction > 0.0) terms.push_back("friction");
   if (vessel->compliance) terms.push_back("yielding_wall");
+  if (vessel->sections) terms.push_back("moving_vessel");
   return terms;
 }
 

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "simulate/insertion/tool_bench.h"
+#include "simulate/insertion/trial.h"
 
 namespace wireplan::simulate {
 
@@ -13,6 +14,7 @@ struct ToolSceneResult {
   std::string reason;               // why it did not converge, or what is doubtful; else empty
   std::vector<std::string> terms;   // energy terms that were built
   std::vector<ToolRecord> history;  // at the start and after each move
+  std::vector<Shape> shapes;        // of the centreline then, without forces
   Eigen::Matrix3Xd nodes;           // of the centreline                                 [mm]
   std::vector<Eigen::Matrix3Xd> tool_nodes;  // up to each tool's tip                     [mm]
   std::vector<Eigen::VectorXd> angles;       // see ToolBench::angles()                  [rad]

@@ -11,6 +11,7 @@
 
 #include "pipeline/commands/scene_run.h"
 #include "pipeline/files/scene_file.h"
+#include "preprocess/files/vessel_io.h"
 #include "tests/pipeline/case_texts.h"
 
 namespace wireplan::pipeline {
@@ -179,6 +180,48 @@ TEST_F(ToolMistakes, AreToldByKey) {
   }
 }
 
+TEST_F(ToolMistakes, AreToldOnceAndWithWhatHelps) {
+  const std::vector<Row> rows = {
+      {"tools[0].device is \"sheath-7f\", expected a wire or catheter of the catalogue (of sheaths "
+       "it knows no stiffness; give name,",
+       [](Json& json) {
+         json["tools"][0] = {{"device", "sheath-7f"}, {"name", "catheter"}, {"insertion_mm", 9}};
+       }},
+      {"moves[0].push_mm is 1000000, expected a number from -10000 to 10000",
+       [](Json& json) { json["moves"][0]["push_mm"] = 1000000; }},
+      {"moves[0].pull_mm is 5, expected no such key (a push_mm below 0 pulls)",
+       [](Json& json) {
+         json["moves"][0] = {{"tool", "wire"}, {"pull_mm", 5}};
+       }},
+      {"tools[1].sections[0].tip_load_gf is 2.0, expected a section of at least 10 mm",
+       [](Json& json) {
+         json["tools"][1]["sections"][0] = {{"length_mm", 9}, {"tip_load_gf", 2}};
+       }},
+      {"tools is [], expected a list of objects",
+       [](Json& json) {
+         json["tools"] = Json::array();
+         json.erase("moves");
+       }},
+  };
+  expect_told(rows);
+  for (const Row& row : rows) {
+    Json json = wire_in_catheter();
+    row.spoil(json);
+    const std::string said = scene_problem(json);
+    EXPECT_EQ(std::count(said.begin(), said.end(), '\n'), 0) << said;
+  }
+}
+
+TEST_F(ToolMistakes, OfWhatDoesNothingAreTold) {
+  expect_told(
+      {{"vessel.contact_spacing_mm is 0.5, expected no such key (tools touch the wall at "
+        "their nodes; give element_length_mm)",
+        [](Json& json) {
+          json["vessel"] = {{"surface", {{"path", "tube.stl"}, {"unit", "mm"}, {"frame", "LPS"}}},
+                            {"contact_spacing_mm", 0.5}};
+        }}});
+}
+
 TEST_F(ToolMistakes, InWhatLoadsAndHoldsThemAreTold) {
   expect_told({
       {"plane_normal is [0.0,0.0,1.0], expected a plane that the supports lie in",
@@ -282,6 +325,110 @@ TEST_F(CaseFile, ToolsInAVesselTellWhatEachDoesToTheWall) {
   } catch (const Error& error) {
     EXPECT_NE(std::string(error.what()).find("introducer.point_mm is "), std::string::npos)
         << error.what();
+  }
+}
+
+/// A straight tube along x that moves as a whole on 1 kPa/mm, as stiff near its access as
+/// elsewhere.
+Json soft_tube() {
+  return {{"surface", {{"path", "tube.stl"}, {"unit", "mm"}, {"frame", "LPS"}}},
+          {"wall",
+           {{"model", "elastic"},
+            {"support_kpa_per_mm", 1},
+            {"held", Json::array({{{"at", "access"}, {"factor", 1}}})}}}};
+}
+
+TEST_F(CaseFile, AVesselThatMovesIsShownAsItMoves) {
+  Surface tube = shapes::straight_tube(5.0, 120.0, 2.5);
+  tube.vertices.row(0).swap(tube.vertices.row(2));
+  tube = shapes::inside_out(tube);  // mirrored, it faces inward
+  write_stl(tube, folder_ / "tube.stl");
+  // So heavy and so soft a wire that its weight w rests on the support alone: the vessel moves by
+  // w / (pi R k_s), 1.875 mm.
+  const double k_s = 1e-3, weight = 1.875 * kPi * 5.0 * k_s, gravity = weight / 1e-8 / 1e3;
+  const Json section = {
+      {"length_mm", 118}, {"bending_stiffness_n_mm2", 1}, {"mass_kg_per_m", 0.01}};
+  Json scene = {{"schema", "wireplan.scene/1"},
+                {"vessel", soft_tube()},
+                {"loads", {{"gravity_m_per_s2", {0, 0, -gravity}}}}};
+  const Json place = {{"point_mm", {3, 0, 0}}, {"direction", {1, 0, 0}}};
+
+  Json pushed = scene;
+  pushed["wire"] = {{"elements", 59}, {"sections", Json::array({section})}};
+  pushed["wire"]["sections"][0]["radius_mm"] = 0.4;
+  pushed["insertion"] = place;
+  pushed["insertion"]["length_mm"] = 112;
+  pushed["insertion"]["step_mm"] = 2;
+  pushed["check_sensitivity"] = false;
+  Json tools = scene;
+  tools["introducer"] = place;
+  tools["element_length_mm"] = 2;
+  tools["tools"] = Json::array({{{"name", "vessel"},
+                                 {"outer_diameter_mm", 0.8},
+                                 {"insertion_mm", 12},
+                                 {"sections", Json::array({section})}}});
+  tools["moves"] =
+      Json::array({{{"tool", "vessel"}, {"push_mm", 50}}, {{"tool", "vessel"}, {"push_mm", 50}}});
+  for (const Json& json : {pushed, tools}) {
+    const fs::path out = folder_ / (json.contains("tools") ? "tools" : "pushed");
+    const SceneAnswer answer = run_scene_file(read_scene(write("scene.json", json.dump())), out);
+    ASSERT_TRUE(answer.solved) << answer.line;
+    const Json vessel = read_json(out / "result.json", "wireplan.result/1").at("vessel");
+    EXPECT_EQ(vessel.at("support_kpa_per_mm"), 1.0);
+    const double most = vessel.at("largest_shift_mm");  // where the wire comes to lie on it
+    EXPECT_GT(most, 1.875);
+    EXPECT_LT(most, 1.3 * 1.875);
+    // The last of the series is moved so far, about its middle.
+    int last = 0;
+    while (fs::exists(out / "vessel" / (std::to_string(last + 1) + ".vtp"))) ++last;
+    EXPECT_GE(last, json.contains("tools") ? 2 : 10);
+    const Surface moved =
+        preprocess::read_surface_artifact(out / "vessel" / (std::to_string(last) + ".vtp"));
+    double shift = 0.0, count = 0.0;
+    for (Eigen::Index k = 0; k < tube.vertices.cols(); ++k) {
+      if (std::abs(tube.vertices(0, k) - 70.0) > 15.0) continue;
+      shift += tube.vertices(2, k) - moved.vertices(2, k);
+      ++count;
+    }
+    EXPECT_NEAR(shift / count, 1.875, 0.05 * 1.875);
+    EXPECT_TRUE(fs::exists(out / "vessel.pvd"));
+  }
+  EXPECT_TRUE(fs::exists(folder_ / "tools" / "vessel.vtp")) << "the tool of that name";
+  EXPECT_TRUE(fs::exists(folder_ / "tools" / "shapes-vessel" / "2.vtp"));
+  EXPECT_TRUE(fs::exists(folder_ / "tools" / "shapes-vessel.pvd"));
+}
+
+TEST_F(CaseFile, ToolsThatLeaveTheImagedVesselAreToldItsEnd) {
+  write_stl(shapes::straight_tube(4.0, 60.0, 2.0), folder_ / "tube.stl");
+  Json json = wire_in_catheter();
+  json["tools"] = Json::array({straight_wire()});
+  json["tools"][0]["insertion_mm"] = 12;
+  json["moves"] = Json::array({{{"tool", "wire"}, {"push_mm", 90}}});
+  json["vessel"] = {{"surface", {{"path", "tube.stl"}, {"unit", "mm"}, {"frame", "LPS"}}}};
+  const SceneAnswer answer =
+      run_scene_file(read_scene(write("scene.json", json.dump())), folder_ / "out");
+  EXPECT_FALSE(answer.solved);
+  EXPECT_NE(answer.line.find("a tool left the imaged vessel through its end at ("),
+            std::string::npos)
+      << answer.line;
+  EXPECT_NE(answer.line.find("60.0) mm in moves[0]"), std::string::npos) << answer.line;
+}
+
+TEST_F(CaseFile, WarnsOfNoFrictionWhereNothingRubs) {
+  write_stl(shapes::straight_tube(4.0, 60.0, 3.0), folder_ / "tube.stl");
+  Json json = wire_in_catheter();
+  json["tools"][0]["insertion_mm"] = 8;
+  json["tools"][1]["insertion_mm"] = 12;
+  json["moves"] = Json::array({{{"tool", "wire"}, {"push_mm", 2}}});
+  json["vessel"] = {{"surface", {{"path", "tube.stl"}, {"unit", "mm"}, {"frame", "LPS"}}}};
+  for (const double friction : {0.0, 0.05}) {
+    json["tools"][1]["friction"] = friction;
+    run_scene_file(read_scene(write("scene.json", json.dump())), folder_ / "out");
+    const Json result = read_json(folder_ / "out" / "result.json", "wireplan.result/1");
+    const std::string warnings = result.at("warnings").dump();
+    EXPECT_EQ(warnings.find("frictionless") != std::string::npos, friction == 0.0) << warnings;
+    const std::string terms = result.at("terms").dump();
+    EXPECT_EQ(terms.find("friction") != std::string::npos, friction > 0.0) << terms;
   }
 }
 

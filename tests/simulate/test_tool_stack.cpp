@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "simulate/insertion/tool_bench.h"
+#include "simulate/insertion/tool_scene.h"
 #include "tests/simulate/random_values.h"
 #include "tests/simulate/tool_bench.h"
 
@@ -221,6 +222,19 @@ TEST(ToolBench, TwoStraightToolsAreOneOfTwiceTheStiffness) {
   EXPECT_GT(two(1, 60), 10.0);
   EXPECT_LT((two - shape({40.0})).norm(), 1e-6);
   EXPECT_LT((two - shape({10.0, 10.0, 20.0})).norm(), 1e-6);
+}
+
+TEST(ToolBench, RoundingBesideAStiffToolIsNoRoughForce) {
+  // The wire that slides in it feels nothing; the stiff one, held straight, stores 2e4 N mm.
+  std::vector<Tool> tools = {uniform_tool(500.0, 1e5, 0.03), uniform_tool(500.0, 100.0)};
+  for (Tool& tool : tools) tool.wire.sections[0].axial_stiffness = 0.0;  // of a solid round rod
+  ToolScene scene = tools_along_x(tools, {{60.0, 0.0}, {60.0, 0.0}});
+  scene.residual_tolerance = 1e-6;
+  scene.moves = {push_of({0.0, 40.0})};
+  const ToolSceneResult result = run_tool_scene(scene);
+  EXPECT_EQ(result.outcome, SceneOutcome::kConverged);
+  EXPECT_EQ(result.reason, "");
+  EXPECT_LT(std::abs(result.history.back().work), 0.01);
 }
 
 TEST(ToolBench, OrderOfEqualToolsDoesNotMatter) {
