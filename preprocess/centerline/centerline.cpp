@@ -8,6 +8,7 @@
 #include <utility>
 #include <vector>
 
+#include "preprocess/centerline/branch_start.h"
 #include "preprocess/centerline/grid_search.h"
 #include "preprocess/centerline/nearest_wall.h"
 #include "preprocess/centerline/section_width.h"
@@ -435,13 +436,6 @@ std::vector<Twig> find_twigs(GridSearch& search) {
   return twigs;
 }
 
-/// Point of a line nearest to another: its index.
-Eigen::Index nearest_index(const Centerline& line, const Vec3& p) {
-  Eigen::Index best = 0;
-  (line.points.colwise() - p).colwise().squaredNorm().minCoeff(&best);
-  return best;
-}
-
 /// The way along a twig to the node that another begins at, and on along that; the other's own
 /// where there is none.
 std::vector<int> joined(const std::vector<int>& twig, const std::vector<int>& other) {
@@ -453,8 +447,10 @@ std::vector<int> joined(const std::vector<int>& twig, const std::vector<int>& ot
 
 /// Whether a branch runs in its parent's lumen all along: an edge of a lumen that is not round, as
 /// that of a dissected aorta, whose ridge ends aside.
-bool runs_in_parent(const Surface& surface, const Branch& branch, const Centerline& parent) {
+bool runs_in_parent(const Surface& surface, const Branch& branch,
+                    const std::vector<Branch>& branches) {
   const Centerline& line = branch.line;
+  const Centerline& parent = branches[static_cast<std::size_t>(branch.parent)].line;
   const Eigen::Index last = line.points.cols() - 1;
   const double start = line.radius(0), end = line.arc_length(last) - 0.3 * line.radius(last);
   for (const double part : {1.0, 0.5, 0.25, 0.75}) {  // the end, where most differ, first
@@ -476,8 +472,8 @@ std::vector<Branch> find_tree(const Surface& surface, const Vec3& root,
   const NearestWall wall(surface);
   const double spacing = first_spacing(surface, kTreeNodesWanted, options),
                sample = options.sample_mm;
-  const Vec3 start = leave_wall(wall, root, 2.0 * spacing);
-  GridSearch search(wall, surface, spacing, start, start);
+  const Vec3 inside = leave_wall(wall, root, 2.0 * spacing);
+  GridSearch search(wall, surface, spacing, inside, inside);
 
   std::vector<Branch> branches;
   std::vector<int> branch_of;  // of each twig; its parent's where it is none itself
@@ -507,30 +503,34 @@ std::vector<Branch> find_tree(const Surface& surface, const Vec3& root,
                    sample);
     }
     extend_straight(wall, line, end, sample);
-    Branch branch{.line = {}, .parent = parent};
-    if (parent >= 0) {
-      const Centerline& from = branches[static_cast<std::size_t>(parent)].line;
-      const Eigen::Index at = nearest_index(from, line.front());
-      branch.parent_arc = from.arc_length(at);
-      if ((line.front() - from.points.col(at)).norm() > 1e-9) {
-        line.insert(line.begin(), from.points.col(at));
-      }
-    } else {
+    const auto finished = [&](const Points& points) {
+      return measured(wall, smooth(wall, resample(points, sample), sample,
+                                   {.least = sample, .part = kSmoothing}));
+    };
+    if (parent < 0) {
       std::reverse(line.begin(), line.end());
       extend(wall, line, root, sample);
       cut_after(line, root, sample);
       std::reverse(line.begin(), line.end());
+      branches.push_back({.line = finished(line)});
+      branch_of.push_back(0);
+      continue;
     }
-    branch.line = measured(
-        wall, smooth(wall, resample(line, sample), sample, {.least = sample, .part = kSmoothing}));
-    if (parent >= 0 &&
-        runs_in_parent(surface, branch, branches[static_cast<std::size_t>(parent)].line)) {
+    const auto begun = [&](const BranchStart& start) {
+      const Centerline& from = branches[static_cast<std::size_t>(start.parent)].line;
+      return Branch{.line = finished(begin_line(from, start, line)),
+                    .parent = start.parent,
+                    .parent_arc = from.arc_length(start.at)};
+    };
+    const BranchStart start = find_branch_start(branches, parent, line);
+    if (line.size() < start.own_first + kFewPoints ||
+        runs_in_parent(surface, begun(start_whole(branches, parent, line)), branches)) {
       branch_of.push_back(parent);
       edges[t] = nodes;
       continue;
     }
     branch_of.push_back(static_cast<int>(branches.size()));
-    branches.push_back(std::move(branch));
+    branches.push_back(begun(start));
   }
   return branches;
 }
