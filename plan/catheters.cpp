@@ -98,7 +98,7 @@ std::optional<Ostium> find_ostium(const simulate::Goal& goal) {
   std::optional<Ostium> last;
   for (const Junction& junction : find_junctions(*goal.way)) {
     const double end = path.arc_length[path.arc_length.size() - 1];
-    if (!junction.taken || junction.arc >= end) continue;
+    if (!junction.taken || junction.entered || junction.arc >= end) continue;
     Ostium& here = last.emplace();
     here.arc = junction.arc;
     here.point = junction.point;

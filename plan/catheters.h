@@ -39,7 +39,7 @@ struct Ostium : simulate::TakeOff {
   double narrowest = HUGE_VAL;   // of the way up to the ostium, inscribed               [mm]
 };
 
-/// None where the way takes none, or is not known.
+/// None where the way takes none, as out of a branch into a wider vessel, or is not known.
 std::optional<Ostium> find_ostium(const simulate::Goal& goal);
 
 /// A wire in a catheter.

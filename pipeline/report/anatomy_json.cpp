@@ -124,9 +124,7 @@ Json c_arm_json(const simulate::Way& way, const std::vector<plan::Junction>& jun
   Json rows = Json::array();
   for (const plan::Junction& junction : junctions) {
     if (!junction.taken) continue;
-    const preprocess::Branch& branch = tree[static_cast<std::size_t>(junction.branch)];
-    const double leaves = branch.parent == junction.trunk ? branch.parent_arc : 0.0;
-    Json row = {{"trunk", branch_name(tree, junction.trunk, leaves)},
+    Json row = {{"trunk", plan::trunk_name(tree, junction)},
                 {"branch", plan::leaving_name(tree, junction)},
                 {"leads_to_target", false},
                 {"at_mm", junction.level},
@@ -154,7 +152,6 @@ Json lengths_json(const Centerline& way, const std::vector<plan::Junction>& junc
   Json places = Json::array();
   const double length = way.arc_length(way.arc_length.size() - 1);
   for (const plan::Junction& junction : junctions) {
-    if (!junction.taken && junction.level > length) continue;  // the target comes first
     const char* what = junction.bifurcation
                            ? (junction.taken ? "the bifurcation, into" : "the bifurcation, past")
                        : junction.taken ? "the way turns into"

@@ -12,6 +12,7 @@ namespace {
 std::optional<Vec3> find_ostium(const std::vector<preprocess::Branch>& tree, int k) {
   const preprocess::Branch& branch = tree[static_cast<std::size_t>(k)];
   if (branch.parent < 0 || simulate::is_stump(tree, k) || simulate::goes_on(tree, k) ||
+      simulate::is_entered(tree, k) ||
       simulate::bifurcation_width(tree, {.parent = branch.parent, .child = k})) {
     return {};
   }

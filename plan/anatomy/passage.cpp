@@ -65,12 +65,26 @@ Vec3 direction_beyond(const Centerline& line, double ostium) {
   return chord(line, start + reach / 6.0, start + reach * 5.0 / 6.0);
 }
 
+/// The vessel that another leaves, along the way; one that the way enters, or starts in the middle
+/// of, begins elsewhere.
+struct Trunk {
+  Centerline line;
+  bool entered = false;
+};
+
 /// How far along the way it is to the level of a place beside the trunk, which the way comes along
 /// to `arc` or turns off there.
-double find_level(const Centerline& way, double arc, const Centerline& trunk, const Vec3& p) {
+double find_level(const Centerline& way, double arc, const Trunk& of, const Vec3& p) {
+  const Centerline& trunk = of.line;
   const auto place_of = [&](const Vec3& q) { return preprocess::find_place(q, trunk); };
   // Counted from where the way is on the trunk's axis. Where a branch begins, a line is bent a
   // little off it: a chord is not.
+  if (of.entered) {
+    // Before the access where the way begins beyond it.
+    const preprocess::PathPlace on_way =
+        preprocess::find_place(point_at(trunk, place_of(p).arc), way);
+    return on_way.arc > 0.0 ? on_way.arc : -on_way.from_axis;
+  }
   const double start = preprocess::find_place(trunk.points.col(0), way).arc,
                before = std::max(start, arc - 2.0 * place_of(point_at(way, arc)).radius);
   const preprocess::PathPlace place = place_of(p);
@@ -81,40 +95,121 @@ double find_level(const Centerline& way, double arc, const Centerline& trunk, co
 
 /// The junction at `arc` of the way, where `side` leaves `trunk` beyond `from` of its own: the way
 /// itself where it takes the branch.
-Junction junction_of(const Centerline& way, double arc, const Centerline& trunk,
-                     const Centerline& side, double from) {
+Junction junction_of(const Centerline& way, double arc, const Trunk& of, const Centerline& side,
+                     double from) {
+  const Centerline& trunk = of.line;
   const preprocess::PathPlace place = preprocess::find_place(point_at(side, from), trunk);
   const double reach = 2.0 * place.radius, ostium = find_ostium(side, from, trunk);
   Junction junction{.taken = &side == &way};
-  junction.level = find_level(way, arc, trunk, point_at(side, ostium));
+  junction.level = find_level(way, arc, of, point_at(side, ostium));
   junction.arc = junction.taken ? ostium : junction.level;
   junction.point = point_at(way, junction.arc);
   junction.radius = radius_at(side, ostium);
   junction.trunk_direction = chord(trunk, place.arc - reach, place.arc + reach);
   junction.branch_direction = direction_beyond(side, ostium);
+  if (of.entered) {  // onward, as the way goes there
+    const Vec3 level = point_at(trunk, preprocess::find_place(point_at(side, ostium), trunk).arc);
+    const Vec3 goes = level - point_at(way, junction.level - reach);
+    if (goes.dot(junction.trunk_direction) < 0.0) junction.trunk_direction *= -1.0;
+  }
   return junction;
 }
 
 /// Whether a child of the tree is the trunk where it leaves its parent.
 bool is_trunk(const std::vector<Branch>& tree, int child) {
   constexpr double kClearlyWider = 4.0 / 3.0;
-  return simulate::goes_on(tree, child) && simulate::width_over_parent(tree, child) > kClearlyWider;
+  return (simulate::goes_on(tree, child) &&
+          simulate::width_over_parent(tree, child) > kClearlyWider) ||
+         simulate::goes_straight_on(tree, child);
+}
+
+/// The part of a line from its point `first` on, or the same back from its end.
+Centerline part_from(const Centerline& line, Eigen::Index first, bool reversed) {
+  const Eigen::Index count = line.points.cols() - first;
+  Centerline part{
+      .points = line.points.rightCols(count), .radius = line.radius.tail(count), .arc_length = {}};
+  if (reversed) {
+    part.points = part.points.rowwise().reverse().eval();
+    part.radius = part.radius.reverse().eval();
+  }
+  part.arc_length = arc_length_of(part.points);
+  return part;
+}
+
+/// The vessel that the line of a branch's parent enters or begins in at the fork, whole: along the
+/// branch from its end to the fork and on along the parent.
+Centerline entered_vessel(const std::vector<Branch>& tree, int fork) {
+  const Branch& branch = tree[static_cast<std::size_t>(fork)];
+  const Centerline& line = tree[static_cast<std::size_t>(branch.parent)].line;
+  const Centerline one = part_from(branch.line, 1, true);
+  return joined(one, length_of(one), part_from(line, segment_at(line, branch.parent_arc), false));
 }
 
 /// The vessel that a child leaves, past that: its parent, or where that turns off there, up to
-/// there and on in the child that is the trunk.
-Centerline trunk_at(const std::vector<Branch>& tree, int child) {
+/// there and on in the child that is the trunk; behind the place where the parent's line enters a
+/// wider vessel, that vessel.
+Trunk trunk_at(const std::vector<Branch>& tree, int child) {
   const Branch& branch = tree[static_cast<std::size_t>(child)];
   const Centerline& line = tree[static_cast<std::size_t>(branch.parent)].line;
   const double near = branch.parent_arc - radius_at(line, branch.parent_arc);
+  int whole = -1;  // begins behind the way's
   for (std::size_t b = 0; b < tree.size(); ++b) {
-    if (tree[b].parent != branch.parent || tree[b].parent_arc < near) continue;
-    if (is_trunk(tree, static_cast<int>(b))) return joined(line, tree[b].parent_arc, tree[b].line);
+    if (tree[b].parent != branch.parent) continue;
+    if (tree[b].parent_arc >= near && is_trunk(tree, static_cast<int>(b))) {
+      return {joined(line, tree[b].parent_arc, tree[b].line)};
+    }
+    const bool before = tree[b].parent_arc - simulate::own_start(tree[b]) < branch.parent_arc;
+    const bool begins = simulate::is_entered(tree, static_cast<int>(b)) ||
+                        simulate::runs_back(tree, static_cast<int>(b));
+    if (before && begins) whole = static_cast<int>(b);
   }
-  return line;
+  if (whole >= 0) return {.line = entered_vessel(tree, whole), .entered = true};
+  return {line};
 }
 
-/// Where the way turns into a branch: from the trunk's axis until it has settled in the branch.
+/// Where the way comes into the vessel that it enters at a fork, from `arc` in that vessel back;
+/// none where it starts there.
+std::optional<double> find_entry(const Centerline& way, double arc, const Centerline& vessel) {
+  const auto is_inside = [&](Eigen::Index k) {
+    const preprocess::PathPlace place = preprocess::find_place(way.points.col(k), vessel);
+    return place.from_axis <= place.radius;
+  };
+  Eigen::Index k = segment_at(way, arc) + 1;
+  while (k > 0 && is_inside(k - 1)) --k;
+  if (k == 0) return {};
+  return way.arc_length(k);
+}
+
+/// Where the way turns out of a branch into a wider vessel, of which `fork` is one way; none where
+/// it starts in that.
+std::optional<Junction> entry_at(const simulate::Way& of, double arc, int fork, bool takes) {
+  constexpr double kLeast = 1.0;  // of the branch, for a direction                        [mm]
+  const std::vector<Branch>& tree = of.tree();
+  const Centerline& way = of.path();
+  const Centerline vessel = entered_vessel(tree, fork);
+  const std::optional<double> entry = find_entry(way, arc, vessel);
+  if (!entry || *entry < kLeast) return {};
+  const int own = tree[static_cast<std::size_t>(fork)].parent;
+  const preprocess::PathPlace place = preprocess::find_place(point_at(way, *entry), vessel);
+  const double reach = 2.0 * place.radius;
+  Junction junction{.trunk = own, .branch = takes ? fork : own, .taken = true};
+  junction.entered = true;
+  junction.fork = fork;
+  junction.arc = *entry;
+  junction.level = *entry + place.from_axis;
+  junction.point = point_at(way, *entry);
+  junction.radius = radius_at(way, *entry);
+  const double into = std::min(*entry, std::max(6.0, 3.0 * junction.radius));
+  junction.trunk_direction = chord(way, *entry - into * 5.0 / 6.0, *entry - into / 6.0);
+  // Onward, as the way goes.
+  junction.branch_direction = chord(vessel, place.arc - reach, place.arc + reach);
+  const Vec3 goes = point_at(way, junction.level + reach) - point_at(vessel, place.arc);
+  if (goes.dot(junction.branch_direction) < 0.0) junction.branch_direction *= -1.0;
+  return junction;
+}
+
+/// Where the way turns into a branch: from the trunk's axis until it has settled in the branch. Of
+/// a vessel that is entered the other way round.
 struct Turn {
   double from = 0.0, corner = 0.0, to = 0.0;  // along the way                             [mm]
 };
@@ -123,7 +218,8 @@ std::vector<Turn> list_turns(const Centerline& way, const std::vector<Junction>&
   std::vector<Turn> turns;
   for (const Junction& j : junctions) {
     const double free = turns.empty() ? 0.0 : turns.back().to;
-    const Turn turn{std::max(free, j.level - j.radius), j.level, j.arc + j.radius};
+    const Turn turn{std::max(free, std::min(j.level, j.arc) - j.radius), j.level,
+                    std::max(j.level, j.arc) + j.radius};
     if (j.taken && turn.from < turn.to && turn.to < length_of(way)) turns.push_back(turn);
   }
   return turns;
@@ -180,6 +276,62 @@ Corner corner_at(const Centerline& line, double arc, double near, double far) {
   return corner;
 }
 
+/// Whether the way goes there from one leg into the other of two that meet in a wider vessel.
+bool crosses(const std::vector<Branch>& tree, const Junction& junction) {
+  const int own = tree[static_cast<std::size_t>(junction.fork)].parent;
+  const simulate::Bifurcation fork{own, junction.fork, junction.trunk == junction.fork};
+  return junction.taken && !junction.entered && simulate::bifurcation_width(tree, fork);
+}
+
+/// Direction of the way where it has not yet come to the fork of a junction.
+Vec3 direction_before(const Centerline& way, const Junction& junction) {
+  const double fork = std::max(0.0, junction.level - radius_at(way, junction.level));
+  return chord(way, fork - std::max(10.0, 4.0 * radius_at(way, fork)), fork);
+}
+
+/// Whether the vessel that a branch leaves parts within the ball of the fork, into that or others.
+bool parts_beside(const std::vector<Branch>& tree, int child) {
+  const Branch& branch = tree[static_cast<std::size_t>(child)];
+  for (std::size_t b = 0; b < tree.size(); ++b) {
+    if (tree[b].parent != branch.parent) continue;
+    const double apart = std::abs(tree[b].parent_arc - branch.parent_arc);
+    if (apart <= simulate::own_start(branch) && simulate::parts(tree, static_cast<int>(b))) {
+      return true;
+    }
+  }
+  return false;
+}
+
+/// The first of the branches at which a vessel parts, along a line.
+bool is_first_part(const std::vector<Branch>& tree, int child) {
+  const Branch& branch = tree[static_cast<std::size_t>(child)];
+  for (std::size_t b = 0; b < tree.size(); ++b) {
+    if (tree[b].parent != branch.parent || static_cast<int>(b) == child) continue;
+    const double ahead = branch.parent_arc - tree[b].parent_arc;
+    const bool earlier = ahead > 0.0 || (ahead == 0.0 && static_cast<int>(b) < child);
+    if (earlier && ahead <= simulate::own_start(branch) &&
+        simulate::parts(tree, static_cast<int>(b))) {
+      return false;
+    }
+  }
+  return true;
+}
+
+/// Where the trunk parts at `arc` of the way, which goes on along the tree's line: as it turns into
+/// a branch, since either of the two may be the line's.
+Junction part_at(const Centerline& way, double arc, const std::vector<Branch>& tree, int fork) {
+  const Branch& branch = tree[static_cast<std::size_t>(fork)];
+  Junction junction{.trunk = branch.parent, .branch = branch.parent, .taken = true};
+  junction.fork = fork;
+  junction.level = arc;
+  junction.arc = std::min(arc + simulate::own_start(branch), length_of(way));
+  junction.point = point_at(way, junction.arc);
+  junction.radius = radius_at(way, junction.arc);
+  junction.trunk_direction = direction_before(way, junction);
+  junction.branch_direction = direction_beyond(way, junction.arc);
+  return junction;
+}
+
 /// At `arc` of the way, where `child` leaves the tree's branch that the way comes along, for the
 /// child where that is what the way takes. None where the other of the two is a stump.
 std::optional<Junction> junction_at(const simulate::Way& of, double arc, int child, bool takes) {
@@ -188,7 +340,8 @@ std::optional<Junction> junction_at(const simulate::Way& of, double arc, int chi
   const Branch& branch = tree[static_cast<std::size_t>(child)];
   const int own = branch.parent;
   const Centerline& line = tree[static_cast<std::size_t>(own)].line;
-  const Centerline trunk = trunk_at(tree, child);
+  const Trunk trunk = trunk_at(tree, child);
+  if (simulate::is_entered(tree, child)) return entry_at(of, arc, child, takes);
   const bool goes_on = is_trunk(tree, child);
   Junction junction;
   if (!takes) {
@@ -207,6 +360,10 @@ std::optional<Junction> junction_at(const simulate::Way& of, double arc, int chi
   junction.branch = goes_on ? own : child;
   const std::optional<simulate::Bifurcation>& fork = of.bifurcation();
   junction.bifurcation = fork && fork->child == child;
+  junction.fork = child;
+  if (crosses(tree, junction) || (takes && !goes_on && parts_beside(tree, child))) {
+    junction.trunk_direction = direction_before(way, junction);
+  }
   return junction;
 }
 
@@ -225,11 +382,21 @@ double turn_of(const Junction& junction) {
 }
 
 std::string leaving_name(const std::vector<preprocess::Branch>& tree, const Junction& junction) {
-  const bool from_before = tree[static_cast<std::size_t>(junction.trunk)].parent == junction.branch;
-  return branch_name(tree, junction.branch,
-                     from_before
-                         ? simulate::begins_behind(tree, junction.trunk)
-                         : simulate::own_start(tree[static_cast<std::size_t>(junction.branch)]));
+  const bool goes_on = tree[static_cast<std::size_t>(junction.fork)].parent == junction.branch;
+  const double begins = goes_on
+                            ? simulate::begins_behind(tree, junction.fork)
+                            : simulate::own_start(tree[static_cast<std::size_t>(junction.branch)]);
+  const std::string name = branch_name(tree, junction.branch, begins);
+  const std::string number = "branch " + std::to_string(junction.branch + 1);
+  return junction.entered && name == number ? "the wider vessel (" + number + ")" : name;
+}
+
+std::string trunk_name(const std::vector<preprocess::Branch>& tree, const Junction& junction) {
+  const Branch& fork = tree[static_cast<std::size_t>(junction.fork)];
+  const bool along = junction.trunk == fork.parent || crosses(tree, junction);
+  if (!along) return branch_name(tree, junction.trunk, 0.0);
+  const double before = fork.parent_arc - simulate::own_start(fork) - 1.0;  // of its ball    [mm]
+  return branch_name(tree, fork.parent, std::max(0.0, before));
 }
 
 Vec3 point_at(const Centerline& line, double arc) {
@@ -304,7 +471,8 @@ std::vector<Junction> find_junctions(const simulate::Way& of) {
                                      : preprocess::find_place(end, line).arc;
 
     // A branch that faces the one that the way takes may begin a little later.
-    const bool turns = next >= 0 && !is_trunk(tree, next);
+    const bool turns = next >= 0 && !is_trunk(tree, next) && !simulate::is_entered(tree, next) &&
+                       !simulate::runs_back(tree, next);
     const double last = turns ? left_at + 2.0 * radius_at(line, left_at) : left_at;
 
     std::vector<Junction> here;
@@ -312,9 +480,14 @@ std::vector<Junction> find_junctions(const simulate::Way& of) {
     for (std::size_t b = 0; b < tree.size(); ++b) {
       const int child = static_cast<int>(b);
       if (tree[b].parent != own || tree[b].parent_arc > last) continue;
-      if (tree[b].parent_arc > left_at && is_trunk(tree, child)) continue;
+      if (simulate::runs_back(tree, child)) continue;
+      const bool ends_trunk = is_trunk(tree, child) || simulate::is_entered(tree, child);
+      if (tree[b].parent_arc > left_at && ends_trunk) continue;
       const double arc = preprocess::find_place(point_at(line, tree[b].parent_arc), way).arc;
-      const std::optional<Junction> junction = junction_at(of, arc, child, child == next);
+      const bool stays = left_at > tree[b].parent_arc + simulate::own_start(tree[b]);
+      const bool parts = stays && simulate::parts(tree, child) && is_first_part(tree, child);
+      const std::optional<Junction> junction =
+          parts ? part_at(way, arc, tree, child) : junction_at(of, arc, child, child == next);
       if (!junction) continue;
       here.push_back(*junction);
       if (turns && child == next) level = junction->level;
@@ -324,6 +497,13 @@ std::vector<Junction> find_junctions(const simulate::Way& of) {
       if (!junction.taken) junction.level = junction.arc = std::min(junction.level, level);
       junctions.push_back(junction);
     }
+  }
+  // What is no place of the way: the target may lie before the level of its branch's ostium.
+  std::erase_if(junctions, [&](const Junction& junction) {
+    return !junction.taken && (junction.level < 0.0 || junction.level > length_of(way));
+  });
+  for (Junction& junction : junctions) {
+    junction.level = std::clamp(junction.level, 0.0, length_of(way));
   }
   std::stable_sort(junctions.begin(), junctions.end(), [](const Junction& a, const Junction& b) {
     return std::tie(a.level, a.taken) < std::tie(b.level, b.taken);

@@ -40,6 +40,9 @@ struct Junction {
   int branch = -1;            // ... and the one that leaves it there
   bool taken = false;         // the way leaves the trunk for the branch; else it passes the branch
   bool bifurcation = false;   // of the aorta (simulate::Bifurcation)
+  bool entered = false;       // taken out of a branch into a wider vessel (simulate::is_entered):
+                              // trunk and trunk_direction are those of the branch, coming in
+  int fork = -1;              // branch of the tree that begins there
   double arc = 0.0;           // of the ostium, along the way; of one passed its level     [mm]
   Vec3 point = Vec3::Zero();  // there                                                     [mm]
   double level = 0.0;         // how far along the trunk from the access the ostium is     [mm]
@@ -54,17 +57,25 @@ double turn_of(const Junction& junction);
 /// The vessel that leaves, by the name of its part there.
 std::string leaving_name(const std::vector<preprocess::Branch>& tree, const Junction& junction);
 
-/// All along the way, nearest first; none without a tree, and none of stumps. It leaves a trunk
-/// where it changes from one branch of the tree to another, unless that is the trunk, and where the
-/// trunk is another branch than the one that it stays in: the vessel that goes on
-/// (simulate::goes_on) and is wider by a third, since a tree's first branch may well end in a small
-/// artery. The ostium is where the branch's line leaves the trunk's inscribed spheres, whether the
-/// way takes it or passes it; its level is the place of the trunk's axis nearest to it, as lengths
-/// between ostia are measured for stent grafts (Chassin-Trubert et al., J Endovasc Ther 2020, from
-/// centre to centre along the aorta), so that ostia which face each other have one. The trunk's
-/// direction is that of a chord of two of its diameters round the ostium, the branch's that of its
-/// first three radii, at least 6 mm, without a sixth at either end: a line crosses the trunk at
-/// right angles, and settles in an oblique branch only beyond the ostium. Expects a tree that
+/// The vessel that it leaves, by the name of its part there.
+std::string trunk_name(const std::vector<preprocess::Branch>& tree, const Junction& junction);
+
+/// All along the way, nearest first; none without a tree, and none of stumps, of ostia whose level
+/// is before the access, or passed by beyond the target. It leaves a trunk where it changes from
+/// one branch of the tree to another, unless that is the trunk, and where the trunk is another
+/// branch than the one that it stays in: the vessel that goes on (simulate::goes_on) and is wider
+/// by a third, since a tree's first branch may well end in a small artery, or goes straight on
+/// (simulate::goes_straight_on). The ostium is where the branch's line leaves the trunk's inscribed
+/// spheres, whether the way takes it or passes it; its level is the place of the trunk's axis
+/// nearest to it, as lengths between ostia are measured for stent grafts (Chassin-Trubert et al., J
+/// Endovasc Ther 2020, from centre to centre along the aorta), so that ostia which face each other
+/// have one. The trunk's direction is that of a chord of two of its diameters round the ostium, the
+/// branch's that of its first three radii, at least 6 mm, without a sixth at either end: a line
+/// crosses the trunk at right angles, and settles in an oblique branch only beyond the ostium.
+/// Where the trunk parts into arteries of like width (simulate::parts), and where the way goes from
+/// one leg into the other of two that meet in a wider vessel, the trunk's direction is that before
+/// the fork. A way out of a branch into a wider vessel turns into that; the ostium is then where it
+/// comes into the vessel's spheres, and the level where it comes to its axis. Expects a tree that
 /// starts where the way does, as find_tree() makes it.
 std::vector<Junction> find_junctions(const simulate::Way& of);
 

@@ -14,6 +14,9 @@ constexpr double kStumpRadii = 4.0;  // a shorter branch is a sac or a stump
 constexpr double kArm = 10.0;        // of a vessel, for its direction                      [mm]
 constexpr double kLike = 4.0 / 3.0;  // ratio of widths that are alike
 constexpr double kWider = 1.1;       // of what two branches meet in, at least
+constexpr double kOneSide = 0.17;    // sine of 10 deg: what leaves a vessel sideways is no leg
+constexpr double kFromAbove = 0.5;   // sine of 30 deg: a leg may come in from above
+constexpr double kTurnsIn = 15.0 * kRadPerDeg;  // at a fork is no sway of a line          [rad]
 
 /// The point of a line that is so far along it, or its end.
 Eigen::Index index_at(const Centerline& line, double arc) {
@@ -34,6 +37,46 @@ const Branch& branch_of(const std::vector<Branch>& tree, int k) {
 
 double width_beyond(const Branch& branch) {
   return radius_at(branch.line, own_start(branch) + kForkSpan);
+}
+
+/// Radius of what a branch leaves, before the fork's ball; empty where the parent has less than
+/// that before it or beyond [mm].
+std::optional<double> width_before(const std::vector<Branch>& tree, int k) {
+  const Branch& branch = branch_of(tree, k);
+  if (branch.parent < 0) return {};
+  const Centerline& line = branch_of(tree, branch.parent).line;
+  const double span = own_start(branch) + kForkSpan,
+               length = line.arc_length(line.arc_length.size() - 1);
+  if (branch.parent_arc < span || branch.parent_arc + span > length) return {};
+  return radius_at(line, branch.parent_arc - span);
+}
+
+/// By how much the two ways on turn at a fork from the line before it [rad].
+struct ForkTurns {
+  double parent = 0.0, branch = 0.0;
+};
+
+/// Empty where the parent has less than the fork's ball before it or beyond.
+std::optional<ForkTurns> turns_at(const std::vector<Branch>& tree, int k) {
+  if (!width_before(tree, k)) return {};
+  const Branch& branch = branch_of(tree, k);
+  const Centerline& line = branch_of(tree, branch.parent).line;
+  const double at = branch.parent_arc, start = own_start(branch);
+  const Vec3 from = direction(line, at - start - kArm, at - start);
+  const auto turn = [&](const Vec3& onward) {
+    return std::acos(std::clamp(from.dot(onward), -1.0, 1.0));
+  };
+  return ForkTurns{turn(direction(line, at + start, at + start + kArm)),
+                   turn(direction(branch.line, start, start + kArm))};
+}
+
+/// Whether a branch is longer beyond its start than it is wide, and no narrower than three quarters
+/// at its end, as a sac is.
+bool keeps_its_width(const Branch& branch) {
+  const Eigen::Index last = branch.line.points.cols() - 1;
+  const double width = width_beyond(branch);
+  return kLike * branch.line.radius(last) > width &&
+         branch.line.arc_length(last) - own_start(branch) > width;
 }
 
 }  // namespace
@@ -86,19 +129,32 @@ bool is_stump(const std::vector<Branch>& tree, int k) {
 bool is_cut_off(const std::vector<Branch>& tree, int k) {
   const Branch& branch = branch_of(tree, k);
   if (branch.parent < 0) return false;
-  const double start = own_start(branch), width = width_beyond(branch);
-  const Eigen::Index last = branch.line.points.cols() - 1;
+  const double width = width_beyond(branch);
+  const std::optional<double> before = width_before(tree, k);
+  return before && width >= kAortaRadius && width_over_parent(tree, k) > kLike &&
+         kLike * width > *before && keeps_its_width(branch);
+}
+
+bool is_entered(const std::vector<Branch>& tree, int k) {
+  const std::optional<double> before = width_before(tree, k);
+  if (!before) return false;
+  const Branch& branch = branch_of(tree, k);
   const Centerline& line = branch_of(tree, branch.parent).line;
-  const double span = start + kForkSpan, length = line.arc_length(line.arc_length.size() - 1);
-  if (branch.parent_arc < span || branch.parent_arc + span > length) return false;
-  const double before = radius_at(line, branch.parent_arc - span);
-  return width >= kAortaRadius && width_over_parent(tree, k) > kLike && kLike * width > before &&
-         kLike * branch.line.radius(last) > width && branch.line.arc_length(last) - start > width;
+  const double start = own_start(branch), at = branch.parent_arc;
+  const double widths = std::min(width_beyond(branch), radius_at(line, at + start + kForkSpan));
+  if (widths <= kLike * *before || !keeps_its_width(branch)) return false;
+  const Vec3 onward = direction(line, at + start, at + start + kArm);
+  const auto turn = [&](const Vec3& from) {
+    return std::acos(std::clamp(from.dot(onward), -1.0, 1.0));
+  };
+  const double in = turn(direction(line, at - start - kArm, at - start));
+  return in - turn(-direction(branch.line, start, start + kArm)) > kTurnsIn;
 }
 
 bool goes_on(const std::vector<Branch>& tree, int k) {
   const Branch& branch = branch_of(tree, k);
   if (branch.parent < 0 || is_stump(tree, k) || width_over_parent(tree, k) <= 1.0) return false;
+  if (is_entered(tree, k)) return false;
   for (std::size_t other = 0; other < tree.size(); ++other) {
     const Branch& beside = tree[other];
     if (static_cast<int>(other) == k || beside.parent != branch.parent) continue;
@@ -110,6 +166,39 @@ bool goes_on(const std::vector<Branch>& tree, int k) {
   return true;
 }
 
+bool goes_straight_on(const std::vector<Branch>& tree, int k) {
+  const std::optional<ForkTurns> turns = turns_at(tree, k);
+  if (!turns || is_stump(tree, k) || width_over_parent(tree, k) < 1.0 / kLike) return false;
+  return turns->branch < kTurnsIn && turns->parent > turns->branch + kTurnsIn;
+}
+
+bool runs_back(const std::vector<Branch>& tree, int k) {
+  const Branch& branch = branch_of(tree, k);
+  if (branch.parent < 0 || branch_of(tree, branch.parent).parent >= 0) return false;
+  const double start = own_start(branch);
+  if (branch.parent_arc > start) return false;
+  const double ratio = width_over_parent(tree, k);
+  if (ratio < 1.0 / kLike || ratio > kLike) return false;
+  const double from = branch.parent_arc + start;
+  const Vec3 onward = direction(branch_of(tree, branch.parent).line, from, from + kArm);
+  return onward.dot(direction(branch.line, start, start + kArm)) < -std::cos(2.0 * kTurnsIn);
+}
+
+bool parts(const std::vector<Branch>& tree, int k) {
+  const std::optional<ForkTurns> turns = turns_at(tree, k);
+  const double ratio = turns ? width_over_parent(tree, k) : 0.0;
+  if (ratio < 1.0 / kLike || ratio > kLike || is_stump(tree, k)) return false;
+  const Branch& branch = branch_of(tree, k);
+  const double at = branch.parent_arc, start = own_start(branch);
+  for (std::size_t b = 0; b < tree.size(); ++b) {
+    const int other = static_cast<int>(b);
+    if (tree[b].parent != branch.parent || std::abs(tree[b].parent_arc - at) > start) continue;
+    const bool clearly_wider = goes_on(tree, other) && width_over_parent(tree, other) > kLike;
+    if (clearly_wider || is_entered(tree, other)) return false;
+  }
+  return turns && std::min(turns->parent, turns->branch) > kTurnsIn;
+}
+
 std::optional<double> bifurcation_width(const std::vector<Branch>& tree, const Bifurcation& fork) {
   if (is_stump(tree, fork.child)) return {};
   const Branch& child = branch_of(tree, fork.child);
@@ -119,16 +208,17 @@ std::optional<double> bifurcation_width(const std::vector<Branch>& tree, const B
   if (at - start < kForkSpan || at + start + kForkSpan > length) return {};
   const double before = radius_at(line, at - start - kForkSpan);
   double beside = width_beyond(child), width = radius_at(line, at + start + kForkSpan);
-  Vec3 outward = direction(child.line, start, start + kArm);
+  Vec3 leg = direction(child.line, start, start + kArm),
+       wide = direction(line, at + start, at + start + kArm);
   if (fork.takes_child) {
     std::swap(beside, width);
-    outward = direction(line, at + start, at + start + kArm);
+    std::swap(leg, wide);
   }
   const Vec3 onward = direction(line, at - start - kArm, at - start);
   const double ratio = beside / std::max(before, 1e-3);
   const bool found = ratio < kLike && ratio > 1.0 / kLike &&
                      width > kWider * std::max(before, beside) && width >= kAortaRadius &&
-                     outward.dot(onward) < 0.0;
+                     leg.dot(wide) < -kOneSide && onward.dot(wide) > -kFromAbove;
   return found ? std::optional(width) : std::nullopt;
 }
 

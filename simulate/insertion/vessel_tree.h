@@ -45,13 +45,33 @@ bool is_cut_off(const std::vector<preprocess::Branch>& tree, int k);
 /// parent.
 double width_over_parent(const std::vector<preprocess::Branch>& tree, int k);
 
+/// Whether the line that a branch leaves comes there out of a side branch into a wider vessel, as
+/// from an arm or a renal artery into the aorta: the branch is one way of that vessel and what the
+/// line goes on in the other, both wider by a third than the line before, of which there is more
+/// than the fork's ball. They are in line, by 15 deg or more straighter than the line turns there,
+/// so two iliac arteries of unlike width are none; and the branch is longer than it is wide.
+bool is_entered(const std::vector<preprocess::Branch>& tree, int k);
+
 /// Whether a branch is the vessel that goes on where it leaves its parent, though the tree's line
 /// turns into a smaller one there: wider than the parent beyond the fork and than all others that
-/// leave it within the same ball, and no stump.
+/// leave it within the same ball, no stump, and not one way of a vessel that is entered there.
 bool goes_on(const std::vector<preprocess::Branch>& tree, int k);
 
-/// A fork of two branches of like width, within a third, that lie side by side and meet in a wider
-/// vessel of 6 mm radius or more: to a way from a femoral artery that of the aorta.
+/// Whether a branch goes straight on where the line that it leaves turns off, by 15 deg or more
+/// than that, and is no narrower than by a quarter, as an internal carotid artery beside the
+/// external.
+bool goes_straight_on(const std::vector<preprocess::Branch>& tree, int k);
+
+/// Whether a branch is the other way of the vessel that the root begins in: it leaves the root's
+/// first ball straight back, within 30 deg, and is of like width.
+bool runs_back(const std::vector<preprocess::Branch>& tree, int k);
+
+/// Whether the vessel that a branch leaves parts there into two of like width, within a third,
+/// which both turn from it by 15 deg or more, as an aorta into two iliac arteries.
+bool parts(const std::vector<preprocess::Branch>& tree, int k);
+
+/// A fork of two branches of like width, within a third, that come from one side and meet in a
+/// wider vessel of 6 mm radius or more: to a way from a femoral artery that of the aorta.
 struct Bifurcation {
   int parent = -1, child = -1;  // of the tree, that part there ...
   bool takes_child = false;     // ... and which of them a way goes on in

@@ -181,6 +181,7 @@ std::optional<Astray> Way::find_astray(const Vec3& tip) const {
   const auto name_of_start = [&](int k) {
     return branch_name(tree_, k, own_start(tree_[static_cast<std::size_t>(k)]));
   };
+  const std::string other_way = ", beyond the place where the way turns the other way, into ";
   if (is_across(here, on_way, left)) {
     return Astray{false, "it is in " + name + ", across the bifurcation"};
   }
@@ -190,6 +191,9 @@ std::optional<Astray> Way::find_astray(const Vec3& tip) const {
   if (on_way.arc > leaves) {
     const int taken = next_branch(on_way.branch);
     const std::string next = name_of_start(taken);
+    if (is_entered(tree_, taken)) {
+      return Astray{false, "it is in " + name + other_way + next};
+    }
     if (goes_on(tree_, taken)) {
       return Astray{
           false, "it is in " + name + ", where the way goes on in " + next + ", the wider vessel"};
@@ -200,6 +204,10 @@ std::optional<Astray> Way::find_astray(const Vec3& tip) const {
                             " beyond the place where the way turns into " + next};
   }
   if (in_branch_of_way) return std::nullopt;
+  if (is_entered(tree_, left)) {
+    return Astray{false, "it is in " + name + other_way +
+                             branch_name(tree_, on_way.branch, begins_behind(tree_, left))};
+  }
   if (goes_on(tree_, left)) {
     return Astray{true, "it went on in " + name + ", the wider vessel where the way turns into " +
                             branch_name(tree_, on_way.branch, begins_behind(tree_, left))};

@@ -9,6 +9,7 @@
 #include "plan/anatomy/branch_names.h"
 #include "plan/anatomy/passage.h"
 #include "plan/anatomy/projection.h"
+#include "tests/plan/vessel_trees.h"
 #include "tests/shapes.h"
 
 namespace wireplan::plan {
@@ -16,6 +17,9 @@ namespace {
 
 using preprocess::Branch;
 using shapes::line_through;
+using trees::into_branch;
+using trees::right_renal_way;
+using trees::side_branch;
 constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
 
 /// A quarter of a circle of radius 40 mm.
@@ -134,22 +138,6 @@ TEST(Junctions, TreeWhoseFirstBranchEndsInTheSmallArteryTellsTheSame) {
   EXPECT_NEAR(found[0].branch_direction.dot(Vec3::UnitX()), 1.0, 1e-9);
 }
 
-/// A branch of a trunk of 10 mm radius, sideways from its middle.
-Branch side_branch(double z, double x, double radius, double parent_arc) {
-  Branch branch{.line = line_through({Vec3(0, 0, z), Vec3(x, 0, z)}, radius),
-                .parent = 0,
-                .parent_arc = parent_arc};
-  for (Eigen::Index k = 0; branch.line.arc_length(k) < 10.0; ++k) branch.line.radius(k) = 10.0;
-  return branch;
-}
-
-/// Up a trunk of 10 mm radius to 100 mm, and 50 mm to the right.
-Centerline right_renal_way(double radius) {
-  Centerline way = line_through({Vec3::Zero(), Vec3(0, 0, 100), Vec3(-50, 0, 100)}, radius);
-  for (Eigen::Index k = 0; way.arc_length(k) < 110.0; ++k) way.radius(k) = 10.0;
-  return way;
-}
-
 TEST(Junctions, OppositeRenalsFourMillimetresApartAreOneOstiumOnTheWay) {
   // The left one is the wider, and lower: the way into the right one passes it.
   const Branch left = side_branch(96.0, 60.0, 3.0, 96.0);
@@ -175,15 +163,6 @@ TEST(Junctions, OppositeRenalsFourMillimetresApartAreOneOstiumOnTheWay) {
   EXPECT_TRUE(same[1].taken);
   EXPECT_EQ(same[1].trunk, 2);
   EXPECT_EQ(same[1].branch, 0);
-}
-
-/// A line as it runs in a tree of the trunk and a branch to one side (1 left, -1 right), whose axes
-/// meet at z = 100: up the trunk's axis to the ostium's level, across, and along the branch's axis.
-std::vector<Vec3> into_branch(double side, double elevation) {
-  const double c = std::cos(elevation), s = std::sin(elevation);
-  const double level = 100.0 + 10.0 * s / c;
-  return {Vec3(0, 0, level), Vec3(10.0 * side, 0, level),
-          Vec3((10.0 + 40.0 * c) * side, 0, level + 40.0 * s)};
 }
 
 TEST(Junctions, OstiaThatFaceEachOtherAreAtOneLevel) {

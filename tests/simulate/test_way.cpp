@@ -223,8 +223,8 @@ TEST(Way, TheOtherLegIsAcrossTheBifurcationWhicheverVesselTheTreeFollows) {
       const auto astray = way.find_astray(deep * other);
       ASSERT_TRUE(astray) << deep;
       EXPECT_FALSE(astray->passed_by) << astray->text;
-      EXPECT_EQ(astray->text, std::string("it is in branch ") + (k == 0 ? "2" : "1") +
-                                  ", across the bifurcation");
+      EXPECT_EQ(astray->text, k == 0 ? "it is in branch 2, across the bifurcation"
+                                     : "it is in branch 1, across the bifurcation");
     }
     EXPECT_FALSE(way.find_astray(0.5 * foot));
     EXPECT_FALSE(way.find_astray(0.5 * head));
@@ -238,6 +238,34 @@ TEST(Way, TheOtherLegIsAcrossTheBifurcationWhicheverVesselTheTreeFollows) {
                    {{small(leg_and_on(foot, head, 9.0)), -1, 0.0}, {small(out(other, 5.0)), 0, at}})
                    .bifurcation());
   EXPECT_FALSE(Way(into_branch(kSecond, 25.0), tree_of_fork()).bifurcation());
+}
+
+TEST(Way, TheOtherWayOfAVesselThatIsEnteredIsAnotherBranch) {
+  // Out of an arm of 4 mm radius into a trunk of 10 mm, down it, and by the tree's first line up.
+  const Vec3 hand(90.0, 0.0, 0.0), foot(0.0, 0.0, -120.0), head(0.0, 0.0, 120.0);
+  const auto from_hand = [&](const Vec3& end) {
+    Centerline line = line_through({hand, Vec3::Zero(), end}, 10.0);
+    for (Eigen::Index i = 0; line.arc_length(i) < 90.0; ++i) {
+      line.radius(i) = std::max(4.0, line.arc_length(i) - 80.0);
+    }
+    return line;
+  };
+  for (const bool first_up : {true, false}) {
+    SCOPED_TRACE(first_up);
+    const std::vector<Branch> tree = {
+        {from_hand(first_up ? head : foot), -1, 0.0},
+        {line_through({Vec3::Zero(), first_up ? foot : head}, 10.0), 0, 90.0}};
+    ASSERT_TRUE(is_entered(tree, 1));
+    EXPECT_FALSE(goes_on(tree, 1));
+    const Way way(from_hand(0.7 * foot), tree);
+    EXPECT_FALSE(way.find_astray(0.5 * foot));
+    EXPECT_FALSE(way.find_astray(0.5 * hand));
+    const auto astray = way.find_astray(0.5 * head);
+    ASSERT_TRUE(astray);
+    EXPECT_FALSE(astray->passed_by) << astray->text;
+    EXPECT_NE(astray->text.find("where the way turns the other way"), std::string::npos)
+        << astray->text;
+  }
 }
 
 TEST(Way, TheEndOfTheImageIsOpenThoughItsModelIsClosed) {
