@@ -2,6 +2,7 @@
 
 #include <Eigen/Eigenvalues>
 #include <algorithm>
+#include <utility>
 
 #include "plan/anatomy/passage.h"
 #include "preprocess/centerline/path_place.h"
@@ -37,15 +38,27 @@ double own_vessel_from(const Centerline& line, double arc) {
   return line.arc_length(k);
 }
 
-/// Where the last vessel before an arc length leaves that goes on from what came before, as a
-/// brachiocephalic trunk beside the carotid that its line ends in; 0 without one [mm].
-double last_stem_before(const std::vector<Branch>& tree, int branch, double arc) {
-  double end = 0.0;
+/// A place of a line where one vessel ends at a fork and another begins: the ball of the fork.
+struct VesselEdge {
+  double before = 0.0, behind = 0.0;  // along the line                                  [mm]
+  bool into_wider = false;            // the ball is the second vessel's, else the first one's
+};
+
+/// Of a branch, at the children that go on from what came before, as a brachiocephalic trunk beside
+/// the carotid that its line ends in, and where it comes into a wider vessel.
+std::vector<VesselEdge> list_edges(const std::vector<Branch>& tree, int branch) {
+  std::vector<VesselEdge> edges;
   for (std::size_t k = 0; k < tree.size(); ++k) {
-    if (tree[k].parent != branch || tree[k].parent_arc >= arc) continue;
-    if (simulate::goes_on(tree, static_cast<int>(k))) end = std::max(end, tree[k].parent_arc);
+    const int child = static_cast<int>(k);
+    if (tree[k].parent != branch) continue;
+    const bool into_wider = simulate::is_entered(tree, child) ||
+                            simulate::bifurcation_width(tree, {.parent = branch, .child = child});
+    if (!into_wider && !simulate::goes_on(tree, child)) continue;
+    const double ball = simulate::own_start(tree[k]), at = tree[k].parent_arc;
+    edges.push_back(
+        {into_wider ? std::max(0.0, at - ball) : at, into_wider ? at : at + ball, into_wider});
   }
-  return end;
+  return edges;
 }
 
 /// Whether a place of a branch's line is in its parent's lumen still.
@@ -64,42 +77,87 @@ double vessel_from(const std::vector<Branch>& tree, const simulate::BranchPlace&
   for (const preprocess::NamedPart& part : branch.parts) {
     if (part.from <= place.arc) from = std::max(from, part.from);
   }
-  return std::max(from, last_stem_before(tree, place.branch, place.arc));
+  for (const VesselEdge& edge : list_edges(tree, place.branch)) {
+    if (edge.before < place.arc) from = std::max(from, edge.before);
+  }
+  return from;
 }
 
-/// Calls branches by places in them, each by the first; keeps what it has called.
+/// Where it ends along its branch; the branch's length where it goes on to its end [mm].
+double vessel_to(const std::vector<Branch>& tree, const simulate::BranchPlace& place) {
+  const Centerline& line = tree[static_cast<std::size_t>(place.branch)].line;
+  const Eigen::Index count = line.arc_length.size();
+  double to = line.arc_length(count - 1);
+  for (const VesselEdge& edge : list_edges(tree, place.branch)) {
+    const double ends = edge.into_wider ? edge.before : edge.behind;
+    if (ends > place.arc && edge.before >= place.arc) to = std::min(to, ends);
+  }
+  double own = 0.0;
+  for (Eigen::Index k = 0; k < count && line.arc_length(k) < to; ++k) {
+    if (line.arc_length(k) <= place.arc) own = line.radius(k);
+    if (line.arc_length(k) <= place.arc || kWiderVessel * line.radius(k) > own) continue;
+    const double begins = own_vessel_from(line, line.arc_length(k));
+    if (begins > place.arc) to = std::min(to, begins);
+  }
+  return to;
+}
+
+/// What a line is called at an arc length; empty where nobody said.
+std::string name_at(const std::vector<preprocess::NamedPart>& parts, double arc) {
+  std::string name;
+  for (const preprocess::NamedPart& part : parts) {
+    if (part.from <= arc) name = part.name;
+  }
+  return name;
+}
+
+/// Calls vessels by places in them, each by the first; keeps what it has called.
 class BranchNames {
  public:
-  explicit BranchNames(std::vector<Branch>& tree) : tree_(tree), named_(tree.size(), false) {}
+  explicit BranchNames(std::vector<Branch>& tree) : tree_(tree) {
+    for (const Branch& branch : tree) told_.push_back(branch.parts);
+  }
 
   void name(const NamedPlace& place, bool root_too) {
     if (tree_.empty() || place.name.empty()) return;
     const simulate::BranchPlace found = simulate::find_branch(tree_, place.point);
     const auto index = static_cast<std::size_t>(found.branch);
-    Branch& branch = tree_[index];
-    if (named_[index] || (!root_too && branch.parent < 0)) return;
-    named_[index] = true;
-    const double from = vessel_from(tree_, found);
+    if (!root_too && tree_[index].parent < 0) return;
+    // By the labels alone, so that the order of places does not count.
+    std::vector<preprocess::NamedPart> parts = std::exchange(tree_[index].parts, told_[index]);
+    const double from = vessel_from(tree_, found), to = vessel_to(tree_, found);
+    tree_[index].parts = std::move(parts);
+    const std::pair vessel(found.branch, from);
+    if (std::find(named_.begin(), named_.end(), vessel) != named_.end()) return;
+    named_.push_back(vessel);
     // In the place of what labels call that part, if they do.
-    std::vector<preprocess::NamedPart>& parts = branch.parts;
-    std::erase_if(parts, [&](const auto& part) { return part.from == from; });
-    const auto next = std::find_if(parts.begin(), parts.end(),
-                                   [&](const auto& part) { return part.from > from; });
-    parts.insert(next, {from, place.name});
+    if (to < tree_[index].line.arc_length.tail<1>().value()) {
+      begin_part(index, {to, name_at(tree_[index].parts, to)}, false);
+    }
+    begin_part(index, {from, place.name}, true);
   }
 
  private:
+  void begin_part(std::size_t index, const preprocess::NamedPart& part, bool instead) {
+    std::vector<preprocess::NamedPart>& parts = tree_[index].parts;
+    const auto same = [&](const preprocess::NamedPart& other) { return other.from == part.from; };
+    if (!instead && std::any_of(parts.begin(), parts.end(), same)) return;
+    std::erase_if(parts, same);
+    const auto next = std::find_if(parts.begin(), parts.end(),
+                                   [&](const auto& other) { return other.from > part.from; });
+    parts.insert(next, part);
+  }
+
   std::vector<Branch>& tree_;
-  std::vector<bool> named_;
+  std::vector<std::vector<preprocess::NamedPart>> told_;  // by labels
+  std::vector<std::pair<int, double>> named_;             // branch, and where the vessel begins
 };
 
 /// Whether labels tell what vessel a place is in.
 bool is_named(const std::vector<Branch>& tree, const Vec3& point) {
   if (tree.empty()) return false;
   const simulate::BranchPlace place = simulate::find_branch(tree, point);
-  const std::vector<preprocess::NamedPart>& parts =
-      tree[static_cast<std::size_t>(place.branch)].parts;
-  return !parts.empty() && parts.front().from <= place.arc;
+  return !name_at(tree[static_cast<std::size_t>(place.branch)].parts, place.arc).empty();
 }
 
 }  // namespace

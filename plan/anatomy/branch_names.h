@@ -14,12 +14,14 @@ struct NamedPlace {
   Vec3 point = Vec3::Zero();  //                                                          [mm]
 };
 
-/// Names branches by what lies in them: "left renal (branch 6)". The target's branch is called
-/// after the target, "the target's branch" where neither that nor labels have a name; others after
-/// the other targets and accesses, those that come first before the rest. The root, from which the
-/// tree starts, is called after no access: it goes on far beyond it. Of a branch that runs through
-/// a clearly wider vessel before the place, through what labels call otherwise, or shares a stem
-/// with another vessel that goes on from it (simulate::goes_on), what lies beyond is named.
+/// Names the vessels of branches by what lies in them: "left renal (branch 6)". The target's vessel
+/// is called after the target, "the target's branch" where neither that nor labels have a name;
+/// others after the other targets and accesses, those that come first before the rest. The root,
+/// from which the tree starts, is called after no access: it goes on far beyond it. A branch may
+/// run through several vessels, and a name is that of one: from the last place before that leaves a
+/// clearly wider vessel, enters a wider one (simulate::is_entered) or the one that two legs meet
+/// in, has another name by labels, or has shared a stem with another vessel that goes on from it
+/// (simulate::goes_on), up to the next such place.
 void name_branches(std::vector<preprocess::Branch>& tree, const NamedPlace& target,
                    const std::vector<NamedPlace>& other_targets,
                    const std::vector<NamedPlace>& other_accesses);

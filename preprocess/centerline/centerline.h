@@ -42,7 +42,7 @@ std::optional<Vec3> find_shortcut(const Surface& surface, const Centerline& line
 /// A part of a branch's line, up to the next part or the end, as people call the vessel there.
 struct NamedPart {
   double from = 0.0;  // where it begins                                                  [mm]
-  std::string name;
+  std::string name;   // empty: nobody has named it
 };
 
 /// A line of the tree from where it leaves its parent to its end. It may run through several
@@ -60,16 +60,17 @@ inline std::string branch_name(const std::vector<Branch>& tree, int k) {
   const std::string number = "branch " + std::to_string(k + 1);
   std::string names;
   for (const NamedPart& part : tree.at(static_cast<std::size_t>(k)).parts) {
-    names += (names.empty() ? "" : ", then ") + part.name;
+    if (!part.name.empty()) names += (names.empty() ? "" : ", then ") + part.name;
   }
   return names.empty() ? number : names + " (" + number + ")";
 }
 
 /// The same of what is so far along it [mm]: "aorta (branch 1)", or "branch 1" before all parts.
 inline std::string branch_name(const std::vector<Branch>& tree, int k, double arc) {
-  std::string name = "branch " + std::to_string(k + 1);
+  const std::string number = "branch " + std::to_string(k + 1);
+  std::string name = number;
   for (const NamedPart& part : tree.at(static_cast<std::size_t>(k)).parts) {
-    if (part.from <= arc) name = part.name + " (branch " + std::to_string(k + 1) + ")";
+    if (part.from <= arc) name = part.name.empty() ? number : part.name + " (" + number + ")";
   }
   return name;
 }
@@ -78,7 +79,8 @@ inline std::string branch_name(const std::vector<Branch>& tree, int k, double ar
 ///   1. The place that is farthest from the root, and not within 1.5 radii of a line found before,
 ///      is the next end.
 ///   2. The cheapest way (1/R^2 per length) from there to the lines found before is a branch, if it
-///      is longer than the parent's radius and its own together.
+///      is longer than the parent's radius and its own together. It begins where it last is one
+///      line with one of these.
 ///   3. This is repeated until lines cover the lumen, so branches come farthest end first.
 /// Edges of a lumen that is not round, as that of a dissected aorta, are no branches: cuts across
 /// the line there, to its end, have the parent's line in them too.

@@ -431,7 +431,9 @@ TEST(BranchNames, ATaperAndAStenosisBeginNoOtherVessel) {
   }
   std::vector<Branch> tree = {first};
   name_branches(tree, {"aorta", point_at(line, 60.0)}, {}, {});
-  EXPECT_EQ(tree[0].parts[0].from, 0.0) << "named whole, by a place in the aorta";
+  EXPECT_EQ(tree[0].parts[0].from, 0.0);
+  EXPECT_EQ(branch_name(tree, 0, 100.0), "aorta (branch 1)") << "up to the renal artery's ostium";
+  EXPECT_EQ(branch_name(tree, 0, 120.0), "branch 1");
 }
 
 TEST(TrunkAxis, IsThatOfTheWideVessels) {

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "plan/anatomy/branch_names.h"
 #include "plan/anatomy/passage.h"
 #include "plan/anatomy/projection.h"
 #include "tests/plan/vessel_trees.h"
@@ -16,6 +17,7 @@ namespace {
 using preprocess::Branch;
 using shapes::line_through;
 using trees::into_branch;
+using trees::right_renal_way;
 using trees::side_branch;
 
 /// Out of an arm of 4.1 mm radius, at an elevation to the left of a trunk of 10 mm, whose axis it
@@ -77,6 +79,26 @@ TEST(Junctions, AWayOutOfABranchTurnsIntoTheVesselThatItEnters) {
   }
 }
 
+TEST(BranchNames, ALineThatEntersTheAortaHasANameForEach) {
+  std::vector<Branch> tree = ArmAndTrunk(0.0).tree;
+  name_branches(tree, {"aorta", Vec3(0, 0, 80)}, {{"arm", Vec3(60, 0, 150)}}, {});
+  EXPECT_EQ(branch_name(tree, 0, 30.0), "arm (branch 1)");
+  EXPECT_EQ(branch_name(tree, 0, 90.0), "aorta (branch 1)");
+  EXPECT_EQ(branch_name(tree, 0), "arm, then aorta (branch 1)");
+  // In the other order of places, and of a line that goes from the aorta into a renal artery.
+  for (const bool first : {true, false}) {
+    std::vector<Branch> other = {{.line = right_renal_way(3.0)},
+                                 {.line = line_through({Vec3(0, 0, 100), Vec3(0, 0, 200)}, 10.0),
+                                  .parent = 0,
+                                  .parent_arc = 100.0}};
+    const NamedPlace aorta{"aorta", Vec3(0, 0, 50)}, renal{"renal", Vec3(-40, 0, 100)};
+    name_branches(other, first ? aorta : renal, {first ? renal : aorta}, {});
+    EXPECT_EQ(branch_name(other, 0), "aorta, then renal (branch 1)");
+    EXPECT_EQ(branch_name(other, 0, 100.0), "aorta (branch 1)");
+    EXPECT_EQ(branch_name(other, 0, 120.0), "renal (branch 1)");
+  }
+}
+
 /// From z = 0 up a trunk to z = 100, and on in a direction.
 Centerline forked_way(const Vec3& onward, double before, double beyond) {
   Centerline line =
@@ -105,6 +127,10 @@ TEST(Junctions, AWayTurnsIntoEachOfThreeArteriesInWhichATrunkEnds) {
     EXPECT_EQ(turn.branch, static_cast<int>(k));
     EXPECT_NEAR(turn_of(turn) / kRadPerDeg, 40.0, 0.5);
     EXPECT_NEAR(turn.level, 100.0, 5.0);  // where it leaves the spheres of the first
+    std::vector<Branch> named = tree;
+    name_branches(named, {"aim", 60.0 * onward[k] + Vec3(0, 0, 100)}, {}, {});
+    EXPECT_EQ(leaving_name(named, turn), "aim (branch " + std::to_string(k + 1) + ")");
+    EXPECT_EQ(trunk_name(named, turn), "branch 1") << "the trunk is none of the three";
     const View view = find_projections(turn.trunk_direction, turn.branch_direction).best.view;
     EXPECT_NEAR(view.rotation / kRadPerDeg, k == 2 ? 90.0 : 0.0, 0.5);
   }
