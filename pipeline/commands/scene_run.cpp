@@ -203,6 +203,11 @@ bool is_frictionless(const SceneFile& scene) {
   });
 }
 
+bool has_own_friction(const std::vector<simulate::Tool>& tools) {
+  return std::all_of(tools.begin(), tools.end(),
+                     [](const simulate::Tool& tool) { return tool.wire.friction.has_value(); });
+}
+
 Json warnings_json(const SceneFile& scene, const LoadedVessel& vessel) {
   const SceneVessel& given = *scene.vessel;
   const bool fitted = scene.insertion && scene.insertion->measured;  // the support
@@ -210,6 +215,9 @@ Json warnings_json(const SceneFile& scene, const LoadedVessel& vessel) {
   for (const std::string& line : vessel.told) warnings.push_back(line);
   if (is_frictionless(scene)) {
     warnings.push_back("frictionless (friction is 0): push forces are lower bounds");
+  }
+  if (given.friction > 0.0 && scene.tools && has_own_friction(scene.tools->scene.tools)) {
+    warnings.push_back("vessel.friction acts on no tool: each has its own");
   }
   if (!given.wall.elastic) warnings.push_back("rigid wall: contact forces are upper bounds");
   if (given.wall.support) warnings.push_back(support_warning(*given.wall.support, fitted));

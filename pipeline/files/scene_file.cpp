@@ -496,6 +496,9 @@ InsertionScene read_insertion_scene(JsonReader& root, const simulate::Scene& wir
   if (solver.method != simulate::Method::kNewton) {
     root.problems().add("solver.method", "not \"newton\"", "\"newton\"",
                         "the paper's own methods work on the bench alone in this version");
+  } else if (solver.load_steps != 1) {
+    root.problems().add("solver.load_steps", std::to_string(solver.load_steps), "1",
+                        "of a wire that is pushed in; insertion.step_mm says in which steps");
   }
   scene.options.element_length = wire.wire.length() / wire.elements;
   scene.options.section_element_length = wire.element_length;
@@ -513,20 +516,6 @@ InsertionScene read_insertion_scene(JsonReader& root, const simulate::Scene& wir
   scene.goal = read_goal(root, scene.introducer);
   return scene;
 }
-
-}  // namespace
-
-double axial_stiffness_from_paper(double stretch_coefficient, double edge_length) {
-  const double h = edge_length / kMmPerM;  // [m]
-  return 2.0 * stretch_coefficient * h * h * h;
-}
-
-double bending_stiffness_from_paper(double bend_coefficient, double edge_length) {
-  const double h = edge_length / kMmPerM;                   // [m]
-  return bend_coefficient * h * h * h * kMmPerM * kMmPerM;  // N m^2 -> N mm^2
-}
-
-namespace {
 
 /// Of several tools.
 void refuse_contact_spacing(const Json& vessel, Problems& problems) {
@@ -546,6 +535,16 @@ void refuse_support(const SceneVessel& vessel, Problems& problems) {
 }
 
 }  // namespace
+
+double axial_stiffness_from_paper(double stretch_coefficient, double edge_length) {
+  const double h = edge_length / kMmPerM;  // [m]
+  return 2.0 * stretch_coefficient * h * h * h;
+}
+
+double bending_stiffness_from_paper(double bend_coefficient, double edge_length) {
+  const double h = edge_length / kMmPerM;                   // [m]
+  return bend_coefficient * h * h * h * kMmPerM * kMmPerM;  // N m^2 -> N mm^2
+}
 
 SceneFile read_scene(const std::filesystem::path& path) {
   SceneFile scene;

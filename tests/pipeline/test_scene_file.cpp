@@ -389,6 +389,7 @@ TEST_F(SceneMistakes, AreToldAndWhatIsNotInThisVersion) {
        "/wire/sections/0/element_length_mm",
        1,
        {"wire.elements is given", "element_length_mm"}},
+      {pushed_wire(), "/solver/load_steps", 5, {"solver.load_steps is 5, expected 1", "step_mm"}},
       {pushed_wire(), "/solver/method", "explicit", {"solver.method", "bench alone"}},
       {pushed_wire(), "/wire/twist", "decoupled", {"wire.twist", "\"auto\""}},
       {pushed_wire(), "/plane_normal", {0, 0, 1}, {"plane_normal is given", "version"}},

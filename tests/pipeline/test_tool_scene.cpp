@@ -427,9 +427,16 @@ TEST_F(CaseFile, WarnsOfNoFrictionWhereNothingRubs) {
     const Json result = read_json(folder_ / "out" / "result.json", "wireplan.result/1");
     const std::string warnings = result.at("warnings").dump();
     EXPECT_EQ(warnings.find("frictionless") != std::string::npos, friction == 0.0) << warnings;
+    EXPECT_EQ(warnings.find("vessel.friction acts on no tool"), std::string::npos) << warnings;
     const std::string terms = result.at("terms").dump();
     EXPECT_EQ(terms.find("friction") != std::string::npos, friction > 0.0) << terms;
   }
+  json["tools"][0]["friction"] = 0.1;
+  json["vessel"]["friction"] = 0.2;
+  run_scene_file(read_scene(write("scene.json", json.dump())), folder_ / "out");
+  const Json result = read_json(folder_ / "out" / "result.json", "wireplan.result/1");
+  EXPECT_NE(result.at("warnings").dump().find("vessel.friction acts on no tool"),
+            std::string::npos);
 }
 
 TEST_F(CaseFile, InsertionWithoutATargetTellsWhereItsForcesAreRough) {
