@@ -53,7 +53,7 @@ std::vector<VesselEdge> list_edges(const std::vector<Branch>& tree, int branch) 
     if (tree[k].parent != branch) continue;
     const bool into_wider = simulate::is_entered(tree, child) ||
                             simulate::bifurcation_width(tree, {.parent = branch, .child = child});
-    if (!into_wider && !simulate::goes_on(tree, child)) continue;
+    if (!into_wider && !simulate::goes_on(tree, child) && !simulate::parts(tree, child)) continue;
     const double ball = simulate::own_start(tree[k]), at = tree[k].parent_arc;
     edges.push_back(
         {into_wider ? std::max(0.0, at - ball) : at, into_wider ? at : at + ball, into_wider});

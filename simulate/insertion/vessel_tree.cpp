@@ -189,6 +189,7 @@ bool parts(const std::vector<Branch>& tree, int k) {
   const double ratio = turns ? width_over_parent(tree, k) : 0.0;
   if (ratio < 1.0 / kLike || ratio > kLike || is_stump(tree, k)) return false;
   const Branch& branch = branch_of(tree, k);
+  if (bifurcation_width(tree, {.parent = branch.parent, .child = k})) return false;
   const double at = branch.parent_arc, start = own_start(branch);
   for (std::size_t b = 0; b < tree.size(); ++b) {
     const int other = static_cast<int>(b);

@@ -5,6 +5,7 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "plan/anatomy/branch_names.h"
 #include "plan/anatomy/passage.h"
@@ -174,8 +175,9 @@ TEST(Junctions, AnAccessInTheMiddleOfATrunkTurnsIntoNoneOfItsWays) {
 TEST(Junctions, AcrossABifurcationTheTurnIsThatFromLegToLeg) {
   // Legs of 5 mm radius, 30 deg off the axis of an aorta of 9 mm; one comes in from above.
   const Vec3 left(std::sin(30 * kRadPerDeg), 0, -std::cos(30 * kRadPerDeg));
-  for (const double rise : {-60.0, 20.0}) {  // of the right leg, outward
-    SCOPED_TRACE(rise);
+  // Where that is hardly wider than a leg it does not part into one and the other.
+  for (const auto& [rise, wide] : {std::pair(-60.0, 9.0), {20.0, 9.0}, {-60.0, 6.2}}) {
+    SCOPED_TRACE(testing::Message() << "right leg " << rise << " deg up, aorta " << wide);
     const Vec3 right(-std::cos(rise * kRadPerDeg), 0, std::sin(rise * kRadPerDeg));
     const auto through = [&](const Vec3& end, double beyond) {
       Centerline line = line_through({80.0 * right, Vec3::Zero(), end}, 5.0);
@@ -188,13 +190,13 @@ TEST(Junctions, AcrossABifurcationTheTurnIsThatFromLegToLeg) {
     Branch leg{
         .line = line_through({Vec3::Zero(), 80.0 * left}, 5.0), .parent = 0, .parent_arc = 80.0};
     leg.line.radius.head(15).setConstant(7.0);
-    const std::vector<Branch> tree = {{.line = through(Vec3(0, 0, 120), 9.0)}, leg};
+    const std::vector<Branch> tree = {{.line = through(Vec3(0, 0, 120), wide)}, leg};
     const auto across = find_junctions(simulate::Way(through(60.0 * left, 5.0), tree));
     ASSERT_EQ(across.size(), 1u);
     EXPECT_TRUE(across[0].taken);
     const double turn = std::acos(-right.dot(left)) / kRadPerDeg;
     EXPECT_NEAR(turn_of(across[0]) / kRadPerDeg, turn, 0.5);
-    const auto up = find_junctions(simulate::Way(through(Vec3(0, 0, 90), 9.0), tree));
+    const auto up = find_junctions(simulate::Way(through(Vec3(0, 0, 90), wide), tree));
     ASSERT_EQ(up.size(), 1u);
     EXPECT_TRUE(up[0].bifurcation && !up[0].taken);
   }
