@@ -67,7 +67,8 @@ bool goes_straight_on(const std::vector<preprocess::Branch>& tree, int k);
 bool runs_back(const std::vector<preprocess::Branch>& tree, int k);
 
 /// Whether the vessel that a branch leaves parts there into two of like width, within a third,
-/// which both turn from it by 15 deg or more, as an aorta into two iliac arteries.
+/// which both turn from it by 15 deg or more, as an aorta into two iliac arteries; two legs that
+/// meet (below) do not part.
 bool parts(const std::vector<preprocess::Branch>& tree, int k);
 
 /// A fork of two branches of like width, within a third, that come from one side and meet in a
