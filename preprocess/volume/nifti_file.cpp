@@ -535,8 +535,7 @@ Image read_nifti(const fs::path& path, VolumeHeader& told) {
   // A slope of 0 means none, and so does one that is no number, as nibabel writes it.
   const double slope = header.real(header.layout().slope),
                shift = header.real(header.layout().slope, 1);
-  if (std::isinf(slope)) throw wrong_field("scl_slope", number_text(slope), "a number", path);
-  if (std::isnan(slope) || slope == 0.0) return image;
+  if (!std::isfinite(slope) || slope == 0.0) return image;
   if (!std::isfinite(shift)) {
     throw Error(path.string() +
                 ": its scl_inter is no number, expected one beside a scl_slope of " +
