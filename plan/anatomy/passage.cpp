@@ -6,6 +6,7 @@
 #include <limits>
 #include <optional>
 #include <tuple>
+#include <utility>
 
 #include "preprocess/centerline/path_place.h"
 
@@ -289,32 +290,29 @@ Vec3 direction_before(const Centerline& way, const Junction& junction) {
   return chord(way, fork - std::max(10.0, 4.0 * radius_at(way, fork)), fork);
 }
 
-/// Whether the vessel that a branch leaves parts within the ball of the fork, into that or others.
-bool parts_beside(const std::vector<Branch>& tree, int child) {
+/// The branches, the given one too, at which the vessel that it leaves parts within the ball of the
+/// fork.
+std::vector<int> list_parts(const std::vector<Branch>& tree, int child) {
   const Branch& branch = tree[static_cast<std::size_t>(child)];
+  std::vector<int> parts;
   for (std::size_t b = 0; b < tree.size(); ++b) {
     if (tree[b].parent != branch.parent) continue;
     const double apart = std::abs(tree[b].parent_arc - branch.parent_arc);
-    if (apart <= simulate::own_start(branch) && simulate::parts(tree, static_cast<int>(b))) {
-      return true;
-    }
+    const int other = static_cast<int>(b);
+    if (apart <= simulate::own_start(branch) && simulate::parts(tree, other))
+      parts.push_back(other);
   }
-  return false;
+  return parts;
 }
 
-/// The first of the branches at which a vessel parts, along a line.
+/// Whether none of those is before it along the line that it leaves.
 bool is_first_part(const std::vector<Branch>& tree, int child) {
-  const Branch& branch = tree[static_cast<std::size_t>(child)];
-  for (std::size_t b = 0; b < tree.size(); ++b) {
-    if (tree[b].parent != branch.parent || static_cast<int>(b) == child) continue;
-    const double ahead = branch.parent_arc - tree[b].parent_arc;
-    const bool earlier = ahead > 0.0 || (ahead == 0.0 && static_cast<int>(b) < child);
-    if (earlier && ahead <= simulate::own_start(branch) &&
-        simulate::parts(tree, static_cast<int>(b))) {
-      return false;
-    }
-  }
-  return true;
+  const auto place = [&](int part) {
+    return std::pair(tree[static_cast<std::size_t>(part)].parent_arc, part);
+  };
+  const std::vector<int> parts = list_parts(tree, child);
+  return std::none_of(parts.begin(), parts.end(),
+                      [&](int part) { return place(part) < place(child); });
 }
 
 /// Where the trunk parts at `arc` of the way, which goes on along the tree's line: as it turns into
@@ -361,7 +359,7 @@ std::optional<Junction> junction_at(const simulate::Way& of, double arc, int chi
   const std::optional<simulate::Bifurcation>& fork = of.bifurcation();
   junction.bifurcation = fork && fork->child == child;
   junction.fork = child;
-  if (crosses(tree, junction) || (takes && !goes_on && parts_beside(tree, child))) {
+  if (crosses(tree, junction) || (takes && !goes_on && !list_parts(tree, child).empty())) {
     junction.trunk_direction = direction_before(way, junction);
   }
   return junction;
