@@ -1,6 +1,5 @@
 #include "pipeline/commands/scene_support.h"
 
-#include <algorithm>
 #include <cmath>
 #include <optional>
 

@@ -140,14 +140,16 @@ std::vector<std::string> cells_of(const std::string& line, char separator) {
   return cells;
 }
 
+std::string small_letters(std::string text) {
+  std::transform(text.begin(), text.end(), text.begin(),
+                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  return text;
+}
+
 /// In small letters, without blanks around it.
 std::string small_word(const std::string& text) {
   const std::size_t first = text.find_first_not_of(" \t"), last = text.find_last_not_of(" \t");
-  if (first == std::string::npos) return {};
-  std::string word = text.substr(first, last - first + 1);
-  std::transform(word.begin(), word.end(), word.begin(),
-                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  return word;
+  return first == std::string::npos ? "" : small_letters(text.substr(first, last - first + 1));
 }
 
 /// Where a table of points has what, by the words that head its columns.
@@ -495,9 +497,7 @@ Markups read_markups(const fs::path& path) {
     throw Error(path.string() + ": no such file; " + kExpected);
   }
   const std::string text(std::istreambuf_iterator<char>(stream), {});
-  std::string ending = path.extension().string();
-  std::transform(ending.begin(), ending.end(), ending.begin(),
-                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  const std::string ending = small_letters(path.extension().string());
   const bool table = ending == ".fcsv" || ending == ".csv" || ending == ".tsv";
   Markups read = table ? PointTable(text, path.string(), ending == ".fcsv").finish()
                        : read_markups_json(text, path.string());
