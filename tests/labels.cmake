@@ -1,9 +1,7 @@
-# Read by ctest once all tests are listed: each has two labels, its folder and "fast" or "slow".
+# Read by ctest once the slow tests are listed: each has two labels, its folder and "slow".
 # gtest_discover_tests cannot set them: it passes on a list as words and takes the first as the label.
 foreach(folder simulate plan preprocess pipeline)
-  foreach(speed fast slow)
-    if(${speed}_${folder})
-      set_tests_properties(${${speed}_${folder}} PROPERTIES LABELS "${folder};${speed}")
-    endif()
-  endforeach()
+  if(slow_${folder})
+    set_tests_properties(${slow_${folder}} PROPERTIES LABELS "${folder};slow")
+  endif()
 endforeach()
