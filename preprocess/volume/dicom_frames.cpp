@@ -115,6 +115,7 @@ std::vector<DicomFrame> read_dicom_frames(const gdcm::DataSet& data, const Dicom
     Told told = told_of_all;
     read_groups(items->GetItem(k).GetNestedDataSet(), dimensions, frame, told);
     tell_lacks(told, frame);
+    frame.number = frames.size();
     frames.push_back(frame);
   }
   return frames;

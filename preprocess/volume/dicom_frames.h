@@ -11,7 +11,8 @@
 namespace wireplan::preprocess {
 
 struct DicomFrame {
-  std::string lacks;  // what the file does not tell of where it lies; empty where it does
+  std::size_t number = 0;  // in its file, from 0
+  std::string lacks;       // what the file does not tell of where it lies; empty where it does
   WrongValue wrong;
   Vec3 position = Vec3::Zero();  // centre of its first pixel, LPS                        [mm]
   Vec3 right = Vec3::UnitX(), down = Vec3::UnitY();  // unit vectors of a row and a column

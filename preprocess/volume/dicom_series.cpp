@@ -84,14 +84,14 @@ std::string unit_of(const Series& series) {
   return unit;
 }
 
-/// All frames of an enhanced file, in the order of their places.
+/// The frames of an enhanced file that are in the stack, in the order of their places.
 std::vector<float> read_frames(const Slice& slice, const Stack& stacked, const fs::path& folder) {
   std::vector<float> values, sorted;
   append_slice(slice, folder, values);
-  const std::size_t size = values.size() / slice.frames.size();
-  sorted.reserve(values.size());
+  const std::size_t size = values.size() / static_cast<std::size_t>(slice.grid.size[2]);
+  sorted.reserve(size * stacked.order.size());
   for (const std::size_t k : stacked.order) {
-    const auto frame = values.begin() + static_cast<std::ptrdiff_t>(k * size);
+    const auto frame = values.begin() + static_cast<std::ptrdiff_t>(slice.frames[k].number * size);
     sorted.insert(sorted.end(), frame, frame + static_cast<std::ptrdiff_t>(size));
   }
   return sorted;

@@ -349,14 +349,13 @@ void ask_itk(Slice& slice, const std::string& path) {
 /// Gives each frame its own scale: GDCM scales all as the first, and by its groups alone. What is
 /// stored are integers.
 void scale_frames(const Slice& slice, std::size_t first, std::vector<float>& values) {
-  const std::size_t count = slice.frames.size();
-  if (count == 0 || count != static_cast<std::size_t>(slice.grid.size[2])) return;
   const double slope = slice.io->GetRescaleSlope(), intercept = slice.io->GetRescaleIntercept();
-  const std::size_t size = (values.size() - first) / count;
-  for (std::size_t k = 0; k < count; ++k) {
-    const DicomScale& scale = slice.frames[k].scale;
+  const std::size_t size = (values.size() - first) / static_cast<std::size_t>(slice.grid.size[2]);
+  for (const DicomFrame& frame : slice.frames) {
+    const DicomScale& scale = frame.scale;
     if (scale.slope == slope && scale.intercept == intercept) continue;
-    for (std::size_t n = first + k * size; n < first + (k + 1) * size; ++n) {
+    const std::size_t from = first + frame.number * size;
+    for (std::size_t n = from; n < from + size; ++n) {
       const double stored = std::round((static_cast<double>(values[n]) - intercept) / slope);
       values[n] = static_cast<float>(scale.slope * stored + scale.intercept);
     }

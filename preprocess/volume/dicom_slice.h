@@ -17,7 +17,8 @@ struct Slice {
   DicomLook look;
   itk::GDCMImageIO::Pointer io;    // header read; null where GDCM does not read the image
   DicomFrame image;                // what the file tells of all, or of its one frame
-  std::vector<DicomFrame> frames;  // of an enhanced file, which has groups of them
+  std::vector<DicomFrame> frames;  // of an enhanced file, which has groups of them; once a part is
+                                   // chosen, those of it
   std::string refused;             // why it is no slice of a volume; empty where it can be one
   std::string series_uid, instance_uid;  // to compare with, never shown
   std::string series_number;             // to compare with

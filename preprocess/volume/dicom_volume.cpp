@@ -13,6 +13,12 @@ namespace {
 
 namespace fs = std::filesystem;
 
+Mat3 axes_of(const DicomFrame& frame) {
+  Mat3 axes;
+  axes << frame.right, frame.down, frame.right.cross(frame.down);
+  return axes;
+}
+
 /// The images of a series: frames of its one file, or its files.
 class Images {
  public:
@@ -25,7 +31,8 @@ class Images {
   }
   /// How an error about one begins.
   std::string place_of(std::size_t k) const {
-    return frames_ ? series_.front().file.string() + ": frame " + std::to_string(k + 1) + ": "
+    return frames_ ? series_.front().file.string() + ": frame " + std::to_string(number_of(k) + 1) +
+                         ": "
                    : series_[k].file.string() + ": ";
   }
   /// "60 frames (1 to 60)", or "60 slices (FILE, FILE and 58 more)".
@@ -36,16 +43,30 @@ class Images {
     for (int n = 0; n < kShown && told < some.size(); ++n) {
       const std::size_t first = some[told++];
       std::size_t last = first;  // of frames that follow one another
-      while (frames_ && told < some.size() && some[told] == last + 1) last = some[told++];
+      while (frames_ && told < some.size() && number_of(some[told]) == number_of(last) + 1) {
+        last = some[told++];
+      }
       text += n == 0 ? "" : ", ";
-      text += frames_ ? std::to_string(first + 1) : series_[first].file.string();
-      if (last > first) text += " to " + std::to_string(last + 1);
+      text += frames_ ? std::to_string(number_of(first) + 1) : series_[first].file.string();
+      if (last > first) text += " to " + std::to_string(number_of(last) + 1);
     }
     if (told < some.size()) text += " and " + std::to_string(some.size() - told) + " more";
     return std::to_string(some.size()) + (frames_ ? " frames (" : " slices (") + text + ")";
   }
 
+  /// Of the images, along the normal of the first.
+  std::vector<std::size_t> order() const {
+    if (!frames_) return stack(origins_of(series_), series_.front().grid).order;
+    Grid grid = series_.front().grid;
+    std::vector<Vec3> origins;
+    for (const DicomFrame& frame : series_.front().frames) origins.push_back(frame.position);
+    if (!origins.empty()) grid.direction = axes_of((*this)[0]);
+    return stack(origins, grid).order;
+  }
+
  private:
+  std::size_t number_of(std::size_t k) const { return series_.front().frames[k].number; }
+
   const Series& series_;
   bool frames_;
 };
@@ -69,11 +90,6 @@ Stack stack_frames(const Slice& slice, const fs::path& folder) {
   }
   const DicomFrame& first = frames.front();
   std::vector<Vec3> origins;
-  const auto axes_of = [](const DicomFrame& frame) {
-    Mat3 axes;
-    axes << frame.right, frame.down, frame.right.cross(frame.down);
-    return axes;
-  };
   for (const DicomFrame& frame : frames) {
     require_place(Vec3(frame.along_row, frame.along_column, 1.0), frame.position, axes_of(frame),
                   folder);
@@ -110,17 +126,16 @@ std::string find_copies(const Series& series, const std::vector<std::size_t>& or
   return {};
 }
 
-DicomParts parts_of_images(const Images& images, const std::vector<std::size_t>& order) {
+DicomParts parts_of_images(const Images& images) {
   std::vector<const DicomPhase*> phases;
   for (std::size_t k = 0; k < images.count(); ++k) phases.push_back(&images[k].phase);
-  return find_parts(phases, order);
+  return find_parts(phases, images.order());
 }
 
 /// Why images are of several phases; empty where they are of one.
-std::string find_several(const Series& series, const Images& images,
-                         const std::vector<std::size_t>& order, const fs::path& folder) {
+std::string find_several(const Series& series, const Images& images, const fs::path& folder) {
   constexpr std::size_t kShown = 4;
-  const DicomParts parts = parts_of_images(images, order);
+  const DicomParts parts = parts_of_images(images);
   const std::size_t count = parts.images.size();
   if (count == 0) return {};
   std::string told = folder.string() + ": images of " + parts.what + ", expected one:";
@@ -128,11 +143,11 @@ std::string find_several(const Series& series, const Images& images,
     told += (k == 0 ? " " : "; ") + images.shown(parts.images[k]);
   }
   if (count > kShown) told += "; and " + std::to_string(count - kShown) + " more";
-  if (images.are_frames()) return told + "; export the one to plan on as a series of its own";
   const std::string key = key_of(series);
   return told + "; name the one to plan on by \"series\" in the case's volume, from \"" + key +
-         ".1\" for the first of these to \"" + key + "." + std::to_string(count) +
-         "\", or put the files of the one to plan on into a folder of their own";
+         ".1\" for the first of these to \"" + key + "." + std::to_string(count) + "\", or " +
+         (images.are_frames() ? "export the one to plan on as a series of its own"
+                              : "put the files of the one to plan on into a folder of their own");
 }
 
 /// Why images are slabs that are much thicker than they are apart, as projections are; empty where
@@ -206,35 +221,38 @@ std::string find_unscaled(const Series& series, const Images& images, const fs::
 void keep_part(Series& series, std::size_t part, const std::string& wanted,
                const fs::path& folder) {
   const Images images(series);
-  DicomParts parts;
-  if (!images.are_frames()) {
-    parts = parts_of_images(images, stack(origins_of(series), series.front().grid).order);
-  }
+  const DicomParts parts = parts_of_images(images);
   if (part < 1 || part > parts.images.size()) {
-    throw Error(folder.string() + ": \"series\" is \"" + wanted + "\", expected a part from 1 to " +
-                std::to_string(parts.images.size()) +
-                (parts.images.empty() ? " (its images are of one acquisition); leave \".\" and "
-                                        "what is behind it out"
-                                      : " behind the point"));
+    throw Error(folder.string() + ": \"series\" is \"" + wanted + "\", expected " +
+                (parts.images.empty() ? "no part (its images are of one acquisition); leave \".\" "
+                                        "and what is behind it out"
+                                      : "a part from 1 to " + std::to_string(parts.images.size()) +
+                                            " behind the point"));
   }
-  Series kept;
-  for (const std::size_t k : parts.images[part - 1]) kept.push_back(std::move(series[k]));
-  series = std::move(kept);
+  const auto keep = [&](auto& all) {
+    std::remove_reference_t<decltype(all)> kept;
+    for (const std::size_t k : parts.images[part - 1]) kept.push_back(std::move(all[k]));
+    all = std::move(kept);
+  };
+  images.are_frames() ? keep(series.front().frames) : keep(series);
 }
 
 Stack stack_series(const Series& series, const fs::path& folder, const At& at) {
   const Slice& first = series.front();
   const Images images(series);
-  Stack stacked =
-      images.are_frames() ? stack_frames(first, folder) : stack(origins_of(series), first.grid);
   for (std::size_t k = 0; k < images.count(); ++k) {
     require_hounsfield(images[k].scale.unit, first.modality,
                        images.are_frames() ? first.file : series[k].file);
   }
+  const std::string several = find_several(series, images, folder);
+  if (images.are_frames() && !several.empty()) {  // which may have no common grid
+    return {.order = {}, .grid = first.grid, .problem = several};
+  }
+  Stack stacked =
+      images.are_frames() ? stack_frames(first, folder) : stack(origins_of(series), first.grid);
   const std::string uneven = stacked.problem;
   stacked.problem = find_copies(series, stacked.order);
-  if (stacked.problem.empty())
-    stacked.problem = find_several(series, images, stacked.order, folder);
+  if (stacked.problem.empty()) stacked.problem = several;
   if (stacked.problem.empty() && !uneven.empty()) {
     const std::vector<std::size_t>& some = stacked.images;
     stacked.problem = some.size() == 1 ? images.place_of(some.front()) : folder.string() + ": ";

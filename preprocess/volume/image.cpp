@@ -79,11 +79,8 @@ Image read_told(const fs::path& path, const std::string& series, VolumeHeader& t
   if (fs::is_directory(path, unknown)) {
     told.format = "DICOM";
     image = call_itk(path, damaged("DICOM"), [&] { return read_dicom(path, series); });
-  } else if (!series.empty()) {
-    throw Error(path.string() + ": series \"" + series +
-                "\" of a file, expected a folder of DICOM files; a file holds one volume");
   } else {
-    image = read_file(path, told);
+    image = read_file(path, series, told);
   }
   require_finite(image, path);
   return image;
@@ -116,7 +113,7 @@ Mask read_mask(const fs::path& path) {
   }
   silence_libraries();
   VolumeHeader told;
-  const Image image = read_file(path, told);
+  const Image image = read_file(path, "", told);
   const bool is_mask = std::all_of(image.values.begin(), image.values.end(),
                                    [](float value) { return value == 0.0F || value == 1.0F; });
   if (!is_mask) throw Error(path.string() + ": not a mask, expected an image of 0 and 1");

@@ -511,14 +511,20 @@ std::string no_volume(const fs::path& path) {
 
 }  // namespace
 
-Image read_file(const fs::path& path, VolumeHeader& told) {
-  if (ends_with(path, ".nii", ".nii.gz")) return read_nifti(path, told);
-  if (ends_with(path, ".nrrd", ".nhdr")) return std::move(read_nrrd(path, told, false).front());
-  if (ends_with(path, ".mha", ".mhd")) return read_meta(path, told);
-  if (check_dicom(path) != DicomForm::kNone) {
+Image read_file(const fs::path& path, const std::string& series, VolumeHeader& told) {
+  const bool nifti = ends_with(path, ".nii", ".nii.gz");
+  const bool nrrd = ends_with(path, ".nrrd", ".nhdr"), meta = ends_with(path, ".mha", ".mhd");
+  if (!nifti && !nrrd && !meta && check_dicom(path) != DicomForm::kNone) {
     told.format = "DICOM";
-    return call_itk(path, damaged("DICOM"), [&] { return read_dicom(path, ""); });
+    return call_itk(path, damaged("DICOM"), [&] { return read_dicom(path, series); });
   }
+  if (!series.empty()) {
+    throw Error(path.string() + ": series \"" + series +
+                "\" of a file, expected a folder of DICOM files; a file holds one volume");
+  }
+  if (nifti) return read_nifti(path, told);
+  if (nrrd) return std::move(read_nrrd(path, told, false).front());
+  if (meta) return read_meta(path, told);
   throw Error(path.string() + ": " + no_volume(path));
 }
 

@@ -12,8 +12,9 @@ namespace wireplan::preprocess {
 void silence_libraries();
 
 /// Reads a volume by the extension of its file, after looking whether it is what it is called.
-/// What is read of its header stands in `told` then too, where it is refused after that.
-Image read_file(const std::filesystem::path& path, VolumeHeader& told);
+/// A `series` may be named of a DICOM file alone. What is read of its header stands in `told` then
+/// too, where it is refused after that.
+Image read_file(const std::filesystem::path& path, const std::string& series, VolumeHeader& told);
 
 /// As read_image, which is this without what is told.
 Image read_told(const std::filesystem::path& path, const std::string& series, VolumeHeader& told);

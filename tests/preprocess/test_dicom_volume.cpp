@@ -65,6 +65,18 @@ class DicomVolume : public FieldDicom {
               1);
   }
 
+  /// Of the series, as the refusal of several parts gives it.
+  std::string key() const {
+    const std::string error = read_error(folder_);
+    return error.substr(error.find("\"#") + 1, 9);
+  }
+
+  void expect_part(int part, const std::array<int, 3>& size, float first) const {
+    const Image image = read_image(folder_, key() + "." + std::to_string(part));
+    EXPECT_EQ(image.grid.size, size);
+    EXPECT_EQ(image.values.front(), first);
+  }
+
   /// An element in every slice, of a value for each.
   void write_told(std::uint16_t group, std::uint16_t number, const std::string& vr,
                   const std::function<std::string(int)>& value) const {
@@ -131,9 +143,37 @@ TEST_F(DicomVolume, FramesOfTwoStacksOrPhasesHalfAStepApartAreRefusedWithTheirFr
     SCOPED_TRACE(kind.told);
     write("ct.dcm", two_by_turns([&](int place, int) { return kind.group(1 + place % 2); }));
     expect_refused({"images of " + kind.told,
-                    "expected one: 4 frames (1 to 4); 4 frames (5 to 8); export the one to plan on "
-                    "as a series of its own"});
+                    "expected one: 4 frames (1 to 4); 4 frames (5 to 8); name the one to plan on "
+                    "by \"series\" in the case's volume",
+                    "or export the one to plan on as a series of its own"});
+    expect_part(1, {3, 2, 4}, 0.0F);
+    expect_part(2, {3, 2, 4}, 40.0F);
   }
+}
+
+TEST_F(DicomVolume, APartOfAnEnhancedFileKeepsItsFramesScalesAndAxes) {
+  // Three axial frames downwards, then four coronal ones, each with a slope of its own.
+  std::vector<Frame> frames;
+  for (int k = 0; k < 7; ++k) {
+    const bool axial = k < 3;
+    const double along = axial ? 30.0 - 2.0 * k : 1.5 * k;
+    const std::string place = axial ? "5\\6\\" + std::to_string(along).substr(0, 6)
+                                    : "5\\" + std::to_string(along).substr(0, 6) + "\\9";
+    std::string group = sequence(0x20, 0x9113, {of(0x20, 0x32, "DS", place)}) +
+                        content(of(0x20, 0x9056, "SH", axial ? "axial" : "coronal"));
+    if (!axial) group += sequence(0x20, 0x9116, {of(0x20, 0x37, "DS", "1\\0\\0\\0\\0\\-1")});
+    frames.push_back({.slope = std::to_string(k + 1), .more = group});
+  }
+  write("ct.dcm", enhanced(frames, false));
+  expect_refused(
+      {"2 stacks (Stack ID (0020,9056)), expected one: 3 frames (1 to 3); 4 frames "
+       "(4 to 7)"});
+  expect_part(1, {3, 2, 3}, 3.0F * 20.0F);  // from the lowest, which is the third
+  expect_part(2, {3, 2, 4}, 4.0F * 30.0F);
+  const Image coronal = read_image(folder_ / "ct.dcm", key() + ".2");  // the file itself
+  EXPECT_NEAR(coronal.grid.spacing[2], 1.5, 1e-9);
+  EXPECT_TRUE(coronal.grid.direction.col(2).isApprox(Vec3(0, 1, 0)));
+  EXPECT_EQ(coronal.values.back(), 7.0F * 65.0F);
 }
 
 TEST_F(DicomVolume, ADimensionIsToldByWhatItPointsToAndOneOfPlacesIsNone) {
@@ -184,17 +224,11 @@ TEST_F(DicomVolume, TwoAcquisitionsOfOneSeriesBetweenOneAnotherAreRefusedWithThe
        "expected one: 4 slices (",
        "3_2 and 2 more); 4 slices (", "3_1, ",
        "put the files of the one to plan on into a folder of their own"});
-  // One of them can be chosen by the key that the refusal gives.
-  const std::string error = read_error(folder_), key = error.substr(error.find("\"#") + 1, 9);
-  for (const int part : {1, 2}) {
-    const Image image = read_image(folder_, key + "." + std::to_string(part));
-    EXPECT_EQ(image.grid.size[2], 4);
-    EXPECT_EQ(image.grid.spacing[2], 3.0);
-    EXPECT_EQ(image.values.front(), static_cast<float>(10 * (part - 1)));
-  }
+  expect_part(1, {3, 2, 4}, 0.0F);
+  expect_part(2, {3, 2, 4}, 10.0F);
   for (const char* none : {".3", ".0", ".x"}) {
     EXPECT_TRUE(
-        has(error_of([&] { read_image(folder_, key + none); }), "expected a part from 1 to 2"));
+        has(error_of([&] { read_image(folder_, key() + none); }), "expected a part from 1 to 2"));
   }
   write_told(0x20, 0x100, "IS", [](int k) { return std::to_string(1 + k % 2); });
   expect_refused({"2 temporal positions (Temporal Position Identifier (0020,0100)), expected one"});
