@@ -14,6 +14,7 @@
 #include "pipeline/files/text.h"
 #include "pipeline/report/inspect.h"
 #include "pipeline/stages/makers.h"
+#include "preprocess/text.h"
 #include "preprocess/volume/image.h"
 #include "preprocess/volume/labels.h"
 #include "preprocess/volume/voxels.h"
@@ -44,10 +45,7 @@ std::string case_name(const fs::path& folder) {
 }
 
 bool begins_as(const std::string& label, const std::string& word) {
-  return label.size() >= word.size() &&
-         std::equal(word.begin(), word.end(), label.begin(), [](char a, char b) {
-           return a == std::tolower(static_cast<unsigned char>(b));
-         });
+  return lower_case(label).starts_with(word);
 }
 
 /// "ct.nrrd: CT of 512 x 512 x 119 voxels of 0.74 x 0.74 x 1.6 mm"
@@ -60,10 +58,7 @@ std::string volume_line(const fs::path& path, const preprocess::Image& image) {
 }
 
 bool has_word(const std::string& name, const std::string& word) {
-  const auto equal = [](char a, char b) {
-    return std::tolower(static_cast<unsigned char>(a)) == b;
-  };
-  return std::search(name.begin(), name.end(), word.begin(), word.end(), equal) != name.end();
+  return lower_case(name).find(word) != std::string::npos;
 }
 
 /// Whether the name of a class is an artery's, as segmentation tools and people call them.

@@ -13,6 +13,7 @@
 #include "pipeline/files/access_limits_file.h"
 #include "pipeline/files/case_robustness.h"
 #include "pipeline/files/markups_file.h"
+#include "preprocess/text.h"
 
 namespace wireplan::pipeline {
 namespace {
@@ -331,9 +332,7 @@ SurfaceInput read_surface_input(JsonReader& reader, const std::filesystem::path&
   surface.path = resolve_path(surface.given, folder);
   expect_exists(reader, "path", surface.given, surface.path, "a surface file");
 
-  std::string extension = surface.path.extension().string();
-  std::transform(extension.begin(), extension.end(), extension.begin(),
-                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  const std::string extension = lower_case(surface.path.extension().string());
   const std::set<std::string> endings = {".stl", ".ply", ".obj", ".vtp"};
   if (!surface.given.empty() && endings.count(extension) == 0) {
     reader.problems().add(reader.path_of("path"), "\"" + surface.given + "\"",

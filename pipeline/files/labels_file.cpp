@@ -14,6 +14,7 @@
 
 #include "pipeline/files/case_file.h"
 #include "preprocess/segment/label_places.h"
+#include "preprocess/text.h"
 #include "preprocess/volume/identity.h"
 
 namespace wireplan::pipeline {
@@ -26,13 +27,6 @@ constexpr const char* kTables =
     "expected names of label values: a dataset.json, {\"aorta\": 1, ...}, or lines of a value and "
     "a "
     "name";
-
-std::string small_name(const fs::path& path) {
-  std::string name = path.filename().string();
-  std::transform(name.begin(), name.end(), name.begin(),
-                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  return name;
-}
 
 /// A whole number from 0; empty where the text is something else.
 std::optional<int> whole_number(const std::string& text) {
@@ -302,7 +296,7 @@ std::map<int, std::string> table_of_lines(std::string text, const fs::path& path
 /// Without the ending of a volume.
 std::string stem_of(const fs::path& path) {
   std::string name = path.filename().string();
-  const std::string small = small_name(path);
+  const std::string small = lower_case(path.filename().string());
   for (const char* ending : {".nii.gz", ".nii", ".seg.nrrd", ".nrrd", ".nhdr", ".mha", ".mhd"}) {
     if (small.ends_with(ending)) return name.substr(0, name.size() - std::string(ending).size());
   }
@@ -468,8 +462,9 @@ std::map<int, std::string> read_label_table(const fs::path& path) {
     throw Error(path.string() + ": no such file; " + kTables);
   }
   const std::string text(std::istreambuf_iterator<char>(stream), {});
-  const std::map<int, std::string> table =
-      small_name(path).ends_with(".json") ? table_of_json(text, path) : table_of_lines(text, path);
+  const std::map<int, std::string> table = lower_case(path.filename().string()).ends_with(".json")
+                                               ? table_of_json(text, path)
+                                               : table_of_lines(text, path);
   if (table.empty()) throw NoTable(path.string() + ": holds no names; " + kTables);
   return table;
 }

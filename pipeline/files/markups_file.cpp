@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <array>
-#include <cctype>
 #include <cmath>
 #include <cstdlib>
 #include <fstream>
@@ -15,6 +14,7 @@
 
 #include "pipeline/files/case_file.h"
 #include "pipeline/files/labels_file.h"
+#include "preprocess/text.h"
 #include "preprocess/volume/identity.h"
 #include "preprocess/volume/image.h"
 
@@ -140,16 +140,10 @@ std::vector<std::string> cells_of(const std::string& line, char separator) {
   return cells;
 }
 
-std::string small_letters(std::string text) {
-  std::transform(text.begin(), text.end(), text.begin(),
-                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  return text;
-}
-
 /// In small letters, without blanks around it.
 std::string small_word(const std::string& text) {
   const std::size_t first = text.find_first_not_of(" \t"), last = text.find_last_not_of(" \t");
-  return first == std::string::npos ? "" : small_letters(text.substr(first, last - first + 1));
+  return first == std::string::npos ? "" : lower_case(text.substr(first, last - first + 1));
 }
 
 /// Where a table of points has what, by the words that head its columns.
@@ -497,7 +491,7 @@ Markups read_markups(const fs::path& path) {
     throw Error(path.string() + ": no such file; " + kExpected);
   }
   const std::string text(std::istreambuf_iterator<char>(stream), {});
-  const std::string ending = small_letters(path.extension().string());
+  const std::string ending = lower_case(path.extension().string());
   const bool table = ending == ".fcsv" || ending == ".csv" || ending == ".tsv";
   Markups read = table ? PointTable(text, path.string(), ending == ".fcsv").finish()
                        : read_markups_json(text, path.string());

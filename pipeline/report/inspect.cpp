@@ -11,6 +11,7 @@
 #include "pipeline/files/labels_file.h"
 #include "pipeline/files/text.h"
 #include "preprocess/surface/surface_describe.h"
+#include "preprocess/text.h"
 #include "preprocess/volume/describe.h"
 #include "preprocess/volume/dicom_check.h"
 #include "preprocess/volume/labels.h"
@@ -28,9 +29,7 @@ constexpr double kMm3PerMl = 1000.0;
 Json told_or_null(const std::string& text) { return text.empty() ? Json(nullptr) : Json(text); }
 
 std::string ending_of(const fs::path& path) {
-  std::string name = path.filename().string();
-  std::transform(name.begin(), name.end(), name.begin(),
-                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  const std::string name = lower_case(path.filename().string());
   return name.ends_with(".nii.gz") ? ".nii.gz" : fs::path(name).extension().string();
 }
 

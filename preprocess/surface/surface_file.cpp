@@ -20,6 +20,7 @@
 
 #include "preprocess/surface/surface.h"
 #include "preprocess/surface/vtk_mesh.h"
+#include "preprocess/text.h"
 
 namespace wireplan::preprocess {
 namespace {
@@ -158,8 +159,7 @@ vtkSmartPointer<vtkPolyData> read_text_stl(const std::filesystem::path& path) {
     if (++number == 1 && line.starts_with(kByteOrderMark)) line.erase(0, kByteOrderMark.size());
     std::istringstream words(line);
     if (!(words >> word)) continue;
-    std::transform(word.begin(), word.end(), word.begin(),
-                   [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+    word = lower_case(word);
     require(begun || word == "solid", "no \"solid\" at its begin");
     if (word == "solid") begun = inside = true;
     if (word == "endsolid") inside = false;
@@ -440,9 +440,7 @@ vtkSmartPointer<vtkPolyData> read_any(const std::filesystem::path& path) {
   if (!std::filesystem::is_regular_file(path)) {
     throw Error(path.string() + ": no such file; expected a surface (STL, PLY, OBJ or VTP)");
   }
-  std::string ending = path.extension().string();
-  std::transform(ending.begin(), ending.end(), ending.begin(),
-                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  const std::string ending = lower_case(path.extension().string());
   if (ending == ".stl") {
     return stl_form(path) == StlForm::kText ? read_text_stl(path) : read_binary_stl(path);
   }

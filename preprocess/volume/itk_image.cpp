@@ -3,7 +3,6 @@
 #include <Eigen/Eigenvalues>  // before ITK, which would bring in its own older copy
 #include <Eigen/SVD>
 #include <algorithm>
-#include <cctype>
 #include <cmath>
 #include <cstdint>
 #include <fstream>
@@ -116,12 +115,6 @@ void require_size(std::int64_t size, const std::string& field, const fs::path& p
 std::string without_path(const std::string& message, const fs::path& path) {
   const std::string start = path.string() + ": ";
   return message.starts_with(start) ? message.substr(start.size()) : message;
-}
-
-std::string lower_case(std::string text) {
-  std::transform(text.begin(), text.end(), text.begin(),
-                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  return text;
 }
 
 std::string trimmed(const std::string& text) {

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "itkImageIOBase.h"
+#include "preprocess/text.h"
 #include "preprocess/volume/describe.h"
 
 namespace wireplan::preprocess {
@@ -48,8 +49,6 @@ void require_size(std::int64_t size, const std::string& field, const std::filesy
 
 /// The message of an Error about that path, without the path at its beginning.
 std::string without_path(const std::string& message, const std::filesystem::path& path);
-
-std::string lower_case(std::string text);
 
 /// Without blanks at both ends.
 std::string trimmed(const std::string& text);
