@@ -34,59 +34,11 @@ Labels find_largest(const Grid& grid, const Labels& labels, std::size_t& pieces)
   return flood(grid, {start_of_largest}, [&](std::size_t n) { return labels[n] != 0; });
 }
 
-/// Background voxels of a row that lie side by side, from first to last.
-struct BackgroundRun {
-  int first = 0, last = 0;
-  std::size_t united_with = 0;  // another run, towards the first of its part
-};
-
-std::size_t first_of_part(std::vector<BackgroundRun>& runs, std::size_t run) {
-  while (runs[run].united_with != run) {
-    runs[run].united_with = runs[runs[run].united_with].united_with;
-    run = runs[run].united_with;
-  }
-  return run;
-}
-
 /// Parts of the background, connected through corners too, that do not reach the grid's border.
-/// By runs, of which there are few: a vessel's box is mostly empty.
 std::size_t count_cavities(const Grid& grid, const Labels& labels) {
-  const int nx = grid.size[0], ny = grid.size[1], nz = grid.size[2];
-  std::vector<BackgroundRun> runs(1);  // the first is all that reaches the border
-  std::vector<std::size_t> row_start;
-  const auto unite = [&](std::size_t a, std::size_t b) {
-    const std::size_t low = first_of_part(runs, a), high = first_of_part(runs, b);
-    runs[std::max(low, high)].united_with = std::min(low, high);
-  };
-  for (int k = 0; k < nz; ++k) {
-    for (int j = 0; j < ny; ++j) {
-      const std::size_t begin = runs.size();
-      row_start.push_back(begin);
-      const bool at_border = j == 0 || k == 0 || j == ny - 1 || k == nz - 1;
-      const std::uint8_t* row = labels.data() + grid.index(0, j, k);
-      for (int i = 0; i < nx; ++i) {
-        if (row[i] != 0) continue;
-        const int first = i;
-        while (i + 1 < nx && row[i + 1] == 0) ++i;
-        runs.push_back({first, i, runs.size()});
-        if (at_border || first == 0 || i == nx - 1) unite(0, runs.size() - 1);
-      }
-      const std::size_t end = runs.size();
-      for (const auto& [dj, dk] : {std::pair(-1, 0), {-1, -1}, {0, -1}, {1, -1}}) {
-        if (j + dj < 0 || j + dj >= ny || k + dk < 0) continue;
-        const std::size_t other = static_cast<std::size_t>(j + dj) +
-                                  static_cast<std::size_t>(ny) * static_cast<std::size_t>(k + dk);
-        std::size_t m = row_start[other];
-        const std::size_t last = row_start[other + 1];
-        for (std::size_t n = begin; n < end; ++n) {
-          while (m < last && runs[m].last + 1 < runs[n].first) ++m;
-          for (std::size_t q = m; q < last && runs[q].first <= runs[n].last + 1; ++q) unite(n, q);
-        }
-      }
-    }
-  }
+  const std::vector<BackgroundRun> runs = find_background(grid, labels, Joined::kByCorners);
   std::size_t cavities = 0;
-  for (std::size_t n = 1; n < runs.size(); ++n) cavities += runs[n].united_with == n ? 1 : 0;
+  for (std::size_t n = 1; n < runs.size(); ++n) cavities += runs[n].part == n ? 1 : 0;
   return cavities;
 }
 

@@ -165,8 +165,9 @@ Segmentation segment(const Image& image, const SegmentOptions& options) {
 bool in_hounsfield(const Image& image) {
   constexpr float kLeastAir = -50.0F, kMostHu = 700.0F;
   if (!image.modality.empty()) return image.modality == "CT";
-  const auto [low, high] = std::minmax_element(image.values.begin(), image.values.end());
-  return *low < kLeastAir || *high < kMostHu;
+  const auto& values = image.values;
+  return std::any_of(values.begin(), values.end(), [](float value) { return value < kLeastAir; }) ||
+         std::all_of(values.begin(), values.end(), [](float value) { return value < kMostHu; });
 }
 
 void measure_mask(const Image& image, const Mask& mask, SegmentStatistics& statistics) {

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstdint>
 #include <functional>
+#include <iterator>
 #include <limits>
 #include <queue>
 #include <utility>
@@ -65,6 +66,7 @@ std::vector<std::size_t> find_ways(const Inside& inside, const std::vector<std::
   std::vector<std::uint32_t> before(inside.depth.size());
   cost[ends.front()] = 0.0F;
   queue.push({0.0F, ends.front()});
+  std::ptrdiff_t missing = std::ssize(ends);
   while (!queue.empty()) {
     const float reached_at = queue.top().first;
     const std::size_t n = queue.top().second;
@@ -72,6 +74,8 @@ std::vector<std::size_t> find_ways(const Inside& inside, const std::vector<std::
     if (reached_at > cost[n]) {
       continue;
     }
+    missing -= std::count(ends.begin(), ends.end(), n);
+    if (missing == 0) break;
     for_each_inside(inside, n, [&](std::size_t m, double step) {
       const double depth = 0.5 * (static_cast<double>(inside.depth[n]) + inside.depth[m]);
       const auto next =

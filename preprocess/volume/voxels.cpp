@@ -3,7 +3,9 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
+#include <iterator>
 #include <limits>
+#include <utility>
 
 namespace wireplan::preprocess {
 namespace {
@@ -69,13 +71,51 @@ void convolve_along(const Grid& grid, int axis, const std::vector<double>& weigh
   values.swap(result);
 }
 
+/// Squared distances along rows: of each voxel to the nearest one of its row that is 0.
+void measure_rows(const Grid& grid, std::vector<float>& squared) {
+  const std::ptrdiff_t nx = grid.size[0], all = std::ssize(squared);
+  const double h = grid.spacing[0];
+#pragma omp parallel for schedule(static)
+  for (std::ptrdiff_t start = 0; start < all; start += nx) {
+    float* row = squared.data() + start;
+    std::ptrdiff_t before = -1;  // the last one that is 0
+    for (std::ptrdiff_t n = 0; n < nx; ++n) {
+      if (row[n] != 0.0F) continue;
+      // Up to the middle the one before is nearer, from there on this one.
+      for (std::ptrdiff_t m = before + 1; m < n; ++m) {
+        const double way =
+            h * static_cast<double>(before < 0 ? n - m : std::min(m - before, n - m));
+        row[m] = static_cast<float>(way * way);
+      }
+      before = n;
+    }
+    for (std::ptrdiff_t m = before + 1; before >= 0 && m < nx; ++m) {
+      const double way = h * static_cast<double>(m - before);
+      row[m] = static_cast<float>(way * way);
+    }
+  }
+}
+
 /// Lower envelope along one line: squared[n] becomes the least of squared[m] + (h (n - m))^2.
 class Envelope {
  public:
   void apply(std::vector<double>& squared, double h) {
+    result_.resize(squared.size());
+    // What is 0 stays so, and nothing beyond it counts.
+    for (std::size_t begin = 0, end = 0; begin < squared.size(); begin = end) {
+      for (end = begin + 1; end < squared.size() && squared[end] != 0.0;) ++end;
+      if (end > begin + 1 || squared[begin] != 0.0) {
+        apply_between(squared, begin, std::min(end + 1, squared.size()), h);
+      }
+    }
+  }
+
+ private:
+  /// The same of a part of the line, in which only the first and the last may be 0.
+  void apply_between(std::vector<double>& squared, std::size_t begin, std::size_t end, double h) {
     apexes_.clear();
     starts_.clear();
-    for (std::size_t n = 0; n < squared.size(); ++n) {
+    for (std::size_t n = begin; n < end; ++n) {
       if (!std::isfinite(squared[n])) {
         continue;
       }
@@ -97,19 +137,19 @@ class Envelope {
     if (apexes_.empty()) {
       return;
     }
-    result_.resize(squared.size());
     std::size_t piece = 0;
-    for (std::size_t n = 0; n < squared.size(); ++n) {
+    for (std::size_t n = begin; n < end; ++n) {
       while (piece + 1 < apexes_.size() && starts_[piece + 1] <= static_cast<double>(n)) {
         ++piece;
       }
       const double way = h * (static_cast<double>(n) - static_cast<double>(apexes_[piece]));
       result_[n] = squared[apexes_[piece]] + way * way;
     }
-    squared.swap(result_);
+    std::copy(result_.begin() + static_cast<std::ptrdiff_t>(begin),
+              result_.begin() + static_cast<std::ptrdiff_t>(end),
+              squared.begin() + static_cast<std::ptrdiff_t>(begin));
   }
 
- private:
   std::vector<std::size_t> apexes_;  // of the parabolas in the envelope
   std::vector<double> starts_;       // from where on each of them is the lowest
   std::vector<double> result_;
@@ -232,42 +272,62 @@ NearestLabel nearest_label(const Grid& grid, const Labels& labels, const Vec3& p
   return nearest;
 }
 
-void fill_cavities(const Grid& grid, Labels& labels, double largest) {
-  // what the border reaches is no cavity
-  std::vector<std::size_t> border;
-  for (int k = 0; k < grid.size[2]; ++k) {
-    for (int j = 0; j < grid.size[1]; ++j) {
-      const bool all = k == 0 || k == grid.size[2] - 1 || j == 0 || j == grid.size[1] - 1;
-      for (int i = 0; i < grid.size[0]; i += all ? 1 : std::max(1, grid.size[0] - 1)) {
-        if (labels[grid.index(i, j, k)] == 0) {
-          border.push_back(grid.index(i, j, k));
+std::vector<BackgroundRun> find_background(const Grid& grid, const Labels& labels, Joined joined) {
+  const int nx = grid.size[0], ny = grid.size[1], nz = grid.size[2];
+  const std::size_t reach = joined == Joined::kByCorners ? 1 : 0;
+  std::vector<BackgroundRun> runs(1);
+  const auto first_of_part = [&](std::size_t run) {
+    while (runs[run].part != run) run = runs[run].part = runs[runs[run].part].part;
+    return run;
+  };
+  const auto unite = [&](std::size_t a, std::size_t b) {
+    const auto [low, high] = std::minmax({first_of_part(a), first_of_part(b)});
+    runs[high].part = low;
+  };
+  std::vector<std::size_t> row_start;
+  for (int k = 0; k < nz; ++k) {
+    for (int j = 0; j < ny; ++j) {
+      const std::size_t begin = runs.size(), row = grid.index(0, j, k);
+      row_start.push_back(begin);
+      const bool at_border = j == 0 || k == 0 || j == ny - 1 || k == nz - 1;
+      for (int i = 0; i < nx; ++i) {
+        const std::size_t first = row + static_cast<std::size_t>(i);
+        if (labels[first] != 0) continue;
+        const bool from_border = at_border || i == 0;
+        while (i + 1 < nx && labels[row + static_cast<std::size_t>(i) + 1] == 0) ++i;
+        runs.push_back({first, row + static_cast<std::size_t>(i) + 1 - first, runs.size()});
+        if (from_border || i == nx - 1) unite(0, runs.size() - 1);
+      }
+      const std::size_t end = runs.size();
+      for (const auto& [dj, dk] : {std::pair(-1, 0), {0, -1}, {-1, -1}, {1, -1}}) {
+        if (j + dj < 0 || j + dj >= ny || k + dk < 0 ||
+            (joined == Joined::kByFaces && dj * dk != 0)) {
+          continue;
+        }
+        const std::size_t other = static_cast<std::size_t>(j + dj) +
+                                  static_cast<std::size_t>(ny) * static_cast<std::size_t>(k + dk);
+        const std::size_t back = row - grid.index(0, j + dj, k + dk);
+        std::size_t m = row_start[other];
+        const std::size_t last = row_start[other + 1];
+        for (std::size_t n = begin; n < end; ++n) {
+          const std::size_t from = runs[n].first, to = from + runs[n].count;
+          while (m < last && runs[m].first + runs[m].count + back + reach <= from) ++m;
+          for (std::size_t q = m; q < last && runs[q].first + back < to + reach; ++q) unite(n, q);
         }
       }
     }
   }
-  Labels seen = flood(grid, std::move(border), [&](std::size_t n) { return labels[n] == 0; });
+  for (std::size_t n = 0; n < runs.size(); ++n) runs[n].part = first_of_part(n);
+  return runs;
+}
 
-  // collect each cavity on its own
-  std::vector<std::size_t> cavity;
-  for (std::size_t n = 0; n < labels.size(); ++n) {
-    if (labels[n] != 0 || seen[n] != 0) {
-      continue;
-    }
-    cavity.assign(1, n);
-    seen[n] = 1;
-    for (std::size_t next = 0; next < cavity.size(); ++next) {
-      for_each_face_neighbour(grid, cavity[next], [&](std::size_t m) {
-        if (labels[m] == 0 && seen[m] == 0) {
-          seen[m] = 1;
-          cavity.push_back(m);
-        }
-      });
-    }
-    if (static_cast<double>(cavity.size()) <= largest) {
-      for (const std::size_t m : cavity) {
-        labels[m] = 1;
-      }
-    }
+void fill_cavities(const Grid& grid, Labels& labels, double largest) {
+  const std::vector<BackgroundRun> runs = find_background(grid, labels, Joined::kByFaces);
+  std::vector<double> voxels(runs.size(), 0.0);  // of each part
+  for (const BackgroundRun& run : runs) voxels[run.part] += static_cast<double>(run.count);
+  for (const BackgroundRun& run : runs) {
+    if (run.part == 0 || voxels[run.part] > largest) continue;
+    std::fill_n(labels.begin() + static_cast<std::ptrdiff_t>(run.first), run.count, 1);
   }
 }
 
@@ -276,9 +336,10 @@ std::vector<float> distance_to(std::uint8_t label, const Grid& grid, const Label
   std::transform(labels.begin(), labels.end(), distance.begin(), [&](std::uint8_t l) {
     return l == label ? 0.0F : std::numeric_limits<float>::infinity();
   });
+  measure_rows(grid, distance);
   const std::array<std::size_t, 3> stride = {1, grid.index(0, 1, 0), grid.index(0, 0, 1)};
-  for (int axis = 0; axis < 3; ++axis) {
-    const int a = axis == 0 ? 1 : 0, b = axis == 2 ? 1 : 2;  // the other two axes
+  for (int axis = 1; axis < 3; ++axis) {
+    const int a = 0, b = axis == 2 ? 1 : 2;  // the other two axes
 #pragma omp parallel
     {
       Envelope envelope;

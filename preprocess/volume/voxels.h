@@ -16,10 +16,11 @@ using Voxel = std::array<int, 3>;
 using Labels = std::vector<std::uint8_t>;
 
 inline Voxel voxel_at(const Grid& grid, std::size_t index) {
-  const auto nx = static_cast<std::size_t>(grid.size[0]);
-  const auto ny = static_cast<std::size_t>(grid.size[1]);
-  return {static_cast<int>(index % nx), static_cast<int>(index / nx % ny),
-          static_cast<int>(index / (nx * ny))};
+  const std::size_t slice = grid.index(0, 0, 1), k = index / slice;
+  // A slice has room in 32 bits, whose division takes a third of the time.
+  const auto in_slice = static_cast<std::uint32_t>(index - k * slice);
+  const auto nx = static_cast<std::uint32_t>(grid.size[0]);
+  return {static_cast<int>(in_slice % nx), static_cast<int>(in_slice / nx), static_cast<int>(k)};
 }
 
 inline std::size_t index_of(const Grid& grid, const Voxel& v) {
@@ -143,6 +144,19 @@ struct NearestLabel {
   double distance = std::numeric_limits<double>::infinity();
 };
 NearestLabel nearest_label(const Grid& grid, const Labels& labels, const Vec3& point);
+
+/// Unlabelled voxels of a row that lie side by side: so many of them from the first on.
+struct BackgroundRun {
+  std::size_t first = 0, count = 0;
+  std::size_t part = 0;  // the first run of what it is connected with; 0: with the grid's border
+};
+
+/// What connects voxels: a face they share, or an edge or corner too.
+enum class Joined { kByFaces, kByCorners };
+
+/// The background in the order of the voxels, behind a run 0 of no voxels that stands for all that
+/// reaches the border of the grid. By runs, of which there are few: a vessel's box is mostly empty.
+std::vector<BackgroundRun> find_background(const Grid& grid, const Labels& labels, Joined joined);
 
 /// Labels each part of the background that does not reach the border of the grid through voxel
 /// faces and has at most `largest` voxels.

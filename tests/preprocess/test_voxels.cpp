@@ -1,0 +1,76 @@
+// Distances and cavities of masks, against what defines them.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+#include <random>
+#include <vector>
+
+#include "preprocess/volume/voxels.h"
+
+namespace wireplan::preprocess {
+namespace {
+
+/// Voxels of different sides, so many of a hundred labelled.
+struct RandomMask {
+  Grid grid{.size = {13, 9, 11}, .spacing = {0.7, 0.9, 1.6}};
+  Labels labels;
+
+  explicit RandomMask(unsigned percent) {
+    std::mt19937_64 random(percent + 1);
+    for (std::size_t n = 0; n < grid.voxels(); ++n) {
+      labels.push_back(random() % 100 < percent ? 1 : 0);
+    }
+  }
+};
+
+TEST(DistanceTo, IsThatOfTheNearestVoxelOfTheLabel) {
+  for (const unsigned percent : {0U, 1U, 10U, 50U, 90U, 99U, 100U}) {
+    SCOPED_TRACE(percent);
+    const RandomMask mask(percent);
+    for (const std::uint8_t label : {std::uint8_t{0}, std::uint8_t{1}}) {
+      const std::vector<float> distance = distance_to(label, mask.grid, mask.labels);
+      for (std::size_t n = 0; n < distance.size(); ++n) {
+        double nearest = std::numeric_limits<double>::infinity();
+        for (std::size_t m = 0; m < distance.size(); ++m) {
+          if (mask.labels[m] != label) continue;
+          nearest = std::min(nearest, (center_of(mask.grid, n) - center_of(mask.grid, m)).norm());
+        }
+        ASSERT_FLOAT_EQ(distance[n], static_cast<float>(nearest));
+      }
+    }
+  }
+}
+
+TEST(FillCavities, FillsWhatDoesNotReachTheBorderAndIsSmallEnough) {
+  int filled = 0, left = 0;
+  for (const unsigned percent : {0U, 50U, 70U, 90U, 100U}) {
+    const RandomMask mask(percent);
+    for (const double largest : {1.0, 3.0, std::numeric_limits<double>::infinity()}) {
+      SCOPED_TRACE(testing::Message() << percent << " %, " << largest);
+      Labels labels = mask.labels;
+      fill_cavities(mask.grid, labels, largest);
+      for (std::size_t n = 0; n < labels.size(); ++n) {
+        if (mask.labels[n] != 0) {
+          ASSERT_EQ(labels[n], 1);
+          continue;
+        }
+        const Labels part =
+            flood(mask.grid, {n}, [&](std::size_t m) { return mask.labels[m] == 0; });
+        bool open = false;
+        for (std::size_t m = 0; m < part.size(); ++m) {
+          open = open || (part[m] != 0 && on_border(mask.grid, voxel_at(mask.grid, m)));
+        }
+        const bool fills = !open && static_cast<double>(count(part)) <= largest;
+        ASSERT_EQ(labels[n], fills ? 1 : 0);
+        filled += fills ? 1 : 0;
+        left += !open && !fills ? 1 : 0;
+      }
+    }
+  }
+  EXPECT_GT(filled, 100);
+  EXPECT_GT(left, 10);  // too large
+}
+
+}  // namespace
+}  // namespace wireplan::preprocess
