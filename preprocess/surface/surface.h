@@ -69,7 +69,13 @@ Surface read_triangles(const std::filesystem::path& path, const std::string& uni
 /// one.
 Surface remesh(const Surface& surface, double edge_length_mm);
 
+/// The same of a surface that was checked.
+Surface remesh(const Surface& surface, const SurfaceCheck& check, double edge_length_mm);
+
 SurfaceCheck check_surface(const Surface& surface);
+
+/// The same; `cutting` becomes the triangles of the self-intersections, ascending.
+SurfaceCheck check_surface(const Surface& surface, std::vector<int>& cutting);
 
 /// Triangles that cut another one, ascending. Expects a manifold, oriented surface.
 std::vector<int> find_self_intersections(const Surface& surface);

@@ -110,6 +110,18 @@ double half_solid_angle(const Vec3& p, const std::array<Vec3, 3>& corner) {
                     la * lb * lc + a.dot(b) * lc + b.dot(c) * la + c.dot(a) * lb);
 }
 
+/// The triangles of these pairs, ascending.
+std::vector<int> triangles_of(const std::vector<std::pair<int, int>>& pairs) {
+  std::vector<int> triangles;
+  for (const auto& [a, b] : pairs) {
+    triangles.push_back(a);
+    triangles.push_back(b);
+  }
+  std::sort(triangles.begin(), triangles.end());
+  triangles.erase(std::unique(triangles.begin(), triangles.end()), triangles.end());
+  return triangles;
+}
+
 std::array<Vec3, 3> corners_of(const Surface& surface, int triangle) {
   const Eigen::Vector3i v = surface.triangles.col(triangle);
   return {surface.vertices.col(v(0)), surface.vertices.col(v(1)), surface.vertices.col(v(2))};
@@ -185,6 +197,12 @@ Surface largest_piece(const Surface& surface) {
 }
 
 SurfaceCheck check_surface(const Surface& surface) {
+  std::vector<int> cutting;
+  return check_surface(surface, cutting);
+}
+
+SurfaceCheck check_surface(const Surface& surface, std::vector<int>& cutting) {
+  cutting.clear();
   SurfaceCheck check;
   check.triangles = static_cast<int>(surface.triangles.cols());
   if (check.triangles == 0) return check;
@@ -214,6 +232,7 @@ SurfaceCheck check_surface(const Surface& surface) {
   if (check.non_manifold_edges + check.misoriented_edges + check.non_manifold_vertices == 0) {
     const std::vector<std::pair<int, int>> pairs = cutting_pairs(surface);
     check.self_intersections = static_cast<int>(pairs.size());
+    cutting = triangles_of(pairs);
     if (!pairs.empty()) {
       const auto cut = static_cast<Eigen::Index>(pairs.front().first);
       check.cut_at = surface.vertices.col(surface.triangles(0, cut));
@@ -223,14 +242,7 @@ SurfaceCheck check_surface(const Surface& surface) {
 }
 
 std::vector<int> find_self_intersections(const Surface& surface) {
-  std::vector<int> triangles;
-  for (const auto& [a, b] : cutting_pairs(surface)) {
-    triangles.push_back(a);
-    triangles.push_back(b);
-  }
-  std::sort(triangles.begin(), triangles.end());
-  triangles.erase(std::unique(triangles.begin(), triangles.end()), triangles.end());
-  return triangles;
+  return triangles_of(cutting_pairs(surface));
 }
 
 bool is_sound(const SurfaceCheck& check) {

@@ -119,15 +119,15 @@ void require_labels(const Mask& mask) {
 }
 
 /// Takes vertices of triangles that cut each other, and their neighbours, back toward where they
-/// were before the fit: half way at first, then all of it.
-Surface without_cuts(Surface fitted, const Surface& base) {
+/// were before the fit: half way at first, then all of it. `check` becomes that of the result.
+Surface without_cuts(Surface fitted, const Surface& base, SurfaceCheck& check) {
   constexpr int kTries = 6, kRings = 3;
   const Neighbours neighbours = find_neighbours(base);
-  for (int k = 0; k < kTries; ++k) {
-    const std::vector<int> cut = find_self_intersections(fitted);
-    if (cut.empty()) break;
+  std::vector<int> cutting;
+  check = check_surface(fitted, cutting);
+  for (int k = 0; k < kTries && !cutting.empty(); ++k) {
     Eigen::VectorXd near = Eigen::VectorXd::Zero(base.vertices.cols());
-    for (const int t : cut) {
+    for (const int t : cutting) {
       for (int c = 0; c < 3; ++c) near(base.triangles(c, t)) = 1.0;
     }
     Eigen::VectorXd weight = Eigen::VectorXd::Ones(near.size());
@@ -138,6 +138,7 @@ Surface without_cuts(Surface fitted, const Surface& base) {
       const Vec3 before = base.vertices.col(v), after = fitted.vertices.col(v);
       fitted.vertices.col(v) = before + keep * (after - before);
     }
+    check = check_surface(fitted, cutting);
   }
   return fitted;
 }
@@ -149,11 +150,13 @@ Surface surface_from_mask(const Mask& mask, const SurfaceOptions& options) {
   require_labels(mask);
   const vtkSmartPointer<vtkPolyData> stairs = contour_lps(mask);
   Surface surface;
+  SurfaceCheck check;
   for (const double passband : kPassbands) {
     surface = smoothed(stairs, passband);
-    if (is_sound(check_surface(surface))) break;
+    check = check_surface(surface);
+    if (is_sound(check)) break;
   }
-  return remesh(surface, options.edge_length_mm);
+  return remesh(surface, check, options.edge_length_mm);
 }
 
 Surface surface_from_image(const Image& image, const Mask& mask, const SurfaceOptions& options,
@@ -162,12 +165,13 @@ Surface surface_from_image(const Image& image, const Mask& mask, const SurfaceOp
   require_labels(mask);
   const vtkSmartPointer<vtkPolyData> stairs = contour_lps(mask);
   Surface surface;
+  SurfaceCheck check;
   for (const double passband : kPassbandsBeforeFit) {
     const Surface base = smoothed(stairs, passband);
-    surface = without_cuts(fit_to_image(base, image, statistics, width), base);
-    if (is_sound(check_surface(surface))) break;
+    surface = without_cuts(fit_to_image(base, image, statistics, width), base, check);
+    if (is_sound(check)) break;
   }
-  return remesh(surface, options.edge_length_mm);
+  return remesh(surface, check, options.edge_length_mm);
 }
 
 }  // namespace wireplan::preprocess

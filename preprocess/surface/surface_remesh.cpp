@@ -170,8 +170,11 @@ void refine_near(const Surface& result, const std::vector<int>& cut, const Surfa
 }  // namespace
 
 Surface remesh(const Surface& surface, double edge_length_mm) {
+  return remesh(surface, check_surface(surface), edge_length_mm);
+}
+
+Surface remesh(const Surface& surface, const SurfaceCheck& before, double edge_length_mm) {
   expects(edge_length_mm > 0.0 && surface.triangles.cols() > 0);
-  const SurfaceCheck before = check_surface(surface);
   require_sound(before, "surface before remeshing");
   Eigen::VectorXd edge = wanted_edges(surface, edge_length_mm);
   if (has_edges(surface, edge)) return surface;
@@ -187,8 +190,9 @@ Surface remesh(const Surface& surface, double edge_length_mm) {
       break;
     }
     std::optional<Surface> result = remesh_once(surface, classes, longest);
+    std::vector<int> cutting;
     if (result) {
-      SurfaceCheck after = check_surface(*result);
+      SurfaceCheck after = check_surface(*result, cutting);
       if (k + 1 >= kLocalTries && after.self_intersections > 0) {
         std::vector<Mend> mends;
         result = without_intersections(*result, mends);
@@ -201,7 +205,7 @@ Surface remesh(const Surface& surface, double edge_length_mm) {
       tried << "; " << longest << " mm: no mesh came of it";
     }
     if (result && k + 1 < kLocalTries) {
-      refine_near(*result, find_self_intersections(*result), surface, edge, longest);
+      refine_near(*result, cutting, surface, edge, longest);
     } else {
       longest *= kFiner;
       edge.setConstant(longest);
