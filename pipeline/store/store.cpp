@@ -10,10 +10,12 @@
 #include <chrono>
 #include <cstdlib>
 #include <cstring>
+#include <future>
 #include <sstream>
 #include <thread>
 #include <tuple>
 #include <utility>
+#include <vector>
 
 #include "pipeline/files/json_reader.h"
 #include "pipeline/store/hash.h"
@@ -41,6 +43,18 @@ std::vector<ArtifactFile> list_files(const fs::path& folder) {
   std::sort(files.begin(), files.end(),
             [](const ArtifactFile& a, const ArtifactFile& b) { return a.name < b.name; });
   return files;
+}
+
+// Brings all of them to the disk, some at once: it takes as long for these as for one.
+void sync_all(const std::vector<fs::path>& paths) {
+  constexpr std::size_t kAtOnce = 8;  // of 1, 4, 8 and 16 the fastest
+  std::vector<std::future<void>> parts;
+  for (std::size_t part = 0; part < std::min(kAtOnce, paths.size()); ++part) {
+    parts.push_back(std::async(std::launch::async, [&paths, part] {
+      for (std::size_t k = part; k < paths.size(); k += kAtOnce) sync(paths[k]);
+    }));
+  }
+  for (std::future<void>& part : parts) part.get();
 }
 
 // Written without a line break at the end: cut at any byte it is no longer JSON.
@@ -281,17 +295,18 @@ Artifact Store::commit(const std::string& stage, const std::string& key_text,
     make(temporary);
     artifact.seconds =
         std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-    write_whole(key_text, temporary / kKeyFile);
+    write_whole(key_text, temporary / kKeyFile, Durability::kChecked);
     artifact.files = list_files(temporary);
     std::erase_if(artifact.files, [](const ArtifactFile& f) { return f.name == kKeyFile; });
-    write_whole(manifest_text(artifact), temporary / kManifestFile);
+    write_whole(manifest_text(artifact), temporary / kManifestFile, Durability::kChecked);
 
     // To the disk; read-only, since output folders may link to the same bytes.
+    std::vector<fs::path> made = {temporary};
     for (const fs::directory_entry& entry : fs::recursive_directory_iterator(temporary)) {
-      sync(entry.path());
       if (entry.is_regular_file()) fs::permissions(entry.path(), kReadOnly);
+      made.push_back(entry.path());
     }
-    sync(temporary);
+    sync_all(made);
 
     // Into place. Where a folder stands there it is damaged (then it goes) or another process was
     // faster (then its files are as good as ours).
