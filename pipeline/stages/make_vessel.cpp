@@ -300,19 +300,23 @@ void make_volume(Workspace& work, const fs::path& folder) {
   const preprocess::Grid& grid = image.grid;
 
   // Statistics of the values, summed in order.
-  double sum = 0.0;
-  for (const float value : image.values) sum += static_cast<double>(value);
-  const auto [low, high] = std::minmax_element(image.values.begin(), image.values.end());
   expects(!image.values.empty());
+  double sum = 0.0;
+  float low = image.values.front(), high = low;
+  for (const float value : image.values) {
+    sum += static_cast<double>(value);
+    low = std::min(low, value);
+    high = std::max(high, value);
+  }
 
   Json figures = figures_of("volume");
   figures["size"] = grid.size;
   figures["spacing_mm"] = to_json(grid.spacing);
   figures["origin_mm"] = to_json(grid.origin);
   figures["direction_ijk_to_lps"] = to_json(Eigen::Matrix3Xd(grid.direction.transpose()));
-  figures["min_hu"] = *low;
+  figures["min_hu"] = low;
   figures["mean_hu"] = sum / static_cast<double>(image.values.size());
-  figures["max_hu"] = *high;
+  figures["max_hu"] = high;
   for (const std::string& line : warn_of_values(image)) figures["warnings"].push_back(line);
   write_figures(figures, folder);
 }

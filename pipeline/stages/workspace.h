@@ -64,7 +64,11 @@ class Workspace {
   Json figures(const std::string& stage) const;  // its figures.json
 
   const preprocess::Image& image();
-  void drop_image() { image_.reset(); }
+  /// Frees what takes much memory; a small one is kept, since later stages read it too.
+  void drop_image() {
+    constexpr std::size_t kSmall = 32'000'000;  // voxels: 128 MB
+    if (image_ && image_->values.size() > kSmall) image_.reset();
+  }
   const Surface& surface();
   const Centerline& path();  // access to target
   const Wall& wall();
