@@ -114,12 +114,17 @@ TEST(SurfaceCheck, FindsTwoPiecesAndTwoThatTouchInAVertex) {
 TEST(SurfaceCheck, FindsWallsThatCutEachOther) {
   // Two walls cross where a tube bends by a full turn and more in one plane.
   const Surface looped = shapes::bend_tube(1.0, 6.0, 2.0 * kPi, 4.0, 4.0, 0.6);
-  const SurfaceCheck check = check_surface(looped);
+  std::vector<int> cutting;
+  const SurfaceCheck check = check_surface(looped, cutting);
   EXPECT_EQ(check.open_edges, 0);
   EXPECT_GT(check.self_intersections, 0);
+  EXPECT_GT(cutting.size(), 1U);
+  EXPECT_EQ(cutting, find_self_intersections(looped));
   EXPECT_FALSE(is_sound(check));
   EXPECT_NE(message_of([&] { require_sound(check, "x"); }).find("cut each other"),
             std::string::npos);
+  check_surface(shapes::box({0, 0, 0}, {1, 1, 1}), cutting);
+  EXPECT_TRUE(cutting.empty());
 }
 
 TEST(SurfaceCheck, FindsATriangleWithoutArea) {
