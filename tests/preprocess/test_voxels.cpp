@@ -1,6 +1,7 @@
 // Distances and cavities of masks, against what defines them.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <random>
