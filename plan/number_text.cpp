@@ -17,6 +17,7 @@ std::string printed(const char* pattern, double value) {
 }  // namespace
 
 std::string two_digits(double value) {
+  if (std::abs(value) < 5e-5) return "0";
   const double size = std::max(std::abs(value), 1e-4);
   const int decimals = std::clamp(1 - static_cast<int>(std::floor(std::log10(size))), 0, 4);
   char text[64];
@@ -28,5 +29,9 @@ std::string two_decimals(double value) { return printed("%.2f", value); }
 std::string one_decimal(double value) { return printed("%.1f", value); }
 std::string three_digits(double value) { return printed("%.3g", value); }
 std::string four_digits(double value) { return printed("%.4g", value); }
+
+std::string count_of(int count, const std::string& noun) {
+  return std::to_string(count) + " " + noun + (count == 1 ? "" : "s");
+}
 
 }  // namespace wireplan::plan

@@ -433,9 +433,8 @@ class Weighing {
     const bool surely = passage.device > passage.max_ratio * (passage.lumen + off);
     std::string text = "The narrowest place of the way is " + three_digits(passage.lumen) +
                        " mm wide, " + whole_millimetres(passage.at) + " from the access; " +
-                       (passage.assumed ? "a device of " : "the widest device, of ") +
-                       three_digits(passage.device) +
-                       (passage.assumed ? " mm, which is assumed, " : " mm, ");
+                       "a device of " + three_digits(passage.device) +
+                       (passage.assumed ? " mm, which is assumed, " : " mm ");
     text += surely     ? "does not pass"
             : too_wide ? "passes only if the lumen is wider than it seems, which it may be by " +
                              two_digits(off) + " mm"

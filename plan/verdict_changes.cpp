@@ -77,13 +77,23 @@ std::string change_of_catheters(const std::string& went, const Known& known) {
          list_words(others) + (others.size() == 1 ? " was not." : " were not.");
 }
 
+/// The first five, and how many more there are.
+std::vector<std::string> first_of(std::vector<std::string> names) {
+  constexpr std::size_t kNamed = 5;
+  if (names.size() <= kNamed + 1) return names;
+  const std::size_t more = names.size() - kNamed;
+  names.resize(kNamed);
+  names.push_back(std::to_string(more) + " more");
+  return names;
+}
+
 std::string change_at_branch(const Endings& endings, const Known& known, const std::string& noun) {
   const std::string went = tell_astray(endings, noun);
   if (!known.study.catheters.empty()) return change_of_catheters(went, known);
   if (!tried_angled(known.study)) {
     std::string text = "A wire with an angled tip: " + went + ", and no such wire was tried";
     if (!known.angled_wires.empty()) {
-      text += " (in the catalogue: " + list_words(known.angled_wires) + ")";
+      text += " (in the catalogue: " + list_words(first_of(known.angled_wires)) + ")";
     }
     return text + ".";
   }
@@ -126,13 +136,11 @@ std::string list_words(const std::vector<std::string>& parts) {
   return text;
 }
 
-std::string count_of(int count, const std::string& noun) {
-  return std::to_string(count) + " " + noun + (count == 1 ? "" : "s");
-}
-
 std::string part_of(int count, int all, const std::string& noun) {
   if (count < all || all == 0) return std::to_string(count) + " of " + count_of(all, noun);
-  return all == 1 ? "the one " + noun : "all " + count_of(all, noun);
+  return all == 1   ? "the one " + noun
+         : all == 2 ? "both " + noun + "s"
+                    : "all " + count_of(all, noun);
 }
 
 std::string capital(std::string text) {
@@ -230,13 +238,12 @@ std::string describe_broken_limits(const Endings& endings, const Limits& limits)
 }
 
 std::vector<std::string> describe_pairs(const Known& known, std::size_t most) {
-  std::vector<std::string> texts;
+  std::vector<std::string> texts, untried;
   for (const PairFindings& pair : known.plan.scripts.pairs) {
-    if (texts.size() == most) break;
     const std::string name = catheter_name(known, pair) + " with " +
                              known.study.wires[static_cast<std::size_t>(pair.pair.wire)].name;
     if (!pair.pair.unfit.empty()) {
-      texts.push_back("Not tried was " + name + ": " + pair.pair.unfit + ".");
+      untried.push_back("Not tried was " + name + ": " + pair.pair.unfit + ".");
     } else if (pair.tried() && !pair.stopped.empty()) {
       std::string text = "No script of " + name + " reaches: " + pair.stopped;
       if (pair.nearest_hook >= 0.0) {
@@ -245,6 +252,14 @@ std::vector<std::string> describe_pairs(const Known& known, std::size_t most) {
       }
       texts.push_back(text + ".");
     }
+  }
+  texts.insert(texts.end(), untried.begin(), untried.end());
+  if (texts.size() > most) {
+    const int more = static_cast<int>(texts.size() - most);
+    texts.resize(most);
+    texts.push_back(count_of(more, "other pair") + " of catheter and wire " +
+                    (more == 1 ? "was" : "were") +
+                    " not tried or found no script either; the report lists each with its reason.");
   }
   return texts;
 }

@@ -9,9 +9,7 @@ namespace wireplan::plan {
 
 /// "a", "a and b", "a, b and c"
 std::string list_words(const std::vector<std::string>& parts);
-/// "1 trial", "3 trials"
-std::string count_of(int count, const std::string& noun);
-/// Of all that there are: "3 of 9 trials", "all 9 trials", "the one trial"
+/// Of all that there are: "3 of 9 trials", "all 9 trials", "both trials", "the one trial"
 std::string part_of(int count, int all, const std::string& noun);
 /// With a capital letter in front.
 std::string capital(std::string text);
@@ -44,8 +42,8 @@ std::string describe_endings(const Endings& endings);
 /// Which limits those that reached break; expects that there are some.
 std::string describe_broken_limits(const Endings& endings, const Limits& limits);
 
-/// Of catheters and wires, where none of their scripts is a plan: what stopped each pair, or why it
-/// was not tried; at most so many sentences.
+/// Of catheters and wires, where none of their scripts is a plan: what stopped each pair that
+/// was tried, then why others were not; at most so many sentences, and one that counts the others.
 std::vector<std::string> describe_pairs(const Known& known, std::size_t most = 4);
 
 /// What would change how these end, the most frequent first; from what at least one in ten of them

@@ -17,6 +17,7 @@
 #include "pipeline/report/print.h"
 #include "pipeline/report/render.h"
 #include "pipeline/store/cache.h"
+#include "plan/number_text.h"
 #include "preprocess/volume/random_patient.h"
 
 namespace wireplan::pipeline {
@@ -86,8 +87,9 @@ int check_file(const std::string& path, const std::vector<std::string>& override
   } else {
     const Case given = read_case(path, overrides);
     const std::vector<std::string> told = check_input(given);
+    const auto trials = static_cast<int>(plan::list_candidates(given.study).size());
     std::cout << given.file.string() << ": the case is in order, "
-              << plan::list_candidates(given.study).size() << " trials\n";
+              << plan::count_of(trials, "trial") << "\n";
     print_told(told, "");
     print_told(given.told, "");
     const simulate::InsertionOptions& insertion = given.study.insertion;

@@ -315,7 +315,7 @@ TEST(Rank, ComparesPlansThatDoNotTouchTheWall) {
   bench.add(1, 2.0, 0.0);
   const Ranking ranking = bench.ranked();
   EXPECT_EQ(ranking.plans.front().sentence,
-            "reaches the target 1.0 mm from its centre with at most 0.0000 N on the wall, as much "
+            "reaches the target 1.0 mm from its centre with at most 0 N on the wall, as much "
             "as the next wire (wire-1)");
 }
 

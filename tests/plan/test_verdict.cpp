@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "plan/number_text.h"
 #include "plan/verdict.h"
 #include "tests/plan/known_plans.h"
 
@@ -27,8 +28,8 @@ TEST(Verdict, OfAGoodPlanIsFeasibleAndTellsItsNumbers) {
           "warning level of 0.3 N (limit 1.5 N).",
           "The tip's stated error is 0.12 mm, of the computation alone; the lumen at the target "
           "has a radius of 2.5 mm.",
-          "The narrowest place of the way is 5 mm wide, 312 mm from the access; the widest "
-          "device, of 1.67 mm, passes.",
+          "The narrowest place of the way is 5 mm wide, 312 mm from the access; a device of "
+          "1.67 mm passes.",
           "The sheath of 2.7 mm is 0.40 times as wide as the narrowest lumen in the first 110 mm "
           "(6.75 mm); below 1.05 it passes.",
           "The way is 1.10 times as long as the straight line between its ends: tortuosity below "
@@ -81,6 +82,15 @@ TEST(Verdict, OfALowShareTellsReachedRepeatsAndWhatWouldMendThem) {
                     "A wire with an angled tip: 4 of 5 failed repeats went past the branch, and no "
                     "such wire was tried (in the catalogue: angled-a and angled-b)."));
   EXPECT_TRUE(tells(verdict.changes, "1 of 5 failed repeats pressed the tip on the wall"));
+  bench.angled_wires = {"a", "b", "c", "d", "e", "f", "g"};
+  EXPECT_TRUE(tells(bench.verdict().changes, "(in the catalogue: a, b, c, d, e and 2 more)."));
+}
+
+TEST(Verdict, AForceOfNothingIsZero) {
+  EXPECT_EQ(two_digits(0.0), "0");
+  EXPECT_EQ(two_digits(-4e-5), "0");
+  EXPECT_EQ(two_digits(6e-5), "0.0001");
+  EXPECT_EQ(two_digits(0.0814), "0.081");
 }
 
 TEST(Verdict, WithoutRepeatsIsUnsure) {
@@ -205,9 +215,10 @@ TEST(Verdict, ADeviceIsHeldAgainstTheNarrowestPlaceAndWhatItsWidthIsUnknownBy) {
     EXPECT_EQ(verdict.answer, answer);
     EXPECT_EQ(tells(verdict.changes, "A device thinner than "), lumen < 1.68);
     if (answer == Answer::kNotFeasible) {
-      EXPECT_EQ(verdict.headline,
-                "The narrowest place of the way is 1.1 mm wide, 312 mm from the access; the widest "
-                "device, of 1.67 mm, does not pass.");
+      EXPECT_EQ(
+          verdict.headline,
+          "The narrowest place of the way is 1.1 mm wide, 312 mm from the access; a device of "
+          "1.67 mm does not pass.");
     }
   }
 }
@@ -218,7 +229,7 @@ TEST(Verdict, WhatPassesAnOvalLumenByItsAreaAloneIsTold) {
   known.way->device.oval = known.way->sheath.oval = true;
   const Verdict verdict = known.verdict();
   EXPECT_EQ(verdict.answer, Answer::kFeasible);
-  for (const char* device : {"device, of 1.67 mm, ", "below 1.05 it "}) {
+  for (const char* device : {"device of 1.67 mm ", "below 1.05 it "}) {
     const std::string told = std::string(device) + "passes where the lumen, oval there, gives way.";
     EXPECT_TRUE(tells(verdict.reasons, told)) << told;
   }
@@ -469,6 +480,20 @@ TEST(Verdict, OfCathetersThatDoNotReachSaysWhatStopsThemAndWhichAreLeft) {
   EXPECT_TRUE(tells(bench.verdict().changes,
                     "Another access, or a catheter of another width: all 9 trials went past the "
                     "branch, though cobra, vertebral and sos were tried."));
+}
+
+TEST(Verdict, CountsThePairsThatItDoesNotName) {
+  WhatIsKnown bench;
+  bench.add_many(2, Outcome::kPassedBy);
+  bench.study.catheters.assign(6, curved("short", 1.5));
+  for (int k = 0; k < 6; ++k) {
+    PairFindings& pair = bench.plan.scripts.pairs.emplace_back();
+    pair.pair = {.catheter = k, .wire = 0, .unfit = "catheter too short"};
+    const Verdict verdict = bench.verdict();
+    EXPECT_EQ(tells(verdict.reasons, "1 other pair of catheter and wire was not tried"), k == 4);
+    EXPECT_EQ(tells(verdict.reasons, "2 other pairs of catheter and wire were not tried"), k == 5);
+  }
+  EXPECT_TRUE(tells(bench.verdict().reasons, "Both trials passed by the branch."));
 }
 
 TEST(Verdict, AnAssumedSheathLongerThanTheWayIsNotWeighed) {
