@@ -252,7 +252,7 @@ std::vector<Stage> stages_of(const Case& given) {
   // Names of branches, or the way that was found.
   if (from_labels || from_volume) stages.back().after.emplace_back("segment");
   Stage anatomy{.name = "anatomy",
-                .version = 12,
+                .version = 13,
                 .reads_input = from_volume,
                 .after = {"surface", "centerline"},
                 .parameters = {"/access_limits", "/axes"},
@@ -269,7 +269,7 @@ std::vector<Stage> stages_of(const Case& given) {
        .parameters = {"/wall/thickness_mm", "/wall/young_modulus_kpa", "/wall/poisson_ratio"},
        .make = make_wall});
   Stage trials{.name = "trials",
-               .version = 33,
+               .version = 34,
                .after = {"surface", "centerline"},
                .parameters = {"/access", "/target", "/wires", "/tip_roll_deg", "/friction",
                               "/friction_factor", "/wall/model", "/insertion"},
@@ -286,7 +286,7 @@ std::vector<Stage> stages_of(const Case& given) {
   stages.push_back(trials);
   Stage manoeuvres = trials;
   manoeuvres.name = "manoeuvres";
-  manoeuvres.version = 35;
+  manoeuvres.version = 36;
   manoeuvres.after.push_back("trials");
   read_too(manoeuvres, {"/manoeuvres"});
   const bool tools = !given.catheters.empty();
@@ -303,7 +303,7 @@ std::vector<Stage> stages_of(const Case& given) {
   stages.push_back(manoeuvres);
   Stage plans = trials;
   plans.name = "plans";
-  plans.version = 19;
+  plans.version = 20;
   plans.after.insert(plans.after.end(), {"trials", "manoeuvres"});
   if (voxels != nullptr) plans.after.emplace_back(voxels);
   read_too(plans, {"/manoeuvres", "/robustness"});

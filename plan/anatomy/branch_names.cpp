@@ -83,6 +83,32 @@ double vessel_from(const std::vector<Branch>& tree, const simulate::BranchPlace&
   return from;
 }
 
+/// What a line is called at an arc length; empty where nobody said.
+std::string name_at(const std::vector<preprocess::NamedPart>& parts, double arc) {
+  std::string name;
+  for (const preprocess::NamedPart& part : parts) {
+    if (part.from <= arc) name = part.name;
+  }
+  return name;
+}
+
+/// Where the stem begins, along its line, that the vessel which begins at a place shares with
+/// others, as a carotid the brachiocephalic trunk [mm]; empty where it shares none, or labels have
+/// a name for it, or it is the trunk of all.
+std::optional<double> stem_from(const std::vector<Branch>& tree,
+                                const simulate::BranchPlace& begin) {
+  constexpr double kBefore = 0.1;  // of the fork                                       [mm]
+  const std::vector<VesselEdge> edges = list_edges(tree, begin.branch);
+  const bool shares = std::any_of(edges.begin(), edges.end(), [&](const VesselEdge& edge) {
+    return !edge.into_wider && edge.before == begin.arc;
+  });
+  const Branch& branch = tree[static_cast<std::size_t>(begin.branch)];
+  if (!shares || !name_at(branch.parts, begin.arc - kBefore).empty()) return {};
+  const double from = vessel_from(tree, {begin.branch, begin.arc - kBefore});
+  if (branch.parent < 0 && from == 0.0) return {};
+  return from;
+}
+
 /// Where it ends along its branch; the branch's length where it goes on to its end [mm].
 double vessel_to(const std::vector<Branch>& tree, const simulate::BranchPlace& place) {
   const Centerline& line = tree[static_cast<std::size_t>(place.branch)].line;
@@ -102,15 +128,6 @@ double vessel_to(const std::vector<Branch>& tree, const simulate::BranchPlace& p
   return to;
 }
 
-/// What a line is called at an arc length; empty where nobody said.
-std::string name_at(const std::vector<preprocess::NamedPart>& parts, double arc) {
-  std::string name;
-  for (const preprocess::NamedPart& part : parts) {
-    if (part.from <= arc) name = part.name;
-  }
-  return name;
-}
-
 /// Calls vessels by places in them, each by the first; keeps what it has called.
 class BranchNames {
  public:
@@ -126,15 +143,23 @@ class BranchNames {
     // By the labels alone, so that the order of places does not count.
     std::vector<preprocess::NamedPart> parts = std::exchange(tree_[index].parts, told_[index]);
     const double from = vessel_from(tree_, found), to = vessel_to(tree_, found);
+    const std::optional<double> stem = stem_from(tree_, {found.branch, from});
     tree_[index].parts = std::move(parts);
     const std::pair vessel(found.branch, from);
     if (std::find(named_.begin(), named_.end(), vessel) != named_.end()) return;
     named_.push_back(vessel);
+    if (stem && name_at(tree_[index].parts, *stem).empty()) {
+      begin_part(index, {*stem, "the stem of " + place.name}, true);
+    }
     // In the place of what labels call that part, if they do.
     if (to < tree_[index].line.arc_length.tail<1>().value()) {
       begin_part(index, {to, name_at(tree_[index].parts, to)}, false);
     }
     begin_part(index, {from, place.name}, true);
+    // A part that begins in the ball of a fork, and again behind it, is one.
+    std::vector<preprocess::NamedPart>& named = tree_[index].parts;
+    const auto same_name = [](const auto& a, const auto& b) { return a.name == b.name; };
+    named.erase(std::unique(named.begin(), named.end(), same_name), named.end());
   }
 
  private:

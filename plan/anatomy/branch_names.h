@@ -21,7 +21,8 @@ struct NamedPlace {
 /// run through several vessels, and a name is that of one: from the last place before that leaves a
 /// clearly wider vessel, enters a wider one (simulate::is_entered) or the one that two legs meet
 /// in, has another name by labels, or has shared a stem with another vessel that goes on from it
-/// (simulate::goes_on), up to the next such place.
+/// (simulate::goes_on), up to the next such place. A stem without a name is "the stem of" the first
+/// vessel that is named beyond it.
 void name_branches(std::vector<preprocess::Branch>& tree, const NamedPlace& target,
                    const std::vector<NamedPlace>& other_targets,
                    const std::vector<NamedPlace>& other_accesses);

@@ -303,15 +303,15 @@ TEST(BranchNames, OfAVesselThatSharesAStemBeginBehindIt) {
                                .parent = 1,
                                .parent_arc = 40.0}};
   name_branches(tree, {"subclavian", Vec3(40, 50, 100)}, {{"carotid", Vec3(75, 0, 100)}}, {});
-  EXPECT_EQ(branch_name(tree, 1), "carotid (branch 2)");
-  EXPECT_EQ(branch_name(tree, 1, 30.0), "branch 2") << "the stem of both";
+  EXPECT_EQ(branch_name(tree, 1), "the stem of carotid, then carotid (branch 2)");
+  EXPECT_EQ(branch_name(tree, 1, 30.0), "the stem of carotid (branch 2)");
   const simulate::Way way(
       line_through({Vec3::Zero(), Vec3(0, 0, 100), Vec3(40, 0, 100), Vec3(40, 50, 100)}, 5.0),
       tree);
   const auto found = find_junctions(way);
   ASSERT_EQ(found.size(), 2u);
   EXPECT_TRUE(found[0].taken && !found[1].taken);
-  EXPECT_EQ(leaving_name(tree, found[0]), "branch 2");
+  EXPECT_EQ(leaving_name(tree, found[0]), "the stem of carotid (branch 2)");
   EXPECT_EQ(leaving_name(tree, found[1]), "carotid (branch 2)");
 }
 
@@ -367,7 +367,7 @@ TEST(BranchNames, ABranchHasItsNameFromWhereItLeaves) {
   }
 }
 
-TEST(BranchNames, AStemThatTwoVesselsShareHasTheNameOfNeither) {
+TEST(BranchNames, AStemThatTwoVesselsShareIsTheStemOfTheOneThatItsLineEndsIn) {
   std::vector<Branch> tree = tree_with_stem();
   const Vec3 arm(80, 0, 100), carotid(40, 0, 150);
   name_branches(tree, {"left carotid", carotid}, {{"right arm", arm}}, {});
@@ -375,7 +375,7 @@ TEST(BranchNames, AStemThatTwoVesselsShareHasTheNameOfNeither) {
   const auto to_arm = find_junctions(simulate::Way(path, tree));
   ASSERT_EQ(to_arm.size(), 2u);
   EXPECT_TRUE(to_arm[0].taken);
-  EXPECT_EQ(leaving_name(tree, to_arm[0]), "branch 2");
+  EXPECT_EQ(leaving_name(tree, to_arm[0]), "the stem of left carotid (branch 2)");
   EXPECT_FALSE(to_arm[1].taken) << "it stays in the wider vessel";
   EXPECT_EQ(leaving_name(tree, to_arm[1]), "left carotid (branch 2)");
 
@@ -383,11 +383,19 @@ TEST(BranchNames, AStemThatTwoVesselsShareHasTheNameOfNeither) {
   const simulate::Way way(path, tree);
   const auto to_carotid = find_junctions(way);
   ASSERT_EQ(to_carotid.size(), 2u);
-  EXPECT_EQ(leaving_name(tree, to_carotid[0]), "branch 2");
+  EXPECT_EQ(leaving_name(tree, to_carotid[0]), "the stem of left carotid (branch 2)");
   EXPECT_EQ(leaving_name(tree, to_carotid[1]), "left carotid (branch 2)");
   const auto astray = way.find_astray(Vec3(0, 0, 180));
   ASSERT_TRUE(astray);
-  EXPECT_NE(astray->text.find("turns into branch 2"), std::string::npos) << astray->text;
+  EXPECT_NE(astray->text.find("turns into the stem of left carotid (branch 2)"), std::string::npos)
+      << astray->text;
+  // Whatever is named first; a place in the stem names it.
+  for (const bool first : {true, false}) {
+    const NamedPlace trunk{"trunk", Vec3(25, 0, 100)}, beyond{"left carotid", carotid};
+    std::vector<Branch> named = tree_with_stem();
+    name_branches(named, first ? trunk : beyond, {first ? beyond : trunk}, {});
+    EXPECT_EQ(branch_name(named, 1), "trunk, then left carotid (branch 2)") << first;
+  }
 
   // Labels part the two 8 mm behind the place where the lines do.
   std::vector<Branch> labelled = tree_with_stem();
