@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <utility>
 
 #include "plan/anatomy/passage.h"
 
@@ -48,9 +49,9 @@ std::string why_unfit(const Catheter& catheter, const simulate::Wire& wire, cons
            " wide at its narrowest";
   }
   if (tube.length() < ostium.arc + rules.outside) {
-    return "catheter too short: " + millimetres_of(tube.length()) + ", and the ostium is " +
-           millimetres_of(ostium.arc) + " from the access with " + millimetres_of(rules.outside) +
-           " to stay outside";
+    return "catheter too short: " + millimetres_of(tube.length()) +
+           ", and the way to the ostium takes " + millimetres_of(ostium.arc) + " with " +
+           millimetres_of(rules.outside) + " to stay outside";
   }
   // With the catheter at the ostium and the wire at the target.
   const double needed = tube.length() - ostium.arc + ostium.end + rules.hold;
@@ -241,20 +242,20 @@ std::string turned_by(double angle) {
          (angle > 0.0 ? "clockwise" : "counterclockwise");
 }
 
-/// ". If it passes by the branch, ...": what a hand does then; empty of steps without tries.
+/// "If it passes by the branch, ...": what a hand does then; empty of steps without tries.
 std::string tell_tries(const ToolStep& step) {
   if (step.tries == 0) return {};
   const std::string length = whole_number(step.try_pull) + " mm ";
-  return ". If it passes by the branch, withdraw it and try again, " + count_of_times(step.tries) +
+  return "If it passes by the branch, withdraw it and try again, " + count_of_times(step.tries) +
          " at most. First try with both tools " + length + "back from where they were, then " +
          length + "on. Then try with the catheter turned " + turned_by(step.try_turn) +
-         ", then turned to the other side. Then do the same by twice as much";
+         ", then turned to the other side. Then do the same by twice as much.";
 }
 
-/// ". If it goes into another vessel ...": as above, of steps that are steered.
+/// "If it goes into another vessel ...": as above, of steps that are steered.
 std::string tell_steers(const ToolStep& step) {
   if (step.steers == 0) return {};
-  std::string text = ". If it goes into another vessel or stops more than " +
+  std::string text = "If it goes into another vessel or stops more than " +
                      whole_number(simulate::kSteerNear) + " mm before the ostium, withdraw it to " +
                      whole_number(simulate::kSteerBack) +
                      " mm before where that began. Bring the catheter up to " +
@@ -266,13 +267,13 @@ std::string tell_steers(const ToolStep& step) {
             " mm further back and with the catheter turned on by " +
             turned_by(simulate::kSteerTurn) + ". ";
   }
-  return text + "Then bring the catheter back to where it was";
+  return text + "Then bring the catheter back to where it was.";
 }
 
 }  // namespace
 
-std::vector<std::string> describe_steps(const std::vector<ToolStep>& steps, double insertion) {
-  std::vector<std::string> told;
+std::vector<ToldStep> describe_steps(const std::vector<ToolStep>& steps, double insertion) {
+  std::vector<ToldStep> told;
   double tube_in = 0.0, wire_in = kWireStart;
   bool tube_known = true, wire_known = true;
   for (std::size_t k = 0; k < steps.size(); ++k) {
@@ -311,9 +312,17 @@ std::vector<std::string> describe_steps(const std::vector<ToolStep>& steps, doub
       text += end.empty() ? " by " + whole_number(-step.push) + " mm"
                           : ", by " + whole_number(-step.push) + " mm at most";
     }
-    told.push_back(text + tell_tries(step) + tell_steers(step));
+    told.push_back({std::move(text), tell_tries(step) + tell_steers(step)});
   }
   return told;
+}
+
+std::string describe_script(const std::vector<ToolStep>& steps, double insertion) {
+  std::string text;
+  for (const ToldStep& step : describe_steps(steps, insertion)) {
+    text += (text.empty() ? "" : "; ") + step.text;
+  }
+  return text;
 }
 
 }  // namespace wireplan::plan

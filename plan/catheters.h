@@ -64,11 +64,20 @@ std::string find_broken_rule(const std::vector<simulate::ToolStep>& steps, const
 /// Steps rounded as files hold them, in degrees and mm.
 std::vector<simulate::ToolStep> as_written(std::vector<simulate::ToolStep> steps);
 
-/// "advance the wire to 250 mm; advance the catheter over the wire to 230 mm; withdraw the wire by
-/// 60 mm; turn the catheter 60 degrees clockwise; ...": as the hand makes them, turns as seen from
-/// the hub toward the patient. "to" is said as long as no step before ended by what was seen. The
-/// last step goes on to where the trial ended.
-std::vector<std::string> describe_steps(const std::vector<simulate::ToolStep>& steps,
-                                        double insertion);
+/// A step in words.
+struct ToldStep {
+  std::string text;       // "advance the wire to 250 mm"
+  std::string otherwise;  // sentences on what to do where the wire goes elsewhere; may be empty
+};
+
+/// "advance the wire to 250 mm", "advance the catheter over the wire to 230 mm", "withdraw the wire
+/// by 60 mm", "turn the catheter 60 degrees clockwise", ...: as the hand makes them, turns as seen
+/// from the hub toward the patient. "to" is said as long as no step before ended by what was seen.
+/// The last step goes on to where the trial ended.
+std::vector<ToldStep> describe_steps(const std::vector<simulate::ToolStep>& steps,
+                                     double insertion);
+
+/// The texts in one line, without what else to do: "advance the wire to 250 mm; advance ...".
+std::string describe_script(const std::vector<simulate::ToolStep>& steps, double insertion);
 
 }  // namespace wireplan::plan

@@ -104,7 +104,7 @@ std::vector<int> shapes_at_ends(const simulate::TrialResult& trial, std::size_t 
 
 }  // namespace
 
-void write_step_markups(const simulate::TrialResult& trial, const std::vector<std::string>& told,
+void write_step_markups(const simulate::TrialResult& trial, const std::vector<plan::ToldStep>& told,
                         const std::string& name, const std::vector<std::string>& tools,
                         const std::filesystem::path& folder) {
   const std::vector<int> at_end = shapes_at_ends(trial, told.size());
@@ -115,7 +115,7 @@ void write_step_markups(const simulate::TrialResult& trial, const std::vector<st
       const simulate::Shape& shape = trial.shapes[static_cast<std::size_t>(at_end[step])];
       const Eigen::Matrix3Xd line = simulate::line_up_to(shape.nodes, shape.tools[i]);
       if (line.cols() < 2) continue;  // it is still outside
-      curves.push_back({"step " + std::to_string(step + 1) + ": " + told[step], line});
+      curves.push_back({"step " + std::to_string(step + 1) + ": " + told[step].text, line});
     }
     write_curve_markups(curves, folder / (name + "-" + tools[i] + "-steps.mrk.json"));
   }

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "pipeline/files/json_reader.h"
+#include "plan/catheters.h"
 #include "simulate/insertion/trial.h"
 
 namespace wireplan::pipeline {
@@ -35,7 +36,7 @@ void write_plan_markups(const PlanMarkups& plan, const std::filesystem::path& pa
 /// A script of several tools for 3D Slicer: of each tool FOLDER/NAME-TOOL-steps.mrk.json, with a
 /// curve for each step that was made, the tool where the step ended, by the step's text. `tools`
 /// are the names for the files, from the outside in.
-void write_step_markups(const simulate::TrialResult& trial, const std::vector<std::string>& told,
+void write_step_markups(const simulate::TrialResult& trial, const std::vector<plan::ToldStep>& told,
                         const std::string& name, const std::vector<std::string>& tools,
                         const std::filesystem::path& folder);
 

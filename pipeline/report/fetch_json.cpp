@@ -163,8 +163,9 @@ Json step_views_json(const plan::Candidate& candidate, const plan::Measured& tri
     for (std::size_t k = 0; k < arm.at("ostia").size(); ++k) {
       if (arm.at("ostia")[k].at("leads_to_target").get<bool>()) target = &places[k];
     }
-    for (const std::string& text : plan::describe_steps(candidate.steps, trial.metrics.insertion)) {
-      add(text, target);
+    for (const plan::ToldStep& step :
+         plan::describe_steps(candidate.steps, trial.metrics.insertion)) {
+      add(step.text, target);
     }
     return steps;
   }

@@ -134,13 +134,13 @@ std::string describe_plan(const Json& best) {
                                     best.at("inclination_deg").get<double>(),
                                     best.at("azimuth_deg").get<double>(),
                                     best.at("roll_deg").get<double>());
-  if (!script.empty()) text += ", " + script;
   if (!best.at("repeats").is_null()) {
     text += ", safe in " + best.at("repeats_safe").dump() + " of " + best.at("repeats").dump() +
             " repeats";
   }
-  return text + ", at most " + plan::two_digits(best.at("peak_contact_force_n").get<double>()) +
-         " N on the wall";
+  text += ", at most " + plan::two_digits(best.at("peak_contact_force_n").get<double>()) +
+          " N on the wall";
+  return script.empty() ? text : text + "; script: " + script;
 }
 
 /// Whether there is a plan from there, and the answer is not that it is not feasible, as where a

@@ -13,6 +13,7 @@
 #include "pipeline/report/verdict_json.h"
 #include "pipeline/store/hash.h"
 #include "plan/manoeuvre.h"
+#include "plan/number_text.h"
 
 namespace wireplan::pipeline {
 namespace {
@@ -88,7 +89,8 @@ void put_candidate(Row& row, const ReportInput& input, std::size_t trial) {
             plan::describe_moves(candidate.moves, input.plan.trials[trial].metrics.insertion));
     return;
   }
-  row.put("script", describe_tool_script(candidate, input.plan.trials[trial]));
+  row.put("script",
+          plan::describe_script(candidate.steps, input.plan.trials[trial].metrics.insertion));
   row.put("catheter",
           input.study.catheters[static_cast<std::size_t>(candidate.catheter)].tool.wire.name);
   row.put("steps", told_steps_json(candidate, input.plan.trials[trial]));
@@ -552,8 +554,8 @@ std::string describe_best(const Json& report) {
     const auto scouted = std::count_if(trials.begin(), trials.end(), [](const Json& trial) {
       return trial.value("level", "full") != "full";
     });
-    return "no plan reaches the target within the limits: " + std::to_string(trials.size()) +
-           (trials.size() == 1 ? " trial" : " trials") +
+    return "no plan reaches the target within the limits: " +
+           plan::count_of(static_cast<int>(trials.size()), "trial") +
            (scouted > 0 ? ", " + std::to_string(scouted) +
                               " of them on a rigid wall only (--exhaustive runs all in full)"
                         : "") +
@@ -571,7 +573,7 @@ std::string describe_best(const Json& report) {
          std::to_string(trials.size()) + " tried reach: " + describe_tools(best) +
          ", inclination " + best.at("inclination_deg").dump() + " deg, azimuth " +
          best.at("azimuth_deg").dump() + " deg, roll " + best.at("roll_deg").dump() + " deg, " +
-         (script.empty() ? "" : script + ", ") + best.at("sentence").get<std::string>();
+         best.at("sentence").get<std::string>() + (script.empty() ? "" : "; script: " + script);
 }
 
 }  // namespace wireplan::pipeline

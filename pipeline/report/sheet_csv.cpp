@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "pipeline/files/text.h"
 #include "pipeline/files/viewer_files.h"
 #include "pipeline/report/anatomy_json.h"
 
@@ -39,6 +40,14 @@ const Json* find_by_trial(const Json& rows, const Json& trial) {
   return found == rows.end() ? nullptr : &*found;
 }
 
+/// "LAO 30, CRA 0: ostium of left renal"; null where the step has no view.
+Json view_note(const Json& plan, std::size_t step) {
+  if (!plan.contains("step_views")) return nullptr;
+  const Json& seen = plan.at("step_views")[step];
+  if (seen.at("view").is_null()) return nullptr;
+  return seen.at("view").get<std::string>() + ": " + seen.at("at").get<std::string>();
+}
+
 void add_plans(Table& table, const Json& report) {
   const Json& ranking = report.at("ranking");
   const Json& limits = report.at("provenance").at("parameters").at("limits");
@@ -60,8 +69,10 @@ void add_plans(Table& table, const Json& report) {
     if (plan.contains("catheter")) {
       table.row("catheter", plan.at("catheter"));
       for (std::size_t n = 0; n < plan.at("steps").size(); ++n) {
-        table.row("step " + std::to_string(n + 1), plan.at("steps")[n].at("text"), "",
-                  plan.contains("step_views") ? plan.at("step_views")[n].at("view") : Json());
+        const Json& step = plan.at("steps")[n];
+        const std::string name = "step " + std::to_string(n + 1);
+        table.row(name, step.at("text"), "", nullptr, view_note(plan, n));
+        if (step.contains("otherwise")) table.row(name + ", otherwise", step.at("otherwise"));
       }
       for (const Json& tool : trial.at("tools").at("each")) {
         const std::string name = tool.at("name");
@@ -70,10 +81,9 @@ void add_plans(Table& table, const Json& report) {
         table.row(name + ": torque of the hub", tool.at("peak_hub_torque_n_mm"), "N mm");
       }
     } else if (plan.contains("step_views")) {
-      int number = 0;
-      for (const Json& step : plan.at("step_views")) {
-        table.row("step " + std::to_string(++number), step.at("text"), "", step.at("view"),
-                  step.at("at"));
+      for (std::size_t n = 0; n < plan.at("step_views").size(); ++n) {
+        table.row("step " + std::to_string(n + 1), plan.at("step_views")[n].at("text"), "", nullptr,
+                  view_note(plan, n));
       }
     } else if (!plan.at("script").get<std::string>().empty()) {
       table.row("moves", plan.at("script"));
@@ -167,6 +177,39 @@ void add_anatomy(Table& table, const Json& anatomy) {
   }
 }
 
+/// What the best trial of each wire moves in the vessel, in the notes over its repeats.
+void add_motion(Table& table, const Json& motion) {
+  for (const Json& trial : motion.at("trials")) {
+    table.begin("vessel moved by " + trial.at("wire").get<std::string>());
+    const Json over = trial.value("under_disturbances", Json());
+    const auto spread = [&](const Json& rows, const char* key, const char* unit) {
+      if (over.is_null()) return Json();
+      const Json& value = rows.at(key);
+      return Json(
+          format("%.3g to %.3g", value.at("low").get<double>(), value.at("high").get<double>()) +
+          unit + " in 90 % of the repeats that reached");
+    };
+    table.row("largest shift", trial.at("most_mm"), "mm", nullptr, spread(over, "most_mm", " mm"));
+    table.row("way at rest", trial.at("way_length_mm"), "mm");
+    table.row("way moved", trial.at("moved_way_length_mm"), "mm", nullptr,
+              spread(over, "moved_way_length_mm", " mm"));
+    for (std::size_t k = 0; k < trial.at("ostia").size(); ++k) {
+      const Json& ostium = trial.at("ostia")[k];
+      table.row("ostium of " + ostium.at("branch").get<std::string>() + ": shift",
+                ostium.at("shift_mm"), "mm", nullptr,
+                spread(over.is_null() ? over : over.at("ostia")[k], "shift_mm", " mm"));
+    }
+    for (const Json& turn : trial.at("turns")) {
+      const std::string into = "turn into " + turn.at("branch").get<std::string>();
+      table.row(into + ", at rest", turn.at("at_rest_deg"), "deg");
+      table.row(into + ", moved", turn.at("moved_deg"), "deg");
+      table.row(into + ": from the access, at rest", turn.at("from_access_mm"), "mm");
+      table.row(into + ": from the access, moved", turn.at("moved_from_access_mm"), "mm");
+      table.row(into + ": its view changes by", turn.at("view_change_deg"), "deg");
+    }
+  }
+}
+
 }  // namespace
 
 std::string sheet_csv(const Json& report) {
@@ -174,6 +217,7 @@ std::string sheet_csv(const Json& report) {
   if (report.contains("verdict")) add_verdict(table, report.at("verdict"));
   add_plans(table, report);
   if (report.contains("anatomy")) add_anatomy(table, report.at("anatomy"));
+  if (report.contains("vessel_motion")) add_motion(table, report.at("vessel_motion"));
   table.begin("fetch");
   for (const Json& item : report.value("fetch", Json::array())) {
     table.row(item.at("what"), item.at("text"), "", nullptr,

@@ -9,19 +9,14 @@
 
 namespace wireplan::pipeline {
 
-std::string describe_tool_script(const plan::Candidate& candidate, const plan::Measured& trial) {
-  std::string text;
-  for (const std::string& step : plan::describe_steps(candidate.steps, trial.metrics.insertion)) {
-    text += (text.empty() ? "" : "; ") + step;
-  }
-  return text;
-}
-
 Json told_steps_json(const plan::Candidate& candidate, const plan::Measured& trial) {
   Json steps = steps_json(candidate.steps);
-  const std::vector<std::string> told =
+  const std::vector<plan::ToldStep> told =
       plan::describe_steps(candidate.steps, trial.metrics.insertion);
-  for (std::size_t k = 0; k < told.size(); ++k) steps[k]["text"] = told[k];
+  for (std::size_t k = 0; k < told.size(); ++k) {
+    steps[k]["text"] = told[k].text;
+    if (!told[k].otherwise.empty()) steps[k]["otherwise"] = told[k].otherwise;
+  }
   return steps;
 }
 

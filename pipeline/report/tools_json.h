@@ -1,17 +1,13 @@
 #pragma once
 /// What a report tells of catheters: which were tried with which wires, and of a script its steps
 /// and what each tool felt.
-#include <string>
-
 #include "pipeline/files/json_reader.h"
 #include "plan/make_plan.h"
 
 namespace wireplan::pipeline {
 
-/// "advance the wire to 250 mm; advance the catheter over the wire to 230 mm; ..."
-std::string describe_tool_script(const plan::Candidate& candidate, const plan::Measured& trial);
-
-/// The steps as a case's files hold them, each with its "text" for the hand.
+/// The steps as a case's files hold them, each with its "text" for the hand, and where the wire may
+/// go elsewhere with "otherwise".
 Json told_steps_json(const plan::Candidate& candidate, const plan::Measured& trial);
 
 /// Per tool its metrics; beside them the hook: how far the catheter's tip is past the ostium at the

@@ -46,12 +46,9 @@ std::string first_answer_text(const plan::Study& study, const plan::FirstAnswer&
 }
 
 std::string first_script_text(const plan::Study& study, const plan::Candidate& script) {
-  std::string text =
-      "first script, of the search's coarse steps: " + plan::describe(study, script) + ": ";
-  for (const std::string& step : plan::describe_steps(script.steps, study.insertion.length)) {
-    text += step + "; ";
-  }
-  return text + "not known yet: whether it holds in full and under disturbances";
+  return "first script, of the search's coarse steps: " + plan::describe(study, script) + ": " +
+         plan::describe_script(script.steps, study.insertion.length) +
+         "; not known yet: whether it holds in full and under disturbances";
 }
 
 /// A stage tells what it finds first; the later ones find the same in the log.

@@ -61,6 +61,29 @@ TEST(ViewerFiles, PutWireEntryAndTargetOfAPlanIntoOneMarkupsFile) {
   EXPECT_EQ(position(markups[2].at("controlPoints")[1]), Vec3(1.0, 2.0, 12.0));
 }
 
+TEST(ViewerFiles, CurvesOfStepsAreCalledByWhatTheHandDoes) {
+  const TemporaryFolder folder;
+  simulate::TrialResult trial;
+  trial.tools.resize(2);
+  for (const int tool : {0, 1}) {
+    trial.tools[static_cast<std::size_t>(tool)].insertion = {tool == 0 ? 10.0 : 30.0};
+    trial.tools[static_cast<std::size_t>(tool)].roll = {0.0};
+  }
+  trial.steps = {0};
+  simulate::Shape& shape = trial.shapes.emplace_back();
+  shape.nodes = Eigen::Matrix3Xd::Zero(3, 31);
+  shape.nodes.row(2) = Eigen::RowVectorXd::LinSpaced(31, 0.0, 30.0);
+  shape.tools = {10.0, 30.0};
+  write_step_markups(trial, {{"advance the wire to 30 mm", "If it goes elsewhere, stop."}}, "plan",
+                     {"catheter", "wire"}, folder.path());
+  const Json markups = read_markups(folder / "plan-wire-steps.mrk.json");
+  ASSERT_EQ(markups.size(), 1u);
+  EXPECT_EQ(markups[0].at("name"), "step 1: advance the wire to 30 mm");
+  EXPECT_EQ(position(markups[0].at("controlPoints").back()), Vec3(0.0, 0.0, 30.0));
+  const Json catheter = read_markups(folder / "plan-catheter-steps.mrk.json");
+  EXPECT_EQ(position(catheter[0].at("controlPoints").back()), Vec3(0.0, 0.0, 10.0));
+}
+
 TEST(ViewerFiles, ListEveryTrialWithUnitsInTheHeader) {
   const Json report = {{"ranking", {{{"trial", 1}, {"rank", 1}}}},
                        {"trials",
@@ -133,6 +156,43 @@ TEST(ViewerFiles, ListTheFiguresOfTheSheet) {
             "\"plan 1\",\"stated error of the tip\",,\"mm\",,\r\n"
             "\"uncertain\",\"share of lumen in what moves the plans\",0.5,,,\r\n"
             "\"statement\",\"statement\",,,,\"Research use only.\"\r\n");
+}
+
+TEST(ViewerFiles, TheSheetsTableHasEachStepItsViewAndWhatElseToDo) {
+  Json plan = {{"trial", 0},    {"wire", "soft"},      {"inclination_deg", 0}, {"azimuth_deg", 0},
+               {"roll_deg", 0}, {"script", "out; in"}, {"catheter", "hook"},   {"score", 0.25}};
+  plan["steps"] = {{{"text", "out"}, {"otherwise", "If not, back."}}, {{"text", "in"}}};
+  plan["step_views"] = {
+      {{"text", "out"}, {"at", "ostium of left renal"}, {"view", "LAO 30, CRA 0"}},
+      {{"text", "in"}, {"at", nullptr}, {"view", nullptr}}};
+  Json report = {
+      {"verdict",
+       {{"answer", "feasible"},
+        {"headline", ""},
+        {"reasons", Json::array()},
+        {"changes", Json::array()}}},
+      {"provenance",
+       {{"parameters", {{"limits", {{"tip_force_warn_n", 0.3}}}}}, {"warnings", Json::array()}}},
+      {"statement", ""},
+      {"ranking", {plan}},
+      {"trials",
+       {{{"insertion_mm", 1},
+         {"peak_tip_force_n", 0},
+         {"peak_contact_force_n", 0},
+         {"tools", {{"each", Json::array()}}}}}},
+      {"numerics", {{"plans", Json::array()}}},
+      {"robustness", {{"plans", Json::array()}, {"sensitivity", {{"shares", Json::array()}}}}}};
+  const auto expect_rows = [&](const std::string& rows) {
+    EXPECT_NE(sheet_csv(report).find(rows), std::string::npos) << sheet_csv(report);
+  };
+  expect_rows(
+      "\"plan 1\",\"step 1\",\"out\",,,\"LAO 30, CRA 0: ostium of left renal\"\r\n"
+      "\"plan 1\",\"step 1, otherwise\",\"If not, back.\",,,\r\n"
+      "\"plan 1\",\"step 2\",\"in\",,,\r\n");
+  for (const char* key : {"catheter", "steps"}) report["ranking"][0].erase(key);
+  expect_rows(
+      "\"plan 1\",\"step 1\",\"out\",,,\"LAO 30, CRA 0: ostium of left renal\"\r\n"
+      "\"plan 1\",\"step 2\",\"in\",,,\r\n");
 }
 
 TEST(ViewerFiles, ComeWithEveryRankedPlanOfARun) {

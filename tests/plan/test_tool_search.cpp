@@ -56,10 +56,9 @@ TEST(ToolPairs, WhatDoesNotFitIsToldWithTheReason) {
   const Catheter fits = catheter_of(650.0, 1.0);
   EXPECT_EQ(unfit(fits, wire_of(1500.0, 0.44)), "");
   EXPECT_EQ(unfit(fits, wire_of(1500.0, 0.5)), "wire too thick: 1 mm in a lumen of 1 mm");
-  EXPECT_EQ(
-      unfit(catheter_of(340.0, 1.0), wire_of(1500.0, 0.44)),
-      "catheter too short: 340 mm, and the ostium is 300 mm from the access with 50 mm to stay "
-      "outside");
+  EXPECT_EQ(unfit(catheter_of(340.0, 1.0), wire_of(1500.0, 0.44)),
+            "catheter too short: 340 mm, and the way to the ostium takes 300 mm with 50 mm to stay "
+            "outside");
   EXPECT_EQ(unfit(catheter_of(350.0, 1.0), wire_of(1500.0, 0.44)), "");
   // 650 - 300 behind the ostium, 340 to the target and 100 to hold.
   EXPECT_EQ(unfit(fits, wire_of(790.0, 0.44)), "");
@@ -131,14 +130,20 @@ TEST(ToolRules, BoundTheTurnByTheWayThatFollows) {
   EXPECT_NE(find_broken_rule(steps, soft, wire, {.turn_per_length = 80.0 * kRadPerDeg}), "");
 }
 
+std::vector<std::string> texts_of(const std::vector<ToldStep>& told) {
+  std::vector<std::string> texts;
+  for (const ToldStep& step : told) texts.push_back(step.text);
+  return texts;
+}
+
 TEST(ToolSteps, ReadAsTheHandMakesThem) {
-  const std::vector<std::string> told = describe_steps({{.tool = 1, .push = 216.0},
-                                                        {.tool = 0, .push = 212.0},
-                                                        {.tool = 1, .push = -35.0},
-                                                        {.tool = 0, .turn = kPi / 3.0},
-                                                        {.tool = kBothTools, .push = -8.0},
-                                                        {.tool = 1, .push = 90.0}},
-                                                       247.4);
+  const std::vector<ToldStep> told = describe_steps({{.tool = 1, .push = 216.0},
+                                                     {.tool = 0, .push = 212.0},
+                                                     {.tool = 1, .push = -35.0},
+                                                     {.tool = 0, .turn = kPi / 3.0},
+                                                     {.tool = kBothTools, .push = -8.0},
+                                                     {.tool = 1, .push = 90.0}},
+                                                    247.4);
   const std::vector<std::string> expected = {
       "advance the wire to 220 mm",
       "advance the catheter over the wire to 212 mm",
@@ -146,32 +151,29 @@ TEST(ToolSteps, ReadAsTheHandMakesThem) {
       "turn the catheter 60 degrees clockwise",
       "pull back catheter and wire together by 8 mm",
       "advance the wire until its tip is at the target, 247 mm in"};
-  EXPECT_EQ(told, expected);
+  EXPECT_EQ(texts_of(told), expected);
+  for (const ToldStep& step : told) EXPECT_EQ(step.otherwise, "");
 }
 
-TEST(ToolSteps, SayWhatEndsThem) {
-  const std::vector<std::string> told =
-      describe_steps({{.tool = 1, .push = 216.0, .steers = 7},
-                      {.tool = 0, .push = 212.0},
-                      {.tool = 0, .turn = -kPi / 2.0, .until = Until::kFacing, .at = kPi / 6.0},
-                      {.tool = kBothTools, .push = -40.0, .until = Until::kLevel, .at = -6.0},
-                      {.tool = kBothTools, .push = -9.0, .until = Until::kInBranch, .at = 0.0},
-                      {.tool = 1,
-                       .push = 60.0,
-                       .until = Until::kInBranch,
-                       .at = 18.0,
-                       .tries = 8,
-                       .try_pull = 3.0,
-                       .try_turn = -15.0 * kRadPerDeg},
-                      {.tool = 0, .push = 12.0},
-                      {.tool = 1, .push = 90.0}},
-                     247.4);
+TEST(ToolSteps, SayWhatEndsThemAndWhatElseToDo) {
+  const std::vector<ToolStep> steps = {
+      {.tool = 1, .push = 216.0, .steers = 7},
+      {.tool = 0, .push = 212.0},
+      {.tool = 0, .turn = -kPi / 2.0, .until = Until::kFacing, .at = kPi / 6.0},
+      {.tool = kBothTools, .push = -40.0, .until = Until::kLevel, .at = -6.0},
+      {.tool = kBothTools, .push = -9.0, .until = Until::kInBranch, .at = 0.0},
+      {.tool = 1,
+       .push = 60.0,
+       .until = Until::kInBranch,
+       .at = 18.0,
+       .tries = 8,
+       .try_pull = 3.0,
+       .try_turn = -15.0 * kRadPerDeg},
+      {.tool = 0, .push = 12.0},
+      {.tool = 1, .push = 90.0}};
+  const std::vector<ToldStep> told = describe_steps(steps, 247.4);
   const std::vector<std::string> expected = {
-      "advance the wire to 220 mm. If it goes into another vessel or stops more than 50 mm before "
-      "the ostium, withdraw it to 30 mm before where that began. Bring the catheter up to 30 mm "
-      "behind the wire's tip and advance the wire again. Do this 7 times at most, each new time 10 "
-      "mm further back and with the catheter turned on by 45 degrees clockwise. Then bring the "
-      "catheter back to where it was",
+      "advance the wire to 220 mm",
       "advance the catheter over the wire to 212 mm",
       "turn the catheter counterclockwise until its tip looks 30 degrees clockwise of the branch, "
       "by 90 degrees at most",
@@ -179,13 +181,28 @@ TEST(ToolSteps, SayWhatEndsThem) {
       "the ostium, by 40 mm at most",
       "pull back catheter and wire together until the catheter's tip falls into the ostium, by 9 "
       "mm at most",
-      "advance the wire until its tip is 18 mm past the ostium, by 60 mm at most. If it passes "
-      "by the branch, withdraw it and try again, 8 times at most. First try with both tools 3 mm "
-      "back from where they were, then 3 mm on. Then try with the catheter turned 15 degrees "
-      "counterclockwise, then turned to the other side. Then do the same by twice as much",
+      "advance the wire until its tip is 18 mm past the ostium, by 60 mm at most",
       "advance the catheter over the wire by 12 mm",
       "advance the wire until its tip is at the target, 247 mm in"};
-  EXPECT_EQ(told, expected);
+  EXPECT_EQ(texts_of(told), expected);
+  EXPECT_EQ(
+      told[0].otherwise,
+      "If it goes into another vessel or stops more than 50 mm before the ostium, withdraw it "
+      "to 30 mm before where that began. Bring the catheter up to 30 mm behind the wire's tip "
+      "and advance the wire again. Do this 7 times at most, each new time 10 mm further back "
+      "and with the catheter turned on by 45 degrees clockwise. Then bring the catheter back "
+      "to where it was.");
+  EXPECT_EQ(
+      told[5].otherwise,
+      "If it passes by the branch, withdraw it and try again, 8 times at most. First try with "
+      "both tools 3 mm back from where they were, then 3 mm on. Then try with the catheter "
+      "turned 15 degrees counterclockwise, then turned to the other side. Then do the same by "
+      "twice as much.");
+  const std::string script = describe_script(steps, 247.4);
+  EXPECT_EQ(
+      script.find("advance the wire to 220 mm; advance the catheter over the wire to 212 mm; "),
+      0u);
+  EXPECT_EQ(script.find("If it"), std::string::npos) << "one sentence";
 }
 
 TEST(ToolRules, HoldWhereAStepEndsEarly) {

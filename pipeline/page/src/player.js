@@ -224,7 +224,8 @@ export const vesselSection = (page, selection) => {
         el("strong", {}, trial.plan ? `Plan ${trial.plan.rank}` : `Trial ${id}, not ranked`), ": ",
         el("bdi", {}, planName(trial)),
         trial.plan ? `; ${outcomeWord(trial.outcome)}.` : `; ${trial.excluded ?? outcomeWord(trial.outcome)}.`, warn);
-      steps.replaceChildren(...(trial.steps ?? []).map((step) => el("li", {}, el("bdi", {}, shown(step.text)))));
+      steps.replaceChildren(...(trial.steps ?? []).map((step) =>
+        el("li", {}, el("bdi", {}, shown(step.text)), step.otherwise ? el("span", {class: "note"}, `. ${shown(step.otherwise)}`) : null)));
       vessel?.setEntry(trial.direction);
       show();
     });

@@ -54,9 +54,18 @@ const cutList = (items, most) => {
     more.hidden = !left;
   };
   tell();
+  const gone = [];
   list.cut = () => {
     if (kept.length < 2) return false;
-    kept.pop().remove();
+    gone.push(kept.pop());
+    gone.at(-1).remove();
+    tell();
+    return true;
+  };
+  list.uncut = () => {
+    if (!gone.length) return false;
+    kept.push(gone.pop());
+    more.before(kept.at(-1));
     tell();
     return true;
   };
@@ -73,7 +82,8 @@ const stepList = (plan, rank) => {
   const seen = steps.map((step) => (step.view ? `${step.view}, ${shown(step.at)}` : ""));
   const same = seen.every((view) => view === seen[0]);
   const text = steps.map((step, k) => `${steps.length > 1 ? `${k + 1}. ` : ""}${shown(step.text)}${same || !seen[k] ? "" : ` [${seen[k]}]`}`);
-  return el("p", {class: "steps"}, el("strong", {}, `Steps of plan ${rank}${same && seen[0] ? ` [${seen[0]}]` : ""}: `), text.join("; "), ".");
+  const others = (plan.steps ?? []).map((step, k) => (step.otherwise ? ` Step ${k + 1}: ${shown(step.otherwise)}` : ""));
+  return el("p", {class: "steps"}, el("strong", {}, `Steps of plan ${rank}${same && seen[0] ? ` [${seen[0]}]` : ""}: `), text.join("; "), ".", others.join(""));
 };
 
 const planTable = ({report, trials}) => {
@@ -88,6 +98,7 @@ const planTable = ({report, trials}) => {
   });
   const front = report.anatomy?.c_arm.no_views ? "-y of the input" : "the patient's front";
   const note = `Tilt of the introducer from the vessel's axis at the access, toward ${front} at 0\u00b0 and on from there right-handed about the axis into the vessel. Roll: how far the hub is turned before the first push, right-handed about the wire (clockwise as the hand sees it); at 0\u00b0 a bent tip points to ${front}. Safe: the target is reached and no limit is broken.` +
+    (plans.some((plan) => plan.catheter) ? " Steps: millimetres count from the access point, turns are as the hand sees them; where a tip looks is as seen along the trunk, the way on from the access." : "") +
     (warn === undefined ? "" : ` Force at the tip: a warning from ${number(warn)}\u00a0N on.`);
   const {answer} = report.verdict ?? {};
   const title = answer === undefined || answer.startsWith("feasible")
@@ -111,7 +122,7 @@ const accessTable = ({anatomy}) => {
   const {device, sheath, tortuosity, sharpest_bend: bend, calcium} = anatomy.access;
   const severe = (rows) => rows.at(-1);
   const rows = [
-    passageRow("Widest device", device),
+    passageRow("Device", device),
     sheath.assumed_longer_than_way
       ? [`Sheath of ${mm(sheath.length_mm)}`, "assumed, and longer than the way", "\u2013", "\u2013", "not weighed"]
       : passageRow(`Sheath, first ${mm(sheath.length_mm)}`, sheath),
@@ -207,7 +218,7 @@ const pictureBlock = (page) => {
       `Way blue, other vessels grey, ${wire.length ? "wire of plan 1 red, " : ""}A access, T target.`));
 };
 
-/** Cuts lists, the longest first, then steps of the later plans, until nothing of the sheet is beyond what holds it. */
+/** Cuts lists, the longest first, then steps of the later plans, until nothing of the sheet is beyond what holds it; puts back of the lists what has room in the end. */
 const fit = (sheet) => {
   const lists = [...sheet.querySelectorAll("ul")].filter((list) => list.cut), later = [...sheet.querySelectorAll(".steps")].slice(1);
   const bottom = (node) => node.getBoundingClientRect().bottom;
@@ -222,6 +233,13 @@ const fit = (sheet) => {
   };
   sheet.classList.add("on-paper");
   while (over() && cut());
+  for (const list of lists) {
+    while (list.uncut()) {
+      if (!over()) continue;
+      list.cut();
+      break;
+    }
+  }
   sheet.classList.remove("on-paper");
 };
 
