@@ -1,6 +1,7 @@
 #include "preprocess/base.h"
 
 #include <array>
+#include <cmath>
 #include <cstdio>
 #include <sstream>
 
@@ -14,8 +15,10 @@ double clean(double value) {
 }
 
 std::string place_text(const Vec3& p) {
+  const auto shown = [](double x) { return std::abs(x) < 0.05 ? 0.0 : x; };  // no "-0.0"
   std::array<char, 96> buffer{};
-  std::snprintf(buffer.data(), buffer.size(), "(%.1f, %.1f, %.1f)", p.x(), p.y(), p.z());
+  std::snprintf(buffer.data(), buffer.size(), "(%.1f, %.1f, %.1f)", shown(p.x()), shown(p.y()),
+                shown(p.z()));
   return buffer.data();
 }
 

@@ -62,10 +62,8 @@ void draw_mark(Picture& picture, int x, int top) {
 
 void draw_place(Picture& picture, const MaskView& view, const MarkedPlace& place, int left,
                 int top) {
-  draw_text(picture,
-            place.name +
-                format(" (%.1f, %.1f, %.1f) mm", place.point.x(), place.point.y(), place.point.z()),
-            left, picture.height - 1 - top - kTitle / 2, 14, Align::kLeft);
+  draw_text(picture, place.name + " " + place_text(place.point) + " mm", left,
+            picture.height - 1 - top - kTitle / 2, 14, Align::kLeft);
   for (const Plane plane : kPlanes) {
     constexpr double kSpacing = kField / kSlice, kMiddle = 0.5 * (kSlice - 1);
     draw_cut(picture, view, left, top + kTitle, kSlice, kSlice, [&](double column, double row) {

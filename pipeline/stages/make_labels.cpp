@@ -21,9 +21,7 @@ namespace fs = std::filesystem;
 constexpr double kMm3PerMl = 1000.0;
 constexpr double kKnownTo = 0.5;  // of a voxel: how well labels know where the wall is
 
-std::string shown_place(const Vec3& p) {
-  return format("(%.1f, %.1f, %.1f) mm", p.x(), p.y(), p.z());
-}
+std::string shown_place(const Vec3& p) { return place_text(p) + " mm"; }
 
 double voxel_side(const preprocess::Grid& grid) { return std::cbrt(grid.spacing.prod()); }
 

@@ -37,9 +37,9 @@ std::string leak_warning(const preprocess::Leak& leak) {
 // What was kept, though it may be another vessel.
 std::string doubt_warning(const preprocess::Leak& part) {
   const Vec3& at = part.place;
-  return "segment: " + format("%.1f", part.volume_mm3 / 1000.0) + " cm3 round " +
-         format("(%.1f, %.1f, %.1f)", at.x(), at.y(), at.z()) + " mm, up to " +
-         format("%.1f", part.radius_mm) + " mm in radius and of " + format("%.0f", part.mean_hu) +
+  return "segment: " + format("%.1f", part.volume_mm3 / 1000.0) + " cm3 round " + place_text(at) +
+         " mm, up to " + format("%.1f", part.radius_mm) + " mm in radius and of " +
+         format("%.0f", part.mean_hu) +
          " HU in the mean, may be a vein or an organ that touches the artery: look at its outline "
          "there; if it is no artery, give segmentation.lower_hu and upper_hu, or labels";
 }
@@ -50,7 +50,7 @@ std::string loops_warning(const std::vector<preprocess::Loop>& loops) {
   std::string places;
   for (std::size_t k = 0; k < std::min(loops.size(), kLoopsTold); ++k) {
     const Vec3& at = loops[k].place;
-    places += (k == 0 ? "" : ", ") + format("(%.1f, %.1f, %.1f)", at.x(), at.y(), at.z()) +
+    places += (k == 0 ? "" : ", ") + place_text(at) +
               format(" mm (%.1f mm in radius)", loops[k].radius_mm);
   }
   return "segment: the vessel closes to a loop at " + places +
@@ -65,7 +65,7 @@ std::string branches_warning(const std::vector<preprocess::Leak>& branches) {
   for (std::size_t k = 0; k < std::min(branches.size(), kBranchesTold); ++k) {
     const Vec3& at = branches[k].place;
     places +=
-        (k == 0 ? "" : ", ") + format("(%.1f, %.1f, %.1f)", at.x(), at.y(), at.z()) +
+        (k == 0 ? "" : ", ") + place_text(at) +
         format(" mm (%.1f mm in radius, %.0f HU)", branches[k].radius_mm, branches[k].mean_hu);
   }
   return "segment: side branches with less or other contrast than the way were kept, for they end "
@@ -155,7 +155,7 @@ void add_little_contrast(const preprocess::SegmentStatistics& statistics, Json& 
   const Vec3& at = darkest->place;
   figures["warnings"].push_back(
       "segment: little contrast: " + format("%.0f", contrast) +
-      " HU over blood without contrast at " + format("(%.1f, %.1f, %.1f)", at.x(), at.y(), at.z()) +
+      " HU over blood without contrast at " + place_text(at) +
       " mm, expected 150 or more; look at the outline there, and take the arterial phase if there "
       "is one");
 }

@@ -10,9 +10,7 @@
 namespace wireplan::pipeline {
 namespace {
 
-std::string place_in_mask(const Vec3& p) {
-  return format("(%.1f, %.1f, %.1f) mm", p.x(), p.y(), p.z());
-}
+std::string place_in_mask(const Vec3& p) { return place_text(p) + " mm"; }
 
 /// Where two pieces come nearest: of voxels of the one, the nearest to the other's point is enough
 /// for a person to look at.

@@ -39,13 +39,13 @@ double angle_bound(double half_sine) {
 }  // namespace
 
 std::string describe_crossing(const SelfCrossing& crossing, double radius) {
-  char text[240];
-  std::snprintf(text, sizeof text,
-                "the wire crosses itself at (%.1f, %.1f, %.1f) mm: what is %.1f and %.1f mm behind "
-                "its tip comes within %.2f mm, and the wire is %.2f mm thick",
-                crossing.point.x(), crossing.point.y(), crossing.point.z(), crossing.from_tip,
-                crossing.other_from_tip, crossing.distance, 2.0 * radius);
-  return text;
+  char text[160];
+  std::snprintf(
+      text, sizeof text,
+      " mm: what is %.1f and %.1f mm behind its tip comes within %.2f mm, and the wire is "
+      "%.2f mm thick",
+      crossing.from_tip, crossing.other_from_tip, crossing.distance, 2.0 * radius);
+  return "the wire crosses itself at " + place_text(crossing.point) + text;
 }
 
 std::optional<SelfCrossing> CrossingFinder::find(const Eigen::Ref<const Eigen::Matrix3Xd>& nodes,

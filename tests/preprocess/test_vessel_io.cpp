@@ -204,5 +204,10 @@ TEST_F(VesselFile, AFullDiskIsAnError) {
       std::string::npos);
 }
 
+TEST(PlaceText, HasNoMinusBeforeZero) {
+  EXPECT_EQ(place_text(Vec3(-1e-9, -0.04, -0.06)), "(0.0, 0.0, -0.1)");
+  EXPECT_EQ(place_text(Vec3(12.34, -4.56, 0.0)), "(12.3, -4.6, 0.0)");
+}
+
 }  // namespace
 }  // namespace wireplan::preprocess

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <optional>
 #include <string>
 #include <vector>
@@ -157,9 +156,7 @@ TEST(Trial, WireAgainstAnEndIsNamedStuckWithThePlace) {
     // The tip leans on the closed end at z = 60 mm.
     const Vec3 tip = trial.pushes.back().tip;
     EXPECT_NEAR(tip.z(), 60.0, 2.0);
-    char place[40];
-    std::snprintf(place, sizeof place, "(%.1f, %.1f, %.1f) mm", tip.x(), tip.y(), tip.z());
-    EXPECT_NE(trial.reason.find(place), std::string::npos) << trial.reason;
+    EXPECT_NE(trial.reason.find(place_text(tip) + " mm"), std::string::npos) << trial.reason;
   }
 }
 
