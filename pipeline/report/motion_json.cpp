@@ -6,7 +6,6 @@
 #include <vector>
 
 #include "plan/anatomy/passage.h"
-#include "plan/anatomy/projection.h"
 #include "plan/statistics.h"
 
 namespace wireplan::pipeline {
@@ -28,9 +27,9 @@ Json view_json(const plan::View& view) {
 
 /// Where a vessel turns off the way's, and which view shows that, at rest and moved.
 Json turn_json(const std::vector<preprocess::Branch>& tree, const plan::Junction& rest,
-               const plan::Junction& moved) {
-  const auto best_view = [](const plan::Junction& at) {
-    return plan::find_projections(at.trunk_direction, at.branch_direction).best.view;
+               const plan::Junction& moved, const plan::ArmLimits& arm, bool axes_known) {
+  const auto best_view = [&](const plan::Junction& at) {
+    return plan::find_projections(at.trunk_direction, at.branch_direction, arm).best.view;
   };
   const plan::View before = best_view(rest), after = best_view(moved);
   // Of lines of sight: from its other end a line shows the same.
@@ -41,8 +40,8 @@ Json turn_json(const std::vector<preprocess::Branch>& tree, const plan::Junction
           {"moved_deg", plan::turn_of(moved) / kRadPerDeg},
           {"from_access_mm", rest.level},
           {"moved_from_access_mm", moved.level},
-          {"view_at_rest", view_json(before)},
-          {"view_moved", view_json(after)},
+          {"view_at_rest", axes_known ? view_json(before) : Json(nullptr)},
+          {"view_moved", axes_known ? view_json(after) : Json(nullptr)},
           {"view_change_deg", std::acos(std::min(along, 1.0)) / kRadPerDeg}};
 }
 
@@ -86,7 +85,7 @@ Json motion_spread_json(const std::vector<Json>& repeats) {
 }
 
 Json motion_json(const simulate::Way& way, const simulate::SectionChain& chain,
-                 const Eigen::Matrix3Xd& u) {
+                 const Eigen::Matrix3Xd& u, const plan::ArmLimits& arm, bool axes_known) {
   const std::vector<preprocess::Branch>& tree = way.tree();
   std::vector<preprocess::Branch> moved = tree;
   double most = 0.0;
@@ -123,7 +122,7 @@ Json motion_json(const simulate::Way& way, const simulate::SectionChain& chain,
       return other.branch == junction.branch && other.trunk == junction.trunk && other.taken;
     });
     if (!junction.taken || same == after.end()) continue;
-    turns.push_back(turn_json(tree, junction, *same));
+    turns.push_back(turn_json(tree, junction, *same, arm, axes_known));
   }
   const auto length_of = [](const Centerline& line) {
     return line.arc_length[line.arc_length.size() - 1] - line.arc_length[0];

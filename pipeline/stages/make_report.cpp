@@ -89,15 +89,22 @@ Eigen::Matrix3Xd moved_by(const Workspace& work, const ReportInput& report, int 
   return read_trial(work, report.plan.levels[static_cast<std::size_t>(trial)], trial).sections;
 }
 
+Json motion_of(const Workspace& work, const ReportInput& report,
+               const simulate::SectionChain& chain, const Eigen::Matrix3Xd& moved) {
+  const Case& given = work.given();
+  return motion_json(*report.study.goal.way, chain, moved, given.access_limits.arm,
+                     given.axes_known);
+}
+
 /// What a plan's repeats under disturbances do to the vessel, those that reached; null without any.
-Json find_motion_of_repeats(const ReportInput& report, const simulate::SectionChain& chain,
-                            int trial) {
+Json find_motion_of_repeats(const Workspace& work, const ReportInput& report,
+                            const simulate::SectionChain& chain, int trial) {
   std::vector<Json> motions;
   for (const plan::RepeatedTrials& plan : report.plan.repeated) {
     if (plan.trial != trial) continue;
     for (const plan::Measured& repeat : plan.trials) {
       if (!repeat.metrics.reached || repeat.sections.cols() != chain.nodes()) continue;
-      motions.push_back(motion_json(*report.study.goal.way, chain, repeat.sections));
+      motions.push_back(motion_of(work, report, chain, repeat.sections));
     }
   }
   return motions.empty() ? Json(nullptr) : motion_spread_json(motions);
@@ -118,8 +125,8 @@ Json find_motion(const Workspace& work, const ReportInput& report,
     trials.push_back({{"trial", id},
                       {"wire", report.study.wires[wire].name},
                       {"outcome", outcome_name(report.plan.trials[k].outcome)}});
-    trials.back().update(motion_json(*report.study.goal.way, *chain, u));
-    const Json over = find_motion_of_repeats(report, *chain, id);
+    trials.back().update(motion_of(work, report, *chain, u));
+    const Json over = find_motion_of_repeats(work, report, *chain, id);
     if (!over.is_null()) trials.back()["under_disturbances"] = over;
   }
   return {{"support_kpa_per_mm", clean(*work.given().wall.support / kMpaPerKpa)},

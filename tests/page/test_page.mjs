@@ -346,6 +346,8 @@ if (!given.length) {
     assert.equal(await picture(page), shifted);
     await slider.fill("0");
     assert.match(await state.textContent(), /the vessel moved by 0/);
+    const told = await page.locator("#motion tbody tr").allTextContents();
+    assert.ok(told.some((row) => row.startsWith("Length of the way")), told.join("; "));
     assert.deepEqual(faults, []);
     await close();
   });

@@ -39,10 +39,10 @@ struct LeftBranch {
     }
     return line;
   }
-  Json moved(const std::function<Vec3(const Vec3&)>& to) const {
+  Json moved(const std::function<Vec3(const Vec3&)>& to, bool axes_known = true) const {
     Eigen::Matrix3Xd u = chain.places();
     for (auto column : u.colwise()) column = (to(Vec3(column)) - Vec3(column)).eval();
-    return motion_json(way, chain, u);
+    return motion_json(way, chain, u, {}, axes_known);
   }
 };
 
@@ -73,6 +73,15 @@ TEST(VesselMotion, OfATurnAboutTheTrunkTurnsTheArmAsFar) {
                                                       // less well round the fork
   EXPECT_NEAR(std::abs(turn.at("view_moved").at("rotation_deg").get<double>()), 8.0, 0.4);
   EXPECT_NEAR(turn.at("moved_deg"), 90.0, 1.0);
+}
+
+TEST(VesselMotion, WithoutKnownAxesOnlyTheChangeOfAViewIsTold) {
+  const Mat3 turned(Eigen::AngleAxisd(8.0 * kRadPerDeg, Vec3::UnitZ()));
+  const Json motion =
+      LeftBranch().moved([&](const Vec3& p) { return Vec3(turned * p); }, /*axes_known=*/false);
+  const Json& turn = motion.at("turns").at(0);
+  EXPECT_TRUE(turn.at("view_at_rest").is_null() && turn.at("view_moved").is_null());
+  EXPECT_NEAR(turn.at("view_change_deg"), 8.0, 0.4);
 }
 
 TEST(VesselMotion, ArteriesThatLeaveTheTrunkAreHeldAtTheirOstia) {

@@ -3,7 +3,7 @@ import {el, facts, name, section, svg, table} from "./dom.js";
 import {degrees, number, percent, shown} from "./format.js";
 
 const mm = (value) => `${number(value)}\u00a0mm`;
-const place = (p) => `(${p.map((x) => x.toFixed(1)).join(", ")})\u00a0mm`;
+export const place = (p) => `(${p.map((x) => (Math.round(10 * x) / 10 + 0).toFixed(1)).join(", ")})\u00a0mm`;
 
 // ---- Access.
 const thresholds = (from, [mild, moderate, severe]) =>
@@ -26,7 +26,7 @@ const tortuosityText = (index) =>
 
 const accessTable = ({device, sheath, tortuosity, sharpest_bend: bend, calcium}) =>
   table("Access", ["What", "Found", "Held against", "Verdict", "Source"], [
-    passageRow("Widest device, along the whole way", device),
+    passageRow("Device, along the whole way", device),
     passageRow(`Sheath, in the first ${mm(sheath.length_mm)}`, sheath),
     ["Tortuosity",
      tortuosity.index === null ? shown(tortuosity.null_reasons.index) : tortuosityText(tortuosity.index),

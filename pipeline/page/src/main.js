@@ -6,7 +6,7 @@ import {makeSelection} from "./selection.js";
 import {anatomySection} from "./anatomy.js";
 import {showOverview} from "./overview.js";
 import {sheetSection, verdictSection} from "./sheet.js";
-import {answerSection, askedSection, provenanceSection, uncertainSection, warningSection} from "./texts.js";
+import {answerSection, askedSection, catheterSection, motionSection, provenanceSection, uncertainSection, warningSection} from "./texts.js";
 import {rankingSection} from "./ranking.js";
 import {vesselSection} from "./player.js";
 import {heatSection} from "./heatmap.js";
@@ -27,10 +27,12 @@ const showReport = () => {
     answerSection(page),
     askedSection(page),
     rankingSection(page, selection),
+    catheterSection(page),
     vessel.node,
     heatSection(page, selection),
     chartSection(page, selection),
     anatomySection(page),
+    motionSection(page),
     uncertainSection(page),
     sliceSection(page),
     warningSection(page),

@@ -1,9 +1,22 @@
 // What was asked, the answer, what is uncertain, and where it all comes from.
+import {place} from "./anatomy.js";
 import {el, facts, name, section, table} from "./dom.js";
 import {degrees, number, outcomeWord, percent, planName, plural, shown, withError} from "./format.js";
 
 const list = (values, text) => values.map(text).join(", ");
+const mm = (value) => `${number(value)}\u00a0mm`;
 const point = (p) => `(${p.map((x) => number(x)).join(", ")})\u00a0mm`;
+
+/** Those that pairs were made of, each once. */
+const catheterNames = ({pairs}) => [...new Set(pairs.map((pair) => shown(pair.catheter)))].join(", ") || "none that the ostium asks for";
+
+/** The wires' own coefficients, else the case's, as they act. */
+const frictionText = ({wires, friction, friction_factor: factor}) => {
+  const of = (wire) => number((wire.friction?.value ?? wire.friction ?? friction) * (factor ?? 1));
+  return new Set(wires.map(of)).size > 1
+    ? `coefficients: ${list(wires, (wire) => `${shown(wire.name)} ${of(wire)}`)}`
+    : `coefficient ${of(wires[0])}`;
+};
 
 export const askedSection = (page) => {
   const {report, trials} = page;
@@ -18,9 +31,10 @@ export const askedSection = (page) => {
       ["Target", page.atSection ? `${point(page.target)}, reached where the tip passes the vessel's cross-section there` : `${point(page.target)}, reached within ${number(page.targetRadius)}\u00a0mm`],
       ["Way", `${withError(report.vessel.branches[0].length_mm, null).split("\u00a0")[0]}\u00a0mm along the middle of the lumen, ${number(report.vessel.branches[0].min_diameter_mm)} to ${number(report.vessel.branches[0].max_diameter_mm)}\u00a0mm wide`],
       ["Wires", list(asked.wires, (w) => shown(w.name))],
+      ...(report.catheters ? [["Catheters", name(catheterNames(report.catheters))]] : []),
       ["Entry", `inclination ${list(asked.access.inclination_deg, degrees)}; azimuth ${list(asked.access.azimuth_deg, degrees)}`],
       ["Roll of the tip", list(asked.tip_roll_deg, degrees)],
-      ["Friction", `coefficient ${number(asked.friction)}`],
+      ["Friction", frictionText(asked)],
       ["Wall", report.vessel.wall_model === "rigid" ? "rigid" : `yields, ${number(report.vessel.wall_stiffness_kpa_per_mm)}\u00a0kPa/mm`],
       ["Tried", plural(trials.length, "insertion")],
       ["Repeats", report.robustness?.repeats > 0
@@ -70,12 +84,13 @@ const sensitivity = (page, best, key, title) => {
 };
 
 /** How far each unknown may be off, and its share in what moves the plans against each other. */
-const unknownRows = (robustness) => {
+const unknownRows = ({robustness, vessel, catheters}) => {
   const {unknowns, sensitivity, repeats} = robustness;
+  const wires = catheters ? "wires and catheters" : "wires";
   const names = {
     friction: ["Friction", `times ${(unknowns.friction_factor ?? []).map(number).join(" to ")}, each wire by its own spread`],
-    ...(unknowns.stiffness_factor ? {stiffness: ["Stiffness of the wires", `times ${unknowns.stiffness_factor.map(number).join(" to ")}, each wire by its own spread`]} : {}),
-    wall: ["Stiffness of the wall", `times ${(unknowns.wall_factor ?? []).map(number).join(" to ")}`],
+    ...(unknowns.stiffness_factor ? {stiffness: [`Stiffness of the ${wires}`, `times ${unknowns.stiffness_factor.map(number).join(" to ")}, each by its own spread`]} : {}),
+    ...(vessel.wall_model === "rigid" ? {} : {wall: ["Stiffness of the wall", `times ${(unknowns.wall_factor ?? []).map(number).join(" to ")}`]}),
     angle: ["Angle of the introducer", `\u00b1\u00a0${degrees(unknowns.angle_deg)}`],
     entry: ["Place of entry", `\u00b1\u00a0${number(unknowns.entry_mm)}\u00a0mm`],
     lumen: ["Width of the lumen", `wall moved by \u00b1\u00a0${number(unknowns.lumen_mm)}\u00a0mm`],
@@ -120,7 +135,7 @@ export const uncertainSection = (page) => {
     rows.push(sensitivity(page, best, "roll_deg", "Roll of the tip"));
     const {robustness} = report;
     if (robustness?.repeats > 0) {
-      rows.push(...unknownRows(robustness), spreadRow(robustness, best.id, first));
+      rows.push(...unknownRows(report), spreadRow(robustness, best.id, first));
     } else {
       rows.push(["Friction, stiffness of wires and wall, and small errors of the angles", "not varied: the case asked for no repeats", "not known"]);
     }
@@ -137,6 +152,45 @@ export const uncertainSection = (page) => {
   rows.push(["Segmentation, shapes and lengths of the wires, blood flow, breathing", "not varied", "not known; see the limits"]);
   return section("uncertain", "What is uncertain, and how much it matters",
     table("Uncertainties", ["What", "How it was looked at", "What it changes"], rows.filter(Boolean)));
+};
+
+/** Every catheter with every wire: what came of it, or why it was not tried. */
+export const catheterSection = ({report: {catheters}}) => {
+  if (!catheters?.pairs.length) return null;
+  const rows = catheters.pairs.map((pair) => [name(`${shown(pair.wire)} in ${shown(pair.catheter)}`),
+    pair.tried ? plural(pair.scripts_found, "script") : "not tried",
+    pair.nearest_hook_mm === undefined ? "\u2013" : number(pair.nearest_hook_mm),
+    pair.reason ? shown(pair.reason) : "\u2013"]);
+  return section("catheters", "Catheters and wires",
+    catheters.suggested ? el("ul", {}, catheters.suggested.map((row) => el("li", {}, el("strong", {}, shown(row.catheter)), `: ${shown(row.reason)}.`))) : null,
+    table("Pairs of catheter and wire", ["Pair", "Found in the search", "Catheter's tip to the ostium at best [mm]", "What stopped it"], rows));
+};
+
+/** Of a vessel that moves as a whole: what the best trial of each wire moves, and by how much that differs over its repeats. */
+export const motionSection = ({report: {vessel_motion: motion}}) => {
+  if (!motion?.trials.length) return null;
+  const spread = (row, unit) => (row ? `${number(row.low)} to ${number(row.high)}${unit}` : "\u2013");
+  const side = (value, plus, minus) => `${value < 0 ? minus : plus} ${Math.abs(Math.round(value))}`;
+  const view = (v) => (v ? `${side(v.rotation_deg, "LAO", "RAO")}, ${side(v.tilt_deg, "CRA", "CAU")}` : "view");
+  const rowsOf = (trial) => {
+    const over = trial.under_disturbances;
+    return [
+      [`Largest shift, at ${place(trial.most_at_mm)}`, "\u2013", mm(trial.most_mm), spread(over?.most_mm, "\u00a0mm")],
+      ["Length of the way", mm(trial.way_length_mm), mm(trial.moved_way_length_mm), spread(over?.moved_way_length_mm, "\u00a0mm")],
+      ...trial.ostia.map((row, k) => [name(`Shift of the ostium of ${shown(row.branch)}`), "\u2013", mm(row.shift_mm), spread(over?.ostia[k]?.shift_mm, "\u00a0mm")]),
+      ...trial.turns.flatMap((row, k) => [
+        [name(`Turn into ${shown(row.branch)}`), degrees(row.at_rest_deg), degrees(row.moved_deg), spread(over?.turns[k]?.moved_deg, "\u00b0")],
+        [name(`From the access to ${shown(row.branch)}`), mm(row.from_access_mm), mm(row.moved_from_access_mm), spread(over?.turns[k]?.moved_from_access_mm, "\u00a0mm")],
+        [name(`C-arm there: the line of sight changes by ${degrees(row.view_change_deg)}`), view(row.view_at_rest), view(row.view_moved), spread(over?.turns[k]?.view_change_deg, "\u00b0 of change")],
+      ]),
+    ];
+  };
+  return section("motion", "How the wire moves the vessel",
+    el("p", {class: "note"}, `By the best plan of each wire, or its closest attempt, where it ends, on a support of ${number(motion.support_kpa_per_mm)}\u00a0kPa/mm (${shown(motion.support_source)}). Places are those of the vessel at rest.`),
+    ...motion.trials.flatMap((trial) => [
+      el("h3", {}, name(`${shown(trial.wire)}: ${outcomeWord(trial.outcome)}`)),
+      table(`What ${shown(trial.wire)} moves`, ["What", "At rest", "Moved", trial.under_disturbances ? `90\u00a0% of ${plural(trial.under_disturbances.repeats, "repeat")} that reached` : "Not repeated"], rowsOf(trial)),
+    ]));
 };
 
 export const warningSection = (page) => {
