@@ -172,10 +172,11 @@ Catheter read_catheter(JsonReader& reader, const std::vector<Coating>& coatings,
   catheter.tube.name = reader.text("name", std::nullopt);
   catheter.title = reader.text("title", own ? Fallback(catheter.tube.name) : std::nullopt);
   catheter.shape = reader.text("shape", own ? Fallback("") : std::nullopt);
+  const std::size_t before = reader.problems().count();
   const double outer = noted(catheter.values, reader, "diameter_mm", kTubeDiameter);
   catheter.tube.radius = 0.5 * outer;
   catheter.inner_diameter = noted(catheter.values, reader, "inner_diameter_mm", kTubeDiameter);
-  check_tube(reader, catheter.inner_diameter, outer);
+  if (reader.problems().count() == before) check_tube(reader, catheter.inner_diameter, outer);
   if (!own || reader.has("coating")) {
     const DeviceValue coating =
         note_value(catheter.values, "coating", read_word(reader, "coating", coats), "");

@@ -1,7 +1,11 @@
 #include "pipeline/stages/held_places.h"
 
+#include <algorithm>
+#include <cmath>
 #include <optional>
+#include <string>
 
+#include "pipeline/files/text.h"
 #include "plan/anatomy/passage.h"
 #include "simulate/insertion/vessel_tree.h"
 
@@ -19,9 +23,37 @@ std::optional<Vec3> find_ostium(const std::vector<preprocess::Branch>& tree, int
   return plan::point_at(branch.line, branch.line.arc_length[0] + simulate::own_start(branch));
 }
 
+/// Distance of a place from the nearest point of the tree's lines [mm].
+double distance_to(const std::vector<preprocess::Branch>& tree, const Vec3& place) {
+  double nearest = HUGE_VAL;
+  for (const preprocess::Branch& branch : tree) {
+    nearest = std::min(nearest, (branch.line.points.colwise() - place).colwise().norm().minCoeff());
+  }
+  return nearest;
+}
+
+/// Refuses points so far from the vessel that they would hold nothing.
+void expect_near(const WallInput& wall, const std::vector<preprocess::Branch>& tree) {
+  std::string text;
+  for (std::size_t k = 0; k < wall.held.size(); ++k) {
+    const HeldPlace& held = wall.held[k];
+    if (held.at != HeldPlace::At::kPoint) continue;
+    const double off = distance_to(tree, held.point), most = 2.0 * held.radius;
+    if (off < most) continue;
+    text += (text.empty() ? "" : "; ") + format("wall.held[%zu].point_mm is ", k) +
+            place_text(held.point) +
+            format(
+                " mm, %.1f mm from the middle of the vessel, expected less than %g, twice its "
+                "radius_mm: from there on it holds nothing",
+                off, most);
+  }
+  if (!text.empty()) throw Error(text + "; move the point, or give a larger radius_mm");
+}
+
 std::vector<simulate::Pin> pins_of(const WallInput& wall,
                                    const std::vector<preprocess::Branch>& tree,
                                    const Vec3& access) {
+  expect_near(wall, tree);
   std::vector<simulate::Pin> pins;
   for (const HeldPlace& held : wall.held) {
     const auto hold = [&](const Vec3& place) {

@@ -9,7 +9,8 @@
 
 namespace wireplan::pipeline {
 
-/// Expects a wall with a support and the vessel's tree. `young_modulus` is the wall's [MPa].
+/// Expects a wall with a support and the vessel's tree. `young_modulus` is the wall's [MPa]. Throws
+/// Error where a point that is to hold the vessel is too far from it to hold anything.
 std::unique_ptr<const simulate::SectionChain> make_section_chain(
     const WallInput& wall, const std::vector<preprocess::Branch>& tree, const Vec3& access,
     double young_modulus);

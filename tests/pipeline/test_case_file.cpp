@@ -121,6 +121,14 @@ TEST_F(CaseFile, WeighsTheThinnestCatheterThatItNames) {
   EXPECT_TRUE(read(json).access_limits.device_diameter.assumed);
 }
 
+TEST_F(CaseFile, OfACatheterWithoutAnInnerDiameterThatAloneIsTold) {
+  Json json = full_case(volume_case());
+  json["catheters"][0].erase("inner_diameter_mm");
+  const std::string told = problem(json);
+  expect_mentions(told, {"catheters[0].inner_diameter_mm is missing"});
+  EXPECT_EQ(told.find("less than outside"), std::string::npos) << told;
+}
+
 TEST_F(CaseFile, KnowsWhichSizesItGivesThoughTheyAreThoseOfTheDefault) {
   const Case none = read(volume_case());
   const std::vector<std::string> sizes = {"device_diameter_mm", "sheath_diameter_mm",

@@ -7,6 +7,7 @@
 
 #include "pipeline/report/motion_json.h"
 #include "pipeline/stages/held_places.h"
+#include "tests/messages.h"
 
 namespace wireplan::pipeline {
 namespace {
@@ -109,6 +110,27 @@ TEST(VesselMotion, ArteriesThatLeaveTheTrunkAreHeldAtTheirOstia) {
   EXPECT_GT(moved_at(end), 5.0 * free_end);
   EXPECT_LT(moved_at(end), 10.0 * free_end);
   EXPECT_NEAR(moved_at(ostium), free_ostium, 1e-9 * free_ostium);
+}
+
+TEST(VesselMotion, APointThatHoldsNothingIsRefused) {
+  const LeftBranch vessel;
+  WallInput wall;
+  wall.support = 1e-3;
+  const HeldPlace near{.at = HeldPlace::At::kPoint, .point = Vec3(15, 0, 50), .radius = 8.0};
+  HeldPlace far = near;
+  far.point = Vec3(0, 17, 50);
+  const auto make = [&] { make_section_chain(wall, vessel.tree, Vec3::Zero(), 0.0); };
+  wall.held = {near};
+  EXPECT_NO_THROW(make());
+  wall.held = {near, far, far};
+  const std::string text = message_of(make);
+  for (const char* part :
+       {"wall.held[1].point_mm is (0.0, 17.0, 50.0) mm, 17.0 mm from the middle of the vessel, "
+        "expected less than 16, twice its radius_mm",
+        "wall.held[2]"}) {
+    EXPECT_NE(text.find(part), std::string::npos) << text;
+  }
+  EXPECT_EQ(text.find("wall.held[0]"), std::string::npos) << text;
 }
 
 TEST(VesselMotion, SpreadIsThatOfTheRepeats) {
