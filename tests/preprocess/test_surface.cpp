@@ -250,6 +250,23 @@ TEST(Remesh, RefusesAnUnsoundSurfaceAndAnAbsurdEdgeLength) {
             std::string::npos);
 }
 
+TEST(Remesh, TriesAgainWithShorterEdgesWhereSheetsCutEachOther) {
+  // A slab of 0.02 mm in waves. Its sheets are remeshed apart: where waves are high, chords as long
+  // as a quarter of its edges cut through the other sheet.
+  const auto waves = [](double height) {
+    Surface slab = shapes::divided_box({0, 0, 0}, {4, 4, 0.02}, 7);
+    for (auto v : slab.vertices.colwise()) v.z() += height * std::sin(2.0 * kPi * v.x() / 3.0);
+    return check_surface(remesh(slab, 1.5));
+  };
+  const SurfaceCheck low = waves(0.1), high = waves(0.4);
+  for (const SurfaceCheck* check : {&low, &high}) {
+    EXPECT_TRUE(is_sound(*check));
+    EXPECT_EQ(check->euler_number, 2);
+    EXPECT_NEAR(check->volume_mm3, 0.32, 0.01);
+  }
+  EXPECT_LT(high.mean_edge_mm, 0.7 * low.mean_edge_mm) << "half as long at the second try";
+}
+
 TEST(Remesh, IsFinerWhereTheVesselIsThinAndKeepsItsCaps) {
   Eigen::Matrix3Xd axis = Eigen::Matrix3Xd::Zero(3, 241);
   axis.row(2) = Eigen::RowVectorXd::LinSpaced(241, 0.0, 60.0);
