@@ -41,6 +41,7 @@ LumenField make_field(const Image& image, const std::vector<Vec3>& points,
   field.smoothing_mm = statistics.band.smoothing_mm;
   field.surroundings = statistics.band.surroundings_hu;
   field.upper = statistics.band.upper_hu;
+  field.hounsfield = options.hounsfield;
   field.core_part = !options.hounsfield                               ? kCorePartElsewhere
                     : statistics.band.contrast_hu > kStrongContrastHu ? kCorePartStrong
                                                                       : kCorePart;

@@ -25,30 +25,102 @@ constexpr int kSlack = 4;                // of these: ways a little darker than 
 constexpr double kSlackNoises = 1.5;     // by which noise alone makes a way's worst place darker
 constexpr double kNoiseLeft = 1.5;       // noise that smoothing leaves, against independent voxels
 constexpr double kWideningMm = 40.0;     // that a way may be longer to widen by a factor e less
-constexpr float kWideningFrom = 0.9F;    // of the widest place so far: no more is widening again
+constexpr double kMeanMm = 1.5;          // sigma of the means that tell a vein from an artery
+constexpr double kLeastLevel = 0.95;   // of the level that the points let expect: followed no lower
+constexpr float kThinDepthMm = 1.2F;   // vessels of less depth are narrow anyway
+constexpr float kWideningFrom = 0.9F;  // of the widest place so far: no more is widening again
 
 /// 1 - exp(-r^2 / (2 sigma^2)): the middle of a blurred cylinder.
 double seen_part(double radius, double sigma) {
   return 1.0 - std::exp(-0.5 * radius * radius / (sigma * sigma));
 }
 
+/// What the ways are looked for in, at each candidate.
+struct WayMap {
+  std::vector<float> expected;  // level that the points let expect                        [HU]
+  std::vector<float> mean;      // of the voxels round it, those in the middle of vessels most [HU]
+  std::vector<float> seen;      // part of the contrast that blur leaves in such a vessel
+};
+
 /// What a millimetre through a voxel costs to a way of this level, where `seen` of the contrast is
-/// expected [HU, mm].
-double cost_per_mm(double level, double value, double surroundings, double seen, double radius) {
+/// expected and the voxel and the mean round it have these values [HU, mm]. The mean has less noise
+/// and so allows for less.
+double cost_per_mm(const LumenField& field, double level, double value, double mean, double seen,
+                   double radius) {
   constexpr double kFree = 0.12, kLow = 0.06, kHigh = 0.1, kMost = 300.0, kThinMm = 1.2;
-  const double part = (value - surroundings) / (level - surroundings);
+  constexpr double kFreeMean = 0.06, kLowMean = 0.05;
+  const double contrast = level - field.surroundings;
+  const double part = (value - field.surroundings) / contrast;
+  const double mean_part = (mean - field.surroundings) / contrast;
   const double low = std::max(0.0, seen - part - kFree) / kLow;
+  const double low_mean =
+      field.hounsfield ? std::max(0.0, seen - mean_part - kFreeMean) / kLowMean : 0.0;
   const double high = std::max(0.0, part - 1.0 - kFree) / kHigh;
   const double thin = (kThinMm / radius) * (kThinMm / radius);
-  return 1.0 + std::min(kMost, low * low + high * high + thin * thin);
+  return 1.0 + std::min(kMost, low * low + low_mean * low_mean + high * high + thin * thin);
+}
+
+/// The level that the points let expect at each candidate: theirs, by 1 / distance^2.
+std::vector<float> expected_levels(const LumenField& field, const Candidates& candidates,
+                                   const std::vector<WayLevel>& points) {
+  std::vector<Vec3> places;
+  for (const WayLevel& point : points) places.push_back(center_of(field.grid, point.voxel));
+  std::vector<float> expected(candidates.labels.size(), 0.0F);
+  for (std::size_t n = 0; n < expected.size(); ++n) {
+    if (candidates.labels[n] == 0) continue;
+    const Vec3 here = center_of(field.grid, n);
+    double sum = 0.0, weights = 0.0;
+    for (std::size_t k = 0; k < points.size(); ++k) {
+      const double weight = 1.0 / (1.0 + (places[k] - here).squaredNorm());
+      weights += weight;
+      sum += weight * static_cast<double>(points[k].level);
+    }
+    expected[n] = static_cast<float>(sum / weights);
+  }
+  return expected;
+}
+
+/// Means of the candidates round each, by the square of their depth: of a vessel its middle counts.
+std::vector<float> local_means(const LumenField& field, const Candidates& candidates) {
+  const auto half_voxel = static_cast<float>(0.5 * field.grid.spacing.minCoeff());
+  const auto surroundings = static_cast<float>(field.surroundings);
+  std::vector<float> mean(field.raw.size(), 0.0F), weight(field.raw.size(), 0.0F);
+  for (std::size_t n = 0; n < mean.size(); ++n) {
+    if (candidates.labels[n] == 0) continue;
+    const float depth = candidates.depth[n] + half_voxel;
+    weight[n] = depth * depth;
+    mean[n] = weight[n] * (field.raw[n] - surroundings);
+  }
+  smooth(field.grid, kMeanMm, mean);
+  smooth(field.grid, kMeanMm, weight);
+  for (std::size_t n = 0; n < mean.size(); ++n) {
+    if (candidates.labels[n] != 0) mean[n] = surroundings + mean[n] / weight[n];
+  }
+  return mean;
+}
+
+/// What blur leaves of the contrast at each candidate, by the depth of its deepest neighbour: a
+/// place beside a wide one that is narrow for a voxel is a touch, and dark for no blur.
+std::vector<float> seen_parts(const LumenField& field, const Candidates& candidates) {
+  const LevelRule rule(field);
+  std::vector<float> seen(candidates.labels.size(), 0.0F);
+  for (std::size_t n = 0; n < seen.size(); ++n) {
+    if (candidates.labels[n] == 0) continue;
+    float deepest = candidates.depth[n];
+    if (field.hounsfield) {
+      for_each_neighbour(field.grid, n, [&](std::size_t m, const Voxel&) {
+        deepest = std::max(deepest, candidates.depth[m]);
+      });
+    }
+    seen[n] = static_cast<float>(rule.seen(deepest > kThinDepthMm ? deepest : candidates.depth[n]));
+  }
+  return seen;
 }
 
 /// Step 1: 0 outside the candidates, else at least 1.
 std::vector<std::uint8_t> bright_parts(const LumenField& field, const Candidates& candidates,
-                                       const std::vector<WayLevel>& points) {
+                                       const std::vector<float>& expected) {
   const Grid& grid = field.grid;
-  std::vector<Vec3> places;
-  for (const WayLevel& point : points) places.push_back(center_of(grid, point.voxel));
   const double reach = 1.01 * grid.spacing.minCoeff();
   std::vector<std::uint8_t> parts(candidates.labels.size(), 0);
   for (std::size_t n = 0; n < parts.size(); ++n) {
@@ -58,14 +130,8 @@ std::vector<std::uint8_t> bright_parts(const LumenField& field, const Candidates
       const Vec3 away = grid.spacing.cwiseProduct(Vec3(step[0], step[1], step[2]));
       if (away.norm() <= reach) least = std::min(least, field.values[m]);
     });
-    const Vec3 here = center_of(grid, n);
-    double sum = 0.0, weights = 0.0;
-    for (std::size_t k = 0; k < points.size(); ++k) {
-      const double weight = 1.0 / (1.0 + (places[k] - here).squaredNorm());
-      weights += weight;
-      sum += weight * (static_cast<double>(points[k].level) - field.surroundings);
-    }
-    const double part = (static_cast<double>(least) - field.surroundings) / (sum / weights);
+    const double part = (static_cast<double>(least) - field.surroundings) /
+                        (static_cast<double>(expected[n]) - field.surroundings);
     parts[n] = static_cast<std::uint8_t>(std::clamp(kPartSteps * part, 1.0, 250.0));
   }
   return parts;
@@ -129,19 +195,16 @@ WidthSoFar widen(const WidthSoFar& before, float here, double& log_wider) {
 /// Step 2 or 3: the cheapest way over voxels of `least` or more. `widening` is the cost of widening
 /// again by a factor e [mm].
 std::vector<WayLevel> find_way(const LumenField& field, const Candidates& candidates,
-                               const std::vector<std::uint8_t>& parts, int least, double widening,
-                               const WayLevel& start, std::size_t end) {
+                               const WayMap& map, const std::vector<std::uint8_t>& parts, int least,
+                               double widening, const WayLevel& start, std::size_t end) {
   constexpr float kFar = std::numeric_limits<float>::infinity();
   const LevelRule rule(field);
   const double half_voxel = 0.5 * field.grid.spacing.minCoeff();
   using Entry = std::pair<float, std::size_t>;
   std::priority_queue<Entry, std::vector<Entry>, std::greater<>> queue;
-  std::vector<float> cost(parts.size(), kFar), levels(parts.size(), 0.0F), seen(parts.size());
+  std::vector<float> cost(parts.size(), kFar), levels(parts.size(), 0.0F);
   std::vector<std::uint32_t> before(parts.size());
   std::vector<WidthSoFar> widths(parts.size());
-  for (std::size_t n = 0; n < parts.size(); ++n) {
-    if (parts[n] >= least) seen[n] = static_cast<float>(rule.seen(candidates.depth[n]));
-  }
   cost[start.voxel] = 0.0F;
   levels[start.voxel] = start.level;
   const float first = candidates.depth[start.voxel] + static_cast<float>(half_voxel);
@@ -156,18 +219,24 @@ std::vector<WayLevel> find_way(const LumenField& field, const Candidates& candid
       if (parts[m] < least) return;
       const double length = field.grid.spacing.cwiseProduct(Vec3(step[0], step[1], step[2])).norm();
       const auto value = static_cast<double>(field.values[m]);
-      const auto seen_here = static_cast<double>(seen[m]);
+      const double mean = field.hounsfield ? static_cast<double>(map.mean[m]) : value;
+      const auto seen = static_cast<double>(map.seen[m]);
       const float radius = candidates.depth[m] + static_cast<float>(half_voxel);
       double wider = 0.0;
       const WidthSoFar width = widen(widths[n], radius, wider);
-      const double price = cost_per_mm(static_cast<double>(levels[n]), value, field.surroundings,
-                                       seen_here, static_cast<double>(radius));
+      const double price = cost_per_mm(field, static_cast<double>(levels[n]), value, mean, seen,
+                                       static_cast<double>(radius));
       const auto next =
           static_cast<float>(static_cast<double>(top.first) + length * price + widening * wider);
       if (next >= cost[m]) return;
       cost[m] = next;
       before[m] = static_cast<std::uint32_t>(n);
-      levels[m] = rule.follow(levels[n], value, seen_here, length);
+      levels[m] = rule.follow(levels[n], mean, seen, length);
+      if (field.hounsfield) {
+        const double contrast = static_cast<double>(map.expected[m]) - field.surroundings;
+        const double least_level = field.surroundings + kLeastLevel * contrast;
+        levels[m] = std::max(levels[m], static_cast<float>(least_level));
+      }
       widths[m] = width;
       queue.push({next, m});
     });
@@ -311,7 +380,10 @@ std::vector<std::vector<WayLevel>> find_level_ways(const LumenField& field,
                                                    const Candidates& candidates,
                                                    const std::vector<WayLevel>& points) {
   expects(!points.empty());
-  const std::vector<std::uint8_t> parts = bright_parts(field, candidates, points);
+  const WayMap map = {.expected = expected_levels(field, candidates, points),
+                      .mean = local_means(field, candidates),
+                      .seen = seen_parts(field, candidates)};
+  const std::vector<std::uint8_t> parts = bright_parts(field, candidates, map.expected);
   const int slack = find_slack(field, points);
   std::vector<std::vector<WayLevel>> ways;
   for (const WayLevel& end : points) {
@@ -319,10 +391,11 @@ std::vector<std::vector<WayLevel>> find_level_ways(const LumenField& field,
     ways.emplace_back();
     if (most < kLeastBottleneck) continue;
     const int least = std::max(kLeastBottleneck, most - slack);
-    ways.back() = find_way(field, candidates, parts, least, kWideningMm, points.front(), end.voxel);
+    ways.back() =
+        find_way(field, candidates, map, parts, least, kWideningMm, points.front(), end.voxel);
     std::vector<std::uint8_t> vessels = parts;
     keep_vessels(field.grid, candidates.depth, ways.back(), vessels);
-    ways.back() = find_way(field, candidates, vessels, least, 0.0, points.front(), end.voxel);
+    ways.back() = find_way(field, candidates, map, vessels, least, 0.0, points.front(), end.voxel);
     average_levels(field, candidates, ways.back());
   }
   return ways;

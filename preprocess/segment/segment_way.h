@@ -18,6 +18,7 @@ struct LumenField {
   double upper = 0.0;         // calcium, bone and metal lie above                         [HU]
   double noise = 0.0;         // sigma in `raw`                                            [HU]
   double core_part = 0.0;     // of the contrast, that a vessel has in its middle
+  bool hounsfield = true;     // a CT: a vessel's level changes slowly, and bone is beyond `upper`
 };
 
 /// How a vessel's level is followed, and what blur takes of it: a scanner's point spread (sigma of
@@ -62,9 +63,12 @@ struct WayLevel {
 ///      leads over voxels that have as much of it as any connection has in its worst place, less
 ///      what noise makes of it (1.5 sigma of the smoothed values); less than 30 % joins nothing.
 ///   2. Of these ways the cheapest is taken. A millimetre costs more where values fall short of the
-///      level that the way has had over the last 10 mm, or exceed it, by more than 12 %, and in
-///      narrow places; blur is allowed for. So does a way that has become narrower and widens
-///      again, as where a vessel touches another: 40 mm for a factor e.
+///      level that the way has had over the last 10 mm by more than 12 %, or their means over some
+///      1.5 mm by more than 6 %, where they exceed it by 12 %, and in narrow places; blur is
+///      allowed for. The level is followed no lower than 95 % of the contrast that the points let
+///      expect: a vein would else be free once it is entered (means and this of a CT alone). So
+///      does a way that has become narrower and widens again, as where a vessel touches another: 40
+///      mm for a factor e.
 ///   3. A way that avoids this runs along the edge of wide vessels. It is found again without that
 ///      cost, in the vessels that it leads through.
 ///   4. The levels are then averaged along it, over 7 mm to both sides.

@@ -12,7 +12,7 @@ namespace wireplan::preprocess {
 namespace {
 
 constexpr double kDarker = 0.12, kBrighter = 0.2;  // by which another vessel's level differs
-constexpr float kWider = 1.8F, kWiderMm = 1.0F;    // beyond which a wider part is no branch
+constexpr float kWider = 1.5F, kWiderMm = 1.0F;    // beyond which a wider part is no branch
 constexpr float kWiderAlready = 1.3F;              // beyond which half the difference is enough
 constexpr double kMostSoft = 0.6, kSoft = 0.45;    // of the boundary; of the contrast behind it
 constexpr double kMostSoftOn = 0.75;               // of a part that the vessel goes on in ...
@@ -20,6 +20,9 @@ constexpr float kGoesOn = 0.75F;     // ... through a contact of this part of ei
 constexpr double kCorrelated = 1.5;  // noise of a mean, against that of independent voxels
 constexpr double kFewVoxels = 40.0;  // of a core: fewer do not tell its level
 constexpr float kMiddle = 0.6F;      // of the depth: what lies deeper is the middle of a part
+constexpr double kMostFall = 0.001;  // of the contrast per mm, by which a level is followed down
+constexpr float kBoneHu = 800.0F;    // bone has more somewhere
+constexpr double kBoneMm3 = 5000.0;  // bright beyond lumen: plaque and stents have less
 constexpr double kDoubtfulPart = 0.6, kDoubtfulSoft = 0.4;  // of what a part is refused for
 
 /// Where two parts meet.
@@ -167,10 +170,39 @@ void average_cores(const PartContacts& contacts, std::vector<VesselPart>& parts)
   }
 }
 
+/// 1 in what is too bright for lumen, too large for plaque or a stent, and somewhere brighter than
+/// any contrast: bone.
+Labels find_bone(const LumenField& field) {
+  const double voxel = field.grid.spacing.prod();
+  Labels bone(field.values.size(), 0), seen(field.values.size(), 0);
+  const auto is_bright = [&](std::size_t n) {
+    return static_cast<double>(field.values[n]) > field.upper;
+  };
+  std::vector<std::size_t> piece;
+  for (std::size_t n = 0; n < bone.size(); ++n) {
+    if (seen[n] != 0 || !is_bright(n)) continue;
+    piece.assign(1, n);
+    seen[n] = 1;
+    float brightest = 0.0F;
+    for (std::size_t next = 0; next < piece.size(); ++next) {
+      brightest = std::max(brightest, field.raw[piece[next]]);
+      for_each_face_neighbour(field.grid, piece[next], [&](std::size_t m) {
+        if (seen[m] != 0 || !is_bright(m)) return;
+        seen[m] = 1;
+        piece.push_back(m);
+      });
+    }
+    if (static_cast<double>(piece.size()) * voxel < kBoneMm3 || brightest < kBoneHu) continue;
+    for (const std::size_t m : piece) bone[m] = 1;
+  }
+  return bone;
+}
+
 /// Counts the faces that each part has to what is not in the mask, and those behind which, two
-/// voxels on, the values stay high.
+/// voxels on, the values stay high, or bone begins.
 void count_faces(const LumenField& field, const std::vector<float>& level, VesselParts& found) {
   const Grid& grid = field.grid;
+  const Labels bone = field.hounsfield ? find_bone(field) : Labels(field.values.size(), 0);
   for (std::size_t n = 0; n < found.of.size(); ++n) {
     if (found.of[n] == 0) continue;
     VesselPart& part = found.parts[found.of[n]];
@@ -183,9 +215,10 @@ void count_faces(const LumenField& field, const std::vector<float>& level, Vesse
       const Voxel next = {2 * w[0] - v[0], 2 * w[1] - v[1], 2 * w[2] - v[2]};
       const bool exists = std::min({next[0], next[1], next[2]}) >= 0 && next[0] < grid.size[0] &&
                           next[1] < grid.size[1] && next[2] < grid.size[2];
-      const auto value = static_cast<double>(field.values[exists ? index_of(grid, next) : m]);
+      const std::size_t behind = exists ? index_of(grid, next) : m;
+      const auto value = static_cast<double>(field.values[behind]);
       part.faces += 1.0;
-      part.soft += value > high && value < field.upper ? 1.0 : 0.0;
+      part.soft += bone[behind] != 0 || (value > high && value < field.upper) ? 1.0 : 0.0;
     });
   }
 }
@@ -229,8 +262,13 @@ bool leads_on(const LumenField& field, const LevelRule& rule, const Entrance& en
   }
   part.on_way = goes_on;
   part.doubtful = from.doubtful || beside > kDoubtfulPart || part.soft > kDoubtfulSoft * part.faces;
-  part.level =
-      rule.follow(from.level, part.core, rule.seen_raw(part.depth), (part.peak - from.peak).norm());
+  const double apart = (part.peak - from.peak).norm();
+  const double contrast = static_cast<double>(from.level) - field.surroundings;
+  part.level = rule.follow(from.level, part.core, rule.seen_raw(part.depth), apart);
+  if (field.hounsfield && !part.on_way) {
+    const double least = static_cast<double>(from.level) - kMostFall * apart * contrast;
+    part.level = std::max(part.level, static_cast<float>(least));
+  }
   return true;
 }
 

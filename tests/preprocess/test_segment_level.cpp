@@ -110,6 +110,49 @@ TEST(SegmentLevel, TheWayKeepsToItsVesselThoughAWiderOneOfItsLevelTouchesAndIsSh
   }
 }
 
+TEST(SegmentLevel, TheWayTakesNoShortcutThroughADarkerVein) {
+  // The vein, of 80 % of the contrast, leads straight on where the artery bows out by 36 mm, and
+  // both of its ends lie in the artery: nowhere is it narrow.
+  const auto bow = [](double z) {
+    const double s = std::sin(std::numbers::pi * (z - 5.0) / 80.0);
+    return 18.0 - 36.0 * s * s;
+  };
+  const auto artery = [&](const Vec3& p) {
+    const double slope = bow(p.z() + 0.5) - bow(p.z() - 0.5);
+    return std::hypot((p.x() - bow(p.z())) / std::hypot(1.0, slope), p.y()) < 3.5;
+  };
+  const auto vein = [](const Vec3& p) {
+    return p.z() > 12.0 && p.z() < 78.0 && off_axis(p, 18.0) < 3.5;
+  };
+  const Image image = scanned(10.0, [&](const Vec3& p) {
+    return artery(p) ? 250.0 : vein(p) ? 208.0 : kAround;
+  });
+  const Segmentation found = segment(image, {.seeds = {Vec3(18, 0, 5)}, .target = Vec3(18, 0, 85)});
+  for (const Vec3& place : found.statistics.search.route.points) {
+    EXPECT_TRUE(std::abs(place.z() - 45.0) > 20.0 || place.x() < 12.0) << place.transpose();
+  }
+  EXPECT_GT(found.statistics.search.route.length_mm, 105.0);
+}
+
+TEST(SegmentLevel, MarrowOfTheArterysLevelIsLeftOutThoughItsCortexIsOpen) {
+  const auto box = [](const Vec3& p, double low_x, double high_x, double y, double z) {
+    return p.x() > low_x && p.x() < high_x && std::abs(p.y()) < y && std::abs(p.z() - 45.0) < z;
+  };
+  const auto marrow = [&](const Vec3& p) {
+    return box(p, 6.0, 11.0, 8.0, 12.0) || box(p, 4.0, 7.0, 1.8, 5.0);
+  };
+  const Image image = scanned(10.0, [&](const Vec3& p) {
+    return off_axis(p, 0) < 5.0 || marrow(p) ? 190.0
+           : box(p, 4.5, 18.0, 11.0, 15.0)   ? 1000.0
+                                             : kAround;
+  });
+  const Segmentation found = segment(image, {.seeds = {kBottom}, .target = kTop});
+  EXPECT_FALSE(contains(found.mask, Vec3(8.5, 5, 45)));
+  EXPECT_GT(dice(found.mask, [](const Vec3& p) { return off_axis(p, 0) < 5.0; }), 0.9);
+  ASSERT_FALSE(found.statistics.search.leaks.empty());
+  EXPECT_LT((found.statistics.search.leaks.front().place - Vec3(6, 0, 45)).norm(), 7.0);
+}
+
 /// An artery of 5 mm and 300 HU, and beside it what has 57 % of its contrast.
 template <typename Beside>
 Segmentation beside_artery(Beside beside) {
