@@ -23,7 +23,9 @@ export const askedSection = (page) => {
   const asked = report.provenance.parameters;
   const [input] = report.provenance.inputs;
   return section("asked", "What was asked",
-    el("p", {}, "Which of these wires, pushed in at which of these angles, reaches the target with the least force on the wall?"),
+    el("p", {}, report.catheters
+      ? "With which of these wires and catheters, and by which moves of both, is the target reached with the least force on the wall?"
+      : "Which of these wires, pushed in at which of these angles, reaches the target with the least force on the wall?"),
     facts([
       ["Case", name(shown(report.name))],
       ["Input", name(shown(input.name))],
