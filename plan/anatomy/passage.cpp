@@ -490,9 +490,15 @@ std::vector<Junction> find_junctions(const simulate::Way& of) {
       here.push_back(*junction);
       if (turns && child == next) level = junction->level;
     }
+    // The stem that it branches from comes before it: where that is short their ostia overlap.
+    std::stable_partition(here.begin(), here.end(),
+                          [&](const Junction& junction) { return junction.fork != next; });
+    double stem = 0.0;
     for (Junction& junction : here) {
       if (!junction.taken && junction.level > level + kFacing) continue;
       if (!junction.taken) junction.level = junction.arc = std::min(junction.level, level);
+      if (junction.fork == next) junction.level = std::max(junction.level, stem);
+      if (junction.taken) stem = std::max(stem, junction.level);
       junctions.push_back(junction);
     }
   }

@@ -137,6 +137,34 @@ TEST(Junctions, AWayTurnsIntoEachOfThreeArteriesInWhichATrunkEnds) {
   }
 }
 
+TEST(Junctions, AShortStemComesBeforeTheBranchThatLeavesIt) {
+  const double s = std::sin(40.0 * kRadPerDeg), c = std::cos(40.0 * kRadPerDeg);
+  const Vec3 top(0, 0, 100), stem(s, 0, c);
+  for (const double stem_length : {10.0, 11.0, 30.0}) {
+    SCOPED_TRACE(stem_length);
+    std::vector<Branch> tree = {{.line = forked_way(stem, 10.0, 9.0)}};
+    const Branch other{.line = line_through({top, top + 80.0 * Vec3(-s, 0, c)}, 9.0),
+                       .parent = 0,
+                       .parent_arc = 100.0};
+    tree.push_back(other);
+    const Vec3 fork = top + stem_length * stem, onward = Vec3(0, 1, -1.6).normalized();
+    tree.push_back({.line = line_through({fork, fork + 60.0 * onward}, 4.0),
+                    .parent = 0,
+                    .parent_arc = 100.0 + stem_length});
+    Centerline way = line_through({Vec3::Zero(), top, fork, fork + 50.0 * onward}, 4.0);
+    for (Eigen::Index k = 0; way.arc_length(k) < 100.0 + stem_length; ++k) {
+      way.radius(k) = way.arc_length(k) < 100.0 ? 10.0 : 9.0;
+    }
+    std::vector<Junction> taken = find_junctions(simulate::Way(way, tree));
+    std::erase_if(taken, [](const Junction& junction) { return !junction.taken; });
+    ASSERT_EQ(taken.size(), 2u);
+    EXPECT_EQ(taken[0].branch, 0);  // into the stem, on the tree's line
+    EXPECT_EQ(taken[1].branch, 2);
+    EXPECT_NEAR(taken[0].level, 100.0, 0.6);  // a point of the line
+    EXPECT_LE(taken[0].level, taken[1].level);
+  }
+}
+
 TEST(Junctions, WhatGoesStraightOnIsTheTrunkThoughTheTreesLineTurnsOff) {
   const Vec3 aside(std::sin(40.0 * kRadPerDeg), 0.0, std::cos(40.0 * kRadPerDeg));
   Branch on{.line = line_through({Vec3(0, 0, 100), Vec3(0, 0, 180)}, 3.0),
