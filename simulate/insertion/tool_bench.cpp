@@ -45,6 +45,21 @@ int count_elements(const ToolScene& scene) {
   return elements_over(longest, scene.element_length);
 }
 
+/// A tool's tip among nodes: at one of them, or by a part of the edge beyond it.
+struct TipNodes {
+  Eigen::Index node = 0;
+  double part = 0.0;
+};
+
+TipNodes tip_nodes(const ToolPlace& tool, const Rod& rod) {
+  constexpr double kAtNode = 1e-9;  // of an edge
+  const double place = tool.insertion / rod.rest_length[0];
+  const Eigen::Index last = rod.nodes() - 1,
+                     node = std::min(last, static_cast<Eigen::Index>(std::floor(place + kAtNode)));
+  const double part = place - static_cast<double>(node);
+  return {node, node == last || part <= kAtNode ? 0.0 : part};
+}
+
 /// How many times the move before this one is; 0 where it goes another way.
 double times_before(const ToolMove& before, const ToolMove& by) {
   constexpr double kSameWay = 1e-9;  // of the move
@@ -347,7 +362,7 @@ Problem ToolBench::problem() const { return problem_of(now_); }
 void ToolBench::place(const std::vector<ToolPlace>& places, State& at) const {
   at.places = places;
   build_composite(scene_.tools, places, elements_, at.composite);
-  set_load(at.composite.rod, at.load);
+  set_load(places, at.composite.rod, at.load);
   if (scene_.vessel == nullptr) return;
   if (scene_.contact.friction > 0.0) {
     at.composite.rod.rubs.setZero(at.load.cols());
@@ -358,9 +373,14 @@ void ToolBench::place(const std::vector<ToolPlace>& places, State& at) const {
   }
 }
 
-void ToolBench::set_load(const Rod& rod, Eigen::Matrix3Xd& load) const {
+void ToolBench::set_load(const std::vector<ToolPlace>& places, const Rod& rod,
+                         Eigen::Matrix3Xd& load) const {
   load = scene_.loads.gravity * rod.mass.transpose();
   load.rightCols<1>() += scene_.loads.tip_force;
+  if (pressed_.isZero(0.0)) return;
+  const TipNodes at = tip_nodes(places[static_cast<std::size_t>(pressed_tool_)], rod);
+  load.col(at.node) += (1.0 - at.part) * pressed_;
+  if (at.part > 0.0) load.col(at.node + 1) += at.part * pressed_;
 }
 
 /// Has contact be that of the state's tools, with what they remember.
@@ -482,16 +502,13 @@ void ToolBench::report(const ToolMove& by) {
 }
 
 Eigen::Matrix3Xd ToolBench::nodes_of(int tool) const {
-  const double place =
-      now_.places[static_cast<std::size_t>(tool)].insertion / now_.composite.rod.rest_length[0];
+  const auto [node, part] =
+      tip_nodes(now_.places[static_cast<std::size_t>(tool)], now_.composite.rod);
   const Eigen::Matrix3Xd& x = now_.state.x;
-  const Eigen::Index last = x.cols() - 1;
-  const Eigen::Index whole = std::min(last, static_cast<Eigen::Index>(std::floor(place + 1e-9)));
-  const double part = place - static_cast<double>(whole);
-  if (whole == last || part <= 1e-9) return x.leftCols(whole + 1);
-  Eigen::Matrix3Xd nodes(3, whole + 2);
-  nodes.leftCols(whole + 1) = x.leftCols(whole + 1);
-  nodes.col(whole + 1) = (1.0 - part) * x.col(whole) + part * x.col(whole + 1);
+  if (part == 0.0) return x.leftCols(node + 1);
+  Eigen::Matrix3Xd nodes(3, node + 2);
+  nodes.leftCols(node + 1) = x.leftCols(node + 1);
+  nodes.col(node + 1) = (1.0 - part) * x.col(node) + part * x.col(node + 1);
   return nodes;
 }
 

@@ -136,6 +136,11 @@ class ToolBench {
   /// none. Tools whose moves are not in the scene need it before an edge is 1.5 times as long.
   bool divide(double longest);
 
+  /// Presses a force on a tool's tip, in the place of one before, on top of the scene's loads, hubs
+  /// held, and finds the equilibrium [N]. It goes with the tip from then on. The record stays that
+  /// of the last move. False, and all as before, where there is no equilibrium.
+  bool press(int tool, const Vec3& force);
+
   /// save() marks where the tools are, restore() takes them back there.
   struct Mark {
     int elements = 0;
@@ -144,6 +149,8 @@ class ToolBench {
     ContactMemory memory;  // with the vessel
     Going going;
     ToolRecord record;
+    Vec3 pressed = Vec3::Zero();  // see press()
+    int pressed_tool = 0;
   };
   Mark save() const;
   void restore(const Mark& mark);
@@ -195,7 +202,7 @@ class ToolBench {
   }
   Problem problem_of(const State& at) const;
   void place(const std::vector<ToolPlace>& places, State& at) const;
-  void set_load(const Rod& rod, Eigen::Matrix3Xd& load) const;
+  void set_load(const std::vector<ToolPlace>& places, const Rod& rod, Eigen::Matrix3Xd& load) const;
   void touch(const State& at);
   RodState unloaded(const State& at) const;
   bool lies_free(const State& at) const;
@@ -213,6 +220,8 @@ class ToolBench {
   static double outside_part(const State& at, std::size_t tool, const Touch& touch);
   bool solve(State& at);
   bool follow_jump(State& at, double& rubbed);
+  bool settle_from(State& next);
+  void feel_at_rest(State& at);
   Going going_on_with(const ToolMove& by);
   void rub_between(const ToolMove& by, double part);
   double rub(const Eigen::VectorXd& slides, State& at, double& by_hands);
@@ -237,6 +246,8 @@ class ToolBench {
   int elements_ = 0;
   State now_, next_;  // next_: where a part of a move leads
   Going going_;
+  Vec3 pressed_ = Vec3::Zero();  // on the tip of a tool
+  int pressed_tool_ = 0;
   std::unique_ptr<WallContact> contact_;  // with the vessel, of the state that touched last
   ToolRecord record_;
   Statics statics_;

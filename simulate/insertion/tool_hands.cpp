@@ -41,7 +41,7 @@ double ToolBench::energy_at(const State& at, Pushes push, double by) {
   problem.rod = &rod;
   if (problem.tools != nullptr) problem.tools = &other_.terms;
   problem.contact = nullptr;
-  set_load(rod, other_load_);
+  set_load(pushed_, rod, other_load_);
   problem.load = &other_load_;
   double energy = Statics::energy(problem, at.state);
   for (const WallContact::Slope& press : at.presses) {  // a point each node

@@ -1,4 +1,4 @@
-// Places of ToolBench that are gone back to, and its centreline divided anew.
+// Places of ToolBench that are gone back to, its centreline divided anew, and its tips pressed.
 #include <algorithm>
 #include <cmath>
 #include <utility>
@@ -15,10 +15,37 @@ bool ToolBench::divide(double longest) {
   place(now_.places, next);
   next.state = guess(next, follow(next), {}, 0.0);
   if (scene_.vessel != nullptr) next.memory = spread_contact(now_, next);
+  if (!settle_from(next)) {
+    elements_ = before;
+    return false;
+  }
+  now_ = std::move(next);
+  going_ = {};
+  return true;
+}
+
+bool ToolBench::press(int tool, const Vec3& force) {
+  expects(settled_ && tool >= 0 && tool < std::ssize(scene_.tools));
+  const Vec3 pressed_before = std::exchange(pressed_, force);
+  const int tool_before = std::exchange(pressed_tool_, tool);
+  State next = now_;
+  set_load(next.places, next.composite.rod, next.load);
+  if (!settle_from(next)) {
+    pressed_ = pressed_before;
+    pressed_tool_ = tool_before;
+    return false;
+  }
+  now_ = std::move(next);
+  going_ = {};
+  return true;
+}
+
+/// Finds the equilibrium near a state, in which friction holds what touched, and what is felt
+/// there. False where there is none: contact is that of now again.
+bool ToolBench::settle_from(State& next) {
   touch(next);
   double rubbed = 0.0;
   if (!solve(next) && !follow_jump(next, rubbed)) {
-    elements_ = before;
     touch(now_);
     return false;
   }
@@ -26,13 +53,16 @@ bool ToolBench::divide(double longest) {
     contact_->settle();
     next.memory = contact_->memory();
   }
-  const std::vector<double> none(scene_.tools.size(), 0.0);
-  find_energy(next);
-  find_slopes(next, {none, none}, true);
-  feel(next, {none, none});
-  now_ = std::move(next);
-  going_ = {};
+  feel_at_rest(next);
   return true;
+}
+
+/// Energy and forces of a state that touched last, where no tool moves.
+void ToolBench::feel_at_rest(State& at) {
+  const std::vector<double> none(scene_.tools.size(), 0.0);
+  find_energy(at);
+  find_slopes(at, {none, none}, true);
+  feel(at, {none, none});
 }
 
 ToolBench::ToolBench(const ToolBench& other) : scene_(other.scene_) {
@@ -46,21 +76,22 @@ ToolBench::Mark ToolBench::save() const {
           .state = now_.state,
           .memory = now_.memory,
           .going = going_,
-          .record = record_};
+          .record = record_,
+          .pressed = pressed_,
+          .pressed_tool = pressed_tool_};
 }
 
 void ToolBench::restore(const Mark& mark) {
   elements_ = mark.elements;
+  pressed_ = mark.pressed;
+  pressed_tool_ = mark.pressed_tool;
   State at;
   place(mark.places, at);
   at.state = mark.state;
   at.memory = mark.memory;
   touch(at);
   if (contact_ != nullptr) contact_->forget();
-  const std::vector<double> none(scene_.tools.size(), 0.0);
-  find_energy(at);
-  find_slopes(at, {none, none}, true);
-  feel(at, {none, none});
+  feel_at_rest(at);
   now_ = std::move(at);
   going_ = mark.going;
   record_ = mark.record;

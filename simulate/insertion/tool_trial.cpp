@@ -591,7 +591,9 @@ TrialResult run_tool_trial(const std::vector<Tool>& tools, const Introducer& int
   for (std::size_t k = 0; k < steps.size() && !trial.ended(); ++k) {
     trial.make(steps[k], k + 1 == steps.size());
   }
-  return trial.finish();
+  TrialResult result = trial.finish();
+  result.support = trial.find_support();
+  return result;
 }
 
 }  // namespace wireplan::simulate

@@ -24,6 +24,9 @@ inline constexpr double kLongestToolPart = 0.5;  //                             
 /// Of a tool that is led past another vessel: see ToolStep. Chosen.
 inline constexpr double kSteerBack = 30.0, kSteerFurther = 10.0, kSteerBehind = 30.0;  //  [mm]
 inline constexpr double kSteerTurn = 45.0 * kRadPerDeg;
+/// No catheter is pressed harder for its support: more than a hand pushes on a wire; chosen.
+inline constexpr double kMostSupport = 5.0;  //                                             [N]
+
 /// So far before the take-off it is steered: what is astray nearer may lead the other tool on.
 inline constexpr double kSteerNear = 50.0;  //                                             [mm]
 
@@ -106,7 +109,11 @@ class ToolTrial {
   const std::vector<Push>& pushes() const { return record_.pushes; }
 
   /// Ends the trial, unless it has ended: as reached if the tip is in the goal, else as missed.
+  /// Does not find the support.
   TrialResult finish();
+  /// What the catheter bears where the trial has ended; empty unless it has come so far as to be
+  /// reached, missed or stuck, and the catheter's tip is in the branch.
+  std::optional<CatheterSupport> find_support() const;
 
   /// save() marks where an unfinished trial is, restore() takes it back there; peak forces stay. To
   /// a mark further on, of a copy, it brings no records of how it came there.
@@ -154,7 +161,8 @@ class ToolTrial {
   std::vector<double> peak_;                      // per triangle of the wall, largest force  [N]
 };
 
-/// Makes all steps, the last one until the goal is reached or the tip comes no further.
+/// Makes all steps, the last one until the goal is reached or the tip comes no further, and finds
+/// what the catheter bears then.
 TrialResult run_tool_trial(const std::vector<Tool>& tools, const Introducer& introducer,
                            const Goal& goal, const VesselModel& vessel,
                            const ToolTrialOptions& options, const std::vector<ToolStep>& steps);

@@ -64,6 +64,15 @@ struct ToolTrack {
   std::vector<double> wall_force;  // sum of the wall's normal forces on it            [N]
 };
 
+/// What a catheter whose tip is in a branch bears: the push of what is led out of it, against
+/// anything that stops that further on, before its tip comes back out of the ostium. Hubs are held;
+/// the push acts on its mouth as a force back along its axis, in the direction that it has at
+/// first.
+struct CatheterSupport {
+  double push = 0.0;  //                                                                    [N]
+  bool more = false;  // it bears that and more: no more was tried
+};
+
 struct TrialResult {
   Outcome outcome = Outcome::kFailed;
   std::string reason;                 // one sentence; with the place in mm where it failed, and
@@ -80,8 +89,9 @@ struct TrialResult {
   std::vector<WireContact> contacts;       // of the final shape
   std::vector<TriangleForce> peak_forces;  // over all pushes, ascending triangles; if mapped
   std::vector<ToolTrack> tools;            // of several tools, from the outside in; else empty
-  std::vector<int> steps;     // of several tools: the step of the script that each push belongs to
-  std::vector<Shape> shapes;  // every `record_every` of the hand's way, and the final one
+  std::vector<int> steps;  // of several tools: the step of the script that each push belongs to
+  std::optional<CatheterSupport> support;  // of two, where the catheter ends in the branch
+  std::vector<Shape> shapes;       // every `record_every` of the hand's way, and the final one
   std::vector<std::string> terms;  // energy terms that the scene built: "stretch", "bend", ...
   std::optional<Shape> start;      // the equilibrium that it started from, if from a line
   double roll = 0.0;               // of the hub before the first move                    [rad]

@@ -216,7 +216,7 @@ TEST(ToolTrial, AWireThatComesUpInsideTheCatheterIsNotTakenForStuck) {
 }
 
 /// Along the aorta and out into the branch toward +x; steps may end at that.
-ToolTrial watched_trial() {
+ToolTrial watched_trial(double stiffness = 1.0) {
   Centerline path;
   path.points.resize(3, 136);
   path.radius.resize(136);
@@ -231,7 +231,56 @@ ToolTrial watched_trial() {
   ToolTrialOptions options = coarse();
   options.take_off = TakeOff{
       .arc = kOstium - 5.0 + kAorta, .point = Vec3(kAorta, 0.0, kOstium), .trunk = Vec3::UnitZ()};
-  return {{hooked_catheter(), straight_wire(20.0)}, kUpward, goal, aorta(), options};
+  Tool hook = hooked_catheter();
+  for (Section& section : hook.wire.sections) section.bending_stiffness *= stiffness;
+  return {{hook, straight_wire(20.0 * stiffness)}, kUpward, goal, aorta(), options};
+}
+
+/// The hook turned into the branch, on a wire that is led out of it.
+ToolTrial seated_trial(double stiffness) {
+  ToolTrial trial = watched_trial(stiffness);
+  EXPECT_TRUE(trial.make({.tool = 1, .push = 200.0, .until = Until::kLevel, .at = 15.0}));
+  EXPECT_TRUE(trial.make({.tool = 0, .push = 200.0, .until = Until::kLevel, .at = 8.0}));
+  EXPECT_TRUE(trial.make({.tool = 1, .push = -60.0}));
+  EXPECT_TRUE(trial.make({.tool = 0, .turn = 2.0 * kPi, .until = Until::kFacing, .at = 0.0}));
+  EXPECT_TRUE(trial.make({.tool = kBothTools, .push = -30.0, .until = Until::kLevel, .at = 0.0}));
+  EXPECT_TRUE(trial.make({.tool = 1, .push = 80.0, .until = Until::kInBranch, .at = 12.0}));
+  EXPECT_TRUE(trial.make({.tool = 0, .push = 6.0}));
+  return trial;
+}
+
+TEST(ToolSupport, OfAHookedCatheterIsThePressThatBacksItOut) {
+  ToolTrial trial = seated_trial(1.0);
+  EXPECT_GT(trial.measure(Until::kInBranch, 0), 10.0);
+  EXPECT_FALSE(trial.find_support()) << "it has not ended";
+  ToolBench bench(trial.bench());
+  trial.finish();
+  const std::optional<CatheterSupport> support = trial.find_support();
+  ASSERT_TRUE(support);
+  EXPECT_FALSE(support->more);
+  // Pressed by so little more each time that it is known to 2 %.
+  const Eigen::Matrix3Xd mouth = bench.nodes_of(0);
+  const Vec3 back = (mouth.col(mouth.cols() - 2) - mouth.rightCols<1>()).normalized();
+  double press = 0.0;
+  while (bench.nodes_of(0).rightCols<1>().x() > kAorta && press < 1.0) {
+    press += 1e-3;
+    ASSERT_TRUE(bench.press(0, press * back));
+  }
+  EXPECT_GT(press, 0.03);
+  EXPECT_NEAR(support->push, press, 0.04 * press);
+}
+
+TEST(ToolSupport, GrowsWithTheStiffnessOfTheTools) {
+  // On a wall that is rigid all forces do; the contact's own give is the difference.
+  double support[2];
+  for (const int k : {0, 1}) {
+    ToolTrial trial = seated_trial(k == 0 ? 1.0 : 3.0);
+    trial.finish();
+    const std::optional<CatheterSupport> found = trial.find_support();
+    ASSERT_TRUE(found);
+    support[k] = found->push;
+  }
+  EXPECT_NEAR(support[1] / support[0], 3.0, 0.3);
 }
 
 TEST(ToolTrial, StepsEndByWhatIsSeenOfTheTip) {
