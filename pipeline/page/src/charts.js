@@ -44,12 +44,38 @@ const numbersOf = (label, head, rows) =>
   el("details", {}, el("summary", {}, `Numbers: ${label}`), table(label, head, rows));
 
 // ---- Force over insertion.
+const kPeak = {of: (p) => p.peak, name: "largest contact", color: 0, dash: null};
+const kTotal = {of: (p) => p.total, name: "all contacts", color: 3, dash: "9 3 2 3"};
 const kForces = [
-  {key: "peak", name: "largest contact", dash: null},
-  {key: "push", name: "hand", dash: "7 4"},
-  {key: "tip", name: "tip", dash: "2 3"},
-  {key: "total", name: "all contacts", dash: "9 3 2 3"},
+  kPeak,
+  {of: (p) => p.push, name: "hand", color: 1, dash: "7 4"},
+  {of: (p) => p.tip, name: "tip", color: 2, dash: "2 3"},
+  kTotal,
 ];
+const kToolForces = [
+  kPeak,
+  ...["catheter", "wire"].flatMap((name, k) => [
+    {of: (p) => p.tools[k].push, name: `hand on the ${name}`, color: 1 + k, dash: "7 4"},
+    {of: (p) => p.tools[k].tip, name: `tip of the ${name}`, color: 1 + k, dash: "2 3"},
+  ]),
+  kTotal,
+];
+/** Of a trial: those of each tool, where it has several. */
+const forcesOf = (trial) => (trial.pushes()[0]?.tools ? kToolForces : kForces);
+
+const keyOf = ({name, color, dash}) => {
+  const key = document.createElementNS("http://www.w3.org/2000/svg", "svg");
+  key.setAttribute("width", "34");
+  key.setAttribute("height", "10");
+  key.setAttribute("aria-hidden", "true");
+  const stroke = document.createElementNS("http://www.w3.org/2000/svg", "path");
+  stroke.setAttribute("d", "M0 5H34");
+  stroke.setAttribute("stroke", lineColors[color]);
+  stroke.setAttribute("stroke-width", "3");
+  if (dash) stroke.setAttribute("stroke-dasharray", dash);
+  key.append(stroke);
+  return el("li", {}, key, ` ${name}`);
+};
 
 const forceFigure = (page, selection) => {
   const title = el("span", {});
@@ -58,41 +84,32 @@ const forceFigure = (page, selection) => {
     const trial = page.trials[selection.get()];
     const pushes = trial.pushes();
     if (!pushes.length) return el("p", {}, "This wire never entered the vessel.");
-    const rows = kForces.flatMap(({key, name}) => pushes.map((p) => ({x: p.way, y: p[key], name})));
+    const forces = forcesOf(trial);
+    const rows = forces.flatMap(({of, name}) => pushes.map((p) => ({x: p.way, y: of(p), name})));
     return chart(`Forces over the insertion of ${planName(trial)}`, {
       width,
       x: {label: `${trial.script ? "way of the hand, in and back" : "insertion"} [mm] \u2192`, nice: true},
       y: {label: "\u2191 force [N]", nice: true},
       marks: [
         gridX(), gridY(), ruleY([0]),
-        kForces.map(({name, dash}, k) =>
-          line(rows.filter((r) => r.name === name), {x: "x", y: "y", stroke: lineColors[k], strokeWidth: 2, strokeDasharray: dash})),
+        forces.map(({name, color, dash}) =>
+          line(rows.filter((r) => r.name === name), {x: "x", y: "y", stroke: lineColors[color], strokeWidth: 2, strokeDasharray: dash})),
       ],
     });
   };
-  const legend = el("ul", {class: "keys"}, kForces.map(({name, dash}, k) => {
-    const key = document.createElementNS("http://www.w3.org/2000/svg", "svg");
-    key.setAttribute("width", "34");
-    key.setAttribute("height", "10");
-    key.setAttribute("aria-hidden", "true");
-    const stroke = document.createElementNS("http://www.w3.org/2000/svg", "path");
-    stroke.setAttribute("d", "M0 5H34");
-    stroke.setAttribute("stroke", lineColors[k]);
-    stroke.setAttribute("stroke-width", "3");
-    if (dash) stroke.setAttribute("stroke-dasharray", dash);
-    key.append(stroke);
-    return el("li", {}, key, ` ${name}`);
-  }));
+  const legend = el("ul", {class: "keys"});
   const shown = figure(
     el("span", {}, el("b", {}, "Force over insertion"), ": ", title, legend), make, details);
   selection.follow((id) => {
     const trial = page.trials[id];
     const {peak_contact_force_error_n: error} = trial.errors;
     title.textContent = `${planName(trial)}; largest contact ${withError(trial.peak_contact_force_n, error)}\u00a0N.`;
+    const forces = forcesOf(trial);
+    legend.replaceChildren(...forces.map(keyOf));
     const every = trial.pushes().filter((p, k, all) => k === all.length - 1 || Math.floor(p.way / 10) > Math.floor((all[k - 1]?.way ?? 0) / 10));
     details.replaceChildren(details.firstChild,
-      table("Force over insertion", ["Insertion [mm]", ...kForces.map(({name}) => `${name} [N]`)],
-        every.map((p) => [number(p.insertion), ...kForces.map(({key}) => number(p[key]))])));
+      table("Force over insertion", ["Insertion [mm]", ...forces.map(({name}) => `${name} [N]`)],
+        every.map((p) => [number(p.insertion), ...forces.map(({of}) => number(of(p)))])));
     shown.draw();
   });
   return shown.node;
