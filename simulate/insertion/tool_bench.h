@@ -141,9 +141,15 @@ class ToolBench {
   /// of the last move. False, and all as before, where there is no equilibrium.
   bool press(int tool, const Vec3& force);
 
+  /// Puts another tool in the place of one that is out of the body, at insertion 0, with its hub
+  /// turned by `roll`. Shape, forces and work stay; the energy changes by what their curves store
+  /// outside. Expects one that fits, in a vessel with a friction of its own.
+  void replace(int tool, const Tool& with, double roll);
+
   /// save() marks where the tools are, restore() takes them back there.
   struct Mark {
     int elements = 0;
+    std::vector<Tool> tools;
     std::vector<ToolPlace> places;
     RodState state;
     ContactMemory memory;  // with the vessel
@@ -204,6 +210,8 @@ class ToolBench {
   void place(const std::vector<ToolPlace>& places, State& at) const;
   void set_load(const std::vector<ToolPlace>& places, const Rod& rod, Eigen::Matrix3Xd& load) const;
   void touch(const State& at);
+  void take(const std::vector<Tool>& tools);
+  void stand(State at);
   RodState unloaded(const State& at) const;
   bool lies_free(const State& at) const;
   void settle_at(const std::vector<ToolPlace>& places);
@@ -242,7 +250,7 @@ class ToolBench {
   ToolContact find_contact(std::size_t outer, const ToolMove& by) const;
   void report(const ToolMove& by);
 
-  const ToolScene scene_;
+  ToolScene scene_;  // its tools may be replaced
   int elements_ = 0;
   State now_, next_;  // next_: where a part of a move leads
   Going going_;

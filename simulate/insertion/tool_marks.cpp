@@ -1,9 +1,10 @@
-// Places of ToolBench that are gone back to, its centreline divided anew, and its tips pressed.
+// Places of ToolBench and ToolTrial that are gone back to, the centreline divided anew, and tips
+// that are pressed.
 #include <algorithm>
 #include <cmath>
 #include <utility>
 
-#include "simulate/insertion/tool_bench.h"
+#include "simulate/insertion/tool_trial.h"
 
 namespace wireplan::simulate {
 
@@ -72,6 +73,7 @@ ToolBench::ToolBench(const ToolBench& other) : scene_(other.scene_) {
 
 ToolBench::Mark ToolBench::save() const {
   return {.elements = elements_,
+          .tools = scene_.tools,
           .places = now_.places,
           .state = now_.state,
           .memory = now_.memory,
@@ -85,18 +87,24 @@ void ToolBench::restore(const Mark& mark) {
   elements_ = mark.elements;
   pressed_ = mark.pressed;
   pressed_tool_ = mark.pressed_tool;
+  take(mark.tools);
   State at;
   place(mark.places, at);
   at.state = mark.state;
   at.memory = mark.memory;
-  touch(at);
-  if (contact_ != nullptr) contact_->forget();
-  feel_at_rest(at);
-  now_ = std::move(at);
+  stand(std::move(at));
   going_ = mark.going;
   record_ = mark.record;
   settled_ = true;
   through_wall_ = false;
+}
+
+/// In an equilibrium that was found before.
+void ToolBench::stand(State at) {
+  touch(at);
+  if (contact_ != nullptr) contact_->forget();
+  feel_at_rest(at);
+  now_ = std::move(at);
 }
 
 /// What the nodes remember, at the nodes of another division of the same centreline: of the nearest
@@ -122,6 +130,41 @@ ContactMemory ToolBench::spread_contact(const State& from, const State& to) cons
         known.triangle[static_cast<std::size_t>(nearest)];
   }
   return memory;
+}
+
+ToolTrial::Mark ToolTrial::save() const {
+  expects(!ended());
+  return {.bench = bench_.save(),
+          .pushes = record_.pushes.size(),
+          .shapes = record_.shapes.size(),
+          .step = step_,
+          .tries = tries_,
+          .since_shape = since_shape_,
+          .best_distance = best_distance_,
+          .start_energy = start_energy_,
+          .changes = record_.tools.back().changes};
+}
+
+void ToolTrial::restore(const Mark& mark) {
+  bench_.restore(mark.bench);
+  record_.pushes.resize(mark.pushes);
+  record_.steps.resize(mark.pushes);
+  step_ = mark.step;
+  tries_ = mark.tries;
+  record_.shapes.resize(mark.shapes);
+  for (ToolTrack& track : record_.tools) {
+    for (auto* column : {&track.insertion, &track.roll, &track.push_force, &track.hub_torque,
+                         &track.tip_force, &track.wall_force}) {
+      column->resize(mark.pushes);
+    }
+  }
+  record_.tools.back().changes = mark.changes;
+  since_shape_ = mark.since_shape;
+  best_distance_ = mark.best_distance;
+  start_energy_ = mark.start_energy;
+  outcome_.reset();
+  record_.outcome = Outcome::kFailed;
+  record_.reason.clear();
 }
 
 }  // namespace wireplan::simulate

@@ -147,7 +147,9 @@ bool ToolTrial::make(const ToolStep& step, bool last) {
   expects(std::max(step.tries, step.steers) == 0 || (step.tool > 0 && step.push > 0.0));
   ++step_;
   const double from = step.tries > 0 ? insertion(step.tool) : 0.0;
-  if (step.steers > 0) {
+  if (step.spare >= 0) {
+    exchange(step);
+  } else if (step.steers > 0) {
     make_steered(step, last);
   } else {
     for (int tried = 0; advance(step, last, tried < step.tries); ++tried) {
@@ -551,37 +553,6 @@ TrialResult ToolTrial::finish() {
   }
   record_.shapes.push_back(shape_here());
   return record_;
-}
-
-ToolTrial::Mark ToolTrial::save() const {
-  expects(!ended());
-  return {.bench = bench_.save(),
-          .pushes = record_.pushes.size(),
-          .shapes = record_.shapes.size(),
-          .step = step_,
-          .tries = tries_,
-          .since_shape = since_shape_,
-          .best_distance = best_distance_};
-}
-
-void ToolTrial::restore(const Mark& mark) {
-  bench_.restore(mark.bench);
-  record_.pushes.resize(mark.pushes);
-  record_.steps.resize(mark.pushes);
-  step_ = mark.step;
-  tries_ = mark.tries;
-  record_.shapes.resize(mark.shapes);
-  for (ToolTrack& track : record_.tools) {
-    for (auto* column : {&track.insertion, &track.roll, &track.push_force, &track.hub_torque,
-                         &track.tip_force, &track.wall_force}) {
-      column->resize(mark.pushes);
-    }
-  }
-  since_shape_ = mark.since_shape;
-  best_distance_ = mark.best_distance;
-  outcome_.reset();
-  record_.outcome = Outcome::kFailed;
-  record_.reason.clear();
 }
 
 TrialResult run_tool_trial(const std::vector<Tool>& tools, const Introducer& introducer,

@@ -70,6 +70,10 @@ struct ToolStep {
   /// `try_turn`, then to the other side, then all that by twice as much, ...; so often. Chosen.
   int tries = 0;
   double try_pull = 0.0, try_turn = 0.0;  //                                        [mm, rad]
+  /// Of the innermost, in the place of a push or turn: it is withdrawn whole out of the body, the
+  /// others being held, and the options' spare of this number is brought in instead, up to `at` mm
+  /// behind the tip of the tool outside it. -1: no exchange.
+  int spare = -1;
   bool operator==(const ToolStep&) const = default;
 };
 
@@ -80,6 +84,7 @@ struct ToolTrialOptions {
   /// step of a script alone, since a wire may be further in before.
   InsertionOptions insertion;
   std::optional<TakeOff> take_off;  // that steps may end at; without one they are made whole
+  std::vector<Wire> spares = {};    // that may take the innermost's place: ToolStep
 };
 
 /// Copies go on by themselves from where they were copied.
@@ -121,7 +126,8 @@ class ToolTrial {
     ToolBench::Mark bench;
     std::size_t pushes = 0, shapes = 0;
     int step = -1, tries = 0;
-    double since_shape = 0.0, best_distance = 0.0;
+    double since_shape = 0.0, best_distance = 0.0, start_energy = 0.0;
+    std::vector<ToolTrack::Change> changes;  // of the innermost
   };
   Mark save() const;
   void restore(const Mark& mark);
@@ -131,6 +137,7 @@ class ToolTrial {
   bool passes_by(const ToolStep& step) const;
   void try_again(const ToolStep& step, double from, int tried);
   void make_steered(const ToolStep& step, bool last);
+  void exchange(const ToolStep& step);
   bool may_lose_way() const;
   bool loses_way(double pushed);
   bool comes_further(double pushed);
@@ -151,7 +158,8 @@ class ToolTrial {
   const VesselModel& vessel_;
   const ToolTrialOptions options_;
   ToolBench bench_;
-  double start_energy_ = 0.0, start_roll_ = 0.0;  //                          [N mm, rad]
+  double start_energy_ = 0.0;  // of the tools that are in use: what it is counted from   [N mm]
+  double start_roll_ = 0.0;    //                                                          [rad]
   TrialResult record_;
   std::optional<Outcome> outcome_;
   int step_ = -1;  // of the script, under way

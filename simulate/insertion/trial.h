@@ -62,6 +62,12 @@ struct ToolTrack {
   std::vector<double> hub_torque;  // of the hand on it                             [N mm]
   std::vector<double> tip_force;   // of the wall on its last 2 mm; 0 inside another   [N]
   std::vector<double> wall_force;  // sum of the wall's normal forces on it            [N]
+  /// Another tool that takes its place, with what it does from an entry on.
+  struct Change {
+    std::size_t from = 0;
+    std::string name;
+  };
+  std::vector<Change> changes;  // in their order
 };
 
 /// What a catheter whose tip is in a branch bears: the push of what is led out of it, against
