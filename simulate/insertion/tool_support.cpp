@@ -1,6 +1,7 @@
-// What a seated catheter bears, of ToolTrial.
+// A catheter that follows into the branch, and what it bears there: of ToolTrial.
 #include <algorithm>
 #include <cmath>
+#include <string>
 
 #include "preprocess/centerline/path_place.h"
 #include "simulate/insertion/tool_trial.h"
@@ -9,6 +10,8 @@ namespace wireplan::simulate {
 namespace {
 
 /// All chosen.
+constexpr double kMostDrawn = 3.0;    // that a hand lets the wire's tip come back           [mm]
+constexpr double kNearSeat = 0.5;     // so near, a catheter is seated                       [mm]
 constexpr double kFirstPress = 0.02;  //                                                     [N]
 constexpr double kPressMore = 1.25;   // each press of the one before, until it backs out
 constexpr double kPressPart = 0.02;   // of a press: so near, it is known ...
@@ -17,6 +20,33 @@ constexpr double kBitByBit = 2.0;     // that a tip comes back from one press to
                                       // may be a jump                                       [mm]
 
 }  // namespace
+
+void ToolTrial::seat(const ToolStep& step) {
+  expects(step.seats && step.tool == 0 && step.push > 0.0);
+  const bool there = reached();
+  if (ended() && !there) return;
+  outcome_.reset();
+  const Mark arrived = save();
+  const double wire = measure(Until::kInBranch, 1);
+  ++step_;
+  seating_ = true;
+  advance({.tool = 0, .push = step.push, .until = step.until, .at = step.at}, false, false);
+  seating_ = false;
+  std::string why;
+  if (ended()) {
+    why = reason();
+  } else if (measure(Until::kInBranch, 1) < wire - kMostDrawn) {
+    why = "it draws the wire's tip back";
+  } else if (measure(Until::kInBranch, 0) < step.at - kNearSeat) {
+    why = "it comes no deeper";
+  }
+  if (!why.empty()) restore(arrived);
+  keep_end_of_step();
+  if (there) {
+    end(Outcome::kReached,
+        arrived_ + (why.empty() ? "" : "; the catheter does not follow: " + why));
+  }
+}
 
 /// Presses that grow on a copy of the tools. Between the last that it bears and the first that it
 /// does not, the depth of the tip says where it passes the ostium; a catheter that jumps out, or

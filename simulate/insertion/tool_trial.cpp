@@ -142,7 +142,8 @@ std::optional<double> ToolTrial::missing(const ToolStep& step) const {
 }
 
 bool ToolTrial::make(const ToolStep& step, bool last) {
-  expects(step.tool >= kBothTools && step.tool < static_cast<int>(record_.tools.size()));
+  expects(!step.seats && step.tool >= kBothTools &&
+          step.tool < static_cast<int>(record_.tools.size()));
   expects(std::min(step.tries, step.steers) == 0);
   expects(std::max(step.tries, step.steers) == 0 || (step.tool > 0 && step.push > 0.0));
   ++step_;
@@ -156,12 +157,15 @@ bool ToolTrial::make(const ToolStep& step, bool last) {
       try_again(step, from, tried + 1);
     }
   }
-  // The end of each step is looked at.
-  if (!ended() && options_.insertion.map_forces && since_shape_ > 0.0) {
-    since_shape_ = 0.0;
-    record_.shapes.push_back(shape_here());
-  }
+  keep_end_of_step();
   return !ended();
+}
+
+/// The end of each step is looked at.
+void ToolTrial::keep_end_of_step() {
+  if (ended() || !options_.insertion.map_forces || since_shape_ == 0.0) return;
+  since_shape_ = 0.0;
+  record_.shapes.push_back(shape_here());
 }
 
 /// Part by part. True where it stops since the tool passes the branch by, if that is looked for, or
@@ -461,12 +465,13 @@ void ToolTrial::check_place() {
   }
   const Vec3 here = foremost_tip();
   const double to_goal = (here - goal_.point).norm();
-  if (!goal_.at_section && best_distance_ <= goal_.radius && to_goal >= best_distance_) {
+  if (!seating_ && !goal_.at_section && best_distance_ <= goal_.radius &&
+      to_goal >= best_distance_) {
     return end(Outcome::kReached, "tip " + in_mm(best_distance_) + " from the target" + after);
   }
   best_distance_ = to_goal;
   const Eigen::Matrix3Xd nodes = bench_.at_rest(bench_.state().x);
-  const bool near = goal_.at_section && goal_.way->may_have_arrived(here);
+  const bool near = !seating_ && goal_.at_section && goal_.way->may_have_arrived(here);
   if (const auto before = near ? goal_.way->find_arrival(nodes, vessel_.lumen) : std::nullopt) {
     const std::optional<std::string> detour = goal_.way->find_detour(nodes.leftCols(*before + 1));
     if (detour) {
@@ -522,6 +527,7 @@ void ToolTrial::end_where_it_is(Outcome outcome, const std::string& reason) {
 void ToolTrial::end(Outcome outcome, const std::string& reason) {
   outcome_ = record_.outcome = outcome;
   record_.reason = reason;
+  if (outcome == Outcome::kReached) arrived_ = reason;
   if (tries_ > 0) {
     record_.reason +=
         "; tried again " + std::to_string(tries_) + (tries_ == 1 ? " time" : " times");
@@ -559,9 +565,12 @@ TrialResult run_tool_trial(const std::vector<Tool>& tools, const Introducer& int
                            const Goal& goal, const VesselModel& vessel,
                            const ToolTrialOptions& options, const std::vector<ToolStep>& steps) {
   ToolTrial trial(tools, introducer, goal, vessel, options);
-  for (std::size_t k = 0; k < steps.size() && !trial.ended(); ++k) {
-    trial.make(steps[k], k + 1 == steps.size());
+  const bool seats = !steps.empty() && steps.back().seats;
+  const std::size_t count = steps.size() - (seats ? 1 : 0);
+  for (std::size_t k = 0; k < count && !trial.ended(); ++k) {
+    trial.make(steps[k], k + 1 == count);
   }
+  if (seats) trial.seat(steps.back());
   TrialResult result = trial.finish();
   result.support = trial.find_support();
   return result;

@@ -74,6 +74,9 @@ struct ToolStep {
   /// others being held, and the options' spare of this number is brought in instead, up to `at` mm
   /// behind the tip of the tool outside it. -1: no exchange.
   int spare = -1;
+  /// The last of a script, of the outermost tool: made once the others have brought the goal, or
+  /// all have been made; it brings none.
+  bool seats = false;
   bool operator==(const ToolStep&) const = default;
 };
 
@@ -113,6 +116,11 @@ class ToolTrial {
   double measure(Until until, int tool) const;
   const std::vector<Push>& pushes() const { return record_.pushes; }
 
+  /// Makes the step that seats the outermost tool, unless the trial has ended otherwise than by
+  /// reaching. Where the tool does not come so far, or anything else goes wrong, as where it draws
+  /// the innermost back, all is as before.
+  void seat(const ToolStep& step);
+
   /// Ends the trial, unless it has ended: as reached if the tip is in the goal, else as missed.
   /// Does not find the support.
   TrialResult finish();
@@ -138,6 +146,7 @@ class ToolTrial {
   void try_again(const ToolStep& step, double from, int tried);
   void make_steered(const ToolStep& step, bool last);
   void exchange(const ToolStep& step);
+  void keep_end_of_step();
   bool may_lose_way() const;
   bool loses_way(double pushed);
   bool comes_further(double pushed);
@@ -162,8 +171,10 @@ class ToolTrial {
   double start_roll_ = 0.0;    //                                                          [rad]
   TrialResult record_;
   std::optional<Outcome> outcome_;
-  int step_ = -1;  // of the script, under way
-  int tries_ = 0;  // that were made again
+  int step_ = -1;         // of the script, under way
+  int tries_ = 0;         // that were made again
+  bool seating_ = false;  // then no goal is looked for
+  std::string arrived_;   // how it reached
   double since_shape_ = 0.0, best_distance_ = 0.0;
   double furthest_ = 0.0, since_furthest_ = 0.0;  // along the way, pushed since: of this step [mm]
   std::vector<double> peak_;                      // per triangle of the wall, largest force  [N]

@@ -249,6 +249,50 @@ ToolTrial seated_trial(double stiffness) {
   return trial;
 }
 
+TEST(ToolSupport, ACatheterFollowsIntoTheBranchOnceTheWireIsThere) {
+  const ToolStep follows{
+      .tool = 0, .push = 40.0, .until = Until::kInBranch, .at = 15.0, .seats = true};
+  ToolTrial trial = seated_trial(1.0);
+  ASSERT_FALSE(trial.make({.tool = 1, .push = 80.0}, true));
+  ASSERT_TRUE(trial.reached()) << trial.reason();
+  const std::string reason = trial.reason();
+  const double before = trial.measure(Until::kInBranch, 0), wire = trial.insertion(1);
+  EXPECT_LT(before, 13.0);
+  const double weaker = trial.find_support()->push;
+  trial.seat(follows);
+  EXPECT_TRUE(trial.reached());
+  EXPECT_NEAR(trial.measure(Until::kInBranch, 0), 15.0, 0.3);
+  EXPECT_EQ(trial.insertion(1), wire);
+  EXPECT_EQ(trial.reason().substr(0, 60), reason.substr(0, 60));
+  EXPECT_GT(trial.find_support()->push, weaker) << "deeper in the branch";
+  const TrialResult result = trial.finish();
+  EXPECT_EQ(result.outcome, Outcome::kReached);
+  EXPECT_EQ(result.steps.back(), result.steps.front() + 8);
+}
+
+TEST(ToolSupport, WhereTheCatheterDoesNotFollowAllIsAsItWas) {
+  // As deep as the branch is not.
+  ToolTrial trial = seated_trial(1.0);
+  ASSERT_FALSE(trial.make({.tool = 1, .push = 80.0}, true));
+  ASSERT_TRUE(trial.reached()) << trial.reason();
+  const Eigen::Matrix3Xd before = trial.bench().state().x;
+  const std::size_t pushes = trial.pushes().size();
+  trial.seat({.tool = 0, .push = 10.0, .until = Until::kInBranch, .at = 60.0, .seats = true});
+  EXPECT_TRUE(trial.reached());
+  EXPECT_NE(trial.reason().find("the catheter does not follow"), std::string::npos);
+  EXPECT_EQ(trial.bench().state().x, before) << "bit for bit";
+  EXPECT_EQ(trial.finish().pushes.size(), pushes);
+}
+
+TEST(ToolSupport, ACatheterDoesNotFollowAWireThatWentElsewhere) {
+  ToolTrial trial = watched_trial();
+  trial.make({.tool = 1, .push = 400.0}, true);  // up the aorta
+  ASSERT_TRUE(trial.ended() && !trial.reached());
+  trial.seat({.tool = 0, .push = 40.0, .until = Until::kInBranch, .at = 15.0, .seats = true});
+  EXPECT_EQ(trial.insertion(0), 0.0);
+  EXPECT_FALSE(trial.find_support());
+}
+
 TEST(ToolSupport, OfAHookedCatheterIsThePressThatBacksItOut) {
   ToolTrial trial = seated_trial(1.0);
   EXPECT_GT(trial.measure(Until::kInBranch, 0), 10.0);
