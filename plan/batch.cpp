@@ -37,7 +37,7 @@ bool is_finite(const simulate::TrialResult& trial) {
   const auto force_is_finite = [](const simulate::TriangleForce& peak) {
     return std::isfinite(peak.force);
   };
-  return trial.nodes.allFinite() &&
+  return trial.nodes.allFinite() && (!trial.support || std::isfinite(trial.support->push)) &&
          std::all_of(trial.pushes.begin(), trial.pushes.end(), push_is_finite) &&
          std::all_of(trial.contacts.begin(), trial.contacts.end(), contact_is_finite) &&
          std::all_of(trial.peak_forces.begin(), trial.peak_forces.end(), force_is_finite);

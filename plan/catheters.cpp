@@ -190,6 +190,17 @@ std::string find_broken_rule(const std::vector<ToolStep>& steps, const Catheter&
   return find_broken_when_whole(ended, catheter, wire, rules);
 }
 
+std::vector<ToolStep> with_seat(std::vector<ToolStep> steps, const Ostium& ostium,
+                                const ToolRules& rules) {
+  constexpr double kBehindTarget = 5.0;   // at least, so that the wire leads                 [mm]
+  constexpr double kMostFollowed = 60.0;  // that hooks lie before the ostium, and curves take up
+  const double at = std::min(rules.seat, ostium.end - ostium.arc - kBehindTarget);
+  if (at <= 0.0) return steps;
+  steps.push_back(
+      {.tool = 0, .push = kMostFollowed, .until = Until::kInBranch, .at = at, .seats = true});
+  return steps;
+}
+
 std::vector<ToolStep> as_written(std::vector<ToolStep> steps) {
   for (ToolStep& step : steps) {
     step.turn = clean(step.turn / kRadPerDeg) * kRadPerDeg;
@@ -276,6 +287,7 @@ std::vector<ToldStep> describe_steps(const std::vector<ToolStep>& steps, double 
   std::vector<ToldStep> told;
   double tube_in = 0.0, wire_in = kWireStart;
   bool tube_known = true, wire_known = true;
+  const std::size_t count = steps.size() - (!steps.empty() && steps.back().seats ? 1 : 0);
   for (std::size_t k = 0; k < steps.size(); ++k) {
     const ToolStep& step = steps[k];
     const bool both = step.tool == simulate::kBothTools, of_wire = step.tool == 1;
@@ -294,7 +306,7 @@ std::vector<ToldStep> describe_steps(const std::vector<ToolStep>& steps, double 
       text = "turn " + name +
              (end.empty() ? " " + whole_number(angle) + " degrees" + side
                           : side + end + ", by " + whole_number(angle) + " degrees at most");
-    } else if (k + 1 == steps.size() && step.push > 0.0 && end.empty()) {
+    } else if (k + 1 == count && step.push > 0.0 && end.empty()) {
       text = "advance " + name + " until its tip is at the target, " + whole_number(insertion) +
              " mm in";
     } else if (step.push > 0.0) {

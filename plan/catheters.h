@@ -28,7 +28,10 @@ struct ToolRules {
                            // is wound up                                                     [rad]
   double turn_per_length = 0.5 * kPi;  // of the hub, for the push or pull of the catheter that
                                        // follows: more winds up                         [rad/mm]
-  double friction = 0.05;              // Coulomb's coefficient between wire and catheter
+  /// So far past the ostium the catheter follows once the wire is at the target, where that is far
+  /// enough; 0: it stays. Assumed: deep enough to bear a push, short of common branches     [mm]
+  double seat = 10.0;
+  double friction = 0.05;  // Coulomb's coefficient between wire and catheter
 };
 
 /// Where scripts are to bring the tip: the last vessel that the way takes from a wider one.
@@ -60,6 +63,11 @@ std::vector<ToolPair> list_pairs(const std::vector<Catheter>& catheters,
 /// Steps that end before they are made whole may break none either.
 std::string find_broken_rule(const std::vector<simulate::ToolStep>& steps, const Catheter& catheter,
                              const simulate::Wire& wire, const ToolRules& rules);
+
+/// A script, and after it the step that seats the catheter, where the branch up to the target is
+/// long enough for it.
+std::vector<simulate::ToolStep> with_seat(std::vector<simulate::ToolStep> steps,
+                                          const Ostium& ostium, const ToolRules& rules);
 
 /// Steps rounded as files hold them, in degrees and mm.
 std::vector<simulate::ToolStep> as_written(std::vector<simulate::ToolStep> steps);

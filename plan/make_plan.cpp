@@ -154,6 +154,7 @@ class Planner {
     std::vector<Measured> trials =
         find_or_run(study_, vessel_, runs, log_, options_.batch, plan_.full);
     try_spares(search, runs, trials);
+    leave_out_seats(runs, trials);
     for (PairFindings& pair : search.pairs) {
       std::vector<std::size_t> own, reached;
       for (std::size_t k = 0; k < runs.size(); ++k) {
@@ -204,6 +205,24 @@ class Planner {
         runs[owners[n]] = next[n];
         trials[owners[n]] = found[n];
       }
+    }
+  }
+
+  // Where the catheter does not follow a wire that has arrived, its script does not ask for that.
+  void leave_out_seats(std::vector<Run>& runs, std::vector<Measured>& trials) {
+    std::vector<Run> next;
+    std::vector<std::size_t> owners;
+    for (std::size_t k = 0; k < runs.size(); ++k) {
+      if (!stays_unseated(runs[k].candidate, trials[k])) continue;
+      next.push_back(runs[k]);
+      next.back().candidate.steps.pop_back();
+      owners.push_back(k);
+    }
+    const std::vector<Measured> found =
+        find_or_run(study_, vessel_, next, log_, silent_, plan_.full);
+    for (std::size_t n = 0; n < next.size(); ++n) {
+      runs[owners[n]] = next[n];
+      trials[owners[n]] = found[n];
     }
   }
 
@@ -313,10 +332,11 @@ class Planner {
 
   void repeat_best(int count, int rounds) {
     for (int round = 0; count > 0; ++round) {
-      // In the end the first, and the best of each wire, alone.
+      // In the end the first, and the best of each wire and catheter, alone.
       const Judgement now = judged();
-      const std::vector<int> chosen = choose_plans_to_repeat(
-          now.ranking, now.repeated, round < rounds ? plan_.robustness.plans : 1, count);
+      const std::vector<int> chosen =
+          choose_plans_to_repeat(now.ranking, plan_.candidates, now.repeated,
+                                 round < rounds ? plan_.robustness.plans : 1, count);
       if (chosen.empty()) return;
       add_repeats(chosen, static_cast<std::size_t>(count));
     }

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "preprocess/centerline/path_place.h"
 #include "simulate/insertion/start_line.h"
@@ -27,6 +28,35 @@ WallMotion find_wall_motion(const std::vector<simulate::Push>& pushes, const Cen
     worst = {push.wall_displacement, radius, push.wall_displacement_point};
   }
   return worst;
+}
+
+/// Which way a value went: -1, 0 or 1.
+int side_of_change(double before, double after) {
+  constexpr double kRounding = 1e-9;  // mm, rad
+  return std::abs(after - before) <= kRounding ? 0 : after > before ? 1 : -1;
+}
+
+/// A new move begins where other tools go, or one goes another way, than in the record before.
+int count_moves(const simulate::TrialResult& trial) {
+  int count = 0;
+  std::vector<int> last;
+  for (std::size_t k = 0; k < trial.pushes.size(); ++k) {
+    std::vector<int> now;
+    const auto add = [&](const auto& value) {
+      now.push_back(side_of_change(k > 0 ? value(k - 1) : 0.0, value(k)));
+    };
+    for (const simulate::ToolTrack& track : trial.tools) {
+      add([&](std::size_t i) { return track.insertion[i]; });
+      add([&](std::size_t i) { return track.roll[i]; });
+    }
+    if (trial.tools.empty()) {
+      add([&](std::size_t i) { return trial.pushes[i].insertion; });
+      add([&](std::size_t i) { return trial.pushes[i].hub_angle; });
+    }
+    if (now != last) ++count;
+    last = std::move(now);
+  }
+  return count;
 }
 
 }  // namespace
@@ -114,11 +144,46 @@ std::vector<ToolMetrics> compute_tool_metrics(const simulate::TrialResult& trial
   return all;
 }
 
+ScriptMetrics compute_script_metrics(const simulate::TrialResult& trial, const Study& study,
+                                     const Centerline& path) {
+  ScriptMetrics script;
+  script.moves = count_moves(trial);
+  if (trial.tools.empty()) {
+    for (const simulate::Push& push : trial.pushes) {
+      script.hand_force = std::max(script.hand_force, std::abs(push.push_force));
+      script.hub_torque = std::max(script.hub_torque, std::abs(push.hub_torque));
+    }
+    return script;
+  }
+  const std::vector<ToolMetrics> tools = compute_tool_metrics(trial, path);
+  for (const ToolMetrics& tool : tools) {
+    script.hand_force = std::max(script.hand_force, tool.peak_push_force);
+    script.hub_torque = std::max(script.hub_torque, tool.peak_hub_torque);
+  }
+  if (const std::optional<Ostium> ostium = find_ostium(study.goal)) {
+    script.hook_depth = std::max(0.0, tools.front().progress - ostium->arc);
+  }
+  script.wire_beyond = std::max(0.0, tools.back().insertion - tools.front().insertion);
+  if (trial.support) {
+    script.support = trial.support->push;
+    script.bears_more = trial.support->more;
+  }
+  return script;
+}
+
+bool stays_unseated(const Candidate& script, const Measured& trial) {
+  constexpr double kNear = 1.0;  // that a seat may be off, chosen                           [mm]
+  if (script.steps.empty() || !script.steps.back().seats || !trial.metrics.reached) return false;
+  return trial.metrics.script->hook_depth < script.steps.back().at - kNear;
+}
+
 Measured measure(const simulate::TrialResult& trial, const Study& study, const Centerline& path) {
+  Metrics metrics = compute_metrics(trial, study, path);
+  if (!study.catheters.empty()) metrics.script = compute_script_metrics(trial, study, path);
   return {.outcome = trial.outcome,
           .reason = trial.reason,
           .terms = trial.terms,
-          .metrics = compute_metrics(trial, study, path),
+          .metrics = std::move(metrics),
           .progress = find_progress(trial, path),
           .last_tip = trial.pushes.empty() ? study.access : trial.pushes.back().tip,
           .nodes = trial.nodes,

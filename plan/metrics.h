@@ -1,6 +1,7 @@
 #pragma once
 /// One trial -> the numbers that plans are compared by (references C1; design section 6).
 #include <array>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -18,6 +19,33 @@ struct WallMotion {
   double radius = 0.0;        // of the path at its nearest point                          [mm]
   Vec3 point = Vec3::Zero();  //                                                           [mm]
   bool beyond_linear_theory() const { return displacement > kLinearWallPart * radius; }
+};
+
+/// What a hand does and gets, where a study has catheters: of a wire alone too, which has no
+/// support, no hook and nothing to be out of.
+struct ScriptMetrics {
+  double support = 0.0;      // of the seated catheter, see simulate::CatheterSupport         [N]
+  double hook_depth = 0.0;   // of the catheter's tip past the ostium at the end             [mm]
+  double wire_beyond = 0.0;  // of the wire out of the catheter at the end, not behind it    [mm]
+  double hand_force = 0.0;   // largest on a tool, pushed or held back                        [N]
+  double hub_torque = 0.0;   // largest on a hub                                           [N mm]
+  /// Of the hand: pushes, pulls and turns, each counted once until others begin; with what was
+  /// tried again.
+  int moves = 0;
+  bool bears_more = false;  // the support is that at least
+};
+
+/// The numbers of ScriptMetrics that are measured, with their names in files.
+struct ScriptMetricField {
+  const char* name;
+  double ScriptMetrics::*value;
+};
+inline constexpr std::array kScriptMetricFields = {
+    ScriptMetricField{"support_n", &ScriptMetrics::support},
+    ScriptMetricField{"hook_depth_mm", &ScriptMetrics::hook_depth},
+    ScriptMetricField{"wire_beyond_catheter_mm", &ScriptMetrics::wire_beyond},
+    ScriptMetricField{"peak_hand_force_n", &ScriptMetrics::hand_force},
+    ScriptMetricField{"peak_hub_torque_n_mm", &ScriptMetrics::hub_torque},
 };
 
 struct Metrics {
@@ -44,6 +72,7 @@ struct Metrics {
   double energy_unbalanced = 0.0;  // see simulate::PushBalance                            [N mm]
   double residual = 0.0;           // largest over the pushes                           [N]
   long iterations = 0;             // of all pushes together
+  std::optional<ScriptMetrics> script = {};  // in a study with catheters
 };
 
 /// The numbers of Metrics with their names in files, in the order of a report's trial.
@@ -116,6 +145,10 @@ inline constexpr std::array kToolMetricFields = {
 std::vector<ToolMetrics> compute_tool_metrics(const simulate::TrialResult& trial,
                                               const Centerline& path);
 
+/// Expects a study with catheters.
+ScriptMetrics compute_script_metrics(const simulate::TrialResult& trial, const Study& study,
+                                     const Centerline& path);
+
 /// What planning and judging keep of a trial.
 struct Measured {
   simulate::Outcome outcome = simulate::Outcome::kFailed;
@@ -129,6 +162,9 @@ struct Measured {
   double cpu_seconds = 0.0;        // that it took; timing, so never twice the same            [s]
   std::vector<ToolMetrics> tools = {};  // of catheter and wire; else empty
 };
+
+/// Whether the trial reached, and its catheter did not follow by the script's last step.
+bool stays_unseated(const Candidate& script, const Measured& trial);
 
 /// How far along the path the tip came in any push while it was in the path's lumen [mm].
 double find_progress(const simulate::TrialResult& trial, const Centerline& path);

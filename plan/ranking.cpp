@@ -12,27 +12,6 @@
 namespace wireplan::plan {
 namespace {
 
-double saturating(double force, double scale) { return force / (force + scale); }
-
-double saturating_slope(double force, double scale) {
-  return scale / ((force + scale) * (force + scale));
-}
-
-double weighted_mean(const Score& score, const Weights& weights) {
-  const double sum = weights.reach + weights.peak_force + weights.mean_force + weights.margin;
-  return (weights.reach * score.reach + weights.peak_force * score.peak_force +
-          weights.mean_force * score.mean_force + weights.margin * score.margin) /
-         sum;
-}
-
-void expects_valid(const Limits& limits, const Weights& weights) {
-  expects(limits.tip_force_warn > 0.0 && limits.tip_force_fail > 0.0 &&
-          limits.penetration_fail > 0.0);
-  expects(weights.reach >= 0.0 && weights.peak_force >= 0.0 && weights.mean_force >= 0.0 &&
-          weights.margin >= 0.0);
-  expects(weights.reach + weights.peak_force + weights.mean_force + weights.margin > 0.0);
-}
-
 /// `summary`, and behind a colon what the trial itself says of it.
 std::string with_reason(const std::string& summary, const Measured& trial) {
   return trial.reason.empty() ? summary : summary + ": " + trial.reason;
@@ -177,20 +156,14 @@ std::string compare_with_next_wire(const std::vector<RankedPlan>& plans, const S
 /// A later plan against the best one: its force, and the component that costs it most.
 std::string compare_with_first(const RankedPlan& plan, const RankedPlan& first,
                                const std::vector<Metrics>& metrics, const Weights& weights) {
-  struct Loss {
-    double size;
-    const char* name;
+  const auto loss = [&](const ScorePart& part) {
+    return acts(part, plan.score.of_script)
+               ? weights.*part.weight * (plan.score.*part.cost - first.score.*part.cost)
+               : -HUGE_VAL;
   };
-  const std::array<Loss, 4> losses{{
-      {weights.reach * (plan.score.reach - first.score.reach), "its distance from the centre"},
-      {weights.peak_force * (plan.score.peak_force - first.score.peak_force),
-       "its peak contact force"},
-      {weights.mean_force * (plan.score.mean_force - first.score.mean_force),
-       "its mean contact force"},
-      {weights.margin * (plan.score.margin - first.score.margin), "its tip force"},
-  }};
-  const auto largest = std::max_element(
-      losses.begin(), losses.end(), [](const Loss& a, const Loss& b) { return a.size < b.size; });
+  const auto largest =
+      std::max_element(kScoreParts.begin(), kScoreParts.end(),
+                       [&](const ScorePart& a, const ScorePart& b) { return loss(a) < loss(b); });
 
   std::string text = ", " +
                      compare_forces(metrics[plan.trial].peak_contact_force,
@@ -202,7 +175,7 @@ std::string compare_with_first(const RankedPlan& plan, const RankedPlan& first,
   } else if (plan.robust_score && plan.expected_safe < first.expected_safe) {
     text += "; behind it because it is safe less often";
   } else if (plan.score.total > first.score.total) {
-    text += std::string("; behind it mostly by ") + largest->name;
+    text += std::string("; behind it mostly by ") + largest->said;
   } else if (first.robust_score) {
     text += "; behind it under the perturbations alone";
   }
@@ -264,6 +237,15 @@ std::string safety_of(const RepeatedPlan& plan) {
   return text;
 }
 
+/// How the catheter sits; empty without one.
+std::string seat_of(const Metrics& metrics) {
+  if (!metrics.script || metrics.script->hook_depth <= 0.0) return "";
+  const ScriptMetrics& script = *metrics.script;
+  return "; its catheter ends " + one_decimal(script.hook_depth) +
+         " mm in the branch and bears a push of " + (script.bears_more ? "more than " : "") +
+         two_digits(script.support) + " N before it backs out";
+}
+
 void write_sentences(Ranking& ranking, const Study& study, const std::vector<Candidate>& candidates,
                      const std::vector<Metrics>& metrics, const Limits& limits,
                      const Weights& weights, const std::vector<RepeatedPlan>& repeated) {
@@ -277,6 +259,7 @@ void write_sentences(Ranking& ranking, const Study& study, const std::vector<Can
     plan.sentence += plan.trial == first.trial
                          ? compare_with_next_wire(ranking.plans, study, candidates, metrics)
                          : compare_with_first(plan, first, metrics, weights);
+    plan.sentence += seat_of(m);
     const RepeatedPlan* repeats = find_repeated(repeated, plan.trial);
     if (repeats != nullptr) plan.sentence += safety_of(*repeats);
     plan.sentence += warnings_of(plan, m, study.goal, limits);
@@ -364,44 +347,6 @@ double tip_room(const simulate::Goal& goal, const Metrics& metrics) {
                          : std::max(0.0, goal.radius - metrics.tip_to_target);
 }
 
-NumericalError assumed_error(const Metrics& metrics) {
-  return {.position = kAssumedPositionError,
-          .tip = kAssumedPositionError,
-          .peak_force = kAssumedRelativeForceError * metrics.peak_contact_force,
-          .mean_force = kAssumedRelativeForceError * metrics.mean_contact_force,
-          .tip_force = kAssumedRelativeForceError * metrics.peak_tip_force,
-          .push_force = kAssumedRelativeForceError * metrics.peak_push_force};
-}
-
-Score compute_score(const Metrics& metrics, const simulate::Goal& goal, const Limits& limits,
-                    const Weights& weights) {
-  expects_valid(limits, weights);
-  expects(goal.radius > 0.0);
-  const double scale = limits.tip_force_warn;
-  Score score;
-  score.reach = goal.at_section ? (metrics.reached ? 0.0 : 1.0)
-                                : std::min(metrics.tip_to_target / goal.radius, 1.0);
-  score.peak_force = saturating(metrics.peak_contact_force, scale);
-  score.mean_force = saturating(metrics.mean_contact_force, scale);
-  score.margin = std::min(metrics.peak_tip_force / limits.tip_force_fail, 1.0);
-  score.total = weighted_mean(score, weights);
-  return score;
-}
-
-double compute_score_error(const Metrics& metrics, const NumericalError& error,
-                           const simulate::Goal& goal, const Limits& limits,
-                           const Weights& weights) {
-  expects_valid(limits, weights);
-  expects(goal.radius > 0.0);
-  const double scale = limits.tip_force_warn;
-  Score change;
-  change.reach = goal.at_section ? 0.0 : std::min(error.tip / goal.radius, 1.0);
-  change.peak_force = saturating_slope(metrics.peak_contact_force, scale) * error.peak_force;
-  change.mean_force = saturating_slope(metrics.mean_contact_force, scale) * error.mean_force;
-  change.margin = std::min(error.tip_force / limits.tip_force_fail, 1.0);
-  return weighted_mean(change, weights);
-}
-
 std::string exclusion_reason(const Measured& trial, const Study& study, const Limits& limits) {
   using simulate::Outcome;
   const Metrics& metrics = trial.metrics;
@@ -451,7 +396,6 @@ Ranking rank(const Study& study, const std::vector<Candidate>& candidates,
   expects(findings.sensitive.empty() || findings.sensitive.size() == candidates.size());
   expects(findings.refined.empty() || findings.refined.size() == candidates.size());
   expects(findings.scouted.empty() || findings.scouted.size() == candidates.size());
-  expects_valid(limits, weights);
 
   // A trial is a plan or has a reason.
   Ranking ranking;

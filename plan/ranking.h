@@ -4,66 +4,9 @@
 #include <string>
 #include <vector>
 
-#include "plan/metrics.h"
+#include "plan/score.h"
 
 namespace wireplan::plan {
-
-/// A trial beyond one of the `_fail` limits is excluded. A plan's sentence warns where its tip
-/// force is beyond `tip_force_warn`, where the wall moved beyond linear theory (metrics.h), and
-/// where the tip is so close to the target's border that its numerical error may put it outside.
-struct Limits {
-  double tip_force_warn = 0.3;    // references B3                                          [N]
-  double tip_force_fail = 1.5;    // references B3                                          [N]
-  double off_path_fail = 10.0;    // a wire further from the path's lumen came another way   [mm]
-  double penetration_fail = 0.3;  // a wire further past the wall has left the lumen        [mm]
-};
-
-/// Weights of the score's components; none negative, not all 0.
-struct Weights {
-  double reach = 1.0, peak_force = 1.0, mean_force = 0.5, margin = 0.5;
-};
-
-/// What a plan costs: each component in [0, 1], 0 the best, and their weighted mean. The scales are
-/// absolute, so that a score does not depend on which other plans were tried. With the scale of
-/// force s = Limits::tip_force_warn (references B3), so that forces on the wall weigh as soon as
-/// they are felt:
-///   reach       tip_to_target / goal radius; of a cross-section 0    metric: references C1,
-///   success peak_force  f / (f + s), f = peak_contact_force                 C1, contact force, max
-///   mean_force  f / (f + s), f = mean_contact_force                 C1, contact force, mean
-///   margin      peak_tip_force / Limits::tip_force_fail: what is used up of it   C1, tip force
-/// f / (f + s) is 1/2 at f = s and never reaches 1, since no limit of side-wall forces is agreed
-/// on.
-struct Score {
-  double total = 0.0;  // smaller is better
-  double reach = 0.0, peak_force = 0.0, mean_force = 0.0, margin = 0.0;
-};
-
-/// How far a trial's numbers may be from those of infinitely short elements, on whichever path the
-/// solver takes (refine.h): the true value lies within this of the trial's in 95 % of cases.
-struct NumericalError {
-  double position = 0.0;    // of the final shape, where it is largest                      [mm]
-  double tip = 0.0;         // of the final tip                                             [mm]
-  double peak_force = 0.0;  // of Metrics::peak_contact_force                               [N]
-  double mean_force = 0.0;  // of Metrics::mean_contact_force                               [N]
-  double tip_force = 0.0;   // of Metrics::peak_tip_force                                   [N]
-  double push_force = 0.0;  // of Metrics::peak_push_force                                  [N]
-};
-
-/// What is assumed of a trial that was not refined. Refining 15 plans in a bent tube at elements of
-/// 1 mm found 0.02 to 0.62 mm, median 0.09, and forces within 4 %. It only decides ties, and is
-/// never reported as an error.
-inline constexpr double kAssumedPositionError = 0.2;        //                              [mm]
-inline constexpr double kAssumedRelativeForceError = 0.05;  // of each force                [-]
-NumericalError assumed_error(const Metrics& metrics);
-
-Score compute_score(const Metrics& metrics, const simulate::Goal& goal, const Limits& limits,
-                    const Weights& weights);
-
-/// Largest change of the total score that the error allows, to first order. The components' changes
-/// are added without regard to sign, since one cause may move all forces alike.
-double compute_score_error(const Metrics& metrics, const NumericalError& error,
-                           const simulate::Goal& goal, const Limits& limits,
-                           const Weights& weights);
 
 /// A trial of a plan under a disturbance (robustness.h).
 struct Repeat {
@@ -71,6 +14,7 @@ struct Repeat {
   bool safe = false;   // it reached and broke no limit: it is a plan under the disturbance too
   double score = 1.0;  // its total; 1, the worst there is, where it is no plan
   double peak_contact_force = 0.0, mean_contact_force = 0.0, peak_tip_force = 0.0;  //       [N]
+  double support = 0.0;     // ScriptMetrics::support                                            [N]
   std::string reason = {};  // why it is no plan; else empty
 };
 

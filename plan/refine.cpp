@@ -56,7 +56,8 @@ OtherEnd compare_ends(const Measured& plan, const SettingRun& other, double inse
 
 constexpr std::array kErrorParts = {&NumericalError::position,   &NumericalError::tip,
                                     &NumericalError::peak_force, &NumericalError::mean_force,
-                                    &NumericalError::tip_force,  &NumericalError::push_force};
+                                    &NumericalError::tip_force,  &NumericalError::push_force,
+                                    &NumericalError::support};
 
 /// Whether the change is one of the value. The hand's force is a mean over a push: over shorter
 /// ones it is another figure, as long as the wire goes the same way.
@@ -176,12 +177,14 @@ Refinement estimate_error(int trial, double insertion, const std::vector<Refined
 
 NumericalError find_difference(const Measured& one, const Measured& other) {
   const Metrics &a = one.metrics, &b = other.metrics;
+  const bool scripts = a.script && b.script;
   return {.position = shape_distance(one.nodes, other.nodes),
           .tip = (one.nodes.rightCols<1>() - other.nodes.rightCols<1>()).norm(),
           .peak_force = std::abs(a.peak_contact_force - b.peak_contact_force),
           .mean_force = std::abs(a.mean_contact_force - b.mean_contact_force),
           .tip_force = std::abs(a.peak_tip_force - b.peak_tip_force),
-          .push_force = std::abs(a.peak_push_force - b.peak_push_force)};
+          .push_force = std::abs(a.peak_push_force - b.peak_push_force),
+          .support = scripts ? std::abs(a.script->support - b.script->support) : 0.0};
 }
 
 std::optional<std::string> find_sensitivity(const Refinement& refinement) {

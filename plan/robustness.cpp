@@ -7,6 +7,7 @@
 #include <map>
 #include <numeric>
 #include <random>
+#include <set>
 #include <utility>
 #include <variant>
 
@@ -74,6 +75,7 @@ void multiply_forces(simulate::TrialResult& trial, double factor) {
       for (double& load : *loads) load *= factor;
     }
   }
+  if (trial.support) trial.support->push *= factor;
 }
 
 /// An unknown as the regression sees it: one column per direction; none where it never changes.
@@ -295,22 +297,27 @@ Repeat judge_repeat(const Measured& trial, const Study& study, const Limits& lim
   repeat.peak_contact_force = metrics.peak_contact_force;
   repeat.mean_contact_force = metrics.mean_contact_force;
   repeat.peak_tip_force = metrics.peak_tip_force;
+  if (metrics.script) repeat.support = metrics.script->support;
   return repeat;
 }
 
 std::vector<int> choose_plans_to_repeat(const Ranking& ranking,
+                                        const std::vector<Candidate>& candidates,
                                         const std::vector<RepeatedPlan>& repeated, int plans,
                                         int count) {
   std::vector<int> chosen;
+  std::set<int> catheters;
   for (std::size_t k = 0; k < ranking.plans.size(); ++k) {
     const int trial = ranking.plans[k].trial;
     const bool among_first = static_cast<int>(k) < plans;
+    const int catheter = candidates[static_cast<std::size_t>(trial)].catheter;
+    const bool best_of_catheter = catheter >= 0 && catheters.insert(catheter).second;
     const bool best_of_wire =
         std::any_of(ranking.wires.begin(), ranking.wires.end(),
                     [&](const WireSummary& wire) { return wire.best_trial == trial; });
     const RepeatedPlan* own = find_repeated(repeated, trial);
     const bool done = own != nullptr && std::ssize(own->repeats) >= count;
-    if ((among_first || best_of_wire) && !done) chosen.push_back(trial);
+    if ((among_first || best_of_wire || best_of_catheter) && !done) chosen.push_back(trial);
   }
   return chosen;
 }

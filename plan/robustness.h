@@ -28,7 +28,8 @@ struct Unknowns {
 
 struct RobustnessOptions {
   int repeats = 16;        // of each of the best plans; 0: none
-  int plans = 5;           // this many of the best are repeated, and the best of each wire
+  int plans = 5;           // this many of the best are repeated, the best of each wire and
+                           // of each catheter
   std::uint64_t seed = 1;  // of the disturbances
   Unknowns unknowns = {};
 };
@@ -93,8 +94,9 @@ Repeat judge_repeat(const Measured& trial, const Study& study, const Limits& lim
                     const Weights& weights);
 
 /// The plans to repeat next, as trials, best first: the first `plans` of the ranking and the best
-/// of each wire, without those that have `count` repeats already.
+/// of each wire and of each catheter, without those that have `count` repeats already.
 std::vector<int> choose_plans_to_repeat(const Ranking& ranking,
+                                        const std::vector<Candidate>& candidates,
                                         const std::vector<RepeatedPlan>& repeated, int plans,
                                         int count);
 

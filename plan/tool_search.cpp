@@ -55,8 +55,8 @@ std::vector<std::vector<std::size_t>> tried_together(const Study& study,
 }
 
 /// What a pair's way up and its starts found: the different scripts of it that hold best.
-void gather(const Study& study, const std::vector<ToolStart>& starts, std::size_t slot,
-            const StartFindings& way_up, PairFindings& pair, ToolScripts& all) {
+void gather(const Study& study, const Ostium& ostium, const std::vector<ToolStart>& starts,
+            std::size_t slot, const StartFindings& way_up, PairFindings& pair, ToolScripts& all) {
   std::vector<const StartFindings*> parts;
   for (const ToolStart& start : starts) {
     if (start.pair == slot) parts.push_back(&start.findings);
@@ -83,15 +83,17 @@ void gather(const Study& study, const std::vector<ToolStart>& starts, std::size_
   if (pair.stopped.empty()) pair.stopped = way_up.stopped;
   if (pair.found > 0) pair.stopped.clear();
   if (!kept.empty()) pair.held = kept.front().share;
-  if (kept.empty() && !closest.empty()) kept.push_back({.steps = closest});
+  const bool found_any = !kept.empty();
+  if (!found_any && !closest.empty()) kept.push_back({.steps = closest});
   for (FoundScript& script : kept) {
     Candidate candidate = first_candidate(study, pair.pair);
+    if (found_any) script.steps = with_seat(std::move(script.steps), ostium, study.tool_rules);
     candidate.steps = as_written(std::move(script.steps));
     all.found.push_back(candidate);
     all.spares.emplace_back();
     if (script.share < kSteady) continue;
     for (ToolScript& spare : script.spares) {
-      candidate.steps = as_written(std::move(spare));
+      candidate.steps = as_written(with_seat(std::move(spare), ostium, study.tool_rules));
       all.spares.back().push_back(candidate);
     }
   }
@@ -128,7 +130,8 @@ ToolScripts find_tool_scripts(const Study& study, const simulate::VesselModel& v
   const auto tell = [&](const ToolPair& pair, const StartFindings& findings) {
     if (!on_first || findings.found.empty() || told.exchange(true)) return;
     Candidate candidate = first_candidate(study, pair);
-    candidate.steps = as_written(findings.found.front().steps);
+    candidate.steps =
+        as_written(with_seat(findings.found.front().steps, *ostium, study.tool_rules));
     on_first(candidate);
   };
   for (const std::vector<std::size_t>& slots : tried_together(study, all.pairs)) {
@@ -160,7 +163,7 @@ ToolScripts find_tool_scripts(const Study& study, const simulate::VesselModel& v
     bool holds = false;
     for (std::size_t k = 0; k < slots.size(); ++k) {
       PairFindings& pair = all.pairs[slots[k]];
-      gather(study, starts, k, ways[k].findings, pair, all);
+      gather(study, *ostium, starts, k, ways[k].findings, pair, all);
       holds = holds || pair.held >= kSteady;
     }
     if (holds) break;

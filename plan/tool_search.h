@@ -5,7 +5,8 @@
 ///   2. the wire is withdrawn, so that the catheter's curve forms;
 ///   3. the catheter is turned, by more than half a turn only with a short pull between, and both
 ///   are pulled back, until its tip is in the ostium;
-///   4. the wire goes out into the branch, and where it comes no further, the catheter follows it.
+///   4. the wire goes out into the branch, and where it comes no further, the catheter follows it;
+///   5. once the wire is at the target, the catheter follows into the branch (ToolRules::seat).
 #include <functional>
 #include <string>
 #include <vector>

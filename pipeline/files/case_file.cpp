@@ -11,6 +11,7 @@
 #include <utility>
 
 #include "pipeline/files/access_limits_file.h"
+#include "pipeline/files/case_judging.h"
 #include "pipeline/files/case_robustness.h"
 #include "pipeline/files/markups_file.h"
 #include "preprocess/text.h"
@@ -213,40 +214,6 @@ void read_insertion(JsonReader& root, plan::Study& study) {
                         "at most the length of every wire; \"" + wire.name + "\" has " +
                             Json(clean(wire.length())).dump() + " mm",
                         "push in less, or lengthen the wire's last section");
-  }
-}
-
-void read_limits(JsonReader& root, plan::Limits& limit) {
-  const std::size_t problems_before = root.problems().count();
-  JsonReader limits = root.object("limits", false);
-  const Range force{.min = 0.0, .max = 100.0, .open_min = true};
-  limit.tip_force_warn =
-      limits.number("tip_force_warn_n", limit.tip_force_warn, force, "given in mN or gf?");
-  limit.tip_force_fail =
-      limits.number("tip_force_fail_n", limit.tip_force_fail, force, "given in mN or gf?");
-  limit.penetration_fail = limits.number("penetration_fail_mm", limit.penetration_fail,
-                                         {.min = 0.0, .max = 5.0, .open_min = true});
-  limit.off_path_fail = limits.number("off_path_fail_mm", limit.off_path_fail,
-                                      {.min = 0.0, .max = 1000.0, .open_min = true});
-  limits.finish();
-  if (root.problems().count() == problems_before && limit.tip_force_warn > limit.tip_force_fail) {
-    root.problems().add("limits.tip_force_warn_n", Json(limit.tip_force_warn).dump(),
-                        "at most limits.tip_force_fail_n, " + Json(limit.tip_force_fail).dump());
-  }
-}
-
-void read_weights(JsonReader& root, plan::Weights& weight) {
-  JsonReader ranking = root.object("ranking", false);
-  JsonReader weights = ranking.object("weights", false);
-  const Range share{.min = 0.0, .max = 1000.0};
-  weight.reach = weights.number("reach", weight.reach, share);
-  weight.peak_force = weights.number("peak_force", weight.peak_force, share);
-  weight.mean_force = weights.number("mean_force", weight.mean_force, share);
-  weight.margin = weights.number("margin", weight.margin, share);
-  weights.finish();
-  ranking.finish();
-  if (weight.reach + weight.peak_force + weight.mean_force + weight.margin <= 0.0) {
-    root.problems().add("ranking.weights", "0 in all", "at least one weight above 0");
   }
 }
 
@@ -483,7 +450,7 @@ Case read_case(const std::filesystem::path& path, const std::vector<std::string>
   input.access_limits =
       read_access_limits(root, input.suggest_catheters ? 0.0 : thinnest(input.catheters));
   read_limits(root, input.limits);
-  read_weights(root, input.weights);
+  read_weights(root, !input.catheters.empty(), input.weights);
   input.manoeuvres = read_manoeuvring(root);
   input.study.insertion.friction = read_friction(root, kDefaultFriction);
   input.study.insertion.friction_factor =
@@ -578,17 +545,10 @@ Json case_parameters(const Case& input) {
                        {"max_iterations", study.insertion.max_iterations},
                        {"record_every_mm", study.insertion.record_every}};
   json["access_limits"] = access_limits_json(input.access_limits);
-  json["limits"] = {{"tip_force_warn_n", input.limits.tip_force_warn},
-                    {"tip_force_fail_n", input.limits.tip_force_fail},
-                    {"penetration_fail_mm", input.limits.penetration_fail},
-                    {"off_path_fail_mm", input.limits.off_path_fail}};
+  json["limits"] = limits_json(input.limits);
   json["search"] = {{"exhaustive", input.exhaustive}};
   json["robustness"] = robustness_json(input);
-  json["ranking"] = {{"weights",
-                      {{"reach", input.weights.reach},
-                       {"peak_force", input.weights.peak_force},
-                       {"mean_force", input.weights.mean_force},
-                       {"margin", input.weights.margin}}}};
+  json["ranking"] = {{"weights", weights_json(input.weights, !input.catheters.empty())}};
   return json;
 }
 

@@ -169,6 +169,7 @@ plan::ToolRules read_tool_rules(JsonReader& root) {
   rules.turn_per_length = reader.number("turn_deg_per_mm", rules.turn_per_length / kRadPerDeg,
                                         {.min = 0.0, .max = 3600.0, .open_min = true}) *
                           kRadPerDeg;
+  rules.seat = reader.number("seat_mm", rules.seat, kLength, "given in m?");
   rules.friction = reader.number("friction_between_tools", rules.friction, kFrictionRange);
   reader.finish();
   return rules;
@@ -180,6 +181,7 @@ Json tool_rules_json(const plan::ToolRules& rules) {
           {"outside_mm", rules.outside},
           {"most_turn_deg", clean(rules.most_turn / kRadPerDeg)},
           {"turn_deg_per_mm", clean(rules.turn_per_length / kRadPerDeg)},
+          {"seat_mm", rules.seat},
           {"friction_between_tools", rules.friction}};
 }
 

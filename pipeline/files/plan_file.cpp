@@ -8,7 +8,7 @@
 namespace wireplan::pipeline {
 namespace {
 
-constexpr const char* kMeasuredSchema = "wireplan.measured/1";
+constexpr const char* kMeasuredSchema = "wireplan.measured/2";
 
 Json point(const Vec3& p) {
   return Json::array({number_or_null(p.x()), number_or_null(p.y()), number_or_null(p.z())});
@@ -35,6 +35,14 @@ Json metrics_to_json(const plan::Metrics& metrics) {
   json["wall_motion"] = {{"displacement_mm", number_or_null(motion.displacement)},
                          {"radius_mm", number_or_null(motion.radius)},
                          {"point_mm", point(motion.point)}};
+  if (metrics.script) {
+    Json& script = json["script"];
+    for (const plan::ScriptMetricField& field : plan::kScriptMetricFields) {
+      script[field.name] = number_or_null((*metrics.script).*field.value);
+    }
+    script["moves"] = metrics.script->moves;
+    script["bears_more"] = metrics.script->bears_more;
+  }
   return json;
 }
 
@@ -55,6 +63,15 @@ plan::Metrics metrics_of(const Json& json) {
   metrics.wall_motion = {.displacement = number_of(motion.at("displacement_mm")),
                          .radius = number_of(motion.at("radius_mm")),
                          .point = point_of(motion.at("point_mm"))};
+  if (json.contains("script")) {
+    const Json& script = json.at("script");
+    metrics.script = plan::ScriptMetrics{};
+    for (const plan::ScriptMetricField& field : plan::kScriptMetricFields) {
+      (*metrics.script).*field.value = number_of(script.at(field.name));
+    }
+    metrics.script->moves = script.at("moves");
+    metrics.script->bears_more = script.at("bears_more");
+  }
   return metrics;
 }
 
@@ -124,7 +141,8 @@ plan::Setting setting_of(const std::string& name) {
 Json error_to_json(const plan::NumericalError& error) {
   return {{"position_mm", error.position},    {"tip_mm", error.tip},
           {"peak_force_n", error.peak_force}, {"mean_force_n", error.mean_force},
-          {"tip_force_n", error.tip_force},   {"push_force_n", error.push_force}};
+          {"tip_force_n", error.tip_force},   {"push_force_n", error.push_force},
+          {"support_n", error.support}};
 }
 
 plan::NumericalError error_of(const Json& json) {
@@ -133,7 +151,8 @@ plan::NumericalError error_of(const Json& json) {
           .peak_force = json.at("peak_force_n"),
           .mean_force = json.at("mean_force_n"),
           .tip_force = json.at("tip_force_n"),
-          .push_force = json.at("push_force_n")};
+          .push_force = json.at("push_force_n"),
+          .support = json.at("support_n")};
 }
 
 Json refinement_to_json(const plan::Refinement& refinement) {

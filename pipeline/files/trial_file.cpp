@@ -288,6 +288,9 @@ std::string trial_text(const plan::Study& study, const plan::Candidate& candidat
     file["steps"] = steps_json(candidate.steps);
     file["tools"] = tracks_to_json(trial.tools);
     file["step"] = trial.steps;
+    if (trial.support) {
+      file["support"] = {{"push_n", trial.support->push}, {"more", trial.support->more}};
+    }
   }
   file["outcome"] = simulate::outcome_name(trial.outcome);
   file["reason"] = trial.reason;
@@ -340,6 +343,7 @@ Json steps_json(const std::vector<simulate::ToolStep>& steps) {
                       {"turn_deg", clean(step.try_turn / kRadPerDeg)}};
     }
     if (step.steers > 0) row["steers"] = step.steers;
+    if (step.seats) row["seats"] = true;
     list.push_back(std::move(row));
   }
   return list;
@@ -358,6 +362,7 @@ std::vector<simulate::ToolStep> steps_of(const Json& list) {
                      .at = 0.0});
     simulate::ToolStep& step = steps.back();
     step.steers = row.value("steers", 0);
+    step.seats = row.value("seats", false);
     if (row.contains("tries")) {
       step.tries = row.at("tries").at("most");
       step.try_pull = number_of(row.at("tries").at("pull_mm"));
@@ -388,6 +393,10 @@ std::optional<TrialResult> find_trial(const std::filesystem::path& path) {
   if (file.contains("tools")) {
     trial.tools = tracks_from_json(file.at("tools"));
     trial.steps = file.at("step").get<std::vector<int>>();
+    if (file.contains("support")) {
+      const Json& support = file.at("support");
+      trial.support = {.push = support.at("push_n"), .more = support.at("more")};
+    }
   }
   return trial;
 }

@@ -16,7 +16,7 @@ Json spread_json(const plan::RepeatedPlan& plan, double plan::Repeat::*member) {
   return {{"low", spread.low}, {"median", spread.median}, {"high", spread.high}};
 }
 
-Json plan_json(const plan::RepeatedPlan& plan) {
+Json plan_json(const plan::RepeatedPlan& plan, bool of_script) {
   Json scores = Json::array(), failures = Json::array();
   double sum = 0.0;
   for (std::size_t k = 0; k < plan.repeats.size(); ++k) {
@@ -39,6 +39,7 @@ Json plan_json(const plan::RepeatedPlan& plan) {
   json["peak_contact_force_n"] = spread_json(plan, &plan::Repeat::peak_contact_force);
   json["mean_contact_force_n"] = spread_json(plan, &plan::Repeat::mean_contact_force);
   json["peak_tip_force_n"] = spread_json(plan, &plan::Repeat::peak_tip_force);
+  if (of_script) json["support_n"] = spread_json(plan, &plan::Repeat::support);
   json["scores"] = std::move(scores);
   json["failures"] = std::move(failures);
   return json;
@@ -110,7 +111,10 @@ Json repeats_json(const plan::Study& study, const plan::Plan& plan,
                   const std::vector<plan::RepeatedPlan>& judged) {
   const plan::Unknowns& unknowns = plan.robustness.unknowns;
   Json plans = Json::array();
-  for (const plan::RepeatedPlan& repeated : judged) plans.push_back(plan_json(repeated));
+  for (const plan::RepeatedPlan& repeated : judged) {
+    const auto trial = static_cast<std::size_t>(repeated.trial);
+    plans.push_back(plan_json(repeated, plan.candidates[trial].catheter >= 0));
+  }
   Json json;
   json["repeats"] = plan.robustness.repeats;
   json["seed"] = plan.robustness.seed;

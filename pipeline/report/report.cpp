@@ -24,7 +24,10 @@ constexpr const char* kStatement =
 constexpr const char* kRigidWall = "the wall is rigid";
 constexpr const char* kRigidScout = "the wall of a scout or a probe is rigid";
 constexpr const char* kNotRefined = "only the first plans and those tied with the best are refined";
-constexpr const char* kNoRepeats = "only the best plans are repeated, and the best of each wire";
+std::string no_repeats(const ReportInput& input) {
+  const std::string text = "only the best plans are repeated, and the best of each wire";
+  return input.study.catheters.empty() ? text : text + " and of each catheter";
+}
 
 bool is_rigid(const ReportInput& input) {
   return input.parameters.at("wall").at("model") == "rigid";
@@ -264,7 +267,7 @@ Json trial_json(const ReportInput& input, std::size_t k) {
                      refined->reason);
   }
   row.put("iterations", m.iterations);
-  if (!trial.tools.empty()) row.put("tools", tools_json(input.study, trial));
+  if (!trial.tools.empty()) row.put("tools", tools_json(trial));
   return row.finish();
 }
 
@@ -274,7 +277,7 @@ void put_repeats(Row& row, const ReportInput& input, int trial) {
                                   [&](const Json& plan) { return plan.at("trial") == trial; });
   for (const char* key : {"mean_score", "success_rate", "success_rate_interval"}) {
     if (found == plans.end()) {
-      row.put_optional(key, {}, kNoRepeats);
+      row.put_optional(key, {}, no_repeats(input));
     } else {
       row.put(key, found->at(key));
     }
@@ -305,10 +308,11 @@ Json ranked_json(const ReportInput& input, std::size_t k) {
   row.put("trial", plan.trial);
   put_candidate(row, input, static_cast<std::size_t>(plan.trial));
   row.put("score", plan.score.total);
-  row.put("score_components", {{"reach", plan.score.reach},
-                               {"peak_force", plan.score.peak_force},
-                               {"mean_force", plan.score.mean_force},
-                               {"margin", plan.score.margin}});
+  Json components;
+  for (const plan::ScorePart& part : plan::kScoreParts) {
+    if (plan::acts(part, plan.score.of_script)) components[part.name] = plan.score.*part.cost;
+  }
+  row.put("score_components", std::move(components));
   row.put("score_error", plan.score_error);
   put_repeats(row, input, plan.trial);
   row.put("expected_success_rate", plan.expected_safe);
@@ -388,6 +392,9 @@ Json numerics_json(const ReportInput& input) {
                      refinement.reason);
     row.put_optional("peak_push_force_error_n", part(&plan::NumericalError::push_force),
                      refinement.reason);
+    if (input.plan.candidates[static_cast<std::size_t>(refinement.trial)].catheter >= 0) {
+      row.put_optional("support_error_n", part(&plan::NumericalError::support), refinement.reason);
+    }
     Json others = Json::array();
     for (const plan::OtherEnd& other : refinement.others) {
       others.push_back({{"setting", plan::setting_name(other.setting)},

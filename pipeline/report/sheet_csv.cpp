@@ -80,6 +80,11 @@ void add_plans(Table& table, const Json& report) {
         table.row(name + ": hand", tool.at("peak_push_force_n"), "N");
         table.row(name + ": torque of the hub", tool.at("peak_hub_torque_n_mm"), "N mm");
       }
+      const Json& tools = trial.at("tools");
+      table.row("catheter past the ostium", tools.at("hook_depth_mm"), "mm");
+      table.row("push that the seated catheter bears", tools.at("support_n"), "N", nullptr,
+                tools.at("support_is_least") ? "at least" : "");
+      table.row("moves of the hand", tools.at("moves"));
     } else if (plan.contains("step_views")) {
       for (std::size_t n = 0; n < plan.at("step_views").size(); ++n) {
         table.row("step " + std::to_string(n + 1), plan.at("step_views")[n].at("text"), "", nullptr,

@@ -20,7 +20,7 @@ Json told_steps_json(const plan::Candidate& candidate, const plan::Measured& tri
   return steps;
 }
 
-Json tools_json(const plan::Study& study, const plan::Measured& trial) {
+Json tools_json(const plan::Measured& trial) {
   Json list = Json::array();
   for (const plan::ToolMetrics& tool : trial.tools) {
     Json own = {{"name", tool.name}};
@@ -30,12 +30,12 @@ Json tools_json(const plan::Study& study, const plan::Measured& trial) {
     list.push_back(std::move(own));
   }
   Json json = {{"each", std::move(list)}};
-  const std::optional<plan::Ostium> ostium = plan::find_ostium(study.goal);
-  if (ostium && trial.tools.size() == 2) {
-    const plan::ToolMetrics &catheter = trial.tools[0], &wire = trial.tools[1];
-    json["hook_depth_mm"] = clean(std::max(0.0, catheter.progress - ostium->arc));
-    json["wire_beyond_catheter_mm"] = clean(wire.insertion - catheter.insertion);
+  const plan::ScriptMetrics& script = *trial.metrics.script;
+  for (const plan::ScriptMetricField& field : plan::kScriptMetricFields) {
+    json[field.name] = clean(script.*field.value);
   }
+  json["support_is_least"] = script.bears_more;
+  json["moves"] = script.moves;
   return json;
 }
 

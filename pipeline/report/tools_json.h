@@ -12,7 +12,7 @@ Json told_steps_json(const plan::Candidate& candidate, const plan::Measured& tri
 
 /// Per tool its metrics; beside them the hook: how far the catheter's tip is past the ostium at the
 /// end, and how far the wire is out of it.
-Json tools_json(const plan::Study& study, const plan::Measured& trial);
+Json tools_json(const plan::Measured& trial);
 
 /// Rules, ostium with the C-arm's view of it where axes are known, and all pairs: what came of
 /// them, or why they were not tried.

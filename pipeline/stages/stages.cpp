@@ -286,7 +286,7 @@ std::vector<Stage> stages_of(const Case& given) {
   stages.push_back(trials);
   Stage manoeuvres = trials;
   manoeuvres.name = "manoeuvres";
-  manoeuvres.version = 36;
+  manoeuvres.version = 37;
   manoeuvres.after.push_back("trials");
   read_too(manoeuvres, {"/manoeuvres"});
   const bool tools = !given.catheters.empty();
@@ -303,7 +303,7 @@ std::vector<Stage> stages_of(const Case& given) {
   stages.push_back(manoeuvres);
   Stage plans = trials;
   plans.name = "plans";
-  plans.version = 20;
+  plans.version = 21;
   plans.after.insert(plans.after.end(), {"trials", "manoeuvres"});
   if (voxels != nullptr) plans.after.emplace_back(voxels);
   read_too(plans, {"/manoeuvres", "/robustness"});

@@ -152,6 +152,25 @@ TEST(KeptRun, ThatLacksAMetricOfThisProgramCountsAsAbsent) {
   EXPECT_FALSE(measured_from_text(text.substr(0, text.size() / 2)));
 }
 
+TEST(KeptRun, KeepsWhatAScriptComesTo) {
+  plan::Measured measured;
+  EXPECT_FALSE(measured_from_text(measured_text(measured, false))->metrics.script);
+  measured.metrics.script = plan::ScriptMetrics{.support = 1.0 / 3.0,
+                                                .hook_depth = 0.1,
+                                                .wire_beyond = 0.2,
+                                                .hand_force = 0.3,
+                                                .hub_torque = 0.7,
+                                                .moves = 17,
+                                                .bears_more = true};
+  const std::optional<plan::Measured> back = measured_from_text(measured_text(measured, false));
+  ASSERT_TRUE(back && back->metrics.script);
+  for (const plan::ScriptMetricField& field : plan::kScriptMetricFields) {
+    EXPECT_EQ((*back->metrics.script).*field.value, (*measured.metrics.script).*field.value);
+  }
+  EXPECT_EQ(back->metrics.script->moves, 17);
+  EXPECT_TRUE(back->metrics.script->bears_more);
+}
+
 TEST(Publish, ReplacesItsOwnFilesAndTouchesNoOthers) {
   const TemporaryFolder folder;
   const Store store(folder / "cache");

@@ -79,6 +79,25 @@ TEST(TrialFile, KeepsEveryBitAndMakesNullOfWhatIsNoNumber) {
   EXPECT_FALSE(find_trial(folder / "absent.json"));
 }
 
+TEST(TrialFile, KeepsWhatASeatedCatheterBears) {
+  const TemporaryFolder folder;
+  plan::Study study;
+  study.wires = {{.name = "soft", .radius = 0.4, .sections = {{.length = 100.0}}}};
+  study.catheters.resize(1);
+  simulate::TrialResult trial;
+  for (const bool seated : {true, false}) {
+    trial.support.reset();
+    if (seated) trial.support = {.push = 1.0 / 3.0, .more = true};
+    write_text(trial_text(study, {.catheter = 0}, trial), folder / "trial.json");
+    const std::optional<simulate::TrialResult> read = find_trial(folder / "trial.json");
+    ASSERT_TRUE(read);
+    ASSERT_EQ(read->support.has_value(), seated);
+    if (!seated) continue;
+    EXPECT_EQ(read->support->push, 1.0 / 3.0);
+    EXPECT_TRUE(read->support->more);
+  }
+}
+
 TEST(TrialFile, StepsOfAScriptAreReadAsTheyAreWritten) {
   using simulate::Until;
   const std::vector<simulate::ToolStep> steps = {
@@ -92,7 +111,8 @@ TEST(TrialFile, StepsOfAScriptAreReadAsTheyAreWritten) {
        .at = 18.0,
        .tries = 8,
        .try_pull = 3.0,
-       .try_turn = -15.0 * kRadPerDeg}};
+       .try_turn = -15.0 * kRadPerDeg},
+      {.tool = 0, .push = 60.0, .until = Until::kInBranch, .at = 10.0, .seats = true}};
   EXPECT_EQ(steps_of(steps_json(steps)), steps);
 }
 

@@ -1,6 +1,9 @@
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <array>
 #include <cmath>
+#include <vector>
 
 #include "plan/metrics.h"
 
@@ -202,6 +205,74 @@ TEST(Metrics, ATrialWithoutAPushLiesAtTheAccessFreeOfForce) {
   EXPECT_EQ(metrics.force_impulse, 0.0);
   EXPECT_EQ(metrics.mean_contact_force, 0.0);
   EXPECT_EQ(metrics.centerline_deviation, 0.0);
+}
+
+/// Insertions and rolls of catheter and wire, push by push.
+TrialResult script_of(const std::vector<std::array<double, 4>>& records) {
+  TrialResult trial;
+  trial.tools.resize(2);
+  for (const auto& [catheter, turned, wire, wire_turned] : records) {
+    trial.pushes.push_back(push_at(std::max(catheter, wire), 0.0));
+    for (simulate::ToolTrack& track : trial.tools) {
+      track.push_force.push_back(-0.2 * static_cast<double>(trial.pushes.size()));
+      track.hub_torque.push_back(0.5);
+      track.tip_force.push_back(0.0);
+      track.wall_force.push_back(0.0);
+    }
+    trial.tools[0].insertion.push_back(catheter);
+    trial.tools[0].roll.push_back(turned);
+    trial.tools[1].insertion.push_back(wire);
+    trial.tools[1].roll.push_back(wire_turned);
+  }
+  return trial;
+}
+
+TEST(ScriptMetrics, CountMovesByWhatGoesWhere) {
+  // Wire on, catheter on, wire back, turned, both back, turned the other way.
+  TrialResult trial = script_of({{0, 0, 20, 0},
+                                 {0, 0, 40, 0},
+                                 {15, 0, 40, 0},
+                                 {30, 0, 40, 0},
+                                 {30, 0, 20, 0},
+                                 {30, 0.3, 20, 0},
+                                 {30, 0.6, 20, 0},
+                                 {25, 0.6, 15, 0},
+                                 {25, 0.2, 15, 0}});
+  trial.support = {.push = 0.7, .more = true};
+  Study study = study_with_goal_at(Vec3(0.0, 0.0, 90.0));
+  study.catheters.resize(1);
+  const ScriptMetrics script = compute_script_metrics(trial, study, straight_path());
+  EXPECT_EQ(script.moves, 6);
+  EXPECT_DOUBLE_EQ(script.hand_force, 1.8) << "of either tool, held back too";
+  EXPECT_DOUBLE_EQ(script.hub_torque, 0.5);
+  EXPECT_EQ(script.wire_beyond, 0.0) << "the wire is in the catheter";
+  EXPECT_EQ(script.hook_depth, 0.0) << "no branch is taken";
+  EXPECT_EQ(script.support, 0.7);
+  EXPECT_TRUE(script.bears_more);
+}
+
+TEST(ScriptMetrics, OfAWireAloneHaveItsMovesAndItsHand) {
+  TrialResult trial;
+  const auto add = [&](double insertion, double turned, double force) {
+    Push& push = trial.pushes.emplace_back(push_at(insertion, 0.0));
+    push.hub_angle = turned;
+    push.push_force = force;
+    push.hub_torque = -0.25 * turned;
+  };
+  add(10.0, 0.0, 0.1);
+  add(20.0, 0.0, 0.4);
+  add(20.0, 2.0, 0.0);
+  add(30.0, 2.0, -0.6);
+  add(25.0, 2.0, 0.0);
+  Study study = study_with_goal_at(Vec3(0.0, 0.0, 90.0));
+  EXPECT_FALSE(measure(trial, study, straight_path()).metrics.script);
+  study.catheters.resize(1);
+  const Measured measured = measure(trial, study, straight_path());
+  ASSERT_TRUE(measured.metrics.script);
+  EXPECT_EQ(measured.metrics.script->moves, 4);
+  EXPECT_EQ(measured.metrics.script->hand_force, 0.6);
+  EXPECT_EQ(measured.metrics.script->hub_torque, 0.5);
+  EXPECT_EQ(measured.metrics.script->support, 0.0);
 }
 
 }  // namespace

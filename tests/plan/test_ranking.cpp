@@ -104,6 +104,65 @@ TEST(Score, ErrorIsTheFirstOrderChangeOfTheScore) {
   EXPECT_NEAR(compute_score_error(m, error, goal, Limits{}, Weights{}), change, 1e-4 * change);
 }
 
+Metrics seated(double support) {
+  Metrics m;
+  m.tip_to_target = 1.0;
+  m.peak_contact_force = 0.1;
+  m.mean_contact_force = 0.3;
+  m.peak_tip_force = 0.3;
+  m.script = ScriptMetrics{.support = support,
+                           .hook_depth = 15.0,
+                           .wire_beyond = 10.0,
+                           .hand_force = 3.0,
+                           .hub_torque = 5.0,
+                           .moves = 30};
+  return m;
+}
+
+TEST(Score, OfAScriptHasWhatTheHandDoesAndGets) {
+  const Score score = compute_score(seated(0.3), {.radius = 4.0}, Limits{}, Weights{});
+  EXPECT_DOUBLE_EQ(score.support, 0.25);                     // 0.1 / (0.1 + 0.3)
+  EXPECT_DOUBLE_EQ(score.hook, 0.25);                        // 5 / (5 + 15)
+  EXPECT_DOUBLE_EQ(score.wire_beyond, 0.75);                 // 30 / (30 + 10)
+  EXPECT_DOUBLE_EQ(score.hand_force, 0.75);                  // 3 / (3 + 1)
+  EXPECT_DOUBLE_EQ(score.hub_torque, 0.5);                   // 5 / (5 + 5)
+  EXPECT_DOUBLE_EQ(score.moves, 0.75);                       // 30 / (30 + 10)
+  const double alone = 0.25 + 0.25 + 0.5 * 0.5 + 0.5 * 0.2;  // of the wire, by the weights
+  EXPECT_DOUBLE_EQ(score.total,
+                   (alone + 0.25 * 0.25 + 0.1 * (0.25 + 0.75 + 0.75 + 0.5 + 0.75)) / 3.75);
+}
+
+TEST(Score, ErrorOfTheSupportIsTheFirstOrderChangeOfTheScore) {
+  const NumericalError error{.support = 1e-5};
+  const simulate::Goal goal{.radius = 4.0};
+  const Metrics m = seated(0.3), weaker = seated(0.3 - error.support);
+  const double change = compute_score(weaker, goal, Limits{}, Weights{}).total -
+                        compute_score(m, goal, Limits{}, Weights{}).total;
+  ASSERT_GT(change, 1e-7);
+  EXPECT_NEAR(compute_score_error(m, error, goal, Limits{}, Weights{}), change, 1e-4 * change);
+}
+
+TEST(Rank, TellsWhatTheSeatedCatheterBearsAndThatAPlanStandsBehindByIt) {
+  Bench bench(1);
+  bench.study.catheters.resize(1);
+  bench.add(0, 1.0, 0.1) = seated(0.2);
+  bench.add(0, 1.0, 0.1) = seated(2.0);
+  for (Measured& trial : bench.trials) trial.metrics.reached = true;
+  bench.trials[1].metrics.script->bears_more = true;
+  const Ranking ranking = bench.ranked();
+  ASSERT_EQ(order_of(ranking), (std::vector<int>{1, 0}));
+  EXPECT_NE(ranking.plans[0].sentence.find("its catheter ends 15.0 mm in the branch and bears a "
+                                           "push of more than 2.0 N before it backs out"),
+            std::string::npos)
+      << ranking.plans[0].sentence;
+  EXPECT_NE(ranking.plans[1].sentence.find("bears a push of 0.20 N before"), std::string::npos);
+  EXPECT_NE(ranking.plans[1].sentence.find("behind it mostly by its catheter's support"),
+            std::string::npos)
+      << ranking.plans[1].sentence;
+  bench.weights = {.reach = 0.0, .peak_force = 0.0, .mean_force = 0.0, .margin = 0.0};
+  EXPECT_EQ(order_of(bench.ranked()), (std::vector<int>{1, 0})) << "by the others alone";
+}
+
 TEST(Rank, OrdersByScoreAndThenByCandidate) {
   Bench bench;
   bench.add(0, 2.0, 0.4);

@@ -462,7 +462,8 @@ TEST(ChoosePlansToRepeat, TakesTheFirstAndTheBestOfEachWireOnce) {
   Plans plans({0.1, 0.2, 0.3, 0.4});
   plans.candidates[3].wire = 1;
   const auto choose_of_two = [&](int count) {
-    return choose_plans_to_repeat(plans.ranked(), plans.findings.repeated, 2, count);
+    return choose_plans_to_repeat(plans.ranked(), plans.candidates, plans.findings.repeated, 2,
+                                  count);
   };
   EXPECT_EQ(choose_of_two(1), (std::vector<int>{0, 1, 3}));
   plans.repeat(0, {1.0});
@@ -474,6 +475,21 @@ TEST(ChoosePlansToRepeat, TakesTheFirstAndTheBestOfEachWireOnce) {
   EXPECT_TRUE(choose_of_two(1).empty());
   // More of those that are the best now.
   EXPECT_EQ(choose_of_two(2), (std::vector<int>{1, 3}));
+}
+
+TEST(ChoosePlansToRepeat, TakesTheBestOfEachCatheterToo) {
+  Plans plans({0.1, 0.2, 0.3, 0.4, 0.5, 0.6});
+  for (const int k : {0, 1, 2}) plans.candidates[static_cast<std::size_t>(k)].catheter = 1;
+  for (const int k : {3, 4}) plans.candidates[static_cast<std::size_t>(k)].catheter = 0;
+  const auto choose_of_one = [&] {
+    return choose_plans_to_repeat(plans.ranked(), plans.candidates, plans.findings.repeated, 1, 1);
+  };
+  EXPECT_EQ(choose_of_one(), (std::vector<int>{0, 3}));
+  const Ranking before = plans.ranked();
+  plans.repeat(0, {before.plans[0].score.total});
+  EXPECT_EQ(choose_of_one(), std::vector<int>{3});
+  plans.repeat(3, {before.plans[3].score.total});
+  EXPECT_TRUE(choose_of_one().empty());
 }
 
 /// Plans 0 to 3 of two wires in turn, the friction of both and EI of the second not known.

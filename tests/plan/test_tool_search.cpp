@@ -155,6 +155,36 @@ TEST(ToolSteps, ReadAsTheHandMakesThem) {
   for (const ToldStep& step : told) EXPECT_EQ(step.otherwise, "");
 }
 
+TEST(ToolSteps, EndWithTheCatheterInTheBranchWhereThatIsLongEnough) {
+  Ostium ostium;
+  ostium.arc = 200.0;
+  ostium.end = 240.0;
+  const std::vector<ToolStep> steps = {{.tool = 1, .push = 216.0}, {.tool = 1, .push = 30.0}};
+  const std::vector<ToolStep> seated = with_seat(steps, ostium, {});
+  ASSERT_EQ(seated.size(), 3U);
+  EXPECT_TRUE(seated.back().seats);
+  EXPECT_EQ(seated.back().at, ToolRules{}.seat);
+  const std::vector<std::string> expected = {
+      "advance the wire to 220 mm", "advance the wire until its tip is at the target, 247 mm in",
+      "advance the catheter over the wire until its tip is 10 mm past the ostium, by 60 mm at "
+      "most"};
+  EXPECT_EQ(texts_of(describe_steps(seated, 247.4)), expected);
+  ostium.end = 212.0;
+  EXPECT_EQ(with_seat(steps, ostium, {}).back().at, 7.0) << "5 mm behind the target";
+  ostium.end = 204.0;
+  EXPECT_EQ(with_seat(steps, ostium, {}), steps);
+  ostium.end = 240.0;
+  EXPECT_EQ(with_seat(steps, ostium, {.seat = 0.0}), steps);
+
+  Measured trial{.outcome = simulate::Outcome::kReached};
+  trial.metrics.reached = true;
+  trial.metrics.script = ScriptMetrics{.hook_depth = 2.0};
+  EXPECT_TRUE(stays_unseated({.steps = seated}, trial));
+  EXPECT_FALSE(stays_unseated({.steps = steps}, trial));
+  trial.metrics.script->hook_depth = 9.8;
+  EXPECT_FALSE(stays_unseated({.steps = seated}, trial));
+}
+
 TEST(ToolSteps, SayWhatEndsThemAndWhatElseToDo) {
   const std::vector<ToolStep> steps = {
       {.tool = 1, .push = 216.0, .steers = 7},

@@ -30,13 +30,21 @@ const kColumns = [
   ["Why", (t) => t.plan?.sentence ?? t.excluded ?? "", (t) => shown(t.plan ? t.plan.sentence : t.excluded ?? outcomeWord(t.outcome))],
 ];
 
+// Of scripts of catheter and wire.
+const kSupport = ["Seated catheter bears [N]", (t) => t.tools?.support_n ?? -1,
+  (t) => (t.tools ? `${t.tools.support_is_least ? "\u2265\u00a0" : ""}${told(t, t.tools.support_n, t.errors.support_error_n)}` : "\u2013")];
+const columnsOf = (trials) => trials.some((t) => t.tools) ? [...kColumns.slice(0, 10), kSupport, ...kColumns.slice(10)] : kColumns;
+
+const weightsOf = (report) =>
+  Object.entries(report.provenance.parameters.ranking.weights).map(([name, weight]) => `${name.replaceAll("_", " ")} ${weight}`).join(", ");
+
 const compare = (a, b) => {
   if (typeof a === "string") return a.localeCompare(b);
   return (a ?? Infinity) - (b ?? Infinity) || 0;
 };
 
 export const rankingSection = (page, selection) => {
-  const {trials} = page;
+  const {trials} = page, columns = columnsOf(trials);
   let column = 0, falling = false;
 
   const tools = [...new Set(trials.map(toolsName))];
@@ -49,7 +57,7 @@ export const rankingSection = (page, selection) => {
   const count = el("p", {role: "status", id: "ranking-count"});
   const body = el("tbody", {});
 
-  const heads = kColumns.map(([title], k) =>
+  const heads = columns.map(([title], k) =>
     el("th", {scope: "col"},
       el("button", {type: "button", class: "sort", onclick: () => {
         falling = column === k ? !falling : false;
@@ -60,7 +68,7 @@ export const rankingSection = (page, selection) => {
   const fill = () => {
     const shownTrials = trials.filter(
       (t) => (wire.value === "" || toolsName(t) === tools[Number(wire.value)]) && (which.value === "all" || t.plan));
-    const [, key] = kColumns[column];
+    const [, key] = columns[column];
     // Ties keep the order of ranks, then of trials.
     shownTrials.sort((a, b) =>
       (falling ? -1 : 1) * compare(key(a), key(b)) ||
@@ -69,7 +77,7 @@ export const rankingSection = (page, selection) => {
     body.replaceChildren(...shownTrials.map((t) => {
       const pick = el("button", {type: "button", class: "pick", "data-trial": t.id, onclick: () => selection.set(t.id),
         "aria-label": `Show ${t.plan ? `plan ${t.plan.rank}` : `trial ${t.id}`} in the vessel`}, "Show");
-      return el("tr", {"data-trial": t.id}, el("td", {}, pick), kColumns.map(([, , text]) => el("td", {}, text(t))));
+      return el("tr", {"data-trial": t.id}, el("td", {}, pick), columns.map(([, , text]) => el("td", {}, text(t))));
     }));
     count.textContent = `${plural(shownTrials.length, which.value === "all" ? "trial" : "plan")} shown of ${plural(trials.length, "trial")}.`;
     mark(selection.get());
@@ -97,5 +105,6 @@ export const rankingSection = (page, selection) => {
     el("p", {class: "note"},
       "\u00b1 is the estimated error of the simulation's finite elements and of the path that its solver takes; \u00b1\u00a0? where it was not estimated, as only the best plans are run again with finer elements. " +
       (trials.some((t) => t.level !== "full") ? "\u2248 marks trials against a rigid wall, most of them with long elements. " : "") +
+      `The score is the mean of its components by these weights: ${weightsOf(page.report)}. ` +
       "Errors of the wire's, the wall's and the image's data are not in it. Plans that the errors cannot tell apart are ties; those whose end hangs on how they are solved are sensitive, and stand last, as do those whose tip's error may put it outside the target, or could not be told."));
 };
