@@ -118,7 +118,8 @@ simulate::TrialResult run_candidate(const Study& study, const Candidate& candida
     expects(candidate.wire >= 0 && candidate.wire < std::ssize(study.wires));
     if (candidate.catheter >= 0) {
       return simulate::run_tool_trial(tools_of(study, candidate), make_introducer(study, candidate),
-                                      study.goal, vessel, tool_options(study), candidate.steps);
+                                      study.goal, vessel, tool_options(study, candidate),
+                                      candidate.steps);
     }
     return simulate::run_trial(study.wires[candidate.wire], make_introducer(study, candidate),
                                study.goal, vessel, study.insertion, candidate.moves);

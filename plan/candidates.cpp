@@ -81,14 +81,40 @@ Candidate first_candidate(const Study& study, const ToolPair& pair) {
 }
 
 std::vector<simulate::Tool> tools_of(const Study& study, const Candidate& candidate) {
+  const int first = wires_of(candidate).front();
   return {study.catheters.at(static_cast<std::size_t>(candidate.catheter)).tool,
-          {.wire = study.wires.at(static_cast<std::size_t>(candidate.wire))}};
+          {.wire = study.wires.at(static_cast<std::size_t>(first))}};
 }
 
-simulate::ToolTrialOptions tool_options(const Study& study) {
+std::vector<int> wires_of(const Candidate& candidate) {
+  if (candidate.first_wire < 0) return {candidate.wire};
+  return {candidate.first_wire, candidate.wire};
+}
+
+int count_exchanges(const Candidate& candidate) {
+  return static_cast<int>(
+      std::count_if(candidate.steps.begin(), candidate.steps.end(),
+                    [](const simulate::ToolStep& step) { return step.spare >= 0; }));
+}
+
+std::vector<ToldStep> describe_steps(const Study& study, const Candidate& candidate,
+                                     double insertion) {
+  return describe_steps(candidate.steps, insertion,
+                        study.wires.at(static_cast<std::size_t>(candidate.wire)).name);
+}
+
+std::string describe_script(const Study& study, const Candidate& candidate, double insertion) {
+  return describe_script(candidate.steps, insertion,
+                         study.wires.at(static_cast<std::size_t>(candidate.wire)).name);
+}
+
+simulate::ToolTrialOptions tool_options(const Study& study, const Candidate& candidate) {
   simulate::ToolTrialOptions options{.friction_between = study.tool_rules.friction,
                                      .insertion = study.insertion,
                                      .take_off = find_ostium(study.goal)};
+  if (candidate.first_wire >= 0) {
+    options.spares = {study.wires.at(static_cast<std::size_t>(candidate.wire))};
+  }
   options.insertion.element_length *= kToolElements;
   return options;
 }
@@ -99,10 +125,14 @@ double element_length_of(const Study& study, const Candidate& candidate) {
 
 std::string describe(const Study& study, const Candidate& candidate) {
   expects(candidate.wire >= 0 && candidate.wire < std::ssize(study.wires));
-  const std::string through =
-      candidate.catheter < 0
-          ? ""
-          : " in " + study.catheters[static_cast<std::size_t>(candidate.catheter)].tool.wire.name;
+  std::string through;
+  if (candidate.catheter >= 0) {
+    through = " in " + study.catheters[static_cast<std::size_t>(candidate.catheter)].tool.wire.name;
+  }
+  if (candidate.first_wire >= 0) {
+    through +=
+        " in exchange for " + study.wires[static_cast<std::size_t>(candidate.first_wire)].name;
+  }
   return study.wires[candidate.wire].name + through + ", inclination " +
          degrees(candidate.inclination) + " deg, azimuth " + degrees(candidate.azimuth) +
          " deg, roll " + degrees(candidate.roll) + " deg";

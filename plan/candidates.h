@@ -32,6 +32,7 @@ struct Candidate {
   std::vector<simulate::Move> moves = {};               // before the last push
   int catheter = -1;  // index into Study::catheters, round the wire; -1: none
   std::vector<simulate::ToolStep> steps = {};  // of a script of catheter and wire
+  int first_wire = -1;  // that a script begins with and exchanges for `wire`, its spare 0; -1: none
 };
 
 /// All combinations, wires outermost, roll innermost. What cannot differ is listed once: at
@@ -51,16 +52,26 @@ simulate::Introducer make_introducer(const Study& study, const Candidate& candid
 /// Scripts of a pair begin so: at the study's first inclination, azimuth and roll of both hubs.
 Candidate first_candidate(const Study& study, const ToolPair& pair);
 
-/// The catheter and the wire of a candidate that has one, from the outside in.
+/// The catheter and the wire that a candidate with one begins with, from the outside in.
 std::vector<simulate::Tool> tools_of(const Study& study, const Candidate& candidate);
+
+/// The candidate's wires in the order of their use: one, or two where it exchanges them.
+std::vector<int> wires_of(const Candidate& candidate);
+int count_exchanges(const Candidate& candidate);
+
+/// Its steps in words, and in one line (catheters.h).
+std::vector<ToldStep> describe_steps(const Study& study, const Candidate& candidate,
+                                     double insertion);
+std::string describe_script(const Study& study, const Candidate& candidate, double insertion);
 
 /// Elements of scripts of catheter and wire are so many times the study's: the two together are
 /// stiffer than a wire alone, and halving them moved tips by half a millimetre (MEASUREMENTS.md).
 inline constexpr double kToolElements = 2.0;
-simulate::ToolTrialOptions tool_options(const Study& study);
+simulate::ToolTrialOptions tool_options(const Study& study, const Candidate& candidate);
 double element_length_of(const Study& study, const Candidate& candidate);  //             [mm]
 
-/// "amplatz-stiff, inclination 15 deg, azimuth 90 deg, roll 0 deg"
+/// "amplatz-stiff, inclination 15 deg, azimuth 90 deg, roll 0 deg"; " in cobra-c2" where it is in a
+/// catheter, " in exchange for rosen" where it takes another's place.
 std::string describe(const Study& study, const Candidate& candidate);
 
 }  // namespace wireplan::plan

@@ -134,16 +134,40 @@ std::vector<ToolPair> list_pairs(const std::vector<Catheter>& catheters,
 
 namespace {
 
+/// The wire that is brought in by a step has to fit as any other.
+std::string find_broken_exchange(const ToolStep& step, const Catheter& catheter, double tube_in,
+                                 const simulate::Wire* spare) {
+  expects(spare != nullptr);
+  const double inner = 2.0 * catheter.tool.inner_radius;
+  if (2.0 * spare->radius >= inner) {
+    return "wire too thick: " + millimetres_of(2.0 * spare->radius) + " in a lumen of " +
+           millimetres_of(inner);
+  }
+  if (step.at < 0.0) return "the wire is brought in past the catheter's tip";
+  if (tube_in - step.at < kWireStart) {
+    return "the catheter is only " + millimetres_of(tube_in) + " in, too little to exchange the " +
+           "wire through it";
+  }
+  return {};
+}
+
 /// Of steps that are all made whole.
 std::string find_broken_when_whole(const std::vector<ToolStep>& steps, const Catheter& catheter,
-                                   const simulate::Wire& wire, const ToolRules& rules) {
-  const simulate::Wire& tube = catheter.tool.wire;
+                                   const simulate::Wire& wire, const ToolRules& rules,
+                                   const simulate::Wire* spare) {
+  const simulate::Wire &tube = catheter.tool.wire, *in_use = &wire;
   const bool soft =
       !tube.sections.empty() && tube.sections.front().bending_stiffness <= rules.soft_tip;
   double tube_in = 0.0, wire_in = kWireStart, turned = 0.0;
   for (std::size_t k = 0; k < steps.size(); ++k) {
     const ToolStep& step = steps[k];
     const std::string where = "step " + std::to_string(k + 1) + ": ";
+    if (step.spare >= 0) {
+      const std::string broken = find_broken_exchange(step, catheter, tube_in, spare);
+      if (!broken.empty()) return where + broken;
+      in_use = spare;
+      wire_in = tube_in - step.at;
+    }
     const bool of_catheter = step.tool != 1, of_wire = step.tool != 0;
     const double length = std::abs(step.push);
     if (of_catheter && length > 0.0 && std::abs(turned) > rules.turn_per_length * length + 1e-9) {
@@ -169,7 +193,7 @@ std::string find_broken_when_whole(const std::vector<ToolStep>& steps, const Cat
       return where + "less than " + millimetres_of(rules.outside) + " of catheter stay outside";
     }
     // The wire's hub end behind the catheter's.
-    if (wire.length() - wire_in < tube.length() - tube_in + rules.hold - 1e-9) {
+    if (in_use->length() - wire_in < tube.length() - tube_in + rules.hold - 1e-9) {
       return where + "less than " + millimetres_of(rules.hold) +
              " of wire are left behind the catheter's hub";
     }
@@ -180,14 +204,15 @@ std::string find_broken_when_whole(const std::vector<ToolStep>& steps, const Cat
 }  // namespace
 
 std::string find_broken_rule(const std::vector<ToolStep>& steps, const Catheter& catheter,
-                             const simulate::Wire& wire, const ToolRules& rules) {
-  std::string broken = find_broken_when_whole(steps, catheter, wire, rules);
+                             const simulate::Wire& wire, const ToolRules& rules,
+                             const simulate::Wire* spare) {
+  std::string broken = find_broken_when_whole(steps, catheter, wire, rules, spare);
   if (!broken.empty()) return broken;
   std::vector<ToolStep> ended = steps;
   for (ToolStep& step : ended) {
     if (step.until != Until::kMade && step.push < 0.0) step.push = 0.0;
   }
-  return find_broken_when_whole(ended, catheter, wire, rules);
+  return find_broken_when_whole(ended, catheter, wire, rules, spare);
 }
 
 std::vector<ToolStep> with_seat(std::vector<ToolStep> steps, const Ostium& ostium,
@@ -283,7 +308,8 @@ std::string tell_steers(const ToolStep& step) {
 
 }  // namespace
 
-std::vector<ToldStep> describe_steps(const std::vector<ToolStep>& steps, double insertion) {
+std::vector<ToldStep> describe_steps(const std::vector<ToolStep>& steps, double insertion,
+                                     const std::string& spare) {
   std::vector<ToldStep> told;
   double tube_in = 0.0, wire_in = kWireStart;
   bool tube_known = true, wire_known = true;
@@ -300,7 +326,14 @@ std::vector<ToldStep> describe_steps(const std::vector<ToolStep>& steps, double 
     if (!end.empty() && (of_wire || both)) wire_known = false;
     if (!end.empty() && !of_wire) tube_known = false;
     std::string text;
-    if (step.turn != 0.0) {
+    if (step.spare >= 0) {
+      wire_in = tube_in - step.at;
+      wire_known = tube_known;
+      text = "hold the catheter, withdraw the wire whole and bring in " + spare +
+             " through it, to " +
+             (wire_known ? whole_number(wire_in) + " mm"
+                         : whole_number(step.at) + " mm behind the catheter's tip");
+    } else if (step.turn != 0.0) {
       const std::string side = step.turn > 0.0 ? " clockwise" : " counterclockwise";
       const double angle = std::abs(step.turn) / kRadPerDeg;
       text = "turn " + name +
@@ -329,9 +362,10 @@ std::vector<ToldStep> describe_steps(const std::vector<ToolStep>& steps, double 
   return told;
 }
 
-std::string describe_script(const std::vector<ToolStep>& steps, double insertion) {
+std::string describe_script(const std::vector<ToolStep>& steps, double insertion,
+                            const std::string& spare) {
   std::string text;
-  for (const ToldStep& step : describe_steps(steps, insertion)) {
+  for (const ToldStep& step : describe_steps(steps, insertion, spare)) {
     text += (text.empty() ? "" : "; ") + step.text;
   }
   return text;

@@ -32,6 +32,10 @@ struct ToolRules {
   /// enough; 0: it stays. Assumed: deep enough to bear a push, short of common branches     [mm]
   double seat = 10.0;
   double friction = 0.05;  // Coulomb's coefficient between wire and catheter
+  /// Whether a wire that no script of its own brings there is brought in through the catheter in
+  /// exchange for one that does (wire_exchange.h). No: the hand keeps to one wire, and the search
+  /// is shorter.
+  bool exchange = true;
 };
 
 /// Where scripts are to bring the tip: the last vessel that the way takes from a wider one.
@@ -59,10 +63,12 @@ std::vector<ToolPair> list_pairs(const std::vector<Catheter>& catheters,
                                  const std::vector<simulate::Wire>& wires, const Ostium& ostium,
                                  const ToolRules& rules);
 
-/// What breaks the rules in a script, or is not possible with tools of these lengths; else empty.
-/// Steps that end before they are made whole may break none either.
+/// What breaks the rules in a script, or is not possible with tools of these sizes; else empty.
+/// Steps that end before they are made whole may break none either. `spare` is what an exchange
+/// brings in; a script without one needs none.
 std::string find_broken_rule(const std::vector<simulate::ToolStep>& steps, const Catheter& catheter,
-                             const simulate::Wire& wire, const ToolRules& rules);
+                             const simulate::Wire& wire, const ToolRules& rules,
+                             const simulate::Wire* spare = nullptr);
 
 /// A script, and after it the step that seats the catheter, where the branch up to the target is
 /// long enough for it.
@@ -81,11 +87,13 @@ struct ToldStep {
 /// "advance the wire to 250 mm", "advance the catheter over the wire to 230 mm", "withdraw the wire
 /// by 60 mm", "turn the catheter 60 degrees clockwise", ...: as the hand makes them, turns as seen
 /// from the hub toward the patient. "to" is said as long as no step before ended by what was seen.
-/// The last step goes on to where the trial ended.
-std::vector<ToldStep> describe_steps(const std::vector<simulate::ToolStep>& steps,
-                                     double insertion);
+/// The last step goes on to where the trial ended. `spare` is the name of the wire that an exchange
+/// brings in.
+std::vector<ToldStep> describe_steps(const std::vector<simulate::ToolStep>& steps, double insertion,
+                                     const std::string& spare = {});
 
 /// The texts in one line, without what else to do: "advance the wire to 250 mm; advance ...".
-std::string describe_script(const std::vector<simulate::ToolStep>& steps, double insertion);
+std::string describe_script(const std::vector<simulate::ToolStep>& steps, double insertion,
+                            const std::string& spare = {});
 
 }  // namespace wireplan::plan

@@ -5,6 +5,7 @@
 
 #include "plan/judge.h"
 #include "plan/manoeuvre.h"
+#include "plan/wire_exchange.h"
 
 namespace wireplan::plan {
 namespace {
@@ -22,6 +23,11 @@ constexpr std::size_t kSparesTried = 2;
 // behind let others up, which are repeated next.
 constexpr int kFirstRepeats = 32;
 constexpr int kRepeatRounds = 3;
+
+bool same_script(const Candidate& a, const Candidate& b) {
+  return a.wire == b.wire && a.first_wire == b.first_wire && a.catheter == b.catheter &&
+         a.steps == b.steps;
+}
 
 }  // namespace
 
@@ -147,8 +153,10 @@ class Planner {
     }
     ToolScripts search =
         find_tool_scripts(study_, vessel_.scout_model(), options_.batch, options_.early.script);
+    find_exchanges(study_, vessel_.scout_model(), options_.batch, search);
     if (options_.batch.cancelled && options_.batch.cancelled()) throw Interrupted();
     plan_.scripts.branches += search.branches;
+    add_seats(study_, search);
     std::vector<Run> runs;
     for (const Candidate& found : search.found) runs.push_back({.candidate = found});
     std::vector<Measured> trials =
@@ -156,29 +164,39 @@ class Planner {
     try_spares(search, runs, trials);
     leave_out_seats(runs, trials);
     for (PairFindings& pair : search.pairs) {
-      std::vector<std::size_t> own, reached;
-      for (std::size_t k = 0; k < runs.size(); ++k) {
-        if (runs[k].candidate.catheter != pair.pair.catheter ||
-            runs[k].candidate.wire != pair.pair.wire) {
-          continue;
-        }
-        own.push_back(k);
-        if (trials[k].outcome == simulate::Outcome::kReached) reached.push_back(k);
-      }
-      if (!reached.empty()) pair.stopped.clear();
-      if (reached.empty() && !own.empty()) {
-        const auto further = [&](std::size_t a, std::size_t b) {
-          return trials[a].progress < trials[b].progress;
-        };
-        reached = {*std::max_element(own.begin(), own.end(), further)};
-        if (pair.stopped.empty()) pair.stopped = trials[reached.front()].reason;
-      }
-      for (const std::size_t k : reached) {
-        plan_.scripts.found.push_back(runs[k].candidate);
-        plan_.scripts.starts.push_back(-1);
-      }
+      const bool exchanged = keep_scripts_of(pair, true, runs, trials);
+      keep_scripts_of(pair, false, runs, trials, exchanged);
     }
     plan_.scripts.pairs = std::move(search.pairs);
+  }
+
+  // Of a pair's scripts, those with an exchange or the others, what reaches in full; true where
+  // there is any. Else of the others the one that comes furthest, unless what is `shown` is enough.
+  bool keep_scripts_of(PairFindings& pair, bool exchanged, const std::vector<Run>& runs,
+                       const std::vector<Measured>& trials, bool shown = false) {
+    std::vector<std::size_t> own, reached;
+    for (std::size_t k = 0; k < runs.size(); ++k) {
+      const Candidate& script = runs[k].candidate;
+      if (script.catheter != pair.pair.catheter || script.wire != pair.pair.wire) continue;
+      if ((script.first_wire >= 0) != exchanged) continue;
+      own.push_back(k);
+      if (trials[k].outcome == simulate::Outcome::kReached) reached.push_back(k);
+    }
+    const bool any = !reached.empty();
+    std::string& stopped = exchanged ? pair.exchange.stopped : pair.stopped;
+    if (any) stopped.clear();
+    if (!any && !own.empty()) {
+      const std::size_t furthest = *std::max_element(
+          own.begin(), own.end(),
+          [&](std::size_t a, std::size_t b) { return trials[a].progress < trials[b].progress; });
+      if (stopped.empty()) stopped = trials[furthest].reason;
+      if (!exchanged && !shown) reached = {furthest};
+    }
+    for (const std::size_t k : reached) {
+      plan_.scripts.found.push_back(runs[k].candidate);
+      plan_.scripts.starts.push_back(-1);
+    }
+    return any;
   }
 
   // Where a script does not reach in full that holds in the search, the first of its neighbours
@@ -192,7 +210,7 @@ class Planner {
         if (trials[k].outcome == simulate::Outcome::kReached) continue;
         if (tried >= search.spares[k].size()) continue;
         const bool known = std::any_of(runs.begin(), runs.end(), [&](const Run& run) {
-          return run.candidate.steps == search.spares[k][tried].steps;
+          return same_script(run.candidate, search.spares[k][tried]);
         });
         if (known) continue;
         next.push_back({.candidate = search.spares[k][tried]});

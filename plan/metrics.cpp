@@ -123,22 +123,31 @@ double find_progress(const simulate::TrialResult& trial, const Centerline& path)
 std::vector<ToolMetrics> compute_tool_metrics(const simulate::TrialResult& trial,
                                               const Centerline& path) {
   std::vector<ToolMetrics> all;
-  for (const simulate::ToolTrack& track : trial.tools) {
+  // Of a track from one change of its tool to the next.
+  const auto add = [&](const simulate::ToolTrack& track, const std::string& name, std::size_t from,
+                       std::size_t to) {
     ToolMetrics& tool = all.emplace_back();
-    tool.name = track.name;
-    const std::size_t count = track.insertion.size();
-    if (count == 0) continue;
-    for (std::size_t k = 0; k < count; ++k) {
+    tool.name = name;
+    if (from >= to) return;
+    for (std::size_t k = from; k < to; ++k) {
       tool.peak_tip_force = std::max(tool.peak_tip_force, track.tip_force[k]);
-      tool.mean_tip_force += track.tip_force[k] / static_cast<double>(count);
+      tool.mean_tip_force += track.tip_force[k] / static_cast<double>(to - from);
       tool.peak_wall_force = std::max(tool.peak_wall_force, track.wall_force[k]);
       tool.peak_push_force = std::max(tool.peak_push_force, std::abs(track.push_force[k]));
       tool.peak_hub_torque = std::max(tool.peak_hub_torque, std::abs(track.hub_torque[k]));
     }
-    tool.insertion = track.insertion.back();
-    if (trial.nodes.cols() > 1) {
+    tool.insertion = track.insertion[to - 1];
+    if (trial.nodes.cols() > 1 && to == track.insertion.size()) {
       tool.progress =
           preprocess::find_progress(simulate::point_at_arc(trial.nodes, tool.insertion), path);
+    }
+  };
+  for (const simulate::ToolTrack& track : trial.tools) {
+    std::vector<simulate::ToolTrack::Change> parts = {{.from = 0, .name = track.name}};
+    parts.insert(parts.end(), track.changes.begin(), track.changes.end());
+    for (std::size_t k = 0; k < parts.size(); ++k) {
+      add(track, parts[k].name, parts[k].from,
+          k + 1 < parts.size() ? parts[k + 1].from : track.insertion.size());
     }
   }
   return all;
@@ -154,6 +163,9 @@ ScriptMetrics compute_script_metrics(const simulate::TrialResult& trial, const S
       script.hub_torque = std::max(script.hub_torque, std::abs(push.hub_torque));
     }
     return script;
+  }
+  for (const simulate::ToolTrack& track : trial.tools) {
+    script.exchanges += static_cast<int>(track.changes.size());
   }
   const std::vector<ToolMetrics> tools = compute_tool_metrics(trial, path);
   for (const ToolMetrics& tool : tools) {

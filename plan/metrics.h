@@ -32,6 +32,7 @@ struct ScriptMetrics {
   /// Of the hand: pushes, pulls and turns, each counted once until others begin; with what was
   /// tried again.
   int moves = 0;
+  int exchanges = 0;        // of wires
   bool bears_more = false;  // the support is that at least
 };
 
@@ -141,7 +142,8 @@ inline constexpr std::array kToolMetricFields = {
     ToolMetricField{"peak_hub_torque_n_mm", &ToolMetrics::peak_hub_torque},
 };
 
-/// Of each tool of a trial that has several; else empty.
+/// Of each tool of a trial that has several; else empty. From the outside in, those that were
+/// exchanged in the order of their use.
 std::vector<ToolMetrics> compute_tool_metrics(const simulate::TrialResult& trial,
                                               const Centerline& path);
 

@@ -231,7 +231,7 @@ simulate::Wire disturbed_tube(const Study& study, int catheter, const Disturbanc
 simulate::TrialResult run_disturbed(const Study& study, const Candidate& candidate,
                                     const simulate::VesselModel& vessel,
                                     const Disturbance& disturbance) {
-  // The wire, its friction and its contact radius.
+  // The wires, their friction and their contact radius.
   const bool tools = candidate.catheter >= 0;
   const double factor = vessel.compliance ? disturbance.wall_factor : 1.0;
   const auto own_of = [&](const simulate::Wire& disturbed) {
@@ -239,7 +239,10 @@ simulate::TrialResult run_disturbed(const Study& study, const Candidate& candida
     own.radius += disturbance.inward;
     return own;
   };
-  const simulate::Wire wire = own_of(disturbed_wire(study, candidate.wire, disturbance));
+  std::vector<simulate::Wire> wires;
+  for (const int wire : wires_of(candidate)) {
+    wires.push_back(own_of(disturbed_wire(study, wire, disturbance)));
+  }
   simulate::InsertionOptions insertion = study.insertion;
   insertion.residual_tolerance *= kRepeatTolerance / factor;
   insertion.support_factor *= disturbance.support_factor / factor;
@@ -264,11 +267,14 @@ simulate::TrialResult run_disturbed(const Study& study, const Candidate& candida
       own.insertion = insertion;
       std::vector<simulate::Tool> both = tools_of(study, candidate);
       both[0].wire = own_of(disturbed_tube(study, candidate.catheter, disturbance));
-      both[1].wire = wire;
-      return simulate::run_tool_trial(both, introducer, study.goal, vessel, tool_options(own),
+      both[1].wire = wires.front();
+      simulate::ToolTrialOptions options = tool_options(own, candidate);
+      options.spares.assign(wires.begin() + 1, wires.end());
+      return simulate::run_tool_trial(both, introducer, study.goal, vessel, options,
                                       candidate.steps);
     }
-    return simulate::run_trial(wire, introducer, study.goal, vessel, insertion, candidate.moves);
+    return simulate::run_trial(wires.front(), introducer, study.goal, vessel, insertion,
+                               candidate.moves);
   });
   multiply_forces(trial, factor);
   return trial;

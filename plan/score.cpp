@@ -69,6 +69,7 @@ Score compute_score(const Metrics& metrics, const simulate::Goal& goal, const Li
     score.hand_force = saturating(script.hand_force, scales.hand_force);
     score.hub_torque = saturating(script.hub_torque, scales.hub_torque);
     score.moves = saturating(script.moves, scales.moves);
+    score.exchanges = saturating(script.exchanges, scales.exchanges);
   }
   score.total = weighted_mean(score, weights);
   return score;

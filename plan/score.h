@@ -21,7 +21,7 @@ struct Limits {
 struct Weights {
   double reach = 1.0, peak_force = 1.0, mean_force = 0.5, margin = 0.5;
   double support = 0.25, hook = 0.1, wire_beyond = 0.1, hand_force = 0.1, hub_torque = 0.1,
-         moves = 0.1;
+         moves = 0.1, exchanges = 0.1;
 };
 
 /// What a plan costs: each component in [0, 1], 0 the best, and their weighted mean. The scales are
@@ -35,13 +35,13 @@ struct Weights {
 /// f / (f + s) is 1/2 at f = s and never reaches 1, since no limit of side-wall forces is agreed
 /// on. In studies with catheters, by ScriptMetrics; each is 1/2 at a scale of ScriptScales:
 ///   support, hook, wire_beyond   s / (s + x): 1 without a catheter that is seated
-///   hand_force, hub_torque, moves   x / (x + s)
+///   hand_force, hub_torque, moves, exchanges   x / (x + s)
 struct Score {
   double total = 0.0;  // smaller is better
   double reach = 0.0, peak_force = 0.0, mean_force = 0.0, margin = 0.0;
   bool of_script = false;  // whether the others act
   double support = 0.0, hook = 0.0, wire_beyond = 0.0, hand_force = 0.0, hub_torque = 0.0,
-         moves = 0.0;
+         moves = 0.0, exchanges = 0.0;
 };
 
 /// Assumed: about what common scripts come to, so that they differ most there.
@@ -52,6 +52,7 @@ struct ScriptScales {
   double hand_force = 1.0;    //                                                             [N]
   double hub_torque = 5.0;    //                                                          [N mm]
   double moves = 10.0;
+  double exchanges = 1.0;
 };
 inline constexpr ScriptScales kScriptScales;
 
@@ -75,6 +76,7 @@ inline constexpr std::array kScoreParts = {
     ScorePart{"hand_force", &Score::hand_force, &Weights::hand_force, "the hand's force", true},
     ScorePart{"hub_torque", &Score::hub_torque, &Weights::hub_torque, "the hub's torque", true},
     ScorePart{"moves", &Score::moves, &Weights::moves, "the number of its moves", true},
+    ScorePart{"exchanges", &Score::exchanges, &Weights::exchanges, "its exchange of wires", true},
 };
 
 /// How far a trial's numbers may be from those of infinitely short elements, on whichever path the

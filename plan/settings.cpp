@@ -43,10 +43,15 @@ std::string describe_setting(Setting setting) {
 }
 
 std::vector<Setting> settings_that_act(const Study& study, const Candidate& candidate) {
-  const simulate::Wire& wire = study.wires.at(static_cast<std::size_t>(candidate.wire));
+  bool rolls = false, rubs = false;
+  for (const int k : wires_of(candidate)) {
+    const simulate::Wire& wire = study.wires.at(static_cast<std::size_t>(k));
+    rolls = rolls || !wire.straight() || !wire.round();
+    rubs = rubs || simulate::friction_of(wire, study.insertion) > 0.0;
+  }
   std::vector<Setting> settings = {Setting::kStep, Setting::kTolerance};
-  if (!wire.straight() || !wire.round()) settings.push_back(Setting::kRoll);
-  if (simulate::friction_of(wire, study.insertion) > 0.0) settings.push_back(Setting::kFriction);
+  if (rolls) settings.push_back(Setting::kRoll);
+  if (rubs) settings.push_back(Setting::kFriction);
   return settings;
 }
 

@@ -28,9 +28,9 @@ double sign_of(double value) { return value > 0.0 ? 1.0 : value < 0.0 ? -1.0 : 0
 bool begin_alike(const ToolScript& a, const ToolScript& b) {
   const ToolStep &one = a.front(), &other = b.front();
   if (one == other && (a.size() == 1) == (b.size() == 1)) return true;
-  return a.size() > 1 && b.size() > 1 && one.tool == other.tool && one.until == other.until &&
-         one.until != Until::kInBranch && sign_of(one.push) == sign_of(other.push) &&
-         sign_of(one.turn) == sign_of(other.turn);
+  return a.size() > 1 && b.size() > 1 && std::max(one.spare, other.spare) < 0 &&
+         one.tool == other.tool && one.until == other.until && one.until != Until::kInBranch &&
+         sign_of(one.push) == sign_of(other.push) && sign_of(one.turn) == sign_of(other.turn);
 }
 
 /// Whether what ends step `a` comes before what ends `b`.
@@ -151,6 +151,35 @@ std::vector<bool> try_scripts(ToolTrial& trial, const std::vector<ToolScript>& s
   SharedTrials shared(trial, scripts.size(), cancelled);
   shared.go_on(std::move(rests));
   return shared.reached();
+}
+
+long weigh_scripts(ToolTrial& trial, std::size_t begun,
+                   const std::function<bool(const ToolScript&)>& allowed,
+                   const std::function<bool()>& cancelled, std::vector<FoundScript>& scripts) {
+  std::vector<ToolScript> all, rests;  // they begin alike, and are tried from there
+  std::vector<std::size_t> owners;
+  for (std::size_t k = 0; k < scripts.size(); ++k) {
+    for (ToolScript& script : list_neighbours(scripts[k].steps)) {
+      rests.emplace_back(script.begin() + static_cast<std::ptrdiff_t>(begun), script.end());
+      all.push_back(std::move(script));
+      owners.push_back(k);
+    }
+  }
+  const std::vector<bool> reached = try_scripts(trial, rests, cancelled);
+  for (std::size_t k = 0; k < scripts.size(); ++k) {
+    double tried = 0.0, held = 0.0;
+    for (std::size_t n = 0; n < all.size(); ++n) {
+      if (owners[n] != k) continue;
+      const bool own = tried == 0.0;
+      ++tried;
+      if (own) scripts[k].holds = reached[n];
+      if (!reached[n]) continue;
+      ++held;
+      if (!own && allowed(all[n])) scripts[k].spares.push_back(all[n]);
+    }
+    scripts[k].share = held / tried;
+  }
+  return std::ssize(all);
 }
 
 std::vector<FoundScript> choose_different(const std::vector<FoundScript>& from, std::size_t most) {

@@ -36,6 +36,13 @@ struct FoundScript {
   std::vector<ToolScript> spares = {};  // neighbours that do
 };
 
+/// Of each script how many of it and its neighbours reach, and which of these are allowed to stand
+/// in for it. All begin with the same `begun` steps, which the trial has made. Returns how many
+/// were tried.
+long weigh_scripts(simulate::ToolTrial& trial, std::size_t begun,
+                   const std::function<bool(const ToolScript&)>& allowed,
+                   const std::function<bool()>& cancelled, std::vector<FoundScript>& scripts);
+
 /// At most so many that differ in turn or depth. First those whose neighbours reach, as far as that
 /// was tried, and with most others round them: a hand and a patient that are not quite as assumed
 /// end there. Then the fewest steps and the least force first.

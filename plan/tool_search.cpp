@@ -12,9 +12,7 @@ namespace {
 
 /// All chosen.
 constexpr double kCover = 6.0;  // of a curve behind its end, where the wire is withdrawn to  [mm]
-constexpr std::size_t kScriptsKept = 6;  // scripts of a pair
-constexpr double kSteady = 0.5;  // of a script and its neighbours that reach: it holds, and one of
-                                 // them may stand in for it
+constexpr std::size_t kScriptsKept = 6;      // scripts of a pair
 constexpr std::size_t kSuggestedAtOnce = 3;  // catheters
 
 // Of the search; ten times as much brought half of the wires elsewhere than runs in full   [N]
@@ -55,8 +53,8 @@ std::vector<std::vector<std::size_t>> tried_together(const Study& study,
 }
 
 /// What a pair's way up and its starts found: the different scripts of it that hold best.
-void gather(const Study& study, const Ostium& ostium, const std::vector<ToolStart>& starts,
-            std::size_t slot, const StartFindings& way_up, PairFindings& pair, ToolScripts& all) {
+void gather(const Study& study, const std::vector<ToolStart>& starts, std::size_t slot,
+            const StartFindings& way_up, PairFindings& pair, ToolScripts& all) {
   std::vector<const StartFindings*> parts;
   for (const ToolStart& start : starts) {
     if (start.pair == slot) parts.push_back(&start.findings);
@@ -83,23 +81,42 @@ void gather(const Study& study, const Ostium& ostium, const std::vector<ToolStar
   if (pair.stopped.empty()) pair.stopped = way_up.stopped;
   if (pair.found > 0) pair.stopped.clear();
   if (!kept.empty()) pair.held = kept.front().share;
-  const bool found_any = !kept.empty();
-  if (!found_any && !closest.empty()) kept.push_back({.steps = closest});
-  for (FoundScript& script : kept) {
-    Candidate candidate = first_candidate(study, pair.pair);
-    if (found_any) script.steps = with_seat(std::move(script.steps), ostium, study.tool_rules);
-    candidate.steps = as_written(std::move(script.steps));
-    all.found.push_back(candidate);
+  if (kept.empty() && !closest.empty()) kept.push_back({.steps = closest});
+  add_scripts(first_candidate(study, pair.pair), std::move(kept), all);
+}
+
+}  // namespace
+
+void add_scripts(Candidate begun, std::vector<FoundScript> scripts, ToolScripts& all) {
+  for (FoundScript& script : scripts) {
+    begun.steps = as_written(std::move(script.steps));
+    all.found.push_back(begun);
     all.spares.emplace_back();
-    if (script.share < kSteady) continue;
+    if (script.share < kSteadyShare) continue;
     for (ToolScript& spare : script.spares) {
-      candidate.steps = as_written(with_seat(std::move(spare), ostium, study.tool_rules));
-      all.spares.back().push_back(candidate);
+      begun.steps = as_written(std::move(spare));
+      all.spares.back().push_back(begun);
     }
   }
 }
 
-}  // namespace
+void add_seats(const Study& study, ToolScripts& all) {
+  const std::optional<Ostium> ostium = find_ostium(study.goal);
+  if (!ostium) return;
+  const auto reached = [&](const Candidate& script) {
+    return std::any_of(all.pairs.begin(), all.pairs.end(), [&](const PairFindings& pair) {
+      return pair.pair.catheter == script.catheter && pair.pair.wire == script.wire &&
+             pair.found > 0;
+    });
+  };
+  const auto add = [&](Candidate& script) {
+    if (script.first_wire >= 0 || !reached(script)) return;
+    script.steps = as_written(with_seat(std::move(script.steps), *ostium, study.tool_rules));
+  };
+  for (Candidate& script : all.found) add(script);
+  for (std::vector<Candidate>& spares : all.spares)
+    std::for_each(spares.begin(), spares.end(), add);
+}
 
 std::vector<ToolPair> pairs_of(const Study& study) {
   const std::optional<Ostium> ostium = find_ostium(study.goal);
@@ -163,8 +180,8 @@ ToolScripts find_tool_scripts(const Study& study, const simulate::VesselModel& v
     bool holds = false;
     for (std::size_t k = 0; k < slots.size(); ++k) {
       PairFindings& pair = all.pairs[slots[k]];
-      gather(study, *ostium, starts, k, ways[k].findings, pair, all);
-      holds = holds || pair.held >= kSteady;
+      gather(study, starts, k, ways[k].findings, pair, all);
+      holds = holds || pair.held >= kSteadyShare;
     }
     if (holds) break;
   }

@@ -12,11 +12,27 @@
 #include <vector>
 
 #include "plan/batch.h"
+#include "plan/tool_neighbours.h"
 
 namespace wireplan::plan {
 
 /// Whether there is anything to search: pairs that fit, and an ostium.
 std::vector<ToolPair> pairs_of(const Study& study);
+
+/// Of a script and its neighbours that reach: it holds, and one of them may stand in for it;
+/// chosen.
+inline constexpr double kSteadyShare = 0.5;
+
+/// What came of bringing the wire of a pair in through its catheter in exchange for another
+/// (wire_exchange.h).
+struct ExchangeFindings {
+  int first_wire = -1;  // of the script that holds best or comes furthest; -1: not tried
+  int found = 0;        // scripts that reached in the search
+  double held = 0.0;    // as below
+  std::string stopped;  // what stopped it, or why it was not tried; else empty
+
+  bool tried() const { return first_wire >= 0; }
+};
 
 /// What came of a pair.
 struct PairFindings {
@@ -26,6 +42,7 @@ struct PairFindings {
   double nearest_hook = -1.0;  // of the catheter's tip to the ostium at best; -1: not tried    [mm]
   double furthest = 0.0;       // of a tip along the way                                      [mm]
   std::string stopped;         // what stopped the best script, where none reached; else empty
+  ExchangeFindings exchange = {};  // where its own scripts do not hold
 
   bool tried() const { return nearest_hook >= 0.0 || furthest > 0.0 || !stopped.empty(); }
 };
@@ -38,6 +55,13 @@ struct ToolScripts {
   std::vector<PairFindings> pairs;             // of all pairs, in the order of list_pairs()
   long branches = 0;                           // states that were gone on from
 };
+
+/// Adds scripts of a pair, which begin as that candidate, with their spares where they hold.
+void add_scripts(Candidate begun, std::vector<FoundScript> scripts, ToolScripts& all);
+
+/// Has scripts that reached end with the catheter in the branch, but where it is seated already, as
+/// for an exchange.
+void add_seats(const Study& study, ToolScripts& all);
 
 /// The study as scripts are tried in it: on a rigid wall, with long elements and loose residuals.
 Study tool_scout_study(const Study& study);

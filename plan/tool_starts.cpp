@@ -251,34 +251,14 @@ class ToolSearch {
   }
 
   void weigh(std::vector<FoundScript>& chosen) {
-    const auto begun = static_cast<std::ptrdiff_t>(begin_.steps.size());
-    std::vector<ToolScript> all, rests;  // neighbours begin alike, and are tried from there
-    std::vector<std::size_t> owners;
-    for (std::size_t k = 0; k < chosen.size(); ++k) {
-      for (ToolScript& script : list_neighbours(chosen[k].steps)) {
+    for (const FoundScript& found : chosen) {
+      for (const ToolScript& script : list_neighbours(found.steps)) {
         expects(std::equal(begin_.steps.begin(), begin_.steps.end(), script.begin()));
-        rests.emplace_back(script.begin() + begun, script.end());
-        all.push_back(std::move(script));
-        owners.push_back(k);
       }
     }
-    const std::vector<bool> reached = try_scripts(trial_, rests, cancelled_);
-    findings_.branches += std::ssize(all);
-    for (std::size_t k = 0; k < chosen.size(); ++k) {
-      double tried = 0.0, held = 0.0;
-      for (std::size_t n = 0; n < all.size(); ++n) {
-        if (owners[n] != k) continue;
-        const bool own = tried == 0.0;
-        ++tried;
-        if (own) chosen[k].holds = reached[n];
-        if (!reached[n]) continue;
-        ++held;
-        if (!own && find_broken(all[n]).empty()) {
-          chosen[k].spares.push_back(all[n]);
-        }
-      }
-      chosen[k].share = held / tried;
-    }
+    findings_.branches += weigh_scripts(
+        trial_, begin_.steps.size(),
+        [&](const ToolScript& script) { return find_broken(script).empty(); }, cancelled_, chosen);
   }
 
   /// Beyond the ostium, or as far as the vessel goes there. False where that is not far enough to
@@ -548,7 +528,7 @@ WayUp go_up(const Study& study, const ToolPair& pair, const Ostium& ostium,
   WayUp up;
   const Candidate begun = first_candidate(study, pair);
   up.trial = std::make_unique<ToolTrial>(tools_of(study, begun), make_introducer(study, begun),
-                                         study.goal, vessel, tool_options(study));
+                                         study.goal, vessel, tool_options(study, begun));
   up.findings = ToolSearch(study, pair, ostium, cancelled, *up.trial).go_up(up.depths);
   return up;
 }

@@ -75,10 +75,16 @@ class Weighing {
     return known_.study.wires[static_cast<std::size_t>(candidate.wire)];
   }
   std::string round_it(int id) const {
-    const int catheter = known_.plan.candidates[static_cast<std::size_t>(id)].catheter;
-    if (catheter < 0) return {};
-    return " in the catheter " +
-           known_.study.catheters[static_cast<std::size_t>(catheter)].tool.wire.name;
+    const Candidate& candidate = known_.plan.candidates[static_cast<std::size_t>(id)];
+    if (candidate.catheter < 0) return {};
+    std::string text =
+        " in the catheter " +
+        known_.study.catheters[static_cast<std::size_t>(candidate.catheter)].tool.wire.name;
+    if (candidate.first_wire >= 0) {
+      text += ", brought in through it in exchange for " +
+              known_.study.wires[static_cast<std::size_t>(candidate.first_wire)].name + ",";
+    }
+    return text;
   }
   const RepeatedPlan* repeats_of(int id) const {
     return find_repeated(known_.judgement.repeated, id);
@@ -209,9 +215,13 @@ class Weighing {
   // ---- A plan.
   void weigh_length(const RankedPlan& first) {
     if (!known_.way || !known_.way->wire_needed) return;
-    const double length = wire_of(first.trial).length();
+    const Candidate& candidate = known_.plan.candidates[static_cast<std::size_t>(first.trial)];
+    const int own = candidate.catheter;
+    double length = HUGE_VAL;  // of the shorter, where the plan has two
+    for (const int wire : wires_of(candidate)) {
+      length = std::min(length, known_.study.wires[static_cast<std::size_t>(wire)].length());
+    }
     if (length >= *known_.way->wire_needed) return;
-    const int own = known_.plan.candidates[static_cast<std::size_t>(first.trial)].catheter;
     const std::string told = whole_millimetres(*known_.way->wire_needed);
     find(Answer::kFeasible, "The wire is " + whole_millimetres(length) + " long, and " + told +
                                 " are needed to take " + (own < 0 ? "a" : "the") +

@@ -244,11 +244,18 @@ std::vector<std::string> describe_pairs(const Known& known, std::size_t most) {
                              known.study.wires[static_cast<std::size_t>(pair.pair.wire)].name;
     if (!pair.pair.unfit.empty()) {
       untried.push_back("Not tried was " + name + ": " + pair.pair.unfit + ".");
+    } else if (pair.exchange.tried() && pair.exchange.stopped.empty()) {
+      continue;  // brought in so, it reaches
     } else if (pair.tried() && !pair.stopped.empty()) {
       std::string text = "No script of " + name + " reaches: " + pair.stopped;
       if (pair.nearest_hook >= 0.0) {
         text += "; the catheter's tip came no nearer to the ostium than " +
                 one_decimal(pair.nearest_hook) + " mm";
+      }
+      if (pair.exchange.tried()) {
+        text += "; nor does it in exchange for " +
+                known.study.wires[static_cast<std::size_t>(pair.exchange.first_wire)].name +
+                " through the placed catheter: " + pair.exchange.stopped;
       }
       texts.push_back(text + ".");
     }

@@ -333,7 +333,9 @@ class BatchRun {
          {"trial", "wire", "inclination_deg", "azimuth_deg", "roll_deg", "script", "score"}) {
       row["best_plan"][key] = best.at(key);
     }
-    if (best.contains("catheter")) row["best_plan"]["catheter"] = best.at("catheter");
+    for (const char* key : {"catheter", "first_wire"}) {
+      if (best.contains(key)) row["best_plan"][key] = best.at(key);
+    }
     return row;
   }
 

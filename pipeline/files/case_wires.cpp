@@ -171,6 +171,7 @@ plan::ToolRules read_tool_rules(JsonReader& root) {
                           kRadPerDeg;
   rules.seat = reader.number("seat_mm", rules.seat, kLength, "given in m?");
   rules.friction = reader.number("friction_between_tools", rules.friction, kFrictionRange);
+  rules.exchange = reader.boolean("exchange", rules.exchange);
   reader.finish();
   return rules;
 }
@@ -182,7 +183,8 @@ Json tool_rules_json(const plan::ToolRules& rules) {
           {"most_turn_deg", clean(rules.most_turn / kRadPerDeg)},
           {"turn_deg_per_mm", clean(rules.turn_per_length / kRadPerDeg)},
           {"seat_mm", rules.seat},
-          {"friction_between_tools", rules.friction}};
+          {"friction_between_tools", rules.friction},
+          {"exchange", rules.exchange}};
 }
 
 std::vector<plan::WireSpread> spreads_of(const std::vector<DeviceWire>& devices,

@@ -41,6 +41,7 @@ Json metrics_to_json(const plan::Metrics& metrics) {
       script[field.name] = number_or_null((*metrics.script).*field.value);
     }
     script["moves"] = metrics.script->moves;
+    script["exchanges"] = metrics.script->exchanges;
     script["bears_more"] = metrics.script->bears_more;
   }
   return json;
@@ -70,6 +71,7 @@ plan::Metrics metrics_of(const Json& json) {
       (*metrics.script).*field.value = number_of(script.at(field.name));
     }
     metrics.script->moves = script.at("moves");
+    metrics.script->exchanges = script.at("exchanges");
     metrics.script->bears_more = script.at("bears_more");
   }
   return metrics;

@@ -138,6 +138,9 @@ Json tracks_to_json(const std::vector<simulate::ToolTrack>& tools) {
   for (const simulate::ToolTrack& track : tools) {
     Json own = {{"name", track.name}};
     for (const TrackField& field : kTrackFields) own[field.name] = track.*field.column;
+    for (const auto& [from, name] : track.changes) {
+      own["changes"].push_back({{"from", from}, {"name", name}});
+    }
     list.push_back(std::move(own));
   }
   return list;
@@ -152,6 +155,9 @@ std::vector<simulate::ToolTrack> tracks_from_json(const Json& list) {
       for (const Json& value : own.at(field.name)) {
         (track.*field.column).push_back(number_of(value));
       }
+    }
+    for (const Json& change : own.value("changes", Json::array())) {
+      track.changes.push_back({.from = change.at("from"), .name = change.at("name")});
     }
   }
   return tools;
@@ -285,6 +291,9 @@ std::string trial_text(const plan::Study& study, const plan::Candidate& candidat
   if (!candidate.moves.empty()) file["moves"] = moves_json(candidate.moves);
   if (candidate.catheter >= 0) {
     file["catheter"] = study.catheters[static_cast<std::size_t>(candidate.catheter)].tool.wire.name;
+    if (candidate.first_wire >= 0) {
+      file["first_wire"] = study.wires[static_cast<std::size_t>(candidate.first_wire)].name;
+    }
     file["steps"] = steps_json(candidate.steps);
     file["tools"] = tracks_to_json(trial.tools);
     file["step"] = trial.steps;
@@ -328,7 +337,9 @@ Json steps_json(const std::vector<simulate::ToolStep>& steps) {
   Json list = Json::array();
   for (const simulate::ToolStep& step : steps) {
     Json row = {{"tool", kToolNames.at(static_cast<std::size_t>(step.tool + 1))}};
-    if (step.turn != 0.0) {
+    if (step.spare >= 0) {
+      row["exchange"] = {{"wire", step.spare}, {"behind_mm", clean(step.at)}};
+    } else if (step.turn != 0.0) {
       row["turn_deg"] = clean(step.turn / kRadPerDeg);
     } else {
       row["push_mm"] = clean(step.push);
@@ -363,6 +374,10 @@ std::vector<simulate::ToolStep> steps_of(const Json& list) {
     simulate::ToolStep& step = steps.back();
     step.steers = row.value("steers", 0);
     step.seats = row.value("seats", false);
+    if (row.contains("exchange")) {
+      step.spare = row.at("exchange").at("wire");
+      step.at = number_of(row.at("exchange").at("behind_mm"));
+    }
     if (row.contains("tries")) {
       step.tries = row.at("tries").at("most");
       step.try_pull = number_of(row.at("tries").at("pull_mm"));

@@ -147,8 +147,8 @@ std::string trials_csv(const Json& report) {
   std::map<int, int> ranks;
   for (const Json& plan : report.at("ranking")) ranks[plan.at("trial")] = plan.at("rank");
 
-  // The columns are the plain values of the first trial, and the catheter where any has one; points
-  // and lists stay in the JSON.
+  // The columns are the plain values of the first trial, and those of scripts with a catheter where
+  // any has them; points and lists stay in the JSON.
   std::vector<std::string> columns;
   const Json& trials = report.at("trials");
   for (const auto& [key, value] : trials.front().items()) {
@@ -156,10 +156,10 @@ std::string trials_csv(const Json& report) {
       columns.push_back(key);
     }
   }
-  const auto has_catheter = [](const Json& trial) { return trial.contains("catheter"); };
-  const bool known = std::find(columns.begin(), columns.end(), "catheter") != columns.end();
-  if (!known && std::any_of(trials.begin(), trials.end(), has_catheter)) {
-    columns.emplace_back("catheter");
+  for (const char* own : {"catheter", "first_wire", "exchanges"}) {
+    const auto has = [&](const Json& trial) { return trial.contains(own); };
+    const bool known = std::find(columns.begin(), columns.end(), own) != columns.end();
+    if (!known && std::any_of(trials.begin(), trials.end(), has)) columns.emplace_back(own);
   }
   std::string table = "rank";
   for (const std::string& column : columns) table.append(",").append(column);

@@ -122,11 +122,13 @@ Json fetch_json(const ReportInput& input, const Json& anatomy) {
       lengths.at("working_assumed").get<bool>() || lengths.at("catheter_assumed").get<bool>();
   std::vector<int> wires;
   for (std::size_t k = 0; k < std::min(kPlansTold, plans.size()); ++k) {
-    const int wire = candidate(k).wire;
-    if (std::find(wires.begin(), wires.end(), wire) != wires.end()) continue;
-    list.push_back(wire_row(wires.empty() ? "Wire" : "In reserve",
-                            input.study.wires[static_cast<std::size_t>(wire)], needed));
-    wires.push_back(wire);
+    const std::vector<int> own = plan::wires_of(candidate(k));
+    for (auto wire = own.rbegin(); wire != own.rend(); ++wire) {
+      if (std::find(wires.begin(), wires.end(), *wire) != wires.end()) continue;
+      const char* what = k > 0 ? "In reserve" : wires.empty() ? "Wire" : "Wire to begin with";
+      list.push_back(wire_row(what, input.study.wires[static_cast<std::size_t>(*wire)], needed));
+      wires.push_back(*wire);
+    }
   }
   const simulate::Wire& first = input.study.wires[static_cast<std::size_t>(wires.front())];
   double inside = access.at("device").at("device_diameter_mm");
@@ -148,8 +150,8 @@ Json fetch_json(const ReportInput& input, const Json& anatomy) {
   return list;
 }
 
-Json step_views_json(const plan::Candidate& candidate, const plan::Measured& trial,
-                     const Json& anatomy) {
+Json step_views_json(const plan::Study& study, const plan::Candidate& candidate,
+                     const plan::Measured& trial, const Json& anatomy) {
   const Json& arm = anatomy.at("c_arm");
   const std::vector<Seen> places = places_to_see(arm);
   Json steps = Json::array();
@@ -164,7 +166,7 @@ Json step_views_json(const plan::Candidate& candidate, const plan::Measured& tri
       if (arm.at("ostia")[k].at("leads_to_target").get<bool>()) target = &places[k];
     }
     for (const plan::ToldStep& step :
-         plan::describe_steps(candidate.steps, trial.metrics.insertion)) {
+         plan::describe_steps(study, candidate, trial.metrics.insertion)) {
       add(step.text, target);
     }
     return steps;

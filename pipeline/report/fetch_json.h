@@ -14,7 +14,7 @@ Json fetch_json(const ReportInput& input, const Json& anatomy);
 /// end: "text", "at" and "view", which are null without known axes or places to look at. A wire's
 /// tip is taken to be as far along the way as wire is in; steps of a catheter are all made for the
 /// ostium of the target's branch.
-Json step_views_json(const plan::Candidate& candidate, const plan::Measured& trial,
-                     const Json& anatomy);
+Json step_views_json(const plan::Study& study, const plan::Candidate& candidate,
+                     const plan::Measured& trial, const Json& anatomy);
 
 }  // namespace wireplan::pipeline

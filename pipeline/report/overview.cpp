@@ -32,7 +32,9 @@ Json best_plan_json(const Json& report) {
                           "score", "score_error", "mean_score"}) {
     best[key] = plan.at(key);
   }
-  if (plan.contains(kCatheter)) best[kCatheter] = plan.at(kCatheter);
+  for (const char* key : {kCatheter, "first_wire"}) {
+    if (plan.contains(key)) best[key] = plan.at(key);
+  }
   for (const char* key : {"sensitive", "tip_unsure"}) best[key] = plan.at(key);
   best["repeats_safe"] = nullptr;
   best["repeats"] = nullptr;
@@ -233,11 +235,16 @@ std::string overview_csv(const Json& overview) {
                                       "insertion_mm",
                                       "peak_tip_force_n",
                                       "peak_contact_force_n"};
-  for (const Json& target : overview.at("targets")) {
-    for (const Json& row : target.at("sections")) {
-      const Json& plan = row.at("best_plan");
-      const bool tools = !plan.is_null() && plan.contains(kCatheter);
-      if (tools && columns[1] != kCatheter) columns.insert(columns.begin() + 1, kCatheter);
+  for (const char* own : {"first_wire", kCatheter}) {
+    const auto has = [&](const Json& row) {
+      return !row.at("best_plan").is_null() && row.at("best_plan").contains(own);
+    };
+    const auto any_has = [&](const Json& target) {
+      return std::any_of(target.at("sections").begin(), target.at("sections").end(), has);
+    };
+    const Json& targets = overview.at("targets");
+    if (std::any_of(targets.begin(), targets.end(), any_has)) {
+      columns.insert(columns.begin() + 1, own);
     }
   }
   std::string table = "target";

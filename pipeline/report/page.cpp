@@ -93,6 +93,7 @@ Json trials_json(const PageInput& input, const Quantiser& box) {
                       {"push", encode_floats(trial.push.reshaped())}});
     if (trial.tools.cols() > 0) {
       trials.back()["tools"] = encode_floats(trial.tools.reshaped());
+      if (!trial.exchanges.empty()) trials.back()["exchanges"] = trial.exchanges;
     }
     if (trial.sections.cols() > 0) {
       trials.back()["sections"] = encode_floats(trial.sections.reshaped());
@@ -207,6 +208,7 @@ PageTrial page_trial(const simulate::TrialResult& trial) {
   }
   kept.sections = trial.sections.cast<float>();
   if (trial.tools.size() != 2) return kept;
+  for (const auto& [from, name] : trial.tools[1].changes) kept.exchanges.push_back(from);
   kept.tools.resize(7, static_cast<Eigen::Index>(trial.pushes.size()));
   for (std::size_t k = 0; k < trial.pushes.size(); ++k) {
     const auto column = static_cast<Eigen::Index>(k);

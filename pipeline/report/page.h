@@ -25,6 +25,7 @@ struct PageTrial {
   /// Of a script of catheter and wire, after each push: the step under way; then of each tool how
   /// far it is in [mm], the hand's force and the tip's [N]. No rows of one wire.
   Eigen::Matrix<float, 7, -1> tools = {};
+  std::vector<std::size_t> exchanges = {};  // pushes from which on it is another wire
   Eigen::Matrix3Xf sections = {};  // how far the vessel's have moved; empty where they do not [mm]
 };
 PageTrial page_trial(const simulate::TrialResult& trial);  // all but the direction

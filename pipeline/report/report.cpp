@@ -92,11 +92,15 @@ void put_candidate(Row& row, const ReportInput& input, std::size_t trial) {
             plan::describe_moves(candidate.moves, input.plan.trials[trial].metrics.insertion));
     return;
   }
-  row.put("script",
-          plan::describe_script(candidate.steps, input.plan.trials[trial].metrics.insertion));
+  row.put("script", plan::describe_script(input.study, candidate,
+                                          input.plan.trials[trial].metrics.insertion));
   row.put("catheter",
           input.study.catheters[static_cast<std::size_t>(candidate.catheter)].tool.wire.name);
-  row.put("steps", told_steps_json(candidate, input.plan.trials[trial]));
+  if (candidate.first_wire >= 0) {
+    row.put("first_wire", input.study.wires[static_cast<std::size_t>(candidate.first_wire)].name);
+  }
+  row.put("exchanges", plan::count_exchanges(candidate));
+  row.put("steps", told_steps_json(input.study, candidate, input.plan.trials[trial]));
 }
 
 const plan::Refinement* find_refinement(const ReportInput& input, int trial) {
@@ -331,8 +335,8 @@ Json ranked_json(const ReportInput& input, std::size_t k) {
   const auto id = static_cast<std::size_t>(plan.trial);
   const plan::Candidate& candidate = input.plan.candidates[id];
   if (input.figures.contains("anatomy") && !(candidate.moves.empty() && candidate.steps.empty())) {
-    row.put("step_views",
-            step_views_json(candidate, input.plan.trials[id], input.figures.at("anatomy")));
+    row.put("step_views", step_views_json(input.study, candidate, input.plan.trials[id],
+                                          input.figures.at("anatomy")));
   }
   return row.finish();
 }
@@ -551,7 +555,10 @@ Json read_report(const std::filesystem::path& path) {
 
 std::string describe_tools(const Json& plan) {
   return plan.at("wire").get<std::string>() +
-         (plan.contains("catheter") ? " in " + plan.at("catheter").get<std::string>() : "");
+         (plan.contains("catheter") ? " in " + plan.at("catheter").get<std::string>() : "") +
+         (plan.contains("first_wire")
+              ? " in exchange for " + plan.at("first_wire").get<std::string>()
+              : "");
 }
 
 std::string describe_best(const Json& report) {

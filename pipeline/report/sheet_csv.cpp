@@ -68,6 +68,8 @@ void add_plans(Table& table, const Json& report) {
     table.row("roll of the tip", plan.at("roll_deg"), "deg");
     if (plan.contains("catheter")) {
       table.row("catheter", plan.at("catheter"));
+      if (plan.contains("first_wire")) table.row("wire to begin with", plan.at("first_wire"));
+      table.row("exchanges of the wire", plan.at("exchanges"));
       for (std::size_t n = 0; n < plan.at("steps").size(); ++n) {
         const Json& step = plan.at("steps")[n];
         const std::string name = "step " + std::to_string(n + 1);

@@ -9,10 +9,11 @@
 
 namespace wireplan::pipeline {
 
-Json told_steps_json(const plan::Candidate& candidate, const plan::Measured& trial) {
+Json told_steps_json(const plan::Study& study, const plan::Candidate& candidate,
+                     const plan::Measured& trial) {
   Json steps = steps_json(candidate.steps);
   const std::vector<plan::ToldStep> told =
-      plan::describe_steps(candidate.steps, trial.metrics.insertion);
+      plan::describe_steps(study, candidate, trial.metrics.insertion);
   for (std::size_t k = 0; k < told.size(); ++k) {
     steps[k]["text"] = told[k].text;
     if (!told[k].otherwise.empty()) steps[k]["otherwise"] = told[k].otherwise;
@@ -36,6 +37,16 @@ Json tools_json(const plan::Measured& trial) {
   }
   json["support_is_least"] = script.bears_more;
   json["moves"] = script.moves;
+  return json;
+}
+
+Json exchange_json(const plan::Study& study, const plan::ExchangeFindings& exchange) {
+  if (!exchange.tried() && exchange.stopped.empty()) return nullptr;
+  Json json = {
+      {"tried", exchange.tried()}, {"reason", exchange.stopped}, {"scripts_found", exchange.found}};
+  if (!exchange.tried()) return json;
+  json["first_wire"] = study.wires[static_cast<std::size_t>(exchange.first_wire)].name;
+  if (exchange.found > 0) json["neighbours_reach"] = exchange.held;
   return json;
 }
 
@@ -80,6 +91,9 @@ Json catheters_json(const plan::Study& study, const plan::Plan& plan, bool axes_
     if (tried) {
       if (pair.nearest_hook >= 0.0) row["nearest_hook_mm"] = clean(pair.nearest_hook);
       row["furthest_mm"] = clean(pair.furthest);
+    }
+    if (const Json exchange = exchange_json(study, pair.exchange); !exchange.is_null()) {
+      row["exchange"] = exchange;
     }
     json["pairs"].push_back(std::move(row));
   }

@@ -8,11 +8,15 @@ namespace wireplan::pipeline {
 
 /// The steps as a case's files hold them, each with its "text" for the hand, and where the wire may
 /// go elsewhere with "otherwise".
-Json told_steps_json(const plan::Candidate& candidate, const plan::Measured& trial);
+Json told_steps_json(const plan::Study& study, const plan::Candidate& candidate,
+                     const plan::Measured& trial);
 
 /// Per tool its metrics; beside them the hook: how far the catheter's tip is past the ostium at the
 /// end, and how far the wire is out of it.
 Json tools_json(const plan::Measured& trial);
+
+/// How bringing a pair's wire in by exchange ended; null where its own scripts hold.
+Json exchange_json(const plan::Study& study, const plan::ExchangeFindings& exchange);
 
 /// Rules, ostium with the C-arm's view of it where axes are known, and all pairs: what came of
 /// them, or why they were not tried.

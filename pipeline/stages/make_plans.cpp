@@ -47,7 +47,7 @@ std::string first_answer_text(const plan::Study& study, const plan::FirstAnswer&
 
 std::string first_script_text(const plan::Study& study, const plan::Candidate& script) {
   return "first script, of the search's coarse steps: " + plan::describe(study, script) + ": " +
-         plan::describe_script(script.steps, study.insertion.length) +
+         plan::describe_script(study, script, study.insertion.length) +
          "; not known yet: whether it holds in full and under disturbances";
 }
 

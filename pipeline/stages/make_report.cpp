@@ -336,8 +336,8 @@ std::string to_bytes(const ShownTrials& shown) {
       forces.push_back(force);
     }
     rows.push_back({binary(shown.trials[k].nodes), binary(shown.trials[k].push), binary(triangles),
-                    binary(forces), binary(shown.trials[k].tools),
-                    binary(shown.trials[k].sections)});
+                    binary(forces), binary(shown.trials[k].tools), binary(shown.trials[k].sections),
+                    shown.trials[k].exchanges});
   }
   const std::vector<std::uint8_t> bytes = Json::to_cbor(rows);
   return {bytes.begin(), bytes.end()};
@@ -368,6 +368,7 @@ ShownTrials from_bytes(const std::string& bytes) {
     fill(row.at(4), trial.tools);
     trial.sections.resize(3, columns(5, 3 * sizeof(float)));
     fill(row.at(5), trial.sections);
+    trial.exchanges = row.at(6).get<std::vector<std::size_t>>();
     std::vector<simulate::TriangleForce>& peaks = shown.peaks.emplace_back();
     for (std::size_t k = 0; k < forces.size(); ++k) peaks.push_back({triangles[k], forces[k]});
   }
@@ -417,7 +418,8 @@ std::optional<PageInsertion> read_insertion(const Workspace& work, const ReportI
   const plan::Candidate& candidate = report.plan.candidates[k];
   if (!name.empty() && candidate.catheter >= 0) {
     write_step_markups(
-        *trial, plan::describe_steps(candidate.steps, report.plan.trials[k].metrics.insertion),
+        *trial,
+        plan::describe_steps(report.study, candidate, report.plan.trials[k].metrics.insertion),
         name, {"catheter", "wire"}, folder);
   }
   return PageInsertion{id, std::move(trial->shapes), std::move(trial->peak_forces)};

@@ -45,6 +45,7 @@ Json scripts_json(const plan::Scripts& scripts) {
     } else {
       list.push_back(
           {{"wire", found.wire}, {"catheter", found.catheter}, {"steps", steps_json(found.steps)}});
+      if (found.first_wire >= 0) list.back()["first_wire"] = found.first_wire;
     }
   }
   return list;
@@ -60,7 +61,12 @@ Json pairs_json(const plan::Scripts& scripts) {
                     {"held", pair.held},
                     {"nearest_hook_mm", clean(pair.nearest_hook)},
                     {"furthest_mm", clean(pair.furthest)},
-                    {"stopped", pair.stopped}});
+                    {"stopped", pair.stopped},
+                    {"exchange",
+                     {{"first_wire", pair.exchange.first_wire},
+                      {"found", pair.exchange.found},
+                      {"held", pair.exchange.held},
+                      {"stopped", pair.exchange.stopped}}}});
   }
   return list;
 }
@@ -78,9 +84,11 @@ plan::Scripts read_scripts(const Json& figures, const plan::Study& study) {
     scripts.found.push_back(plan::first_candidate(
         study, {.catheter = script.at("catheter"), .wire = script.at("wire"), .unfit = {}}));
     scripts.found.back().steps = steps_of(script.at("steps"));
+    scripts.found.back().first_wire = script.value("first_wire", -1);
   }
   if (!figures.contains("pairs")) return scripts;
   for (const Json& pair : figures.at("pairs")) {
+    const Json& exchange = pair.at("exchange");
     scripts.pairs.push_back({.pair = {.catheter = pair.at("catheter"),
                                       .wire = pair.at("wire"),
                                       .unfit = pair.at("unfit")},
@@ -88,7 +96,11 @@ plan::Scripts read_scripts(const Json& figures, const plan::Study& study) {
                              .held = pair.at("held"),
                              .nearest_hook = pair.at("nearest_hook_mm"),
                              .furthest = pair.at("furthest_mm"),
-                             .stopped = pair.at("stopped")});
+                             .stopped = pair.at("stopped"),
+                             .exchange = {.first_wire = exchange.at("first_wire"),
+                                          .found = exchange.at("found"),
+                                          .held = exchange.at("held"),
+                                          .stopped = exchange.at("stopped")}});
   }
   return scripts;
 }

@@ -73,13 +73,16 @@ const plan::Study& StoredTrials::study_of(Level level) const {
 // All that one run reads: what the stage of the trials reads, but of the lists only its own entry.
 // The elements of a scout follow from all wires of the study.
 std::string StoredTrials::key_of(const plan::Run& run, const std::string& shared_key) const {
-  const auto& [wire, inclination, azimuth, roll, moves, catheter, steps] = run.candidate;
+  const auto& [wire, inclination, azimuth, roll, moves, catheter, steps, first_wire] =
+      run.candidate;
   const plan::Study& study = study_of(run.level);
   Json script = Json::array();
   for (const auto& [push, turn] : moves) script.push_back({push, turn});
-  const simulate::Wire& own = run.disturbance ? plan::disturbed_wire(study, wire, *run.disturbance)
-                                              : study.wires[static_cast<std::size_t>(wire)];
-  std::vector<KeyLine> lines = {{"wire", wire_json(own).dump()},
+  const auto as_run = [&](int k) {
+    return run.disturbance ? plan::disturbed_wire(study, k, *run.disturbance)
+                           : study.wires[static_cast<std::size_t>(k)];
+  };
+  std::vector<KeyLine> lines = {{"wire", wire_json(as_run(wire)).dump()},
                                 {"inclination", Json(inclination).dump()},
                                 {"azimuth", Json(azimuth).dump()},
                                 {"roll", Json(roll).dump()},
@@ -97,6 +100,7 @@ std::string StoredTrials::key_of(const plan::Run& run, const std::string& shared
         {"lumen",
          Json({known.tool.inner_radius, study.tool_rules.friction, plan::kToolElements}).dump()});
     lines.push_back({"steps", steps_json(steps).dump()});
+    if (first_wire >= 0) lines.push_back({"first_wire", wire_json(as_run(first_wire)).dump()});
   }
   if (run.elements) {
     const auto& [factor, insertion, setting] = *run.elements;

@@ -203,7 +203,8 @@ inline Json full_case(Json json) {
   json["catheters"][1] = "cobra-c2";
   json["tool_rules"] = {{"soft_tip_n_mm2", 90},  {"hold_mm", 80},
                         {"outside_mm", 40},      {"most_turn_deg", 170},
-                        {"turn_deg_per_mm", 60}, {"friction_between_tools", 0.1}};
+                        {"turn_deg_per_mm", 60}, {"friction_between_tools", 0.1},
+                        {"exchange", false}};
   json["tip_roll_deg"] = {0, 180};
   json["friction"] = 0.12;
   json["friction_factor"] = 0.9;

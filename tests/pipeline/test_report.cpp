@@ -222,9 +222,10 @@ TEST(Report, StepsOfAScriptHaveTheViewOfThePlaceNextToTheTip) {
                                     {"second", nullptr}}})},
         {"bend", {{"at_mm", 40.0}, {"best", view("RAO 10, CRA 5")}, {"second", nullptr}}}}}};
   const plan::Candidate candidate{.moves = {{.push = 60.0}, {.turn = kPi / 2}, {.push = 140.0}}};
+  const plan::Study study;
   plan::Measured trial;
   trial.metrics.insertion = 250.0;
-  const Json steps = step_views_json(candidate, trial, anatomy);
+  const Json steps = step_views_json(study, candidate, trial, anatomy);
   ASSERT_EQ(steps.size(), 4u);
   EXPECT_EQ(steps[0].at("text"), "push 60.0 mm");
   EXPECT_EQ(steps[0].at("at"), "bend at 40 mm");
@@ -237,7 +238,7 @@ TEST(Report, StepsOfAScriptHaveTheViewOfThePlaceNextToTheTip) {
   straight["c_arm"] = {{"ostia", Json::array()},
                        {"bend", {{"at_mm", 40.0}, {"best", nullptr}, {"second", nullptr}}},
                        {"no_views", nullptr}};
-  EXPECT_TRUE(step_views_json(candidate, trial, straight).at(0).at("at").is_null());
+  EXPECT_TRUE(step_views_json(study, candidate, trial, straight).at(0).at("at").is_null());
 }
 
 TEST(Report, ATargetWithoutARadiusIsTheVesselsCrossSection) {

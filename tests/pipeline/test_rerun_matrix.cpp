@@ -203,13 +203,14 @@ TEST_F(RerunMatrix, OfACaseThatStartsFromASurface) {
         "catheters/0/friction", "catheters/0/sections/0/length_mm",
         "catheters/0/sections/0/bending_stiffness_n_mm2", "tool_rules/soft_tip_n_mm2",
         "tool_rules/hold_mm", "tool_rules/outside_mm", "tool_rules/most_turn_deg",
-        "tool_rules/turn_deg_per_mm", "tool_rules/friction_between_tools"}) {
+        "tool_rules/turn_deg_per_mm", "tool_rules/friction_between_tools", "tool_rules/exchange"}) {
     table[std::string("/") + key] = {"manoeuvres", "plans", "report"};
   }
   Json changes = common_changes();
   changes["/surface/path"] = "other.stl";
   changes["/surface/unit"] = "cm";
   changes["/surface/frame"] = "RAS";
+  changes["/tool_rules/exchange"] = false;
   expect_reruns(file, table, changes);
 }
 

@@ -265,6 +265,10 @@ TEST(Overview, PutsTheBetterAnswerAndThenMoreSafeRepeatsFirst) {
       << describe_overview(one);
   EXPECT_NE(overview_csv(one).find("wire,catheter,inclination_deg"), std::string::npos);
   EXPECT_EQ(overview_csv(both).find("catheter"), std::string::npos);
+  tools.report["ranking"][0]["first_wire"] = "bentson";
+  EXPECT_NE(overview_csv(build_overview("case", {tools}))
+                .find("wire,catheter,first_wire,inclination_deg"),
+            std::string::npos);
   EXPECT_TRUE(one.at("targets")[0].at("sections")[0].at("access_table").at("sheath_fits").is_null())
       << "not weighed";
 }

@@ -161,6 +161,7 @@ TEST(KeptRun, KeepsWhatAScriptComesTo) {
                                                 .hand_force = 0.3,
                                                 .hub_torque = 0.7,
                                                 .moves = 17,
+                                                .exchanges = 2,
                                                 .bears_more = true};
   const std::optional<plan::Measured> back = measured_from_text(measured_text(measured, false));
   ASSERT_TRUE(back && back->metrics.script);
@@ -168,6 +169,7 @@ TEST(KeptRun, KeepsWhatAScriptComesTo) {
     EXPECT_EQ((*back->metrics.script).*field.value, (*measured.metrics.script).*field.value);
   }
   EXPECT_EQ(back->metrics.script->moves, 17);
+  EXPECT_EQ(back->metrics.script->exchanges, 2);
   EXPECT_TRUE(back->metrics.script->bears_more);
 }
 

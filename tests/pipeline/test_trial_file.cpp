@@ -112,8 +112,40 @@ TEST(TrialFile, StepsOfAScriptAreReadAsTheyAreWritten) {
        .tries = 8,
        .try_pull = 3.0,
        .try_turn = -15.0 * kRadPerDeg},
+      {.tool = 1, .at = 10.0, .spare = 0},
       {.tool = 0, .push = 60.0, .until = Until::kInBranch, .at = 10.0, .seats = true}};
   EXPECT_EQ(steps_of(steps_json(steps)), steps);
+}
+
+TEST(TrialFile, KeepsWhichWireIsInTheCatheterFromWhenOn) {
+  const TemporaryFolder folder;
+  plan::Study study;
+  study.wires.resize(2);
+  study.wires[0].name = "soft";
+  study.wires[1].name = "stiff";
+  study.catheters.emplace_back().tool.wire.name = "hook";
+  const plan::Candidate candidate{.wire = 1,
+                                  .moves = {},
+                                  .catheter = 0,
+                                  .steps = {{.tool = 1, .at = 10.0, .spare = 0}},
+                                  .first_wire = 0};
+  simulate::TrialResult trial;
+  trial.tools.resize(2);
+  trial.tools[0].name = "hook";
+  trial.tools[1].name = "soft";
+  trial.tools[1].changes = {{.from = 7, .name = "stiff"}};
+  const fs::path file = folder / "trial.json";
+  write_text(trial_text(study, candidate, trial), file);
+  const Json json = read_json(file, "wireplan.trial/3");
+  EXPECT_EQ(json.at("wire"), "stiff");
+  EXPECT_EQ(json.at("first_wire"), "soft");
+  const std::optional<simulate::TrialResult> read = find_trial(file);
+  ASSERT_TRUE(read);
+  ASSERT_EQ(read->tools.size(), 2U);
+  EXPECT_TRUE(read->tools[0].changes.empty());
+  ASSERT_EQ(read->tools[1].changes.size(), 1U);
+  EXPECT_EQ(read->tools[1].changes[0].from, 7U);
+  EXPECT_EQ(read->tools[1].changes[0].name, "stiff");
 }
 
 /// The times in FOLDER/NAME.pvd.

@@ -108,6 +108,11 @@ TEST(ViewerFiles, ListEveryTrialWithUnitsInTheHeader) {
             "rank,id,wire,insertion_mm,reached,catheter\r\n"
             ",0,\"say \"\"x\"\", please\",,false,\r\n"
             "1,1,\"soft\",30.5,true,\"cobra-c2\"\r\n");
+  tools["trials"][1].update({{"first_wire", "softer"}, {"exchanges", 1}});
+  EXPECT_EQ(trials_csv(tools),
+            "rank,id,wire,insertion_mm,reached,catheter,first_wire,exchanges\r\n"
+            ",0,\"say \"\"x\"\", please\",,false,,,\r\n"
+            "1,1,\"soft\",30.5,true,\"cobra-c2\",\"softer\",1\r\n");
 }
 
 TEST(ViewerFiles, ListTheFiguresOfTheSheet) {
@@ -161,6 +166,7 @@ TEST(ViewerFiles, ListTheFiguresOfTheSheet) {
 TEST(ViewerFiles, TheSheetsTableHasEachStepItsViewAndWhatElseToDo) {
   Json plan = {{"trial", 0},    {"wire", "soft"},      {"inclination_deg", 0}, {"azimuth_deg", 0},
                {"roll_deg", 0}, {"script", "out; in"}, {"catheter", "hook"},   {"score", 0.25}};
+  plan.update({{"first_wire", "softer"}, {"exchanges", 1}});
   plan["steps"] = {{{"text", "out"}, {"otherwise", "If not, back."}}, {{"text", "in"}}};
   plan["step_views"] = {
       {{"text", "out"}, {"at", "ostium of left renal"}, {"view", "LAO 30, CRA 0"}},
@@ -186,6 +192,9 @@ TEST(ViewerFiles, TheSheetsTableHasEachStepItsViewAndWhatElseToDo) {
     EXPECT_NE(sheet_csv(report).find(rows), std::string::npos) << sheet_csv(report);
   };
   expect_rows(
+      "\"plan 1\",\"catheter\",\"hook\",,,\r\n"
+      "\"plan 1\",\"wire to begin with\",\"softer\",,,\r\n"
+      "\"plan 1\",\"exchanges of the wire\",1,,,\r\n"
       "\"plan 1\",\"step 1\",\"out\",,,\"LAO 30, CRA 0: ostium of left renal\"\r\n"
       "\"plan 1\",\"step 1, otherwise\",\"If not, back.\",,,\r\n"
       "\"plan 1\",\"step 2\",\"in\",,,\r\n");

@@ -115,7 +115,8 @@ Metrics seated(double support) {
                            .wire_beyond = 10.0,
                            .hand_force = 3.0,
                            .hub_torque = 5.0,
-                           .moves = 30};
+                           .moves = 30,
+                           .exchanges = 1};
   return m;
 }
 
@@ -126,10 +127,11 @@ TEST(Score, OfAScriptHasWhatTheHandDoesAndGets) {
   EXPECT_DOUBLE_EQ(score.wire_beyond, 0.75);                 // 30 / (30 + 10)
   EXPECT_DOUBLE_EQ(score.hand_force, 0.75);                  // 3 / (3 + 1)
   EXPECT_DOUBLE_EQ(score.hub_torque, 0.5);                   // 5 / (5 + 5)
+  EXPECT_DOUBLE_EQ(score.exchanges, 0.5);                    // 1 / (1 + 1)
   EXPECT_DOUBLE_EQ(score.moves, 0.75);                       // 30 / (30 + 10)
   const double alone = 0.25 + 0.25 + 0.5 * 0.5 + 0.5 * 0.2;  // of the wire, by the weights
   EXPECT_DOUBLE_EQ(score.total,
-                   (alone + 0.25 * 0.25 + 0.1 * (0.25 + 0.75 + 0.75 + 0.5 + 0.75)) / 3.75);
+                   (alone + 0.25 * 0.25 + 0.1 * (0.25 + 0.75 + 0.75 + 0.5 + 0.75 + 0.5)) / 3.85);
 }
 
 TEST(Score, ErrorOfTheSupportIsTheFirstOrderChangeOfTheScore) {

@@ -14,7 +14,7 @@
 #include "plan/tool_neighbours.h"
 #include "plan/tool_search.h"
 #include "tests/plan/memory_log.h"
-#include "tests/shapes.h"
+#include "tests/plan/two_renals.h"
 
 namespace wireplan::plan {
 namespace {
@@ -22,29 +22,6 @@ namespace {
 using simulate::kBothTools;
 using simulate::ToolStep;
 using simulate::Until;
-
-Catheter catheter_of(double length, double inner, double curve_radius = 10.0) {
-  Catheter catheter;
-  catheter.tool.wire = {
-      .name = "hook",
-      .radius = 0.83,
-      .sections = {{.length = 8.0, .bending_stiffness = 99.0},
-                   {.length = 0.5 * kPi * curve_radius,
-                    .bending_stiffness = 99.0,
-                    .rest_curvature = 1.0 / curve_radius},
-                   {.length = length - 8.0 - 0.5 * kPi * curve_radius, .bending_stiffness = 332.0}},
-      .friction = 0.1};
-  catheter.tool.inner_radius = 0.5 * inner;
-  return catheter;
-}
-
-simulate::Wire wire_of(double length, double radius) {
-  return {.name = "wire",
-          .radius = radius,
-          .sections = {{.length = 30.0, .bending_stiffness = 2.0},
-                       {.length = length - 30.0, .bending_stiffness = 20.0}},
-          .friction = 0.04};
-}
 
 const Ostium kOstium{{.arc = 300.0}, 20.0, 5.0, 340.0};
 
@@ -279,60 +256,6 @@ TEST(ToolNeighbours, DifferInOneStepByWhatAHandDoesNotFeel) {
   EXPECT_NEAR(others[3][4].at, 0.2 + kNeighbourTurn, 1e-12);
 }
 
-// An aorta of 9 mm radius along z from 0 to 130 mm, with branches of 3 mm radius toward +x and -x
-// at 60 mm; all ends are flat and closed.
-constexpr double kLevel = 60.0, kAorta = 9.0, kRenal = 3.0;
-
-const simulate::VesselModel& aorta() {
-  static const simulate::VesselModel vessel(
-      shapes::level_set(
-          [](const Vec3& p) {
-            const auto renal = [&](double x) {
-              return shapes::depth_in_tube(p, Vec3(0.0, 0.0, kLevel), Vec3(x, 0.0, kLevel), kRenal);
-            };
-            const double trunk =
-                shapes::depth_in_tube(p, Vec3(0.0, 0.0, 0.0), Vec3(0.0, 0.0, 130.0), kAorta);
-            const auto soft = [](double depth) { return std::exp(depth / 0.5); };
-            return 0.5 * std::log(soft(trunk) + soft(renal(45.0)) + soft(renal(-45.0)));
-          },
-          Vec3(-46.0, -10.0, -1.5), Vec3(46.0, 10.0, 131.5), 1.1),
-      simulate::LumenOptions{.grid_spacing = 0.6});
-  return vessel;
-}
-
-Centerline line_through(const std::vector<Vec3>& corners) {
-  Centerline line = shapes::line_through(corners, kAorta);
-  for (Eigen::Index i = 0; i < line.points.cols(); ++i) {
-    if (std::abs(line.points(0, i)) > kAorta - 1.0) line.radius[i] = kRenal;
-  }
-  return line;
-}
-
-Study toward(double side) {
-  const auto branch = [](double x) {
-    return preprocess::Branch{line_through({{0.0, 0.0, kLevel}, {x, 0.0, kLevel}}), 0,
-                              kLevel - 5.0};
-  };
-  Study study;
-  study.wires = {wire_of(1500.0, 0.44)};
-  study.catheters = {catheter_of(650.0, 1.0, 8.0)};
-  study.inclinations = study.azimuths = study.rolls = {0.0};
-  study.access = Vec3(0.0, 0.0, 5.0);
-  const auto way = std::make_shared<simulate::Way>(
-      line_through({{0.0, 0.0, 5.0}, {0.0, 0.0, kLevel}, {side * 35.0, 0.0, kLevel}}),
-      std::vector<preprocess::Branch>{{line_through({{0.0, 0.0, 5.0}, {0.0, 0.0, 128.0}}), -1, 0.0},
-                                      branch(44.0),
-                                      branch(-44.0)});
-  study.goal = {.point = way->section().center,
-                .radius = way->section().radius,
-                .at_section = true,
-                .way = way};
-  study.insertion.length = 200.0;
-  study.insertion.element_length = 1.5;
-  study.insertion.friction = 0.04;
-  return study;
-}
-
 double turned(const Candidate& candidate) {
   double sum = 0.0;
   for (const ToolStep& step : candidate.steps) sum += step.turn;
@@ -349,7 +272,7 @@ TEST(ToolNeighbours, ComeToTheSameAsWhenMadeOneByOne) {
   const Candidate candidate = first_candidate(study, {});
   const auto trial = [&] {
     return simulate::ToolTrial(tools_of(study, candidate), make_introducer(study, candidate), goal,
-                               aorta(), tool_options(study));
+                               aorta(), tool_options(study, candidate));
   };
   // Pulled by some 8, 10 and 16 mm, of which the last leaves the wire short.
   std::vector<ToolScript> scripts;

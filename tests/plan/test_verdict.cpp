@@ -277,6 +277,13 @@ TEST(Verdict, SheathGradesAndShortWiresOfTheWay) {
   bench.study.catheters.emplace_back();
   bench.plan.candidates[0].catheter = 0;
   EXPECT_TRUE(tells(bench.verdict().reasons, "are needed to take the catheter over it"));
+  // Of two wires the shorter one counts.
+  bench.study.wires.push_back(bench.study.wires[0]);
+  bench.study.wires[0].sections.back().length += 5000.0;
+  EXPECT_FALSE(tells(bench.verdict().reasons, "are needed to take the catheter over it"));
+  bench.plan.candidates[0].first_wire = 1;
+  EXPECT_TRUE(tells(bench.verdict().reasons, "are needed to take the catheter over it"));
+  bench.plan.candidates[0].first_wire = -1;
   bench.way->wire_needed = bench.study.wires[0].length();
   EXPECT_FALSE(tells(bench.verdict().reasons, "to take")) << "it is just long enough";
 }
@@ -464,6 +471,13 @@ TEST(Verdict, OfCathetersThatDoNotReachSaysWhatStopsThemAndWhichAreLeft) {
   EXPECT_TRUE(tells(verdict.reasons,
                     "No script of cobra with straight reaches: it turns aside; the catheter's tip "
                     "came no nearer to the ostium than 9.7 mm."));
+  bench.study.wires.emplace_back().name = "soft";
+  pairs[0].exchange = {.first_wire = 1, .found = 0, .held = 0.0, .stopped = "it falls out"};
+  EXPECT_TRUE(tells(bench.verdict().reasons,
+                    "came no nearer to the ostium than 9.7 mm; nor does it in exchange for soft "
+                    "through the placed catheter: it falls out."));
+  pairs[0].exchange.stopped.clear();
+  EXPECT_FALSE(tells(bench.verdict().reasons, "No script of cobra")) << "brought in so, it reaches";
   EXPECT_TRUE(tells(verdict.reasons, "Not tried was short with straight: catheter too short."));
   EXPECT_TRUE(
       tells(verdict.changes,

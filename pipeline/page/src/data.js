@@ -70,7 +70,9 @@ export const readPage = () => {
           const [insertion, push, tip, peak, total] = values.subarray(5 * i, 5 * i + 5);
           const row = tools ? tools.subarray(7 * i, 7 * i + 7) : null;
           const tool = (k) => ({insertion: row[k], push: row[k + 1], tip: row[k + 2]});
-          return {insertion, push, tip, peak, total, step: row ? row[0] : 0, tools: row ? [tool(1), tool(4)] : null};
+          // Which of the script's wires is in the catheter: 0 the first.
+          const wire = (stored.exchanges ?? []).filter((from) => i >= from).length;
+          return {insertion, push, tip, peak, total, step: row ? row[0] : 0, tools: row ? [tool(1), tool(4)] : null, wire};
         }), tools ? 2 : 0);
       }),
     };

@@ -53,8 +53,8 @@ export const outcomeWord = (outcome) => kOutcomes[outcome]?.word ?? shown(outcom
 export const outcomeMark = (outcome) => kOutcomes[outcome]?.mark ?? "?";
 export const outcomes = Object.keys(kOutcomes);
 
-/** "bentson", or "bentson in cobra-c2". */
-export const toolsName = (trial) => `${shown(trial.wire)}${trial.catheter ? ` in ${shown(trial.catheter)}` : ""}`;
+/** "bentson", "bentson in cobra-c2", or "amplatz-stiff in cobra-c2 in exchange for bentson". */
+export const toolsName = (trial) => `${shown(trial.wire)}${trial.catheter ? ` in ${shown(trial.catheter)}` : ""}${trial.first_wire ? ` in exchange for ${shown(trial.first_wire)}` : ""}`;
 
 /** "amplatz-stiff, inclination 10\u00b0, azimuth 90\u00b0, roll 0\u00b0", and the moves where it is no straight push. */
 export const planName = (trial) =>

@@ -130,10 +130,12 @@ export const vesselSection = (page, selection) => {
     vessel?.setSections(moves.checked ? shape.sections : null);
     vessel?.setWire(shape.nodes, shape.force, scale, shape.tools ?? toolsAtEnd(push));
     showStep(push);
+    // A wire is called by its name where the script exchanges it.
+    const wireName = (k) => (trial.exchanges > 0 ? shown(trial.tools.each[1 + k].name) : "wire");
     const ofTool = (name, tool) =>
       `${name} ${number(tool.insertion)}\u00a0mm in, hand ${number(tool.push)}\u00a0N, tip ${number(tool.tip)}\u00a0N`;
     const forces = push?.tools
-      ? `${ofTool("catheter", push.tools[0])}; ${ofTool("wire", push.tools[1])}; largest contact ${number(push.peak)}\u00a0N`
+      ? `${ofTool("catheter", push.tools[0])}; ${ofTool(wireName(push.wire), push.tools[1])}; largest contact ${number(push.peak)}\u00a0N`
       : push
       ? `hand ${number(push.push)}\u00a0N, tip ${number(push.tip)}\u00a0N, largest contact ${number(push.peak)}\u00a0N, all contacts ${number(push.total)}\u00a0N`
       : "never entered the vessel";

@@ -156,16 +156,24 @@ export const uncertainSection = (page) => {
     table("Uncertainties", ["What", "How it was looked at", "What it changes"], rows.filter(Boolean)));
 };
 
+/** How bringing a pair's wire in by exchange ended. */
+const exchanged = (row) => {
+  if (!row) return "\u2013";
+  if (!row.tried) return `not tried: ${shown(row.reason)}`;
+  return `${plural(row.scripts_found, "script")} after ${shown(row.first_wire)}${row.reason ? `; ${shown(row.reason)}` : ""}`;
+};
+
 /** Every catheter with every wire: what came of it, or why it was not tried. */
 export const catheterSection = ({report: {catheters}}) => {
   if (!catheters?.pairs.length) return null;
   const rows = catheters.pairs.map((pair) => [name(`${shown(pair.wire)} in ${shown(pair.catheter)}`),
     pair.tried ? plural(pair.scripts_found, "script") : "not tried",
+    exchanged(pair.exchange),
     pair.nearest_hook_mm === undefined ? "\u2013" : number(pair.nearest_hook_mm),
     pair.reason ? shown(pair.reason) : "\u2013"]);
   return section("catheters", "Catheters and wires",
     catheters.suggested ? el("ul", {}, catheters.suggested.map((row) => el("li", {}, el("strong", {}, shown(row.catheter)), `: ${shown(row.reason)}.`))) : null,
-    table("Pairs of catheter and wire", ["Pair", "Found in the search", "Catheter's tip to the ostium at best [mm]", "What stopped it"], rows));
+    table("Pairs of catheter and wire", ["Pair", "Found in the search", "In exchange for another wire", "Catheter's tip to the ostium at best [mm]", "What stopped it"], rows));
 };
 
 /** Of a vessel that moves as a whole: what the best trial of each wire moves, and by how much that differs over its repeats. */
