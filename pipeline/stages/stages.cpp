@@ -238,6 +238,13 @@ std::vector<Stage> stages_to_surface(const Case& given) {
   return stages;
 }
 
+/// Whether what the stage warns of is told as it ends: of the volume's values and of given labels
+/// always, of all else where no report will tell it.
+bool warns_here(const Case& given, const RunOptions& options, const std::string& stage) {
+  if (stage == "volume" || (stage == "segment" && given.labels)) return true;
+  return !options.to.empty() && options.to != "report" && !options.instead;
+}
+
 }  // namespace
 
 std::vector<Stage> stages_of(const Case& given) {
@@ -412,8 +419,8 @@ RunResult run_stages(const Case& given, const RunOptions& options,
       result.artifacts.push_back(*artifact);
     }
     outcome.seconds = seconds_since(start);
-    const bool warns = stage.name == "volume" || (stage.name == "segment" && given.labels);
-    if (artifact && warns && fs::exists(artifact->folder / kFiguresFile)) {
+    if (artifact && warns_here(given, options, stage.name) &&
+        fs::exists(artifact->folder / kFiguresFile)) {
       outcome.warnings = work.figures(stage.name).at("warnings").get<std::vector<std::string>>();
     }
     result.stages.push_back(outcome);

@@ -45,7 +45,7 @@ struct StageOutcome {
   StageState state = StageState::kCached;
   double seconds = 0.0;                    // this time: of the look-up or the run
   std::vector<std::string> reasons = {};   // why it runs; empty where it does not
-  std::vector<std::string> warnings = {};  // of the volume, what its values are
+  std::vector<std::string> warnings = {};  // that are told as it ends
 };
 
 struct RunOptions {

@@ -217,5 +217,16 @@ TEST_F(MaskRun, ASeedInALargerPieceDoesNotTakeTheVesselAway) {
                     " is not connected with that of access and target"));
 }
 
+TEST_F(MaskRun, WhatNoReportWillTellIsToldAsTheStagesEnd) {
+  const Answer first = run_volume(
+      40, [](const Vec3& p) { return std::hypot(p.x() - 20.0, p.y() - 20.0) < 4.0 ? 300 : 40; },
+      Vec3(20, 20, 6), Vec3(20, 20, 30), "--to segment");
+  ASSERT_EQ(first.code, 0) << first.log;
+  const Answer cached = run_between(Vec3(20, 20, 6), Vec3(20, 20, 30), "--to centerline");
+  for (const std::string& log : {first.log, cached.log}) {
+    EXPECT_TRUE(holds(log, "mind: segment: the vessel touches the border of the volume")) << log;
+  }
+}
+
 }  // namespace
 }  // namespace wireplan::pipeline
