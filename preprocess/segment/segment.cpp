@@ -136,6 +136,9 @@ Segmentation segment(const Image& image, const SegmentOptions& options) {
   for (const Vec3& point : points) {
     statistics.samples.push_back(sample_lumen(image, point, surroundings));
   }
+  if (options.hounsfield && !options.lower_hu) {
+    sample_beside_calcium(image, surroundings, statistics.samples);
+  }
   statistics.band.surroundings_hu = surroundings;
   Region region = options.lower_hu ? find_by_band(image, options, statistics)
                                    : find_by_level(image, options, statistics);

@@ -30,6 +30,7 @@ constexpr double kSurroundMm = 15.0;    // ball in which the surroundings are ta
 constexpr double kMedianError = 1.253;  // standard error of a median against that of a mean
 constexpr double kCorrelation = 1.5;    // of an average of neighbours, against independent noise
 constexpr std::size_t kLeastSample = 30;
+constexpr double kNoisyPart = 0.15;  // of the contrast: values are smoothed to find a core
 constexpr double kConnectPart = 0.65, kUpperPart = 0.4, kNoisePart = 0.05;
 constexpr double kNeckMm = 0.5;
 
@@ -155,7 +156,10 @@ Box box_round(const Image& image, const std::vector<Vec3>& points, double margin
   return grown(*box, margin, image.grid);
 }
 
-/// Level and noise from the voxels near the middle that have lumen all round them, if there are
+/// Contacts thinner than twice this are no vessel: with less than one voxel it would ask nothing.
+double neck_of(const Grid& grid) { return std::max(kNeckMm, 0.501 * grid.spacing.minCoeff()); }
+
+/// Level and scatter from the voxels near the middle that have lumen all round them, if there are
 /// enough of them.
 void measure_lumen(const Image& image, const Eroded& eroded, const Vec3& middle, double floor,
                    LumenSample& sample) {
@@ -175,16 +179,53 @@ void measure_lumen(const Image& image, const Eroded& eroded, const Vec3& middle,
   for (double& value : values) {
     value = std::abs(value - sample.level_hu);
   }
-  sample.noise_hu = std::min(sample.noise_hu, 1.4826 * median_of(std::move(values)));
+  sample.scatter_hu = 1.4826 * median_of(std::move(values));
+}
+
+/// The lumen round a point, of values from `least` to `most`; smoothed before where it is noisy.
+void measure_near(const Image& image, double least, double most, bool noisy, LumenSample& sample) {
+  const Band like_lumen{.lower_hu = least,
+                        .connect_hu = least,
+                        .upper_hu = most,
+                        .smoothing_mm = noisy ? 0.6 : 0.0,
+                        .neck_mm = neck_of(image.grid)};
+  const Eroded eroded =
+      erode(image, box_round(image, {sample.point}, kSnapMm + kLumenMm), like_lumen, least);
+  if (const std::optional<std::size_t> center = brightest_near(eroded, sample.point, least)) {
+    measure_lumen(image, eroded, center_of(eroded.grid, *center), least, sample);
+  }
+}
+
+/// The noise is no more than the scatter of a core; and how well the level is known.
+LumenSample with_error(LumenSample sample) {
+  if (sample.voxels > 1) sample.noise_hu = std::min(sample.noise_hu, sample.scatter_hu);
+  const auto voxels = static_cast<double>(std::max<std::size_t>(1, sample.voxels));
+  sample.error_hu = kMedianError * kCorrelation * sample.noise_hu / std::sqrt(voxels);
+  return sample;
+}
+
+/// Where the nearest ball of contrast begins, in words; nothing where there is none within 10 mm.
+std::string nearest_contrast(const Image& image, const Vec3& point, double least, double most) {
+  constexpr double kLookMm = 10.0;
+  std::optional<Vec3> nearest;
+  double away = std::numeric_limits<double>::infinity();
+  for (const std::size_t n : voxels_in_ball(image.grid, point, kLookMm)) {
+    const Vec3 here = center_of(image.grid, n);
+    if ((here - point).norm() >= away) continue;
+    const double value = median_near(image, here);
+    if (value < least || value > most) continue;
+    nearest = here;
+    away = (here - point).norm();
+  }
+  if (!nearest) return "";
+  return "; such contrast begins " + to_text(std::round(10.0 * away) / 10.0) + " mm away, at " +
+         to_text(*nearest) + " mm";
 }
 
 /// Two standard errors, of a level that was measured in a core.
 double allowance(const LumenSample& sample) {
   return sample.voxels > 1 ? std::min(kMostAllowance, 2.0 * sample.error_hu) : 0.0;
 }
-
-/// Contacts thinner than twice this are no vessel: with less than one voxel it would ask nothing.
-double neck_of(const Grid& grid) { return std::max(kNeckMm, 0.501 * grid.spacing.minCoeff()); }
 
 }  // namespace
 
@@ -205,28 +246,48 @@ LumenSample sample_lumen(const Image& image, const Vec3& point, double surroundi
   LumenSample sample{.point = point,
                      .level_hu = median_near(image, point),
                      .noise_hu = measure_noise(image, point)};
-  const auto with_error = [&sample] {
-    const auto voxels = static_cast<double>(std::max<std::size_t>(1, sample.voxels));
-    sample.error_hu = kMedianError * kCorrelation * sample.noise_hu / std::sqrt(voxels);
-    return sample;
-  };
   sample.voxels = 1;
-  if (sample.level_hu < surroundings + kSeenPart * kLeastContrastHu) return with_error();
-
+  if (sample.level_hu < surroundings + kSeenPart * kLeastContrastHu) return with_error(sample);
   // the middle of the vessel nearby tells more than a point near the wall
-  const double contrast = sample.level_hu - surroundings, half = surroundings + 0.5 * contrast;
-  const bool noisy = sample.noise_hu > 0.15 * contrast;
-  const Band like_lumen{.lower_hu = half,
-                        .connect_hu = half,
-                        .upper_hu = std::max(kCalciumHu, sample.level_hu + contrast),
-                        .smoothing_mm = noisy ? 0.6 : 0.0,
-                        .neck_mm = neck_of(image.grid)};
-  const Eroded eroded =
-      erode(image, box_round(image, {point}, kSnapMm + kLumenMm), like_lumen, half);
-  if (const std::optional<std::size_t> center = brightest_near(eroded, point, half)) {
-    measure_lumen(image, eroded, center_of(eroded.grid, *center), half, sample);
+  const double contrast = sample.level_hu - surroundings;
+  measure_near(image, surroundings + 0.5 * contrast,
+               std::max(kCalciumHu, sample.level_hu + contrast),
+               sample.noise_hu > kNoisyPart * contrast, sample);
+  return with_error(sample);
+}
+
+void sample_beside_calcium(const Image& image, double surroundings,
+                           std::vector<LumenSample>& samples) {
+  constexpr double kScatterPart = 0.2, kScatterNoises = 2.5;
+  // Than the others: an even core, one too small to tell, an uneven one; and lumen at most.
+  constexpr double kBrighterEven = 2.0, kBrighter = 1.5, kBrighterUneven = 1.2, kLumen = 1.3;
+  constexpr double kRimPart = 0.4;  // of what lumen may have: the rim is darker
+  const auto contrast_of = [&](const LumenSample& sample) {
+    return sample.level_hu - surroundings;
+  };
+  const auto is_even = [&](const LumenSample& sample) {
+    return sample.voxels > 1 && (sample.scatter_hu <= kScatterPart * contrast_of(sample) ||
+                                 sample.scatter_hu <= kScatterNoises * sample.noise_hu);
+  };
+  const std::vector<LumenSample> before = samples;
+  for (std::size_t k = 0; k < samples.size(); ++k) {
+    LumenSample& sample = samples[k];
+    double others = 0.0;  // the most contrast of those that are sure
+    for (std::size_t m = 0; m < before.size(); ++m) {
+      if (m != k && is_even(before[m])) others = std::max(others, contrast_of(before[m]));
+    }
+    const double brighter = is_even(sample)     ? kBrighterEven
+                            : sample.voxels > 1 ? kBrighterUneven
+                                                : kBrighter;
+    if (others <= 0.0 || contrast_of(sample) < brighter * others) continue;
+    const double most = kLumen * others;
+    LumenSample beside{.point = sample.point, .noise_hu = measure_noise(image, sample.point)};
+    measure_near(image, surroundings + kRimPart * most, surroundings + most,
+                 beside.noise_hu > kNoisyPart * most, beside);
+    if (beside.voxels >= std::max(kLeastSample, sample.voxels) && is_even(beside)) {
+      sample = with_error(beside);
+    }
   }
-  return with_error();
 }
 
 double find_surroundings(const Image& image, const std::vector<Vec3>& points, bool hounsfield) {
@@ -270,6 +331,9 @@ Band choose_band(const Image& image, const std::vector<LumenSample>& samples, do
     const bool none = most < least_of_all || contrast <= 0.0 || (!sure && here < kUnsureContrastHu);
     if (!none && here >= kLeastPart * most) continue;
     const std::string unit = hounsfield ? " HU" : "";
+    const std::string beside =
+        none ? ""
+             : nearest_contrast(image, sample.point, base + kConnectPart * most, base + 1.4 * most);
     throw Error(
         "no contrast-filled artery at " + to_text(sample.point) + " mm: the volume has " +
         to_text(std::round(sample.level_hu)) + unit + " there (median of " +
@@ -279,6 +343,7 @@ Band choose_band(const Image& image, const std::vector<LumenSample>& samples, do
         (none ? hounsfield ? ", 100 HU over blood without contrast"
                            : ", five times the noise over what surrounds it"
               : ", 40 % of the contrast at " + to_text(brightest->point) + " mm") +
+        beside +
         "; take the arterial phase of a CT with contrast, or move the point into the "
         "lumen, or, if this is no CT, give segmentation.lower_hu and upper_hu");
   }

@@ -19,6 +19,7 @@ struct LumenSample {
   Vec3 point = Vec3::Zero();  // as given                                            [mm]
   double level_hu = 0.0;      // median of the contrast                              [HU]
   double noise_hu = 0.0;      // sigma, between neighbouring voxels                  [HU]
+  double scatter_hu = 0.0;    // sigma of the values of which the level is the median [HU]
   std::size_t voxels = 0;     // of which the level is the median
   double error_hu = 0.0;      // standard error of the level                         [HU]
 };
@@ -41,6 +42,14 @@ struct Band {
 /// large. One is from second differences within 10 mm, to which edges add; the other is the spread
 /// of the lumen within 6 mm, to which the wall adds.
 LumenSample sample_lumen(const Image& image, const Vec3& point, double surroundings);
+
+/// Samples again, without what is brighter than lumen, each point that lies in plaque: its core
+/// scatters by a fifth of its contrast and 2.5 times the noise, and has 1.2 times the contrast of
+/// the other points whose cores do not; or it has no core and 1.5 times theirs, or an even one and
+/// twice theirs. The sample stays where no larger and even core is found beside it, of at most 1.3
+/// times their contrast. Of a CT alone.
+void sample_beside_calcium(const Image& image, double surroundings,
+                           std::vector<LumenSample>& samples);
 
 /// What surrounds the vessel at the points: in HU 50 (soft tissue and blood without contrast have
 /// 20 to 70, references B5), in other units the median of what within 15 mm of the points holds

@@ -70,23 +70,58 @@ void shrink(LumenField& field, Candidates& candidates, Box& box) {
   }
 }
 
-/// The voxel in the middle of the vessel at a point: of those that may be lumen the nearest within
-/// reach, and from there uphill in depth as long as it stays so near.
-std::optional<std::size_t> middle_near(const Grid& grid, const Candidates& candidates,
-                                       const Vec3& point) {
-  std::optional<std::size_t> best;
-  double least = std::numeric_limits<double>::infinity();
-  for (const std::size_t n : voxels_in_ball(grid, point, kNearMm)) {
-    const double here = (center_of(grid, n) - point).norm();
-    if (candidates.depth[n] <= 0.0F || here >= least) continue;
-    least = here;
-    best = n;
+/// The piece of what may be lumen that holds a voxel, where that is too small for a vessel, as the
+/// rim of plaque is; nothing where it is a vessel.
+std::vector<std::size_t> speck_of(const Grid& grid, const Candidates& candidates,
+                                  std::size_t start) {
+  constexpr double kSpeckMm3 = 15.0;
+  const auto most = static_cast<std::size_t>(kSpeckMm3 / grid.spacing.prod()) + 1;
+  std::vector<std::size_t> piece = {start};
+  for (std::size_t next = 0; next < piece.size(); ++next) {
+    for_each_face_neighbour(grid, piece[next], [&](std::size_t m) {
+      const bool known = std::find(piece.begin(), piece.end(), m) != piece.end();
+      if (candidates.labels[m] != 0 && !known && piece.size() <= most) piece.push_back(m);
+    });
+    if (piece.size() > most) return {};
   }
-  for (bool climbs = best.has_value(); climbs;) {
+  return piece;
+}
+
+/// The voxel in the middle of the vessel at a point: of those that may be lumen the nearest within
+/// reach, specks left out, and from there uphill in depth as long as it stays so near. Where some
+/// within reach are as bright as the vessel that was measured there, all others are another's: a
+/// point in the wall between an artery and a vein means the artery.
+std::optional<std::size_t> middle_near(const LumenField& field, const Candidates& candidates,
+                                       const Vec3& point, double level) {
+  constexpr double kAsBright = 0.8;  // of the contrast
+  const Grid& grid = field.grid;
+  const auto least =
+      static_cast<float>(field.surroundings + kAsBright * (level - field.surroundings));
+  std::vector<std::size_t> near;
+  for (const std::size_t n : voxels_in_ball(grid, point, kNearMm)) {
+    if (candidates.depth[n] > 0.0F) near.push_back(n);
+  }
+  const auto away = [&](std::size_t n) { return (center_of(grid, n) - point).norm(); };
+  std::stable_sort(near.begin(), near.end(),
+                   [&](std::size_t a, std::size_t b) { return away(a) < away(b); });
+  while (!near.empty()) {
+    const std::vector<std::size_t> speck = speck_of(grid, candidates, near.front());
+    if (speck.empty()) break;
+    std::erase_if(near, [&](std::size_t n) {
+      return std::find(speck.begin(), speck.end(), n) != speck.end();
+    });
+  }
+  const auto is_bright = [&](std::size_t n) { return field.values[n] >= least; };
+  if (field.hounsfield && std::any_of(near.begin(), near.end(), is_bright)) {
+    std::erase_if(near, [&](std::size_t n) { return !is_bright(n); });
+  }
+  if (near.empty()) return {};
+  std::size_t best = near.front();
+  for (bool climbs = true; climbs;) {
     climbs = false;
-    for_each_neighbour(grid, *best, [&](std::size_t m, const Voxel&) {
-      if (candidates.depth[m] <= candidates.depth[*best] ||
-          (center_of(grid, m) - point).norm() > kNearMm) {
+    for_each_neighbour(grid, best, [&](std::size_t m, const Voxel&) {
+      if (candidates.depth[m] <= candidates.depth[best] ||
+          std::find(near.begin(), near.end(), m) == near.end()) {
         return;
       }
       best = m;
@@ -190,7 +225,8 @@ std::vector<WayLevel> find_points(const LumenField& field, const Candidates& can
                                   const SegmentStatistics& statistics, double least_contrast) {
   std::vector<WayLevel> found;
   for (std::size_t k = 0; k < points.size(); ++k) {
-    const std::optional<std::size_t> middle = middle_near(field.grid, candidates, points[k]);
+    const std::optional<std::size_t> middle =
+        middle_near(field, candidates, points[k], statistics.samples[k].level_hu);
     if (!middle) {
       throw Error("no lumen within 2.5 mm of " + to_text(points[k]) + " mm: expected values from " +
                   to_text(std::round(field.surroundings + least_contrast / 2.0)) + " to " +

@@ -265,6 +265,45 @@ TEST(SegmentLevel, APointInMetalIsToldAsOne) {
   EXPECT_TRUE(has(error, "HU round (0.0, 0.0, 85.0) mm, expected at most 800 HU")) << error;
 }
 
+TEST(SegmentLevel, APointInPlaqueTakesTheLumenBesideIt) {
+  // A lens of calcium on the wall: its own values, of 600 HU and less, would be taken for lumen.
+  const auto plaque = [](const Vec3& p) {
+    return off_axis(p, 0) < 5.0 && (p - Vec3(5, 0, 80)).norm() < 2.0;
+  };
+  const auto lumen = [&](const Vec3& p) { return off_axis(p, 0) < 5.0 && !plaque(p); };
+  const Image image = scanned(10.0, [&](const Vec3& p) {
+    return plaque(p) ? 800.0 : off_axis(p, 0) < 5.0 ? 250.0 : kAround;
+  });
+  for (const bool last : {true, false}) {
+    const Vec3 calcium(4.2, 0, 80);
+    const Segmentation found =
+        segment(image, {.seeds = {last ? kBottom : calcium}, .target = last ? calcium : kBottom});
+    const auto& samples = found.statistics.samples;
+    EXPECT_NEAR((last ? samples.back() : samples.front()).level_hu, 250.0, 15.0);
+    EXPECT_GT(dice(found.mask, lumen), 0.96);
+  }
+}
+
+TEST(SegmentLevel, APointInTheWallBetweenArteryAndVeinMeansTheArtery) {
+  // The point lies 0.1 mm from a vein of 70 % of the contrast and 0.5 mm from the artery.
+  const Image image = scanned(10.0, [](const Vec3& p) {
+    return off_axis(p, 0) < 5.0 ? 250.0 : off_axis(p, 10.6) < 5.0 ? 190.0 : kAround;
+  });
+  const Segmentation found = segment(image, {.seeds = {Vec3(5.5, 0, 5)}, .target = kTop});
+  EXPECT_LT(off_axis(found.statistics.ways.back().points.col(0), 0.0), 5.0);
+  EXPECT_GT(dice(found.mask, [](const Vec3& p) { return off_axis(p, 0) < 5.0; }), 0.95);
+}
+
+TEST(SegmentLevel, APointBesideTheArteryIsToldWhereItsContrastBegins) {
+  const Image image =
+      scanned(10.0, [](const Vec3& p) { return off_axis(p, 0) < 5.0 ? 250.0 : kAround; });
+  const std::string error = error_of(image, {.seeds = {kBottom}, .target = Vec3(8, 0, 85)});
+  const std::string told = "such contrast begins ";
+  ASSERT_TRUE(has(error, told)) << error;
+  // The half level lies at 5 mm, and 65 % of the contrast half a voxel further in.
+  EXPECT_NEAR(std::stod(error.substr(error.find(told) + told.size())), 3.4, 0.8) << error;
+}
+
 TEST(SegmentLevel, AWayIsNotGivenUpForAPlaceThatNoiseMakesDark) {
   // The straight vessel has 80 % of the contrast at one place; a longer one round it 90 % all
   // along.
