@@ -68,13 +68,15 @@ std::vector<Vec3> told_places(const SegmentStatistics& statistics) {
   for (const preprocess::Leak& part : statistics.doubtful) places.push_back(part.place);
   for (const preprocess::Leak& branch : statistics.branches) places.push_back(branch.place);
   for (const preprocess::Touch& touch : statistics.touches) places.push_back(touch.place);
+  for (const preprocess::WayDoubt& doubt : statistics.way_doubts) places.push_back(doubt.place);
   return places;
 }
 
 int count_warnings(const SegmentStatistics& statistics, int handles) {
   constexpr std::size_t kLeaksTold = 5;  // as the stage tells them
   return static_cast<int>(std::min(statistics.search.leaks.size(), kLeaksTold) +
-                          statistics.doubtful.size() + statistics.touches.size()) +
+                          statistics.doubtful.size() + statistics.touches.size() +
+                          statistics.way_doubts.size()) +
          (statistics.branches.empty() ? 0 : 1) + (statistics.touches_border ? 1 : 0) +
          (handles > 0 ? 1 : 0);
 }

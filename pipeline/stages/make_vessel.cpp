@@ -44,6 +44,33 @@ std::string doubt_warning(const preprocess::Leak& part) {
          "there; if it is no artery, give segmentation.lower_hu and upper_hu, or labels";
 }
 
+// Where the way may leave its vessel.
+std::string way_warning(const preprocess::WayDoubt& doubt) {
+  const std::string place = place_text(doubt.place) + " mm";
+  if (doubt.by_level) {
+    return "segment: the lumen's level changes from " + format("%.0f", doubt.before_hu) + " to " +
+           format("%.0f", doubt.after_hu) + " HU within 20 mm of the way at " + place +
+           ", which an artery's does not: it may leave the artery for a vein that touches it; look "
+           "at the outline there, and whether access and target lie in arteries";
+  }
+  return "segment: the way narrows to " + format("%.1f", doubt.neck_mm) + " mm in radius at " +
+         place + ", between parts of " + format("%.1f", doubt.beside_mm) +
+         " mm or more: a stenosis, or another vessel that touches the artery there; look at the "
+         "outline, and whether access and target lie in arteries";
+}
+
+// Slices in which vessels that pass each other are one.
+void add_thick_slices(const preprocess::Grid& grid, Json& figures) {
+  constexpr double kThickMm = 2.5;
+  const double slice = grid.spacing.maxCoeff();
+  if (slice < kThickMm) return;
+  figures["warnings"].push_back(
+      "segment: the volume's slices are " + format("%.1f", slice) +
+      " mm apart: vessels that pass each other within one are not told apart, and the way may take "
+      "a shortcut from one to the other; look whether it keeps to the artery, or take slices of 1 "
+      "to 2 mm");
+}
+
 // Loops that were wide enough to be arteries.
 std::string loops_warning(const std::vector<preprocess::Loop>& loops) {
   constexpr std::size_t kLoopsTold = 5;
@@ -137,6 +164,17 @@ void add_segmentation(const preprocess::SegmentStatistics& statistics, bool chos
   }
   if (!statistics.branches.empty()) {
     figures["warnings"].push_back(branches_warning(statistics.branches));
+  }
+  for (const preprocess::WayDoubt& doubt : statistics.way_doubts) {
+    figures["way_doubts"].push_back({{"place_mm", to_json(doubt.place)},
+                                     {"by", doubt.by_level ? "level" : "width"},
+                                     {"before_hu", doubt.before_hu},
+                                     {"after_hu", doubt.after_hu}});
+    if (doubt.by_width) {
+      figures["way_doubts"].back()["neck_radius_mm"] = doubt.neck_mm;
+      figures["way_doubts"].back()["beside_radius_mm"] = doubt.beside_mm;
+    }
+    figures["warnings"].push_back(way_warning(doubt));
   }
   for (const preprocess::Leak& part : statistics.doubtful) {
     if (part.volume_mm3 < kDoubtfulPart * statistics.volume_mm3) continue;
@@ -344,6 +382,7 @@ void make_segment(Workspace& work, const fs::path& folder) {
   }
   add_segmentation(statistics, !options.lower_hu.has_value(), figures);
   if (options.hounsfield) add_little_contrast(statistics, figures);
+  add_thick_slices(segmentation.mask.grid, figures);
   add_shape(statistics.shape, figures);
   add_touches(given, statistics.touches, statistics.dipping, figures);
   preprocess::write_mask(segmentation.mask, folder / "mask.nrrd");

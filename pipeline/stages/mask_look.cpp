@@ -38,6 +38,9 @@ std::vector<MarkedPlace> places_to_look_at(const Case& given, const Json& figure
   add("touches", kMostTouches, [](const Json& touch) -> std::string {
     return touch.at("cut").get<bool>() ? "limbs touch, parted" : "limbs touch";
   });
+  add("way_doubts", kMostTouches, [](const Json& doubt) -> std::string {
+    return doubt.at("by") == "level" ? "the level changes" : "the way narrows";
+  });
   add("leaks", kMostLeaks, [](const Json& leak) {
     return format("leak cut, %.1f ml", leak.at("volume_mm3").get<double>() / 1000.0);
   });

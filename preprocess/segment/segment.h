@@ -9,6 +9,7 @@
 #include "preprocess/segment/segment_leak.h"
 #include "preprocess/segment/segment_loops.h"
 #include "preprocess/segment/segment_touch.h"
+#include "preprocess/segment/way_doubts.h"
 #include "preprocess/vessel.h"
 #include "preprocess/volume/image.h"
 
@@ -55,12 +56,13 @@ struct SegmentStatistics {
   /// Where no band was given: the ways from the first seed to those of the others and to the
   /// target, the last, that lie in other voxels.
   std::vector<Centerline> ways;
-  std::vector<Leak> doubtful;  // what was kept, though it may be a vein
-  std::vector<Leak> branches;  // side branches that were kept by their shape alone
-  MaskShape shape;             // where a band was given before touches are cut
-  LoopSearch loops;            // where none was given
-  std::vector<Touch> touches;  // by their values, then by their shape [HU, mm]
-  std::size_t dipping = 0;     // of these by their values
+  std::vector<WayDoubt> way_doubts;  // where none was given
+  std::vector<Leak> doubtful;        // what was kept, though it may be a vein
+  std::vector<Leak> branches;        // side branches that were kept by their shape alone
+  MaskShape shape;                   // where a band was given before touches are cut
+  LoopSearch loops;                  // where none was given
+  std::vector<Touch> touches;        // by their values, then by their shape [HU, mm]
+  std::size_t dipping = 0;           // of these by their values
 };
 
 struct Segmentation {

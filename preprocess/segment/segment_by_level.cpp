@@ -302,6 +302,7 @@ Region find_by_level(const Image& image, const SegmentOptions& options,
   statistics.branches = std::move(lumen.branches);
   statistics.search.leaks = std::move(lumen.leaks);
   const std::vector<float> depth = measure_depth(region.grid, region.labels);
+  statistics.way_doubts = find_way_doubts(field, depth, ways);
   statistics.ways.clear();
   for (const auto& way : ways) statistics.ways.push_back(line_along(region.grid, depth, way));
   statistics.search.route = route_along(region, depth, ways, statistics.ways.back());

@@ -228,5 +228,36 @@ TEST_F(MaskRun, WhatNoReportWillTellIsToldAsTheStagesEnd) {
   }
 }
 
+TEST_F(MaskRun, WhereTheWayMayLeaveItsVesselIsToldWithThePlace) {
+  case_["segmentation"] = Json::object();
+  const auto neck = [](const Vec3& p) {
+    const double radius = std::min(6.0, 2.0 + 0.5 * std::abs(p.z() - 20.0));
+    return std::hypot(p.x() - 20.0, p.y() - 20.0) < radius ? 300 : 40;
+  };
+  const Answer answer = run_volume(40, neck, Vec3(20, 20, 6), Vec3(20, 20, 34), "--to segment");
+  ASSERT_EQ(answer.code, 0) << answer.log;
+  EXPECT_TRUE(holds(answer.log, "mind: segment: the way narrows to ")) << answer.log;
+  EXPECT_TRUE(holds(answer.log, "mm or more: a stenosis, or another vessel")) << answer.log;
+  EXPECT_TRUE(holds(figures_of_segment(folder_.path()), "neck_radius_mm"));
+  EXPECT_FALSE(holds(answer.log, " mm apart: vessels that pass")) << answer.log;
+}
+
+TEST_F(MaskRun, ThickSlicesAreToldToJoinWhatPassesWithinThem) {
+  preprocess::Image image{.grid = {.size = {40, 40, 16}, .spacing = Vec3(1, 1, 3)}, .values = {}};
+  for (std::size_t n = 0; n < image.grid.voxels(); ++n) {
+    const auto i = static_cast<double>(n % 40), j = static_cast<double>(n / 40 % 40);
+    image.values.push_back(std::hypot(i - 20.0, j - 20.0) < 5.0 ? 300.0F : 40.0F);
+  }
+  preprocess::write_image(image, folder_ / "ct.nrrd");
+  case_["volume"] = {{"path", "ct.nrrd"}};
+  case_["segmentation"] = Json::object();
+  const Answer answer = run_between(Vec3(20, 20, 6), Vec3(20, 20, 36), "--to segment");
+  ASSERT_EQ(answer.code, 0) << answer.log;
+  EXPECT_TRUE(holds(answer.log,
+                    "the volume's slices are 3.0 mm apart: vessels that pass each "
+                    "other within one are not told apart"))
+      << answer.log;
+}
+
 }  // namespace
 }  // namespace wireplan::pipeline

@@ -55,6 +55,7 @@ TEST(SegmentLevel, ContrastThatFallsAlongTheVesselIsFollowed) {
   const Segmentation found = segment(image, {.seeds = {kBottom}, .target = kTop});
   EXPECT_GT(dice(found.mask, [](const Vec3& p) { return off_axis(p, 0) < 5.0; }), 0.96);
   EXPECT_TRUE(found.statistics.search.leaks.empty());
+  EXPECT_TRUE(found.statistics.way_doubts.empty());
   EXPECT_EQ(found.statistics.shape.handles, 0U);
   // As many handles as a case may allow.
   const SegmentOptions any = {
@@ -302,6 +303,46 @@ TEST(SegmentLevel, APointBesideTheArteryIsToldWhereItsContrastBegins) {
   ASSERT_TRUE(has(error, told)) << error;
   // The half level lies at 5 mm, and 65 % of the contrast half a voxel further in.
   EXPECT_NEAR(std::stod(error.substr(error.find(told) + told.size())), 3.4, 0.8) << error;
+}
+
+TEST(SegmentLevel, ATargetInAVeinThatTouchesIsToldByItsLevel) {
+  // The vein, of 75 % of the contrast, has its wall in common with the artery from 50 to 60 mm.
+  const auto vein = [](const Vec3& p) {
+    const double away = std::max(0.0, std::abs(p.z() - 55.0) - 5.0);
+    return p.z() > 40.0 && off_axis(p, 8.5 + 0.2 * away) < 4.0;
+  };
+  const Image image = scanned(10.0, [&](const Vec3& p) {
+    return off_axis(p, 0) < 5.0 ? 250.0 : vein(p) ? 200.0 : kAround;
+  });
+  const Segmentation found = segment(image, {.seeds = {kBottom}, .target = Vec3(13, 0, 84)});
+  const auto& doubts = found.statistics.way_doubts;
+  const auto by_level = std::find_if(doubts.begin(), doubts.end(),
+                                     [](const WayDoubt& doubt) { return doubt.by_level; });
+  ASSERT_NE(by_level, doubts.end());
+  EXPECT_NEAR(by_level->place.z(), 55.0, 10.0);
+  EXPECT_GT(by_level->before_hu - by_level->after_hu, 0.16 * 175.0);  // of the mean contrast
+}
+
+TEST(SegmentLevel, ANeckOfTheWayIsToldWithItsWidth) {
+  // From 5 mm to 2 or 3.5 mm over 10 mm, and back.
+  const auto tube = [](double least) {
+    return scanned(10.0, [least](const Vec3& p) {
+      const double away = std::min(1.0, std::abs(p.z() - 45.0) / 10.0);
+      return off_axis(p, 0) < least + (5.0 - least) * away ? 300.0 : kAround;
+    });
+  };
+  const Segmentation found = segment(tube(2.0), {.seeds = {kBottom}, .target = kTop});
+  ASSERT_EQ(found.statistics.way_doubts.size(), 1U);
+  const WayDoubt& doubt = found.statistics.way_doubts.front();
+  EXPECT_TRUE(doubt.by_width && !doubt.by_level);
+  EXPECT_NEAR(doubt.place.z(), 45.0, 3.0);
+  // Radii are inscribed in voxels of 0.8 mm and so up to a voxel's diagonal in the plane short.
+  EXPECT_LE(doubt.neck_mm, 2.0);
+  EXPECT_GE(doubt.neck_mm, 2.0 - 1.14);
+  EXPECT_LE(doubt.beside_mm, 5.0);
+  EXPECT_GE(doubt.beside_mm, 5.0 - 1.14);
+  EXPECT_TRUE(
+      segment(tube(3.5), {.seeds = {kBottom}, .target = kTop}).statistics.way_doubts.empty());
 }
 
 TEST(SegmentLevel, AWayIsNotGivenUpForAPlaceThatNoiseMakesDark) {
