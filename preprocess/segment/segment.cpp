@@ -140,11 +140,19 @@ Segmentation segment(const Image& image, const SegmentOptions& options) {
     sample_beside_calcium(image, surroundings, statistics.samples);
   }
   statistics.band.surroundings_hu = surroundings;
-  Region region = options.lower_hu ? find_by_band(image, options, statistics)
-                                   : find_by_level(image, options, statistics);
-  fill_cavities(region.grid, region.labels, std::numeric_limits<double>::infinity());
-  statistics.bright_boundary =
-      bright_boundary(region.grid, region.values, statistics.band.upper_hu, region.labels);
+  const auto find_region = [&](bool bounded) {
+    Region found = options.lower_hu ? find_by_band(image, options, statistics)
+                                    : find_by_level(image, options, bounded, statistics);
+    fill_cavities(found.grid, found.labels, std::numeric_limits<double>::infinity());
+    statistics.bright_boundary =
+        bright_boundary(found.grid, found.values, statistics.band.upper_hu, found.labels);
+    return found;
+  };
+  Region region = find_region(/*bounded=*/true);
+  // What is brighter than the points is no bone where no CT: the vessel itself is.
+  if (!options.hounsfield && !options.lower_hu && statistics.bright_boundary > kMostBright) {
+    region = find_region(/*bounded=*/false);
+  }
   require_no_bone(statistics);
   statistics.shape = measure_shape(region.grid, region.labels);
   MaskLimits limits = options.limits;

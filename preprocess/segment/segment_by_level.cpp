@@ -243,13 +243,18 @@ std::vector<WayLevel> find_points(const LumenField& field, const Candidates& can
 
 }  // namespace
 
-Region find_by_level(const Image& image, const SegmentOptions& options,
+Region find_by_level(const Image& image, const SegmentOptions& options, bool bounded,
                      SegmentStatistics& statistics) {
   std::vector<Vec3> points = options.seeds;
   if (options.target) points.push_back(*options.target);
   Band& band = statistics.band;
   band = choose_band(image, statistics.samples, band.surroundings_hu, options.hounsfield,
                      options.smoothing_mm, options.neck_opening_mm);
+  if (!bounded) {
+    band.upper_hu =
+        static_cast<double>(*std::max_element(image.values.begin(), image.values.end()));
+  }
+  statistics.along.clear();
   double least = band.contrast_hu;
   for (const LumenSample& sample : statistics.samples) {
     least = std::min(least, sample.level_hu - band.surroundings_hu);

@@ -20,10 +20,11 @@ struct Region {
   double edge = 0.0;               // the least value where lumen ends                     [HU]
 };
 
-/// Up to the leaks; fill in samples, band, search and what was removed.
+/// Up to the leaks; fill in samples, band, search and what was removed. By level either with an
+/// upper bound of the lumen or, where no calcium or bone can be brighter, not `bounded`.
 Region find_by_band(const Image& image, const SegmentOptions& options,
                     SegmentStatistics& statistics);
-Region find_by_level(const Image& image, const SegmentOptions& options,
+Region find_by_level(const Image& image, const SegmentOptions& options, bool bounded,
                      SegmentStatistics& statistics);
 
 /// The seeds' voxels. Throws `Error` where one lies outside; points of another frame are the usual

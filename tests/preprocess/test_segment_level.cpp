@@ -249,6 +249,20 @@ TEST(SegmentLevel, InOtherUnitsTheNoiseTellsWhetherThereIsContrast) {
   EXPECT_TRUE(has(error, "five times the noise over what surrounds it")) << error;
 }
 
+TEST(SegmentLevel, InOtherUnitsAVesselBrighterThanItsPointsIsNoBone) {
+  // An MR's coil: 1000 at both ends, 2000 over 36 mm in the middle, beyond what the ends let expect
+  // of lumen (1400).
+  const Image image = scanned(40.0, [](const Vec3& p) {
+    const double away = std::max(0.0, std::abs(p.z() - 45.0) / 45.0 - 0.4) / 0.6;
+    return off_axis(p, 0) < 5.0 ? 2000.0 - 1000.0 * away : 100.0;
+  });
+  const Segmentation found =
+      segment(image, {.hounsfield = false, .seeds = {kBottom}, .target = kTop});
+  EXPECT_GT(dice(found.mask, [](const Vec3& p) { return off_axis(p, 0) < 5.0; }), 0.95);
+  ASSERT_FALSE(found.statistics.along.empty());
+  EXPECT_EQ(found.statistics.along.front().arc_mm, 0.0);
+}
+
 TEST(SegmentLevel, LittleContrastIsRefusedByWhatItHasOverBlood) {
   const auto with_level = [](double level) {
     return scanned(10.0, [&](const Vec3& p) { return off_axis(p, 0) < 5.0 ? level : kAround; });
