@@ -18,7 +18,7 @@ namespace wireplan::preprocess {
 struct SegmentOptions {
   /// Band of contrast-filled lumen, inclusive, lower < upper. Give both or neither. Without them
   /// the lumen's level is measured at the seeds and the target, and followed between them; these
-  /// points may lie up to 2.5 mm beside the lumen.                                         [HU]
+  /// points may lie up to 2.5 mm beside the lumen, where they have contrast themselves.     [HU]
   std::optional<double> lower_hu = {}, upper_hu = {};
   bool hounsfield = true;           // the volume's values are HU: a CT
   std::vector<Vec3> seeds = {};     // inside the lumen; at least one                       [mm]
