@@ -16,11 +16,12 @@ constexpr int kSeated = 0, kBroughtIn = 1;  // tools: the catheter, the wire in 
 
 /// All chosen.
 struct ExchangeTemplate {
-  double short_of = 8.0;    // of the target, that the first wire leads out to              [mm]
-  double most_lead = 60.0;  // of it past the ostium                                        [mm]
-  double least_lead = 6.0;  // less leads no catheter                                       [mm]
+  double short_of = 2.0;  // of the target, what the first wire is seen to lead out to    [mm]
+  double further = 10.0;  // of a push beyond that, where the vessel goes on              [mm]
+  int pushes = 4;         // of these, ...
+  double moves = 0.5;     // ... as long as the tip comes on by this part of one
   double depths[5] = {5.0, 10.0, 16.0, 24.0, 34.0};  // of the catheter past the ostium    [mm]
-  double ahead = 2.0;       // of the catheter's tip, the first wire, at least              [mm]
+  double ahead = 2.0;       // of the catheter's tip, the target, at least                  [mm]
   double off = 1.0;         // of a depth, that the catheter has come to                    [mm]
   double behind = 10.0;     // the catheter's tip, of the wire that is brought in           [mm]
   double slack = 12.0;      // of pushes that end by what is seen                           [mm]
@@ -113,22 +114,31 @@ class SeatedSearch {
     return !stop();
   }
 
-  /// The last step, no further than to where the catheter may follow.
+  /// The last step, seen to the target, and beyond it as far as the vessel lets the wire go: the
+  /// stiffer the part of it in the ostium, the better it leads.
   bool lead_out() {
-    const double sphere = study_.goal.at_section ? 0.0 : study_.goal.radius;
-    lead_ = std::floor(
-        std::min(kExchange.most_lead, ostium_.end - ostium_.arc - sphere - kExchange.short_of));
-    if (lead_ < kExchange.least_lead) {
-      tell_stop("the target is " + whole_mm(ostium_.end - ostium_.arc) +
-                " past the ostium, too near for the catheter to follow " + first_.name);
-      return false;
-    }
     simulate::ToolStep out = last_;
     out.until = Until::kInBranch;
-    out.at = lead_;
-    if (go(out) && depth_of(kBroughtIn) >= lead_ - kExchange.off) return !stop();
-    tell_stop(first_.name + " does not lead out into the branch again, short of the target");
-    return false;
+    out.at = std::floor(ostium_.end - ostium_.arc - kExchange.short_of);
+    if (!go(out) || depth_of(kBroughtIn) < out.at - kExchange.off) {
+      tell_stop(first_.name + " does not lead out into the branch again");
+      return false;
+    }
+    double further = 0.0;
+    for (int push = 0; push < kExchange.pushes && !stop(); ++push) {
+      const simulate::ToolTrial::Mark before = trial_.save();
+      const Vec3 tip = trial_.tip(kBroughtIn);
+      trial_.make({.tool = kBroughtIn, .push = kExchange.further});
+      const bool moved = !trial_.ended() && (trial_.tip(kBroughtIn) - tip).norm() >
+                                                kExchange.moves * kExchange.further;
+      if (!moved) {
+        trial_.restore(before);
+        break;
+      }
+      further += kExchange.further;
+    }
+    if (further > 0.0) steps_.push_back({.tool = kBroughtIn, .push = further});
+    return !stop();
   }
 
   void try_depths() {
@@ -136,7 +146,8 @@ class SeatedSearch {
     const ToolScript script = steps_;
     const double own = depth_of(kSeated);
     for (const double depth : kExchange.depths) {
-      if (depth < own + kExchange.ahead || depth > lead_ - kExchange.ahead || stop()) continue;
+      const double most = ostium_.end - ostium_.arc - kExchange.ahead;
+      if (depth < own + kExchange.ahead || depth > most || stop()) continue;
       trial_.restore(led);
       steps_ = script;
       const double push = std::ceil(depth - own + kExchange.slack);
@@ -200,7 +211,6 @@ class SeatedSearch {
   ToolScript steps_;
   simulate::ToolTrial trial_;
   simulate::ToolStep last_;  // of the other wire's script
-  double lead_ = 0.0;  // of the first wire past the ostium                                 [mm]
   StartFindings findings_;
 };
 

@@ -2,8 +2,9 @@
 /// Exchange for another wire through the placed catheter: the template's last part where a wire,
 /// as a stiff one, comes into no branch by itself (tool_search.h). Another wire's script hooks the
 /// branch:
-///   1. that wire leads out into the branch, short of the target, and the catheter follows it; or
-///   this is left out, where the hook alone holds;
+///   1. that wire leads out into the branch, past the target as far as the vessel goes on, at most
+///      40 mm, so that a stiffer part of it lies in the ostium, and the catheter follows it; this
+///      is left out where the hook alone holds;
 ///   2. the hand holds the catheter, withdraws the wire whole and brings in the other one up to
 ///      behind the catheter's tip, which has to be in the branch then;
 ///   3. the other wire goes on to the target.

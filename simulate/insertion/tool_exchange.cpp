@@ -52,6 +52,11 @@ void ToolBench::replace(int tool, const Tool& with, double roll) {
   report({none, none});
 }
 
+/// Whether the wire for which the goal counts is yet to be brought in.
+bool ToolTrial::awaits_spare() const {
+  return !options_.spares.empty() && record_.tools.back().changes.empty();
+}
+
 void ToolTrial::exchange(const ToolStep& step) {
   const int inner = static_cast<int>(record_.tools.size()) - 1;
   expects(inner > 0 && step.tool == inner && step.push == 0.0 && step.turn == 0.0);
@@ -72,6 +77,7 @@ void ToolTrial::exchange(const ToolStep& step) {
   bench_.replace(inner, with, start_roll_);
   start_energy_ += bench_.record().energy.total() - stored;
   record_.tools.back().changes.push_back({.from = record_.pushes.size(), .name = spare.name});
+  best_distance_ = (foremost_tip() - goal_.point).norm();
   advance({.tool = inner, .push = insertion(inner - 1) - step.at}, false, false);
 }
 

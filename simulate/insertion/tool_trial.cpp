@@ -465,13 +465,13 @@ void ToolTrial::check_place() {
   }
   const Vec3 here = foremost_tip();
   const double to_goal = (here - goal_.point).norm();
-  if (!seating_ && !goal_.at_section && best_distance_ <= goal_.radius &&
-      to_goal >= best_distance_) {
+  const bool counts = !seating_ && !awaits_spare();
+  if (counts && !goal_.at_section && best_distance_ <= goal_.radius && to_goal >= best_distance_) {
     return end(Outcome::kReached, "tip " + in_mm(best_distance_) + " from the target" + after);
   }
   best_distance_ = to_goal;
   const Eigen::Matrix3Xd nodes = bench_.at_rest(bench_.state().x);
-  const bool near = !seating_ && goal_.at_section && goal_.way->may_have_arrived(here);
+  const bool near = counts && goal_.at_section && goal_.way->may_have_arrived(here);
   if (const auto before = near ? goal_.way->find_arrival(nodes, vessel_.lumen) : std::nullopt) {
     const std::optional<std::string> detour = goal_.way->find_detour(nodes.leftCols(*before + 1));
     if (detour) {
@@ -536,7 +536,7 @@ void ToolTrial::end(Outcome outcome, const std::string& reason) {
 }
 
 TrialResult ToolTrial::finish() {
-  if (!ended() && !goal_.at_section && best_distance_ <= goal_.radius) {
+  if (!ended() && !awaits_spare() && !goal_.at_section && best_distance_ <= goal_.radius) {
     end(Outcome::kReached, "tip " + in_mm(best_distance_) + " from the target after " +
                                in_mm(foremost()) + " of insertion");
   }

@@ -87,7 +87,9 @@ struct ToolTrialOptions {
   /// step of a script alone, since a wire may be further in before.
   InsertionOptions insertion;
   std::optional<TakeOff> take_off;  // that steps may end at; without one they are made whole
-  std::vector<Wire> spares = {};    // that may take the innermost's place: ToolStep
+  /// That take the innermost's place: ToolStep. The goal is theirs: before the first exchange a tip
+  /// may pass it.
+  std::vector<Wire> spares = {};
 };
 
 /// Copies go on by themselves from where they were copied.
@@ -147,6 +149,7 @@ class ToolTrial {
   void make_steered(const ToolStep& step, bool last);
   void exchange(const ToolStep& step);
   void keep_end_of_step();
+  bool awaits_spare() const;
   bool may_lose_way() const;
   bool loses_way(double pushed);
   bool comes_further(double pushed);

@@ -109,7 +109,9 @@ const VesselModel& branched_aorta() {
   return vessel;
 }
 
-ToolTrial cobra_trial() {
+const Goal kFarAway{.point = Vec3(0.0, 0.0, 500.0), .radius = 1.0};
+
+ToolTrial cobra_trial(const Goal& goal = kFarAway) {
   Tool cobra;
   cobra.wire = {.name = "cobra", .radius = 0.8335, .sections = cobra_tip(), .friction = 0.1};
   cobra.wire.sections.push_back({.length = 580.0, .bending_stiffness = 332.0});
@@ -124,7 +126,7 @@ ToolTrial cobra_trial() {
   options.spares[0].sections[0].rest_curvature = 0.02;
   return {{cobra, {.wire = wire_called("soft", 20.0, 0.04)}},
           {.point = Vec3(0.0, 0.0, 5.0), .direction = Vec3::UnitZ()},
-          {.point = Vec3(0.0, 0.0, 500.0), .radius = 1.0},
+          goal,
           branched_aorta(),
           options};
 }
@@ -203,6 +205,18 @@ TEST(ToolExchange, IsGoneBackFromAndOnFromAndCopied) {
   const TrialResult result = trial.finish();
   ASSERT_EQ(result.tools[1].changes.size(), 1U);
   EXPECT_EQ(result.pushes.back().stored_energy, copy.pushes().back().stored_energy);
+}
+
+TEST(ToolExchange, TheGoalIsThatOfTheWireThatIsBroughtIn) {
+  // 100 mm up the aorta, within its lumen of 7 mm: the first wire passes it.
+  ToolTrial trial = cobra_trial({.point = Vec3(0.0, 0.0, 105.0), .radius = 9.0});
+  ASSERT_TRUE(trial.make({.tool = 1, .push = 126.0}));
+  ASSERT_TRUE(trial.make({.tool = 0, .push = 80.0}));
+  ToolTrial without(trial);
+  EXPECT_NE(without.finish().outcome, Outcome::kReached);
+  ASSERT_TRUE(trial.make(kExchange)) << trial.reason();
+  EXPECT_FALSE(trial.make({.tool = 1, .push = 60.0}));
+  EXPECT_TRUE(trial.reached()) << trial.reason();
 }
 
 TEST(ToolExchange, NeedsACatheterInTheBody) {
