@@ -238,9 +238,10 @@ std::string safety_of(const RepeatedPlan& plan) {
 }
 
 /// How the catheter sits; empty without one.
-std::string seat_of(const Metrics& metrics) {
-  if (!metrics.script || metrics.script->hook_depth <= 0.0) return "";
+std::string seat_of(const Candidate& candidate, const Metrics& metrics) {
+  if (candidate.catheter < 0 || !metrics.script) return "";
   const ScriptMetrics& script = *metrics.script;
+  if (script.hook_depth <= 0.0) return "; its catheter stays before the ostium and bears no push";
   return "; its catheter ends " + one_decimal(script.hook_depth) +
          " mm in the branch and bears a push of " + (script.bears_more ? "more than " : "") +
          two_digits(script.support) + " N before it backs out";
@@ -259,7 +260,7 @@ void write_sentences(Ranking& ranking, const Study& study, const std::vector<Can
     plan.sentence += plan.trial == first.trial
                          ? compare_with_next_wire(ranking.plans, study, candidates, metrics)
                          : compare_with_first(plan, first, metrics, weights);
-    plan.sentence += seat_of(m);
+    plan.sentence += seat_of(candidates[static_cast<std::size_t>(plan.trial)], m);
     const RepeatedPlan* repeats = find_repeated(repeated, plan.trial);
     if (repeats != nullptr) plan.sentence += safety_of(*repeats);
     plan.sentence += warnings_of(plan, m, study.goal, limits);

@@ -548,7 +548,7 @@ Json case_parameters(const Case& input) {
   json["limits"] = limits_json(input.limits);
   json["search"] = {{"exhaustive", input.exhaustive}};
   json["robustness"] = robustness_json(input);
-  json["ranking"] = {{"weights", weights_json(input.weights, !input.catheters.empty())}};
+  json["ranking"] = ranking_json(input.weights, !input.catheters.empty());
   return json;
 }
 

@@ -25,21 +25,26 @@ void read_limits(JsonReader& root, plan::Limits& limit) {
 
 void read_weights(JsonReader& root, bool with_catheters, plan::Weights& weight) {
   JsonReader ranking = root.object("ranking", false);
-  JsonReader weights = ranking.object("weights", false);
-  const Range share{.min = 0.0, .max = 1000.0};
-  for (const plan::ScorePart& part : plan::kScoreParts) {
-    if (!plan::acts(part, with_catheters) && weights.has(part.name)) {
-      root.problems().add(std::string("ranking.weights.") + part.name,
-                          weights.raw(part.name).dump(), "only beside \"catheters\"",
-                          "delete the key, or list catheters");
-      continue;
+  const auto read = [&](const char* key, bool of_script) {
+    JsonReader weights = ranking.object(key, false);
+    for (const plan::ScorePart& part : plan::kScoreParts) {
+      if (part.of_script != of_script) continue;
+      weight.*part.weight =
+          weights.number(part.name, weight.*part.weight, {.min = 0.0, .max = 1000.0});
     }
-    weight.*part.weight = weights.number(part.name, weight.*part.weight, share);
+    weights.finish();
+  };
+  read("weights", false);
+  if (with_catheters) {
+    read("script_weights", true);
+  } else if (ranking.has("script_weights")) {
+    ranking.raw("script_weights");
+    root.problems().add("ranking.script_weights", "given", "only beside \"catheters\"",
+                        "delete the key, or list catheters");
   }
-  weights.finish();
   ranking.finish();
   if (plan::sum_of(weight, with_catheters) <= 0.0) {
-    root.problems().add("ranking.weights", "0 in all", "at least one weight above 0");
+    root.problems().add("ranking", "weights of 0 in all", "at least one weight above 0");
   }
 }
 
@@ -50,10 +55,11 @@ Json limits_json(const plan::Limits& limits) {
           {"off_path_fail_mm", limits.off_path_fail}};
 }
 
-Json weights_json(const plan::Weights& weights, bool with_catheters) {
+Json ranking_json(const plan::Weights& weights, bool with_catheters) {
   Json json;
   for (const plan::ScorePart& part : plan::kScoreParts) {
-    if (plan::acts(part, with_catheters)) json[part.name] = weights.*part.weight;
+    if (!plan::acts(part, with_catheters)) continue;
+    json[part.of_script ? "script_weights" : "weights"][part.name] = weights.*part.weight;
   }
   return json;
 }

@@ -6,10 +6,10 @@
 namespace wireplan::pipeline {
 
 void read_limits(JsonReader& root, plan::Limits& limits);
-/// Some weights act, and may be given, in cases with catheters alone.
+/// Weights of scripts act, and may be given, in cases with catheters alone.
 void read_weights(JsonReader& root, bool with_catheters, plan::Weights& weights);
 
 Json limits_json(const plan::Limits& limits);
-Json weights_json(const plan::Weights& weights, bool with_catheters);
+Json ranking_json(const plan::Weights& weights, bool with_catheters);
 
 }  // namespace wireplan::pipeline

@@ -193,7 +193,8 @@ std::string compare_reports(const std::vector<std::filesystem::path>& files) {
   } else {
     text += "\nThe reports are of different vessels, accesses or targets.\n";
   }
-  for (const char* pointer : {"/limits", "/ranking/weights", "/target/radius_mm"}) {
+  for (const char* pointer :
+       {"/limits", "/ranking/weights", "/ranking/script_weights", "/target/radius_mm"}) {
     if (agree(reports, pointer)) continue;
     text += std::string("Scores are not comparable: ") + (pointer + 1) + " differs.\n";
   }

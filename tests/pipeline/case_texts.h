@@ -204,7 +204,7 @@ inline Json full_case(Json json) {
   json["tool_rules"] = {{"soft_tip_n_mm2", 90},  {"hold_mm", 80},
                         {"outside_mm", 40},      {"most_turn_deg", 170},
                         {"turn_deg_per_mm", 60}, {"friction_between_tools", 0.1},
-                        {"exchange", false}};
+                        {"exchange", false},     {"seat_mm", 12}};
   json["tip_roll_deg"] = {0, 180};
   json["friction"] = 0.12;
   json["friction_factor"] = 0.9;
@@ -238,6 +238,9 @@ inline Json full_case(Json json) {
                         {"entry_mm", 0.5},
                         {"lumen_mm", 0.1}};
   json["ranking"]["weights"] = {{"reach", 2}, {"peak_force", 3}, {"mean_force", 0}, {"margin", 1}};
+  json["ranking"]["script_weights"] = {{"support", 1},    {"hook", 2},       {"wire_beyond", 0},
+                                       {"hand_force", 1}, {"hub_torque", 1}, {"moves", 0.5},
+                                       {"exchanges", 3}};
   return json;
 }
 

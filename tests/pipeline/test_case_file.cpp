@@ -204,7 +204,7 @@ TEST_F(CaseFile, NamesEachMistakeWithItsRemedy) {
       {"insertion.length_mm=0.25", {"insertion.length_mm is 0.25", "0 or at least 1", "in m?"}},
       {"limits.tip_force_warn_n=2", {"limits.tip_force_warn_n is 2", "at most"}},
       {"ranking.weights={\"reach\": 0, \"peak_force\": 0, \"mean_force\": 0, \"margin\": 0}",
-       {"ranking.weights is 0 in all"}},
+       {"ranking is weights of 0 in all"}},
       {"access_limits.tortuosity=[1.5, 1.25, 1.6]",
        {"access_limits.tortuosity is [1.5,1.25,1.6]", "rising"}},
       {"access_limits.angle_deg=[160, 120]",

@@ -203,8 +203,12 @@ TEST_F(RerunMatrix, OfACaseThatStartsFromASurface) {
         "catheters/0/friction", "catheters/0/sections/0/length_mm",
         "catheters/0/sections/0/bending_stiffness_n_mm2", "tool_rules/soft_tip_n_mm2",
         "tool_rules/hold_mm", "tool_rules/outside_mm", "tool_rules/most_turn_deg",
-        "tool_rules/turn_deg_per_mm", "tool_rules/friction_between_tools", "tool_rules/exchange"}) {
+        "tool_rules/turn_deg_per_mm", "tool_rules/friction_between_tools", "tool_rules/exchange",
+        "tool_rules/seat_mm"}) {
     table[std::string("/") + key] = {"manoeuvres", "plans", "report"};
+  }
+  for (const plan::ScorePart& part : plan::kScoreParts) {  // these judge
+    if (part.of_script) table[std::string("/ranking/script_weights/") + part.name] = {"report"};
   }
   Json changes = common_changes();
   changes["/surface/path"] = "other.stl";

@@ -149,6 +149,7 @@ TEST(Rank, TellsWhatTheSeatedCatheterBearsAndThatAPlanStandsBehindByIt) {
   bench.study.catheters.resize(1);
   bench.add(0, 1.0, 0.1) = seated(0.2);
   bench.add(0, 1.0, 0.1) = seated(2.0);
+  for (Candidate& candidate : bench.candidates) candidate.catheter = 0;
   for (Measured& trial : bench.trials) trial.metrics.reached = true;
   bench.trials[1].metrics.script->bears_more = true;
   const Ranking ranking = bench.ranked();
@@ -163,6 +164,9 @@ TEST(Rank, TellsWhatTheSeatedCatheterBearsAndThatAPlanStandsBehindByIt) {
       << ranking.plans[1].sentence;
   bench.weights = {.reach = 0.0, .peak_force = 0.0, .mean_force = 0.0, .margin = 0.0};
   EXPECT_EQ(order_of(bench.ranked()), (std::vector<int>{1, 0})) << "by the others alone";
+  bench.trials[0].metrics.script->hook_depth = 0.0;
+  EXPECT_NE(bench.ranked().plans[1].sentence.find("stays before the ostium and bears no push"),
+            std::string::npos);
 }
 
 TEST(Rank, OrdersByScoreAndThenByCandidate) {

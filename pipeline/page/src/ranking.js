@@ -36,7 +36,7 @@ const kSupport = ["Seated catheter bears [N]", (t) => t.tools?.support_n ?? -1,
 const columnsOf = (trials) => trials.some((t) => t.tools) ? [...kColumns.slice(0, 10), kSupport, ...kColumns.slice(10)] : kColumns;
 
 const weightsOf = (report) =>
-  Object.entries(report.provenance.parameters.ranking.weights).map(([name, weight]) => `${name.replaceAll("_", " ")} ${weight}`).join(", ");
+  Object.values(report.provenance.parameters.ranking).flatMap((weights) => Object.entries(weights)).map(([name, weight]) => `${name.replaceAll("_", " ")} ${weight}`).join(", ");
 
 const compare = (a, b) => {
   if (typeof a === "string") return a.localeCompare(b);
