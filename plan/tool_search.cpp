@@ -111,7 +111,13 @@ void add_seats(const Study& study, ToolScripts& all) {
   };
   const auto add = [&](Candidate& script) {
     if (script.first_wire >= 0 || !reached(script)) return;
-    script.steps = as_written(with_seat(std::move(script.steps), *ostium, study.tool_rules));
+    std::vector<simulate::ToolStep> seated =
+        as_written(with_seat(script.steps, *ostium, study.tool_rules));
+    const Catheter& catheter = study.catheters[static_cast<std::size_t>(script.catheter)];
+    const simulate::Wire& wire = study.wires[static_cast<std::size_t>(script.wire)];
+    if (find_broken_rule(seated, catheter, wire, study.tool_rules).empty()) {
+      script.steps = std::move(seated);
+    }
   };
   for (Candidate& script : all.found) add(script);
   for (std::vector<Candidate>& spares : all.spares)

@@ -60,7 +60,7 @@ struct ToolScripts {
 void add_scripts(Candidate begun, std::vector<FoundScript> scripts, ToolScripts& all);
 
 /// Has scripts that reached end with the catheter in the branch, but where it is seated already, as
-/// for an exchange.
+/// for an exchange, or a rule speaks against it, as of a catheter that is short.
 void add_seats(const Study& study, ToolScripts& all);
 
 /// The study as scripts are tried in it: on a rigid wall, with long elements and loose residuals.

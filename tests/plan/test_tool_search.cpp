@@ -162,6 +162,37 @@ TEST(ToolSteps, EndWithTheCatheterInTheBranchWhereThatIsLongEnough) {
   EXPECT_FALSE(stays_unseated({.steps = seated}, trial));
 }
 
+TEST(ToolSteps, SeatTheCatheterOfScriptsThatReachedAndNoRuleSpeaksAgainst) {
+  Study study = toward(1.0);
+  study.wires.push_back(study.wires.front());
+  study.catheters.push_back(catheter_of(150.0, 1.0));
+  const std::vector<ToolStep> steps = {{.tool = 1, .push = 80.0},
+                                       {.tool = 0, .push = 70.0},
+                                       {.tool = 1, .push = -20.0},
+                                       {.tool = kBothTools, .push = -20.0},
+                                       {.tool = 1, .push = 100.0}};
+  ToolScripts all;
+  const auto add = [&](int catheter, int wire, int first_wire, int found) {
+    all.found.push_back(
+        {.wire = wire, .catheter = catheter, .steps = steps, .first_wire = first_wire});
+    all.spares.push_back({all.found.back()});
+    all.pairs.emplace_back().pair = {.catheter = catheter, .wire = wire};
+    all.pairs.back().found = found;
+  };
+  add(0, 0, -1, 3);
+  add(0, 1, -1, 0);  // none of its scripts reached
+  add(1, 0, -1, 2);  // too short to stay 50 mm outside
+  add(0, 0, 1, 0);   // brought in through a catheter that is seated
+  add_seats(study, all);
+  EXPECT_TRUE(all.found[0].steps.back().seats);
+  EXPECT_TRUE(all.spares[0][0].steps.back().seats);
+  EXPECT_EQ(all.found[0].steps.size(), steps.size() + 1);
+  for (const std::size_t k : {1U, 2U, 3U}) {
+    EXPECT_EQ(all.found[k].steps, steps) << k;
+    EXPECT_EQ(all.spares[k][0].steps, steps) << k;
+  }
+}
+
 TEST(ToolSteps, SayWhatEndsThemAndWhatElseToDo) {
   const std::vector<ToolStep> steps = {
       {.tool = 1, .push = 216.0, .steers = 7},
