@@ -11,8 +11,8 @@ namespace wireplan::pipeline {
 Json told_steps_json(const plan::Study& study, const plan::Candidate& candidate,
                      const plan::Measured& trial);
 
-/// Per tool its metrics; beside them the hook: how far the catheter's tip is past the ostium at the
-/// end, and how far the wire is out of it.
+/// Per tool its metrics; beside them what the script comes to (plan::ScriptMetrics). Expects a
+/// trial of a study with catheters.
 Json tools_json(const plan::Measured& trial);
 
 /// How bringing a pair's wire in by exchange ended; null where its own scripts hold.

@@ -144,7 +144,8 @@ Json parameters() {
        {{{"name", "soft" + kMaker}}, {{"name", "medium" + kMaker}}, {{"name", "stiff" + kMaker}}}},
       {"tip_roll_deg", {0, 72, 144, 216, 288}},
       {"friction", 0.04},
-      {"limits", {{"tip_force_warn_n", 0.3}}}};
+      {"limits", {{"tip_force_warn_n", 0.3}}},
+      {"ranking", {{"weights", {{"reach", 1}, {"peak_force", 1}}}}}};
 }
 
 /// The five best plans, repeated under disturbances.

@@ -185,7 +185,12 @@ TEST(ViewerFiles, TheSheetsTableHasEachStepItsViewAndWhatElseToDo) {
        {{{"insertion_mm", 1},
          {"peak_tip_force_n", 0},
          {"peak_contact_force_n", 0},
-         {"tools", {{"each", Json::array()}}}}}},
+         {"tools",
+          {{"each", Json::array()},
+           {"hook_depth_mm", 10.5},
+           {"support_n", 0.25},
+           {"support_is_least", true},
+           {"moves", 7}}}}}},
       {"numerics", {{"plans", Json::array()}}},
       {"robustness", {{"plans", Json::array()}, {"sensitivity", {{"shares", Json::array()}}}}}};
   const auto expect_rows = [&](const std::string& rows) {
@@ -197,7 +202,10 @@ TEST(ViewerFiles, TheSheetsTableHasEachStepItsViewAndWhatElseToDo) {
       "\"plan 1\",\"exchanges of the wire\",1,,,\r\n"
       "\"plan 1\",\"step 1\",\"out\",,,\"LAO 30, CRA 0: ostium of left renal\"\r\n"
       "\"plan 1\",\"step 1, otherwise\",\"If not, back.\",,,\r\n"
-      "\"plan 1\",\"step 2\",\"in\",,,\r\n");
+      "\"plan 1\",\"step 2\",\"in\",,,\r\n"
+      "\"plan 1\",\"catheter past the ostium\",10.5,\"mm\",,\r\n"
+      "\"plan 1\",\"push that the seated catheter bears\",0.25,\"N\",,\"at least\"\r\n"
+      "\"plan 1\",\"moves of the hand\",7,,,\r\n");
   for (const char* key : {"catheter", "steps"}) report["ranking"][0].erase(key);
   expect_rows(
       "\"plan 1\",\"step 1\",\"out\",,,\"LAO 30, CRA 0: ostium of left renal\"\r\n"
