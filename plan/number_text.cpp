@@ -30,6 +30,8 @@ std::string one_decimal(double value) { return printed("%.1f", value); }
 std::string three_digits(double value) { return printed("%.3g", value); }
 std::string four_digits(double value) { return printed("%.4g", value); }
 
+std::string whole_millimetres(double length) { return std::to_string(std::lround(length)) + " mm"; }
+
 std::string count_of(int count, const std::string& noun) {
   return std::to_string(count) + " " + noun + (count == 1 ? "" : "s");
 }

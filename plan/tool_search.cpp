@@ -18,6 +18,16 @@ constexpr std::size_t kSuggestedAtOnce = 3;  // catheters
 // Of the search; ten times as much brought half of the wires elsewhere than runs in full   [N]
 constexpr double kScoutResidual = 1e-5;
 
+/// The steps of a script that reached, with the step that seats the catheter where no rule speaks
+/// against it.
+ToolScript seated_steps(const Study& study, const Ostium& ostium, const Candidate& script) {
+  ToolScript seated = as_written(with_seat(script.steps, ostium, study.tool_rules));
+  const Catheter& catheter = study.catheters[static_cast<std::size_t>(script.catheter)];
+  const simulate::Wire& wire = study.wires[static_cast<std::size_t>(script.wire)];
+  const bool allowed = find_broken_rule(seated, catheter, wire, study.tool_rules).empty();
+  return allowed ? seated : script.steps;
+}
+
 /// One depth of the catheter and one withdrawal of the wire.
 struct ToolStart {
   std::size_t pair = 0;  // among those that are tried together
@@ -111,13 +121,7 @@ void add_seats(const Study& study, ToolScripts& all) {
   };
   const auto add = [&](Candidate& script) {
     if (script.first_wire >= 0 || !reached(script)) return;
-    std::vector<simulate::ToolStep> seated =
-        as_written(with_seat(script.steps, *ostium, study.tool_rules));
-    const Catheter& catheter = study.catheters[static_cast<std::size_t>(script.catheter)];
-    const simulate::Wire& wire = study.wires[static_cast<std::size_t>(script.wire)];
-    if (find_broken_rule(seated, catheter, wire, study.tool_rules).empty()) {
-      script.steps = std::move(seated);
-    }
+    script.steps = seated_steps(study, *ostium, script);
   };
   for (Candidate& script : all.found) add(script);
   for (std::vector<Candidate>& spares : all.spares)
@@ -153,8 +157,8 @@ ToolScripts find_tool_scripts(const Study& study, const simulate::VesselModel& v
   const auto tell = [&](const ToolPair& pair, const StartFindings& findings) {
     if (!on_first || findings.found.empty() || told.exchange(true)) return;
     Candidate candidate = first_candidate(study, pair);
-    candidate.steps =
-        as_written(with_seat(findings.found.front().steps, *ostium, study.tool_rules));
+    candidate.steps = as_written(findings.found.front().steps);
+    candidate.steps = seated_steps(study, *ostium, candidate);
     on_first(candidate);
   };
   for (const std::vector<std::size_t>& slots : tried_together(study, all.pairs)) {

@@ -20,8 +20,6 @@ std::string percent(double part) { return std::to_string(std::lround(100.0 * par
 
 std::string whole_degrees(double angle) { return std::to_string(std::lround(angle / kRadPerDeg)); }
 
-std::string whole_millimetres(double length) { return std::to_string(std::lround(length)) + " mm"; }
-
 /// "severe tortuosity", "tortuosity below mild"
 std::string graded(int grade, const std::string& what) {
   const std::string word = kGradeWords.at(static_cast<std::size_t>(grade));

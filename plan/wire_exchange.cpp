@@ -4,6 +4,7 @@
 #include <cmath>
 #include <utility>
 
+#include "plan/number_text.h"
 #include "plan/tool_starts.h"
 #include "preprocess/centerline/path_place.h"
 
@@ -32,8 +33,6 @@ struct ExchangeTemplate {
   std::size_t kept = 3;     // scripts of a pair
 };
 constexpr ExchangeTemplate kExchange;
-
-std::string whole_mm(double value) { return std::to_string(std::lround(value)) + " mm"; }
 
 /// Goes on from a script of another wire through the same catheter. Serial.
 class SeatedSearch {
@@ -157,7 +156,7 @@ class SeatedSearch {
       if (depth_of(kSeated) < depth - kExchange.off) {
         const std::string tried = findings_.stopped;
         return tell_stop("the catheter follows " + first_.name + " no further than " +
-                         whole_mm(std::max(0.0, depth_of(kSeated))) + " into the branch" +
+                         whole_millimetres(std::max(0.0, depth_of(kSeated))) + " into the branch" +
                          (tried.empty() ? "" : "; before that " + tried));
       }
       exchange_here();
@@ -172,7 +171,7 @@ class SeatedSearch {
     }
     const double depth = depth_of(kSeated);
     if (depth <= 0.0) {
-      return tell_stop("the catheter's tip, " + whole_mm(std::max(0.0, before)) +
+      return tell_stop("the catheter's tip, " + whole_millimetres(std::max(0.0, before)) +
                        " into the branch, comes out of it as " + wire_.name + " is brought in");
     }
     const std::size_t pushes = trial_.pushes().size();

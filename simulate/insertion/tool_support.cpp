@@ -30,7 +30,7 @@ void ToolTrial::seat(const ToolStep& step) {
   const double wire = measure(Until::kInBranch, 1);
   ++step_;
   seating_ = true;
-  advance({.tool = 0, .push = step.push, .until = step.until, .at = step.at}, false, false);
+  advance(step, false, false);
   seating_ = false;
   std::string why;
   if (ended()) {
