@@ -48,28 +48,11 @@ std::vector<PieceOfLabels> find_pieces(const Part& part) {
   return pieces;
 }
 
-Labels mark(const Part& part, const std::vector<std::size_t>& voxels) {
-  Labels marked(part.class_of.size(), 0);
-  for (const std::size_t n : voxels) marked[n] = 1;
-  return marked;
-}
-
-/// Those with a face neighbour that is not among them, as marked.
-std::vector<std::size_t> border_of(const Grid& grid, const std::vector<std::size_t>& voxels,
-                                   const Labels& marked) {
-  std::vector<std::size_t> border;
-  for (const std::size_t n : voxels) {
-    bool outside = false;
-    for_each_face_neighbour(grid, n, [&](std::size_t m) { outside = outside || marked[m] == 0; });
-    if (outside) border.push_back(n);
-  }
-  return border;
-}
-
 /// How wide a piece is round a point of its end: its largest inscribed radius nearby, to the faces
 /// of the outermost voxels [mm]. In a flat end a ball is no larger than how far its middle lies
 /// from the end, so one looks further where that is what holds it.
-double width_near(const Part& part, const std::vector<float>& depth, const Labels& piece,
+template <typename InPiece>
+double width_near(const Part& part, const std::vector<float>& depth, const InPiece& in_piece,
                   const Vec3& point) {
   constexpr double kFurthest = 25.0, kHeld = 0.7;  // mm; of the way
   const double voxel = part.grid.spacing.mean();
@@ -77,7 +60,7 @@ double width_near(const Part& part, const std::vector<float>& depth, const Label
   for (double reach = std::max(3.0, 2.0 * part.grid.spacing.maxCoeff()); reach < kFurthest;
        reach *= 1.3) {
     for (const std::size_t n : voxels_in_ball(part.grid, point, reach)) {
-      if (piece[n] != 0) widest = std::max(widest, static_cast<double>(depth[n]));
+      if (in_piece(n)) widest = std::max(widest, static_cast<double>(depth[n]));
     }
     if (widest < kHeld * reach) break;
   }
@@ -86,7 +69,6 @@ double width_near(const Part& part, const std::vector<float>& depth, const Label
 
 /// From the middle of a piece's end to the nearest point of the joined ones.
 struct Gap {
-  std::size_t piece = 0;
   Vec3 from = Vec3::Zero(), to = Vec3::Zero();  // in the joined ones; in the piece          [mm]
   double free_mm = std::numeric_limits<double>::infinity();
   std::size_t from_voxel = 0;
@@ -105,40 +87,105 @@ double free_way(const Grid& grid, const Vec3& a, const Vec3& b) {
   return std::max(0.0, 1.0 - 2.0 * part_in_voxel) * length;
 }
 
-/// The gap of the piece, given how far each voxel is from the joined ones, and their border.
-Gap find_gap(const Part& part, const PieceOfLabels& piece, std::size_t index,
-             const std::vector<float>& away, const std::vector<std::size_t>& border) {
-  Gap gap{.piece = index};
+bool holds(const Box& box, const Voxel& v) {
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    if (v[axis] < box.first[axis] || v[axis] > box.last[axis]) return false;
+  }
+  return true;
+}
+
+/// What is joined, and how far each voxel is from it [mm].
+struct JoinedPieces {
+  Labels marked;
+  std::vector<float> away;
+};
+
+/// A joined voxel that is as far from this one as the nearest of them: each row that meets the
+/// sphere holds two that may be, so that a far one costs no more than the sphere's area.
+std::size_t find_nearest(const Grid& grid, const JoinedPieces& joined, std::size_t voxel) {
+  const Voxel at = voxel_at(grid, voxel);
+  const Box whole{{0, 0, 0}, {grid.size[0] - 1, grid.size[1] - 1, grid.size[2] - 1}};
+  const double distance = static_cast<double>(joined.away[voxel]);
+  const auto most = [&](int axis) {
+    return static_cast<int>(std::ceil(distance / grid.spacing[axis])) + 1;
+  };
+  double nearest = std::numeric_limits<double>::infinity();
+  std::size_t found = voxel;
+  for (int dk = -most(2); dk <= most(2); ++dk) {
+    for (int dj = -most(1); dj <= most(1); ++dj) {
+      const double beside = Vec3(0.0, dj * grid.spacing[1], dk * grid.spacing[2]).squaredNorm();
+      const double along = std::sqrt(std::max(0.0, distance * distance - beside));
+      const int di = static_cast<int>(std::lround(along / grid.spacing[0]));
+      for (const int i : {-di, di}) {
+        const Voxel there{at[0] + i, at[1] + dj, at[2] + dk};
+        const double here = beside + std::pow(i * grid.spacing[0], 2);
+        if (here >= nearest || !holds(whole, there)) continue;
+        if (joined.marked[index_of(grid, there)] == 0) continue;
+        nearest = here;
+        found = index_of(grid, there);
+      }
+    }
+  }
+  return found;
+}
+
+/// The gap of the piece: none where all of it is further from the joined ones than `furthest`.
+Gap find_gap(const Part& part, const PieceOfLabels& piece, const JoinedPieces& joined,
+             double furthest) {
+  Gap gap;
   float least = std::numeric_limits<float>::infinity();
-  for (const std::size_t n : piece.voxels) least = std::min(least, away[n]);
+  for (const std::size_t n : piece.voxels) least = std::min(least, joined.away[n]);
+  if (least > furthest) return gap;
   // The end's middle: of all voxels that are hardly further than the nearest.
   const auto near = least + static_cast<float>(0.75 * part.grid.spacing.maxCoeff());
   Vec3 sum = Vec3::Zero();
   double count = 0.0;
   for (const std::size_t n : piece.voxels) {
-    if (away[n] > near) continue;
+    if (joined.away[n] > near) continue;
     sum += center_of(part.grid, n);
     count += 1.0;
   }
   const Vec3 middle = sum / count;
   double distance = std::numeric_limits<double>::infinity();
+  std::size_t to_voxel = piece.voxels.front();
   for (const std::size_t n : piece.voxels) {
     const Vec3 p = center_of(part.grid, n);
-    if (away[n] > near || (p - middle).norm() >= distance) continue;
+    if (joined.away[n] > near || (p - middle).norm() >= distance) continue;
     distance = (p - middle).norm();
+    to_voxel = n;
     gap.to = p;
   }
-  distance = std::numeric_limits<double>::infinity();
-  for (const std::size_t n : border) {
-    const Vec3 p = center_of(part.grid, n);
-    const double here = (p - gap.to).norm();
-    if (here >= distance) continue;
-    distance = here;
-    gap.from = p;
-    gap.from_voxel = n;
-  }
+  gap.from_voxel = find_nearest(part.grid, joined, to_voxel);
+  gap.from = center_of(part.grid, gap.from_voxel);
   gap.free_mm = free_way(part.grid, gap.from, gap.to);
   return gap;
+}
+
+/// Marks the voxels as joined, and finds anew how far all within `known` [mm] of them are:
+/// elsewhere the distances are above `known`, if too large. Returns the box of what was found anew.
+Box join(const Part& part, const std::vector<std::size_t>& voxels, double known,
+         JoinedPieces& joined) {
+  const Voxel first = voxel_at(part.grid, voxels.front());
+  Box box{first, first};
+  for (const std::size_t n : voxels) {
+    const Voxel v = voxel_at(part.grid, n);
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      box.first[axis] = std::min(box.first[axis], v[axis]);
+      box.last[axis] = std::max(box.last[axis], v[axis]);
+    }
+    joined.marked[n] = 1;
+  }
+  box = grown(box, known, part.grid);
+  const Grid local = cropped(part.grid, box);
+  const std::vector<float> away = distance_to(1, local, crop_values(part.grid, box, joined.marked));
+  std::size_t k = 0;
+  for_each_row(part.grid, box, [&](std::size_t start) {
+    for (int i = 0; i < local.size[0]; ++i, ++k) {
+      float& here = joined.away[start + static_cast<std::size_t>(i)];
+      here = std::min(here, away[k]);
+    }
+  });
+  return box;
 }
 
 /// Fills the way between both ends, and a radius into each of them.
@@ -214,6 +261,23 @@ void require_few(const std::vector<PieceOfLabels>& pieces, std::size_t most) {
               "mask.most_handles");
 }
 
+bool reaches_into(const Part& part, const PieceOfLabels& piece, const Box& box) {
+  return std::any_of(piece.voxels.begin(), piece.voxels.end(),
+                     [&](std::size_t n) { return holds(box, voxel_at(part.grid, n)); });
+}
+
+/// Tells of the pieces how far they are from the joined ones, and takes them out.
+void leave_out(Part& part, const std::vector<PieceOfLabels>& pieces, JoinedPieces& joined,
+               LabelMask& made) {
+  joined.away = distance_to(1, part.grid, joined.marked);
+  for (const PieceOfLabels& piece : pieces) {
+    const Gap gap = find_gap(part, piece, joined, std::numeric_limits<double>::infinity());
+    made.lost.push_back({piece.of, gap.to, gap.free_mm,
+                         part.grid.spacing.prod() * static_cast<double>(piece.voxels.size())});
+    for (const std::size_t n : piece.voxels) part.class_of[n] = 0;
+  }
+}
+
 /// Joins pieces to the first, and tells of those that stay alone.
 void join_pieces(Part& part, std::vector<PieceOfLabels> pieces, double most_gap,
                  std::size_t most_pieces, LabelMask& made) {
@@ -224,42 +288,51 @@ void join_pieces(Part& part, std::vector<PieceOfLabels> pieces, double most_gap,
     for (const std::size_t n : pieces.back().voxels) part.class_of[n] = 0;
     pieces.pop_back();
   }
-  std::vector<std::size_t> joined = std::move(pieces.front().voxels);
+  if (pieces.size() == 1) return;
+  const Grid& grid = part.grid;
+  JoinedPieces joined{.marked = Labels(part.class_of.size(), 0), .away = {}};
+  for (const std::size_t n : pieces.front().voxels) joined.marked[n] = 1;
+  joined.away = distance_to(1, grid, joined.marked);
   pieces.erase(pieces.begin());
   Labels inside(part.class_of.size(), 0);
   for (std::size_t n = 0; n < inside.size(); ++n) inside[n] = part.class_of[n] != 0 ? 1 : 0;
-  const std::vector<float> depth =
-      pieces.empty() ? std::vector<float>{} : distance_to(0, part.grid, inside);
+  const std::vector<float> depth = distance_to(0, grid, inside);
+  // Half a voxel's diagonal of a way is in the voxel at each of its ends.
+  const double furthest = most_gap + grid.spacing.norm();
+  std::vector<Gap> gaps(pieces.size());
+  for (std::size_t k = 0; k < pieces.size(); ++k) {
+    gaps[k] = find_gap(part, pieces[k], joined, furthest);
+  }
   while (!pieces.empty()) {
-    const Labels marked = mark(part, joined);
-    const std::vector<float> away = distance_to(1, part.grid, marked);
-    const std::vector<std::size_t> border = border_of(part.grid, joined, marked);
-    std::vector<Gap> gaps;
-    for (std::size_t k = 0; k < pieces.size(); ++k) {
-      gaps.push_back(find_gap(part, pieces[k], k, away, border));
-    }
-    const Gap gap = *std::min_element(
+    const auto least = std::min_element(
         gaps.begin(), gaps.end(), [](const Gap& a, const Gap& b) { return a.free_mm < b.free_mm; });
-    if (gap.free_mm >= most_gap) {
-      for (const Gap& other : gaps) {
-        const PieceOfLabels& piece = pieces[other.piece];
-        made.lost.push_back(
-            {piece.of, other.to, other.free_mm, voxel * static_cast<double>(piece.voxels.size())});
-        for (const std::size_t n : piece.voxels) part.class_of[n] = 0;
-      }
+    if (least->free_mm >= most_gap) {
+      leave_out(part, pieces, joined, made);
       return;
     }
-    const std::size_t which = gap.piece;
-    const Labels other = mark(part, pieces[which].voxels);
-    const double radius = std::max(kThroughFaces * part.grid.spacing.maxCoeff(),
-                                   std::min(width_near(part, depth, marked, gap.from),
-                                            width_near(part, depth, other, gap.to)));
+    const Gap gap = *least;
+    const std::ptrdiff_t which = least - gaps.begin();
+    PieceOfLabels piece = std::move(pieces[static_cast<std::size_t>(which)]);
+    pieces.erase(pieces.begin() + which);
+    gaps.erase(gaps.begin() + which);
+    const auto in_joined = [&](std::size_t n) { return joined.marked[n] != 0; };
+    for (const std::size_t n : piece.voxels) inside[n] = 2;
+    const double radius =
+        std::max(kThroughFaces * grid.spacing.maxCoeff(),
+                 std::min(width_near(part, depth, in_joined, gap.from),
+                          width_near(
+                              part, depth, [&](std::size_t n) { return inside[n] == 2; }, gap.to)));
+    for (const std::size_t n : piece.voxels) inside[n] = 1;
     const std::uint8_t from = part.class_of[gap.from_voxel];
-    made.bridges.push_back({static_cast<std::size_t>(from) - 1, pieces[which].of,
-                            0.5 * (gap.from + gap.to), gap.free_mm, radius});
-    joined.insert(joined.end(), pieces[which].voxels.begin(), pieces[which].voxels.end());
-    fill_bridge(part, gap, radius, static_cast<std::uint8_t>(pieces[which].of + 1), joined);
-    pieces.erase(pieces.begin() + static_cast<std::ptrdiff_t>(which));
+    made.bridges.push_back({static_cast<std::size_t>(from) - 1, piece.of, 0.5 * (gap.from + gap.to),
+                            gap.free_mm, radius});
+    fill_bridge(part, gap, radius, static_cast<std::uint8_t>(piece.of + 1), piece.voxels);
+    const Box changed = join(part, piece.voxels, furthest + grid.spacing.maxCoeff(), joined);
+    for (std::size_t k = 0; k < pieces.size(); ++k) {
+      if (reaches_into(part, pieces[k], changed)) {
+        gaps[k] = find_gap(part, pieces[k], joined, furthest);
+      }
+    }
   }
 }
 

@@ -322,6 +322,54 @@ TEST(MergeLabels, BridgesAGapWithPlaceAndLength) {
   }
 }
 
+TEST(MergeLabels, JoinsAChainWhoseLinksAreNearOneAnotherAlone) {
+  // Cubes in a row and round a corner, the largest first; one at the end too far from any.
+  struct Cube {
+    Voxel first;
+    int side;
+  };
+  const std::vector<Cube> cubes = {{{2, 2, 2}, 6},   {{11, 3, 3}, 4},   {{17, 4, 3}, 3},
+                                   {{17, 10, 4}, 3}, {{18, 10, 10}, 3}, {{18, 20, 12}, 3},
+                                   {{11, 30, 30}, 3}};
+  LabelVolume labels;
+  labels.grid = {.size = {24, 36, 36}, .spacing = Vec3(0.8, 0.8, 0.8), .origin = Vec3(5, 6, 7)};
+  labels.classes = {{"one", 1}};
+  labels.class_of.assign(labels.grid.voxels(), 0);
+  const auto voxels_of = [&](const Cube& cube) {
+    std::vector<std::size_t> voxels;
+    for (int n = 0; n < cube.side * cube.side * cube.side; ++n) {
+      voxels.push_back(labels.grid.index(cube.first[0] + n % cube.side,
+                                         cube.first[1] + n / cube.side % cube.side,
+                                         cube.first[2] + n / cube.side / cube.side));
+    }
+    return voxels;
+  };
+  for (const Cube& cube : cubes) {
+    for (const std::size_t n : voxels_of(cube)) labels.class_of[n] = 1;
+  }
+  const LabelMask made = merge_labels(labels);
+  // Each link's gap lies between faces that look at one another.
+  ASSERT_EQ(made.bridges.size(), 4u);
+  const double expected[] = {3 * 0.8, 2 * 0.8, 3 * 0.8, 3 * 0.8};
+  for (const double length : expected) {
+    EXPECT_TRUE(std::any_of(made.bridges.begin(), made.bridges.end(), [&](const Bridge& bridge) {
+      return std::abs(bridge.length_mm - length) < 0.35;  // the middles may be a voxel beside
+    })) << length;
+  }
+  ASSERT_EQ(made.lost.size(), 2u);
+  for (const LostPiece& lost : made.lost) {
+    // To the nearest of all voxels that are joined, by looking at each.
+    double nearest = 1e9;
+    for (std::size_t n = 0; n < made.mask.labels.size(); ++n) {
+      if (made.mask.labels[n] == 0) continue;
+      nearest = std::min(nearest, (center_of(labels.grid, n) - lost.place).norm());
+    }
+    EXPECT_GT(nearest, kMostGap);
+    EXPECT_LE(lost.gap_mm, nearest);
+    EXPECT_GE(lost.gap_mm, nearest - labels.grid.spacing.norm());
+  }
+}
+
 TEST(MergeLabels, BridgesAGapAsWideAsTheEndsOfATube) {
   // A ball in a flat end is no larger than how far its middle lies from it.
   for (const double radius : {2.5, 4.0, 7.0}) {
