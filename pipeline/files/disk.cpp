@@ -6,6 +6,7 @@
 #include <atomic>
 #include <cerrno>
 #include <cstdio>
+#include <cstdlib>
 #include <cstring>
 #include <fstream>
 #include <random>
@@ -62,7 +63,12 @@ void require_no_file(const fs::path& folder, const std::string& purpose) {
 
 void require_folder(const fs::path& folder, const std::string& purpose) {
   const fs::path there = find_there(folder, purpose);
-  if (::access(there.c_str(), W_OK | X_OK) == 0) return;
+  // Tried, since root is told that it may write where nothing can be made, as in /proc.
+  std::string tried = (there / ".wireplan-XXXXXX").string();
+  if (::mkdtemp(tried.data()) != nullptr) {
+    ::rmdir(tried.c_str());
+    return;
+  }
   throw Error(folder.string() + ": nothing may be written in " + there.string() + " (" +
               std::strerror(errno) + "), expected a folder for " + purpose +
               "; give another, or change its permissions");

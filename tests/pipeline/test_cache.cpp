@@ -213,5 +213,19 @@ TEST(OutputFolders, InWhoseWayAFileStandsAreRefusedBeforeAnyWork) {
   EXPECT_FALSE(fs::exists(folder / "nowhere"));
 }
 
+TEST(OutputFolders, WhereNothingCanBeMadeAreRefusedEvenOfRoot) {
+  if (!fs::is_directory("/proc/self")) GTEST_SKIP() << "this system has no /proc";
+  const TemporaryFolder folder;
+  write_tube_case(folder.path());
+  for (const char* command :
+       {"run case.json -o ", "phantom --random 1 -o ", "run case.json --cache "}) {
+    const Answer answer = run_program(folder.path(), std::string(command) + "/proc/none/deep");
+    EXPECT_EQ(answer.code, 2) << command << "\n" << answer.log;
+    EXPECT_NE(answer.log.find("nothing may be written in /proc"), std::string::npos)
+        << command << "\n"
+        << answer.log;
+  }
+}
+
 }  // namespace
 }  // namespace wireplan::pipeline
