@@ -1,6 +1,7 @@
 // The stage that tells what the way is like before a wire is pushed.
 #include <string>
 
+#include "pipeline/files/text.h"
 #include "pipeline/report/anatomy_json.h"
 #include "pipeline/stages/makers.h"
 #include "preprocess/centerline/section_width.h"
@@ -24,6 +25,16 @@ std::string calcium_unknown(Workspace& work, const plan::AccessLimits& limits) {
   return "";
 }
 
+std::string tell_plaque_in_lumen(const preprocess::Calcium& calcium,
+                                 const plan::AccessLimits& limits) {
+  return "anatomy: " + format("%.0f mm3", calcium.inside) +
+         " of what counts as lumen along the way " +
+         format("are brighter than %.0f HU", limits.calcium_hu) + ", round " +
+         place_text(*calcium.inside_at) +
+         " mm: plaque or metal there leaves less room than the lumen's widths say; look at the "
+         "slices";
+}
+
 }  // namespace
 
 void make_anatomy(Workspace& work, const std::filesystem::path& folder) {
@@ -38,14 +49,15 @@ void make_anatomy(Workspace& work, const std::filesystem::path& folder) {
   }
 
   const std::string unknown = calcium_unknown(work, limits);
-  double volume = 0.0;
+  preprocess::Calcium calcium;
   if (unknown.empty()) {
-    volume = preprocess::calcium_volume(
+    calcium = preprocess::measure_calcium(
         work.image(), preprocess::read_mask(work.artifact("segment").folder / "mask.nrrd"),
         work.path(), {.threshold_hu = limits.calcium_hu, .within_mm = limits.calcium_within});
   }
+  if (calcium.inside_at) figures["warnings"].push_back(tell_plaque_in_lumen(calcium, limits));
   if (work.given().volume) work.drop_image();
-  figures["access"]["calcium"] = calcium_json(volume, unknown, limits);
+  figures["access"]["calcium"] = calcium_json(calcium.beside + calcium.inside, unknown, limits);
   write_figures(figures, folder);
 }
 

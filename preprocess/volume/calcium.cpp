@@ -36,10 +36,23 @@ bool is_beside(const Vec3& point, const Centerline& way, double within) {
   return false;
 }
 
+/// Whether one of the six voxels that share a face with a voxel is such.
+template <typename Is>
+bool has_neighbour(const Grid& grid, std::size_t n, const Is& is) {
+  std::size_t stride = 1;
+  for (int axis = 0; axis < 3; ++axis) {
+    const auto size = static_cast<std::size_t>(grid.size[axis]);
+    const std::size_t at = n / stride % size;
+    if ((at > 0 && is(n - stride)) || (at + 1 < size && is(n + stride))) return true;
+    stride *= size;
+  }
+  return false;
+}
+
 }  // namespace
 
-double calcium_volume(const Image& image, const Mask& lumen, const Centerline& way,
-                      const CalciumOptions& options) {
+Calcium measure_calcium(const Image& image, const Mask& lumen, const Centerline& way,
+                        const CalciumOptions& options) {
   expects(image.values.size() == lumen.labels.size() && way.points.cols() > 0);
   const Box box = box_of(image.grid, way, options.within_mm);
   const Grid grid = cropped(image.grid, box);
@@ -47,13 +60,25 @@ double calcium_volume(const Image& image, const Mask& lumen, const Centerline& w
   const Labels labels = crop_values(image.grid, box, lumen.labels);
   const std::vector<float> distance = distance_to(1, grid, labels);
   const double farthest = options.within_mm + 0.5 * grid.spacing.mean();
-  std::size_t found = 0;
+  const auto is_bright = [&](std::size_t n) {
+    return static_cast<double>(values[n]) > options.threshold_hu;
+  };
+  std::size_t beside = 0, inside = 0;
+  Vec3 sum = Vec3::Zero();
   for (std::size_t n = 0; n < values.size(); ++n) {
-    if (labels[n] != 0 || static_cast<double>(values[n]) <= options.threshold_hu) continue;
-    if (static_cast<double>(distance[n]) > farthest) continue;
-    if (is_beside(center_of(grid, n), way, options.within_mm)) ++found;
+    if (!is_bright(n) || static_cast<double>(distance[n]) > farthest) continue;
+    const bool in_lumen = labels[n] != 0;
+    if (in_lumen && !has_neighbour(grid, n, is_bright)) continue;
+    const Vec3 at = center_of(grid, n);
+    if (!is_beside(at, way, options.within_mm)) continue;
+    ++(in_lumen ? inside : beside);
+    if (in_lumen) sum += at;
   }
-  return static_cast<double>(found) * grid.spacing.prod();
+  const double voxel = grid.spacing.prod();
+  Calcium calcium{.beside = static_cast<double>(beside) * voxel,
+                  .inside = static_cast<double>(inside) * voxel};
+  if (inside > 0) calcium.inside_at = sum / static_cast<double>(inside);
+  return calcium;
 }
 
 }  // namespace wireplan::preprocess

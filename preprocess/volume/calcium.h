@@ -1,5 +1,7 @@
 #pragma once
-/// Calcified plaque beside the lumen of a CT, as far as brightness tells it.
+/// Calcified plaque beside and in the lumen of a CT, as far as brightness tells it.
+#include <optional>
+
 #include "preprocess/vessel.h"
 #include "preprocess/volume/image.h"
 
@@ -10,11 +12,17 @@ struct CalciumOptions {
   double within_mm = 2.0;       // of the lumen                                               [mm]
 };
 
-/// Volume [mm^3] of the voxels outside the lumen that are brighter than the threshold, lie within
-/// that distance of a voxel of the lumen (between centres, less half a voxel) and beside the way:
-/// nearer to its line than 1.5 radii there and that distance. Bone or metal that touches the vessel
-/// counts too. Expects image and lumen on one grid.
-double calcium_volume(const Image& image, const Mask& lumen, const Centerline& way,
-                      const CalciumOptions& options = {});
+struct Calcium {
+  double beside = 0.0, inside = 0.0;   // outside the lumen's voxels, and among them       [mm^3]
+  std::optional<Vec3> inside_at = {};  // the middle of the latter                         [mm]
+};
+
+/// Volume of the voxels that are brighter than the threshold, lie within that distance of a voxel
+/// of the lumen (between centres, less half a voxel) and beside the way: nearer to its line than
+/// 1.5 radii there and that distance. Plaque that a segmentation took for lumen counts apart, where
+/// two such voxels share a face: one alone may be noise of the contrast. Bone or metal that touches
+/// the vessel counts too. Expects image and lumen on one grid.
+Calcium measure_calcium(const Image& image, const Mask& lumen, const Centerline& way,
+                        const CalciumOptions& options = {});
 
 }  // namespace wireplan::preprocess

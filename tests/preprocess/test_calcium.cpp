@@ -36,23 +36,42 @@ struct BrightTube {
 
 TEST(Calcium, IsTheBrightVolumeAgainstTheLumen) {
   BrightTube tube;
-  EXPECT_EQ(calcium_volume(tube.image, tube.lumen, tube.way), 0.0);
+  EXPECT_EQ(measure_calcium(tube.image, tube.lumen, tube.way).beside, 0.0);
   tube.add_block(30, 1100.0F);  // its centres 0 to 1.5 mm outside the lumen's radius
-  EXPECT_DOUBLE_EQ(calcium_volume(tube.image, tube.lumen, tube.way), 8.0);
-  EXPECT_DOUBLE_EQ(calcium_volume(tube.image, tube.lumen, tube.way, {.threshold_hu = 1200.0}), 0.0);
+  EXPECT_DOUBLE_EQ(measure_calcium(tube.image, tube.lumen, tube.way).beside, 8.0);
+  EXPECT_DOUBLE_EQ(
+      measure_calcium(tube.image, tube.lumen, tube.way, {.threshold_hu = 1200.0}).beside, 0.0);
+}
+
+TEST(Calcium, ThatASegmentationTookForLumenCountsApart) {
+  BrightTube tube;
+  tube.add_block(25, 1100.0F);  // 12.5 to 14 mm along x, in a lumen from 5 to 15
+  const Calcium calcium = measure_calcium(tube.image, tube.lumen, tube.way);
+  EXPECT_EQ(calcium.beside, 0.0);
+  EXPECT_DOUBLE_EQ(calcium.inside, 8.0);
+  ASSERT_TRUE(calcium.inside_at);
+  EXPECT_LT((*calcium.inside_at - Vec3(13.25, 9.75, 10.75)).norm(), 1e-9);
+
+  // A voxel alone is noise of the contrast, two are none.
+  BrightTube noisy;
+  noisy.image.values[noisy.image.grid.index(20, 20, 30)] = 900.0F;
+  EXPECT_EQ(measure_calcium(noisy.image, noisy.lumen, noisy.way).inside, 0.0);
+  noisy.image.values[noisy.image.grid.index(20, 20, 31)] = 900.0F;
+  EXPECT_DOUBLE_EQ(measure_calcium(noisy.image, noisy.lumen, noisy.way).inside, 0.25);
 }
 
 TEST(Calcium, FarFromTheLumenOrAwayFromTheWayDoesNotCount) {
   BrightTube tube;
   tube.add_block(35, 1100.0F);  // 2.5 mm and more away
-  EXPECT_EQ(calcium_volume(tube.image, tube.lumen, tube.way), 0.0);
-  EXPECT_DOUBLE_EQ(calcium_volume(tube.image, tube.lumen, tube.way, {.within_mm = 5.0}), 8.0);
+  EXPECT_EQ(measure_calcium(tube.image, tube.lumen, tube.way).beside, 0.0);
+  EXPECT_DOUBLE_EQ(measure_calcium(tube.image, tube.lumen, tube.way, {.within_mm = 5.0}).beside,
+                   8.0);
 
   tube.add_block(30, 1100.0F);
   Centerline above{.points = tube.way.points.rightCols(10),  // from 25 mm on; the block ends at 12
                    .radius = tube.way.radius.tail(10),
                    .arc_length = tube.way.arc_length.head(10)};
-  EXPECT_EQ(calcium_volume(tube.image, tube.lumen, above), 0.0);
+  EXPECT_EQ(measure_calcium(tube.image, tube.lumen, above).beside, 0.0);
 }
 
 }  // namespace
