@@ -515,13 +515,12 @@ bool ToolTrial::check_advance(double pushed) {
   return false;
 }
 
-/// As `outcome`, unless the tip is in another vessel: then that is the outcome.
+/// As `outcome`, unless the tip is not on the way: then that is the outcome.
 void ToolTrial::end_where_it_is(Outcome outcome, const std::string& reason) {
   const std::optional<Astray> astray =
       goal_.way ? goal_.way->find_astray(foremost_tip()) : std::nullopt;
   if (!astray) return end(outcome, reason);
-  end(astray->passed_by ? Outcome::kPassedBy : Outcome::kWrongBranch,
-      "the tip is not on the way: " + astray->text + "; " + reason);
+  end(outcome_of(*astray), describe(*astray) + "; " + reason);
 }
 
 void ToolTrial::end(Outcome outcome, const std::string& reason) {

@@ -40,6 +40,17 @@ const char* outcome_name(Outcome outcome) {
   return "failed";
 }
 
+Outcome outcome_of(const Astray& astray) {
+  return astray.beyond_target ? Outcome::kMissed
+         : astray.passed_by   ? Outcome::kPassedBy
+                              : Outcome::kWrongBranch;
+}
+
+std::string describe(const Astray& astray) {
+  return (astray.beyond_target ? "the tip went by the target: " : "the tip is not on the way: ") +
+         astray.text;
+}
+
 std::string describe_balance(const std::vector<Push>& pushes) {
   if (pushes.empty()) return "";
   const Push& last = pushes.back();
@@ -338,13 +349,12 @@ Shape Trial::shape_here() const {
                                .transpose()};
 }
 
-/// As `outcome`, unless the tip is in another vessel: then that is the outcome.
+/// As `outcome`, unless the tip is not on the way: then that is the outcome.
 void Trial::end_where_it_is(std::size_t goal, Outcome outcome, const std::string& reason) {
   const std::shared_ptr<const Way>& way = goals_[goal].way;
   const std::optional<Astray> astray = way ? way->find_astray(tip_at_rest()) : std::nullopt;
   if (!astray) return end(goal, outcome, reason);
-  end(goal, astray->passed_by ? Outcome::kPassedBy : Outcome::kWrongBranch,
-      "the tip is not on the way: " + astray->text + "; " + reason);
+  end(goal, outcome_of(*astray), describe(*astray) + "; " + reason);
 }
 
 /// For all goals for which it has not ended. Always false.

@@ -26,7 +26,7 @@ struct Goal {
 
 enum class Outcome {
   kReached,        // the tip passed the goal's cross-section, or came within its radius
-  kMissed,         // all wire was pushed in, or the tip went by a sphere; the goal not reached
+  kMissed,         // all wire was pushed in, or the tip went by the goal; it is not reached
   kPassedBy,       // the tip went on in a vessel that the way leaves: it overshot the branch
   kWrongBranch,    // the tip took a branch that is not on the way
   kLeftImage,      // the tip came to an end of the imaged vessel, which goes on in the patient
@@ -39,6 +39,10 @@ enum class Outcome {
   kFailed,         // our fault; the reason holds the message
 };
 const char* outcome_name(Outcome outcome);  // "reached", "missed", "stuck", ...
+
+/// How a trial ends whose tip is not on the way, and the start of its reason.
+Outcome outcome_of(const Astray& astray);
+std::string describe(const Astray& astray);
 
 /// A shape on the way, for pictures and time series.
 struct Shape {

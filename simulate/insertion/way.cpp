@@ -182,40 +182,48 @@ std::optional<Astray> Way::find_astray(const Vec3& tip) const {
     return branch_name(tree_, k, own_start(tree_[static_cast<std::size_t>(k)]));
   };
   const std::string other_way = ", beyond the place where the way turns the other way, into ";
+  const std::string other_part = ", the other of two arteries that part where the way goes on in ";
   if (is_across(here, on_way, left)) {
-    return Astray{false, "it is in " + name + ", across the bifurcation"};
+    return Astray{.text = "it is in " + name + ", across the bifurcation"};
   }
   if (on_way.arc > leaves && in_targets) {
-    return Astray{true, "it is in " + name + ", beyond the target"};
+    return Astray{.beyond_target = true, .text = "it is in " + name + ", beyond the target"};
   }
   if (on_way.arc > leaves) {
     const int taken = next_branch(on_way.branch);
     const std::string next = name_of_start(taken);
+    if (parts(tree_, taken)) return Astray{.text = "it is in " + name + other_part + next};
     if (is_entered(tree_, taken)) {
-      return Astray{false, "it is in " + name + other_way + next};
+      return Astray{.text = "it is in " + name + other_way + next};
     }
     if (goes_on(tree_, taken)) {
-      return Astray{
-          false, "it is in " + name + ", where the way goes on in " + next + ", the wider vessel"};
+      return Astray{.text = "it is in " + name + ", where the way goes on in " + next +
+                            ", the wider vessel"};
     }
     const std::string where =
         in_branch_of_way ? "went on in " + name + ", " : "is in " + name + ", which comes ";
-    return Astray{true, "it " + where + whole_millimetres(on_way.arc - leaves) +
-                            " beyond the place where the way turns into " + next};
+    return Astray{.passed_by = true,
+                  .text = "it " + where + whole_millimetres(on_way.arc - leaves) +
+                          " beyond the place where the way turns into " + next};
   }
   if (in_branch_of_way) return std::nullopt;
+  if (parts(tree_, left)) {
+    return Astray{.text = "it is in " + name + other_part +
+                          branch_name(tree_, on_way.branch, begins_behind(tree_, left))};
+  }
   if (is_entered(tree_, left)) {
-    return Astray{false, "it is in " + name + other_way +
-                             branch_name(tree_, on_way.branch, begins_behind(tree_, left))};
+    return Astray{.text = "it is in " + name + other_way +
+                          branch_name(tree_, on_way.branch, begins_behind(tree_, left))};
   }
   if (goes_on(tree_, left)) {
-    return Astray{true, "it went on in " + name + ", the wider vessel where the way turns into " +
-                            branch_name(tree_, on_way.branch, begins_behind(tree_, left))};
+    return Astray{.passed_by = true,
+                  .text = "it went on in " + name + ", the wider vessel where the way turns into " +
+                          branch_name(tree_, on_way.branch, begins_behind(tree_, left))};
   }
-  return Astray{
-      false, "it is in " + name + ", which leaves the way " +
-                 whole_millimetres(leaves - on_way.arc) + " before " +
-                 (in_targets ? "the target"
+  return Astray{.text = "it is in " + name + ", which leaves the way " +
+                        whole_millimetres(leaves - on_way.arc) + " before " +
+                        (in_targets
+                             ? "the target"
                              : "the way turns into " + name_of_start(next_branch(on_way.branch)))};
 }
 

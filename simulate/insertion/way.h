@@ -19,8 +19,9 @@ struct CrossSection {
   double radius = 0.0;          // inscribed                                              [mm]
 };
 
-/// A tip that is in another vessel than the way.
+/// A tip that is in another vessel than the way, or beyond the target in its own.
 struct Astray {
+  bool beyond_target = false;  // it stayed in the target's vessel
   bool passed_by = false;  // it stayed in a vessel that the way leaves, the wider one at a fork, or
                            // went on from there; else it took a branch that the way does not
   std::string text;        // which vessel, and where that leaves the way

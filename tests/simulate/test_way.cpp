@@ -240,6 +240,38 @@ TEST(Way, TheOtherLegIsAcrossTheBifurcationWhicheverVesselTheTreeFollows) {
   EXPECT_FALSE(Way(into_branch(kSecond, 25.0), tree_of_fork()).bifurcation());
 }
 
+TEST(Way, OfTwoArteriesThatPartTheOtherIsAWrongBranchWhicheverIsWiderOrTheTreeFollows) {
+  // From above, out of a vessel of 9 mm radius into two that turn from it by 27 deg.
+  const Vec3 head(0.0, 0.0, 100.0), left(40.0, 0.0, -80.0), right(-40.0, 0.0, -80.0);
+  const auto into = [&](const Vec3& from, const Vec3& leg, double radius) {
+    Centerline line = from.isZero() ? line_through({from, leg}, radius)
+                                    : line_through({from, Vec3::Zero(), leg}, radius);
+    for (Eigen::Index i = 0; i < line.points.cols(); ++i) {
+      if (line.points.col(i).norm() < 7.0) line.radius(i) = 7.0;
+      if (line.points(2, i) > 5.0) line.radius(i) = 9.0;
+    }
+    return line;
+  };
+  for (const double wide : {4.8, 5.0, 5.2}) {
+    for (const bool by_the_line : {true, false}) {
+      SCOPED_TRACE(testing::Message() << wide << " mm beside 5 mm, " << by_the_line);
+      const Vec3 end = by_the_line ? left : right, other = by_the_line ? right : left;
+      const Way way(
+          into(head, 0.7 * end, by_the_line ? 5.0 : wide),
+          {{into(head, left, 5.0), -1, 0.0}, {into(Vec3::Zero(), right, wide), 0, head.norm()}});
+      const auto astray = way.find_astray(0.5 * other);
+      ASSERT_TRUE(astray);
+      EXPECT_FALSE(astray->passed_by) << astray->text;
+      EXPECT_EQ(astray->text, by_the_line
+                                  ? "it is in branch 2, the other of two arteries that part "
+                                    "where the way goes on in branch 1"
+                                  : "it is in branch 1, the other of two arteries that part "
+                                    "where the way goes on in branch 2");
+      EXPECT_FALSE(way.find_astray(0.5 * end));
+    }
+  }
+}
+
 TEST(Way, TheOtherWayOfAVesselThatIsEnteredIsAnotherBranch) {
   // Out of an arm of 4 mm radius into a trunk of 10 mm, down it, and by the tree's first line up.
   const Vec3 hand(90.0, 0.0, 0.0), foot(0.0, 0.0, -120.0), head(0.0, 0.0, 120.0);
@@ -287,6 +319,19 @@ TEST(Way, TheEndOfTheImageIsOpenThoughItsModelIsClosed) {
   EXPECT_FALSE(way.find_image_end(Vec3(0.0, 1.0, 60.0), dome));
   const Lumen goes_on(shapes::straight_tube(5.0, 120.0, 2.0));
   EXPECT_FALSE(way.find_image_end(Vec3(0.0, 1.0, 76.0), goes_on)) << "a loop was cut there";
+}
+
+TEST(Way, AWireBeyondASphereInTheTargetsOwnVesselMissedItAndPassedByNoBranch) {
+  // A sphere beside the axis, 7 mm before the place where the wire comes to the end of the image.
+  Goal goal = goal_of(line_through({{0.0, 0.0, 5.0}, {0.0, 0.0, 80.0}}, kTrunk), tree_of_fork());
+  goal.at_section = false;
+  goal.point = Vec3(3.0, 0.0, 80.0);
+  goal.radius = 0.5;
+  const Introducer along{.point = Vec3(0.0, 0.0, 60.0), .direction = Vec3::UnitZ()};
+  const TrialResult trial = run_trial(wire_of(60.0), along, goal, fork(), options());
+  EXPECT_EQ(trial.outcome, Outcome::kMissed) << outcome_name(trial.outcome) << trial.reason;
+  EXPECT_EQ(trial.reason.find("the tip went by the target: it is in "), 0u) << trial.reason;
+  EXPECT_NE(trial.reason.find("end of the imaged vessel"), std::string::npos) << trial.reason;
 }
 
 TEST(Way, ThePlaneOfTheSectionCountsInItsOwnLumenAlone) {
