@@ -45,14 +45,18 @@ struct VesselEdge {
 };
 
 /// Of a branch, at the children that go on from what came before, as a brachiocephalic trunk beside
-/// the carotid that its line ends in, and where it comes into a wider vessel.
+/// the carotid that its line ends in, where it comes into a wider vessel, and where it goes from
+/// one leg into the other of two that meet in one.
 std::vector<VesselEdge> list_edges(const std::vector<Branch>& tree, int branch) {
   std::vector<VesselEdge> edges;
   for (std::size_t k = 0; k < tree.size(); ++k) {
     const int child = static_cast<int>(k);
     if (tree[k].parent != branch) continue;
-    const bool into_wider = simulate::is_entered(tree, child) ||
-                            simulate::bifurcation_width(tree, {.parent = branch, .child = child});
+    const auto meet = [&](bool takes_child) {
+      return simulate::bifurcation_width(tree, {branch, child, takes_child}).has_value();
+    };
+    // Where the line goes on in the other of two legs, the ball is the wider vessel's.
+    const bool into_wider = simulate::is_entered(tree, child) || meet(false) || meet(true);
     if (!into_wider && !simulate::goes_on(tree, child) && !simulate::parts(tree, child)) continue;
     const double ball = simulate::own_start(tree[k]), at = tree[k].parent_arc;
     edges.push_back(
@@ -135,16 +139,16 @@ class BranchNames {
     for (const Branch& branch : tree) told_.push_back(branch.parts);
   }
 
-  void name(const NamedPlace& place, bool root_too) {
+  void name(const NamedPlace& place, bool first_too) {
     if (tree_.empty() || place.name.empty()) return;
     const simulate::BranchPlace found = simulate::find_branch(tree_, place.point);
     const auto index = static_cast<std::size_t>(found.branch);
-    if (!root_too && tree_[index].parent < 0) return;
     // By the labels alone, so that the order of places does not count.
     std::vector<preprocess::NamedPart> parts = std::exchange(tree_[index].parts, told_[index]);
     const double from = vessel_from(tree_, found), to = vessel_to(tree_, found);
     const std::optional<double> stem = stem_from(tree_, {found.branch, from});
     tree_[index].parts = std::move(parts);
+    if (!first_too && tree_[index].parent < 0 && from == 0.0) return;
     const std::pair vessel(found.branch, from);
     if (std::find(named_.begin(), named_.end(), vessel) != named_.end()) return;
     named_.push_back(vessel);
@@ -156,6 +160,10 @@ class BranchNames {
       begin_part(index, {to, name_at(tree_[index].parts, to)}, false);
     }
     begin_part(index, {from, place.name}, true);
+    // Where the vessel before was named first, that one ends behind the ball in which this begins.
+    std::erase_if(tree_[index].parts, [&](const preprocess::NamedPart& part) {
+      return part.name.empty() && part.from > from && part.from < to;
+    });
     // A part that begins in the ball of a fork, and again behind it, is one.
     std::vector<preprocess::NamedPart>& named = tree_[index].parts;
     const auto same_name = [](const auto& a, const auto& b) { return a.name == b.name; };

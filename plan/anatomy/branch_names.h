@@ -16,8 +16,8 @@ struct NamedPlace {
 
 /// Names the vessels of branches by what lies in them: "left renal (branch 6)". The target's vessel
 /// is called after the target, "the target's branch" where neither that nor labels have a name;
-/// others after the other targets and accesses, those that come first before the rest. The root,
-/// from which the tree starts, is called after no access: it goes on far beyond it. A branch may
+/// others after the other targets and accesses, those that come first before the rest. The vessel
+/// that the tree starts in is called after no access: it goes on far beyond it. A branch may
 /// run through several vessels, and a name is that of one: from the last place before that leaves a
 /// clearly wider vessel, enters a wider one (simulate::is_entered) or the one that two legs meet
 /// in, has another name by labels, or has shared a stem with another vessel that goes on from it

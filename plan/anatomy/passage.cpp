@@ -357,9 +357,10 @@ std::optional<Junction> junction_at(const simulate::Way& of, double arc, int chi
   junction.trunk = goes_on ? child : own;
   junction.branch = goes_on ? own : child;
   const std::optional<simulate::Bifurcation>& fork = of.bifurcation();
-  junction.bifurcation = fork && fork->child == child;
   junction.fork = child;
-  if (crosses(tree, junction) || (takes && !goes_on && !list_parts(tree, child).empty())) {
+  const bool across = crosses(tree, junction);
+  junction.bifurcation = across || (fork && fork->child == child);
+  if (across || (takes && !goes_on && !list_parts(tree, child).empty())) {
     junction.trunk_direction = direction_before(way, junction);
   }
   return junction;

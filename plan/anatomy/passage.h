@@ -39,7 +39,7 @@ struct Junction {
   int trunk = -1;             // branch of the tree that goes on ...
   int branch = -1;            // ... and the one that leaves it there
   bool taken = false;         // the way leaves the trunk for the branch; else it passes the branch
-  bool bifurcation = false;   // of the aorta (simulate::Bifurcation)
+  bool bifurcation = false;   // of the aorta (simulate::Bifurcation); also where the way crosses it
   bool entered = false;       // taken out of a branch into a wider vessel (simulate::is_entered):
                               // trunk and trunk_direction are those of the branch, coming in
   int fork = -1;              // branch of the tree that begins there

@@ -395,6 +395,7 @@ TEST(BranchNames, AStemThatTwoVesselsShareIsTheStemOfTheOneThatItsLineEndsIn) {
     std::vector<Branch> named = tree_with_stem();
     name_branches(named, first ? trunk : beyond, {first ? beyond : trunk}, {});
     EXPECT_EQ(branch_name(named, 1), "trunk, then left carotid (branch 2)") << first;
+    EXPECT_EQ(branch_name(named, 1, 85.0), "left carotid (branch 2)") << first;
   }
 
   // Labels part the two 8 mm behind the place where the lines do.

@@ -221,13 +221,43 @@ TEST(Junctions, AcrossABifurcationTheTurnIsThatFromLegToLeg) {
     const std::vector<Branch> tree = {{.line = through(Vec3(0, 0, 120), wide)}, leg};
     const auto across = find_junctions(simulate::Way(through(60.0 * left, 5.0), tree));
     ASSERT_EQ(across.size(), 1u);
-    EXPECT_TRUE(across[0].taken);
+    EXPECT_TRUE(across[0].taken && across[0].bifurcation);
     const double turn = std::acos(-right.dot(left)) / kRadPerDeg;
     EXPECT_NEAR(turn_of(across[0]) / kRadPerDeg, turn, 0.5);
     const auto up = find_junctions(simulate::Way(through(Vec3(0, 0, 90), wide), tree));
     ASSERT_EQ(up.size(), 1u);
     EXPECT_TRUE(up[0].bifurcation && !up[0].taken);
   }
+}
+
+TEST(BranchNames, TheOtherLegIsCalledAfterItsGroinAlsoWhereTheTreesLineRunsIntoIt) {
+  // From the right leg over into the left one; the aorta of 9 mm is a branch of that line.
+  const Vec3 left(40, 0, -70), right(-40, 0, -70);
+  Branch over{.line = line_through({right, Vec3::Zero(), left}, 5.0)};
+  const double fork = right.norm();
+  for (Eigen::Index k = 0; k < over.line.radius.size(); ++k) {
+    if (std::abs(over.line.arc_length(k) - fork) < 8.0) over.line.radius(k) = 7.0;
+  }
+  Branch aorta{
+      .line = line_through({Vec3::Zero(), Vec3(0, 0, 120)}, 9.0), .parent = 0, .parent_arc = fork};
+  std::vector<Branch> tree = {over, aorta};
+  name_branches(tree, {"sac", Vec3(0, 0, 80)}, {}, {{"left femoral", 0.9 * left}});
+  EXPECT_EQ(branch_name(tree, 0, 2.0 * fork - 10.0), "left femoral (branch 1)");
+  EXPECT_EQ(branch_name(tree, 0, 20.0), "branch 1") << "the leg that the tree starts in";
+  EXPECT_EQ(branch_name(tree, 1), "sac (branch 2)");
+  const auto up =
+      find_junctions(simulate::Way(line_through({right, Vec3::Zero(), Vec3(0, 0, 80)}, 5.0), tree));
+  ASSERT_EQ(up.size(), 1u);
+  EXPECT_EQ(leaving_name(tree, up[0]), "left femoral (branch 1)");
+  // Also where the leg that the tree starts in has a name already.
+  std::vector<Branch> both = {over, aorta};
+  name_branches(both, {"sac", Vec3(0, 0, 80)}, {{"right iliac", 0.5 * right}},
+                {{"left femoral", 0.9 * left}});
+  EXPECT_EQ(branch_name(both, 0, 20.0), "right iliac (branch 1)");
+  EXPECT_EQ(branch_name(both, 0, 2.0 * fork - 10.0), "left femoral (branch 1)");
+  // An access farther up the leg that the tree starts in gives it no name.
+  name_branches(tree, {"sac", Vec3(0, 0, 80)}, {}, {{"right groin", 0.9 * right}});
+  EXPECT_EQ(branch_name(tree, 0, 20.0), "branch 1");
 }
 
 TEST(Junctions, OfLevelsBeforeTheAccessAreNone) {
