@@ -5,6 +5,7 @@
 #include <cmath>
 #include <utility>
 
+#include "plan/anatomy/passage.h"
 #include "plan/number_text.h"
 #include "plan/search.h"
 #include "plan/statistics.h"
@@ -425,7 +426,11 @@ class Weighing {
     const std::string bend = "The sharpest bend leaves " + whole_degrees(way.bend) +
                              " deg between its arms (180 is straight), " +
                              whole_millimetres(way.bend_at) + " from the access";
-    if (way.bend_ostium.empty()) {
+    if (way.bend_ostium.empty() && way.bend >= kNoBend && way.bend_grade == 0) {
+      find(Answer::kFeasible, "No bend of the way leaves less than " + whole_degrees(way.bend) +
+                                  " deg between its arms (180 is straight): " +
+                                  graded(way.bend_grade, "angulation") + ".");
+    } else if (way.bend_ostium.empty()) {
       severe = severe || way.bend_grade >= kSevere;
       find(way.bend_grade >= kSevere ? Answer::kFeasibleWithRisk : Answer::kFeasible,
            bend + ": " + graded(way.bend_grade, "angulation") + ".");

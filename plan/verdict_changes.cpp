@@ -100,8 +100,9 @@ std::string change_at_branch(const Endings& endings, const Known& known, const s
   if (!tried_moves(known.plan)) {
     return "Turning the wire at the branch: " + went + "; the wire was not turned.";
   }
-  return "A shaped catheter that leads the wire into the branch (not simulated): " + went +
-         ", though wires with an angled tip and turns of the wire were tried.";
+  return R"(A shaped catheter that leads the wire into the branch ("catheters": "suggest" tries )"
+         "some): " +
+         went + ", though wires with an angled tip and turns of the wire were tried.";
 }
 
 std::string change_of_wire_length(const Endings& endings, const Known& known,
@@ -117,7 +118,7 @@ std::string change_of_aim(const Endings& endings, const Known& known, const std:
   const simulate::Goal& goal = known.study.goal;
   if (goal.at_section) {
     return "Another wire, entry angle or roll: " + missed +
-           " ended before the target, with wire left to push.";
+           " ended before the target or beside it, with wire left to push.";
   }
   return "A target that is the vessel's whole cross-section, or another wire, entry angle or "
          "roll: " +

@@ -119,7 +119,6 @@ void put_views(Json& row, const Vec3& trunk, const Vec3& branch, const plan::Arm
 
 Json c_arm_json(const simulate::Way& way, const std::vector<plan::Junction>& junctions,
                 const plan::Corner& bend, const plan::ArmLimits& arm, bool axes_known) {
-  constexpr double kStraight = 170.0 * kRadPerDeg;  // no bend to speak of: noise turns its plane
   const Tree& tree = way.tree();
   Json rows = Json::array();
   for (const plan::Junction& junction : junctions) {
@@ -135,7 +134,7 @@ Json c_arm_json(const simulate::Way& way, const std::vector<plan::Junction>& jun
   }
   if (!rows.empty()) rows.back()["leads_to_target"] = true;  // no other vessel is turned into
   Json of_bend = {{"at_mm", bend.arc}, {"place_mm", to_json(bend.point)}};
-  put_views(of_bend, bend.before, bend.behind, arm, axes_known && bend.angle < kStraight);
+  put_views(of_bend, bend.before, bend.behind, arm, axes_known && bend.angle < plan::kNoBend);
   return {
       {"ostia", rows},
       {"bend", of_bend},
@@ -245,7 +244,9 @@ std::string describe_anatomy(const Json& figures) {
                      ", tortuosity " + number(tortuosity.at("index"), "%.2f") + " (" +
                      tortuosity.at("grade").get<std::string>() + "), sharpest bend " +
                      number(bend.at("angle_deg"), "%.0f deg") +
-                     number(bend.at("at_mm"), ", %.0f mm in") +
+                     (bend.at("angle_deg").get<double>() >= degrees(plan::kNoBend)
+                          ? ""
+                          : number(bend.at("at_mm"), ", %.0f mm in")) +
                      (bend.at("at_ostium_of").is_null()
                           ? " (" + bend.at("grade").get<std::string>() + ")"
                           : ", the turn into " + bend.at("at_ostium_of").get<std::string>()) +

@@ -79,6 +79,9 @@ std::string trunk_name(const std::vector<preprocess::Branch>& tree, const Juncti
 /// starts where the way does, as find_tree() makes it.
 std::vector<Junction> find_junctions(const simulate::Way& of);
 
+/// From there on a bend is none to speak of: noise turns its plane and moves its place.
+inline constexpr double kNoBend = 170.0 * kRadPerDeg;
+
 struct Corner {
   double angle = kPi;         // between the arms, pi where the way is straight            [rad]
   double arc = 0.0;           // of the corner                                             [mm]

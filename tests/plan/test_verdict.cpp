@@ -341,6 +341,21 @@ TEST(Verdict, AWayThatIsStraightIsCalledSo) {
   }
 }
 
+TEST(Verdict, OfAWayWithoutABendTellsNoPlaceOfOne) {
+  WhatIsKnown bench = WhatIsKnown::good();
+  bench.way = wide_way();
+  bench.way->bend = 176.0 * kRadPerDeg;
+  bench.way->bend_grade = 0;
+  EXPECT_TRUE(tells(bench.verdict().reasons,
+                    "No bend of the way leaves less than 176 deg between its arms"));
+  bench.way->bend = 165.0 * kRadPerDeg;
+  EXPECT_TRUE(tells(bench.verdict().reasons,
+                    "The sharpest bend leaves 165 deg between its arms (180 is straight), "));
+  bench.way->bend = 176.0 * kRadPerDeg;  // and a case that asks for straighter
+  bench.way->bend_grade = 1;
+  EXPECT_TRUE(tells(bench.verdict().reasons, "176 deg between its arms (180 is straight), "));
+}
+
 TEST(Verdict, WhereAllThatReachBreakALimitIsNotFeasible) {
   WhatIsKnown bench;
   bench.add(Outcome::kReached).peak_tip_force = 2.0;
@@ -408,6 +423,7 @@ TEST(Verdict, ChangesFollowFromWhatWasTried) {
             "was not turned."));
   bench.plan.scripts.starts_tried = 2;
   EXPECT_TRUE(tells(bench.verdict().changes, "A shaped catheter that leads the wire"));
+  EXPECT_TRUE(tells(bench.verdict().changes, "\"catheters\": \"suggest\" tries some"));
 
   WhatIsKnown wire;
   wire.add(Outcome::kMissed).insertion = 400.0;
@@ -438,7 +454,8 @@ TEST(Verdict, OfAMissWithWireLeftAsksForAnotherAim) {
   bench.add(Outcome::kMissed);
   EXPECT_EQ(bench.verdict().changes,
             std::vector<std::string>{"Another wire, entry angle or roll: the one trial ended "
-                                     "before the target, with wire left to push."});
+                                     "before the target or beside it, with wire left to "
+                                     "push."});
   bench.study.goal.at_section = false;
   EXPECT_EQ(bench.verdict().changes,
             std::vector<std::string>{
