@@ -182,7 +182,6 @@ std::optional<Astray> Way::find_astray(const Vec3& tip) const {
     return branch_name(tree_, k, own_start(tree_[static_cast<std::size_t>(k)]));
   };
   const std::string other_way = ", beyond the place where the way turns the other way, into ";
-  const std::string other_part = ", the other of two arteries that part where the way goes on in ";
   if (is_across(here, on_way, left)) {
     return Astray{.text = "it is in " + name + ", across the bifurcation"};
   }
@@ -192,7 +191,10 @@ std::optional<Astray> Way::find_astray(const Vec3& tip) const {
   if (on_way.arc > leaves) {
     const int taken = next_branch(on_way.branch);
     const std::string next = name_of_start(taken);
-    if (parts(tree_, taken)) return Astray{.text = "it is in " + name + other_part + next};
+    if (parts(tree_, taken)) {
+      return Astray{.text = "it is in " + name + ", " + whole_millimetres(on_way.arc - leaves) +
+                            " beyond the fork where the way goes on in " + next};
+    }
     if (is_entered(tree_, taken)) {
       return Astray{.text = "it is in " + name + other_way + next};
     }
@@ -207,15 +209,11 @@ std::optional<Astray> Way::find_astray(const Vec3& tip) const {
                           " beyond the place where the way turns into " + next};
   }
   if (in_branch_of_way) return std::nullopt;
-  if (parts(tree_, left)) {
-    return Astray{.text = "it is in " + name + other_part +
-                          branch_name(tree_, on_way.branch, begins_behind(tree_, left))};
-  }
   if (is_entered(tree_, left)) {
     return Astray{.text = "it is in " + name + other_way +
                           branch_name(tree_, on_way.branch, begins_behind(tree_, left))};
   }
-  if (goes_on(tree_, left)) {
+  if (goes_on(tree_, left) && !parts(tree_, left)) {
     return Astray{.passed_by = true,
                   .text = "it went on in " + name + ", the wider vessel where the way turns into " +
                           branch_name(tree_, on_way.branch, begins_behind(tree_, left))};

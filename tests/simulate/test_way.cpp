@@ -241,8 +241,8 @@ TEST(Way, TheOtherLegIsAcrossTheBifurcationWhicheverVesselTheTreeFollows) {
 }
 
 TEST(Way, OfTwoArteriesThatPartTheOtherIsAWrongBranchWhicheverIsWiderOrTheTreeFollows) {
-  // From above, out of a vessel of 9 mm radius into two that turn from it by 27 deg.
-  const Vec3 head(0.0, 0.0, 100.0), left(40.0, 0.0, -80.0), right(-40.0, 0.0, -80.0);
+  // From above, out of a vessel of 9 mm radius into two that turn from it by 37 deg.
+  const Vec3 head(0.0, 0.0, 100.0), left(48.0, 0.0, -64.0), right(-48.0, 0.0, -64.0);
   const auto into = [&](const Vec3& from, const Vec3& leg, double radius) {
     Centerline line = from.isZero() ? line_through({from, leg}, radius)
                                     : line_through({from, Vec3::Zero(), leg}, radius);
@@ -257,16 +257,15 @@ TEST(Way, OfTwoArteriesThatPartTheOtherIsAWrongBranchWhicheverIsWiderOrTheTreeFo
       SCOPED_TRACE(testing::Message() << wide << " mm beside 5 mm, " << by_the_line);
       const Vec3 end = by_the_line ? left : right, other = by_the_line ? right : left;
       const Way way(
-          into(head, 0.7 * end, by_the_line ? 5.0 : wide),
+          into(head, 0.75 * end, by_the_line ? 5.0 : wide),
           {{into(head, left, 5.0), -1, 0.0}, {into(Vec3::Zero(), right, wide), 0, head.norm()}});
       const auto astray = way.find_astray(0.5 * other);
       ASSERT_TRUE(astray);
       EXPECT_FALSE(astray->passed_by) << astray->text;
-      EXPECT_EQ(astray->text, by_the_line
-                                  ? "it is in branch 2, the other of two arteries that part "
-                                    "where the way goes on in branch 1"
-                                  : "it is in branch 1, the other of two arteries that part "
-                                    "where the way goes on in branch 2");
+      EXPECT_EQ(astray->text,
+                by_the_line ? "it is in branch 2, which leaves the way 60 mm before the target"
+                            : "it is in branch 1, 40 mm beyond the fork where the way goes on "
+                              "in branch 2");
       EXPECT_FALSE(way.find_astray(0.5 * end));
     }
   }
