@@ -114,12 +114,20 @@ simulate::TrialResult run_guarded(const std::function<simulate::TrialResult()>& 
 
 simulate::TrialResult run_candidate(const Study& study, const Candidate& candidate,
                                     const simulate::VesselModel& vessel) {
+  SharedTools none;
+  return run_candidate(study, candidate, vessel, none);
+}
+
+simulate::TrialResult run_candidate(const Study& study, const Candidate& candidate,
+                                    const simulate::VesselModel& vessel, SharedTools& shared) {
   return run_guarded([&] {
     expects(candidate.wire >= 0 && candidate.wire < std::ssize(study.wires));
     if (candidate.catheter >= 0) {
-      return simulate::run_tool_trial(tools_of(study, candidate), make_introducer(study, candidate),
-                                      study.goal, vessel, tool_options(study, candidate),
-                                      candidate.steps);
+      if (!shared) {
+        shared.emplace(tools_of(study, candidate), make_introducer(study, candidate), study.goal,
+                       vessel, tool_options(study, candidate));
+      }
+      return shared->run(candidate.steps, study.insertion.length);
     }
     return simulate::run_trial(study.wires[candidate.wire], make_introducer(study, candidate),
                                study.goal, vessel, study.insertion, candidate.moves);

@@ -2,10 +2,12 @@
 /// Many trials, any thread count, the same answer.
 #include <exception>
 #include <functional>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "plan/candidates.h"
+#include "simulate/insertion/tool_script.h"
 
 namespace wireplan::plan {
 
@@ -37,7 +39,13 @@ BatchResult run_batch(const Study& study, const std::vector<Candidate>& candidat
 /// One trial: what it throws, or a number that is not finite, becomes Outcome::kFailed.
 simulate::TrialResult run_guarded(const std::function<simulate::TrialResult()>& run);
 
+/// What runs of scripts with the same tools share, which differ in their steps alone; empty before
+/// the first of them.
+using SharedTools = std::optional<simulate::ToolScriptRunner>;
+
 /// One trial of the batch, guarded; a script of catheter and wire where the candidate has one.
+simulate::TrialResult run_candidate(const Study& study, const Candidate& candidate,
+                                    const simulate::VesselModel& vessel, SharedTools& shared);
 simulate::TrialResult run_candidate(const Study& study, const Candidate& candidate,
                                     const simulate::VesselModel& vessel);
 

@@ -67,6 +67,8 @@ std::string describe_script(const Study& study, const Candidate& candidate, doub
 /// Elements of scripts of catheter and wire are so many times the study's: the two together are
 /// stiffer than a wire alone, and halving them moved tips by half a millimetre (MEASUREMENTS.md).
 inline constexpr double kToolElements = 2.0;
+/// Of pushes between two recorded shapes: none is.
+inline constexpr double kNoShapes = 1e4;  //                                            [mm]
 simulate::ToolTrialOptions tool_options(const Study& study, const Candidate& candidate);
 double element_length_of(const Study& study, const Candidate& candidate);  //             [mm]
 

@@ -114,7 +114,10 @@ Study refined_study(const Study& study, const Candidate& candidate, double facto
   changed.insertion.record_every = insertion;  // no shapes on the way
   changed.insertion.map_forces = false;
   changed.goal = {.point = study.goal.point, .radius = 1e-9};  // no push ends that near
-  if (candidate.catheter >= 0) changed.goal.way = study.goal.way;
+  if (candidate.catheter >= 0) {
+    changed.goal.way = study.goal.way;
+    changed.insertion.record_every = kNoShapes;  // the same for all that share a way up
+  }
   return changed;
 }
 

@@ -11,7 +11,6 @@
 #include <utility>
 #include <variant>
 
-#include "plan/batch.h"
 #include "plan/statistics.h"
 
 namespace wireplan::plan {
@@ -228,28 +227,36 @@ simulate::Wire disturbed_tube(const Study& study, int catheter, const Disturbanc
   return disturbed(given.tool.wire, given.spread, disturbance.tube, study, disturbance);
 }
 
-simulate::TrialResult run_disturbed(const Study& study, const Candidate& candidate,
-                                    const simulate::VesselModel& vessel,
-                                    const Disturbance& disturbance) {
-  // The wires, their friction and their contact radius.
-  const bool tools = candidate.catheter >= 0;
-  const double factor = vessel.compliance ? disturbance.wall_factor : 1.0;
-  const auto own_of = [&](const simulate::Wire& disturbed) {
-    simulate::Wire own = softened(disturbed, factor, /*fix_axial=*/disturbance.inward != 0.0);
-    own.radius += disturbance.inward;
-    return own;
-  };
-  std::vector<simulate::Wire> wires;
-  for (const int wire : wires_of(candidate)) {
-    wires.push_back(own_of(disturbed_wire(study, wire, disturbance)));
-  }
+namespace {
+
+double wall_factor_of(const simulate::VesselModel& vessel, const Disturbance& disturbance) {
+  return vessel.compliance ? disturbance.wall_factor : 1.0;
+}
+
+/// As it acts in that vessel: against a wall of stiffness 1, in a lumen as it is.
+simulate::Wire in_vessel(const simulate::Wire& disturbed, const simulate::VesselModel& vessel,
+                         const Disturbance& disturbance) {
+  simulate::Wire own = softened(disturbed, wall_factor_of(vessel, disturbance),
+                                /*fix_axial=*/disturbance.inward != 0.0);
+  own.radius += disturbance.inward;
+  return own;
+}
+
+simulate::InsertionOptions disturbed_insertion(const Study& study,
+                                               const simulate::VesselModel& vessel,
+                                               const Disturbance& disturbance) {
+  const double factor = wall_factor_of(vessel, disturbance);
   simulate::InsertionOptions insertion = study.insertion;
   insertion.residual_tolerance *= kRepeatTolerance / factor;
   insertion.support_factor *= disturbance.support_factor / factor;
   insertion.record_every = insertion.length;
   insertion.map_forces = false;
+  return insertion;
+}
 
-  // The introducer, moved and turned across the vessel.
+/// The introducer, moved and turned across the vessel.
+simulate::Introducer disturbed_introducer(const Study& study, const Candidate& candidate,
+                                          const Disturbance& disturbance) {
   const Vec3 t = study.tangent.normalized();
   const Vec3 u = simulate::reference_normal(t), v = t.cross(u);
   simulate::Introducer introducer = make_introducer(study, candidate);
@@ -260,23 +267,61 @@ simulate::TrialResult run_disturbed(const Study& study, const Candidate& candida
     introducer.direction =
         (Eigen::AngleAxisd(axis.norm(), axis.normalized()) * introducer.direction).normalized();
   }
+  return introducer;
+}
 
+/// The candidate's wires, their friction and their contact radius.
+std::vector<simulate::Wire> disturbed_wires(const Study& study, const Candidate& candidate,
+                                            const simulate::VesselModel& vessel,
+                                            const Disturbance& disturbance) {
+  std::vector<simulate::Wire> wires;
+  for (const int wire : wires_of(candidate)) {
+    wires.push_back(in_vessel(disturbed_wire(study, wire, disturbance), vessel, disturbance));
+  }
+  return wires;
+}
+
+}  // namespace
+
+DisturbedTools disturb_tools(const Study& study, const Candidate& candidate,
+                             const simulate::VesselModel& vessel, const Disturbance& disturbance) {
+  Study own = study;
+  own.insertion = disturbed_insertion(study, vessel, disturbance);
+  const std::vector<simulate::Wire> wires = disturbed_wires(study, candidate, vessel, disturbance);
+  DisturbedTools with{.tools = tools_of(study, candidate),
+                      .introducer = disturbed_introducer(study, candidate, disturbance),
+                      .options = tool_options(own, candidate)};
+  with.tools[0].wire =
+      in_vessel(disturbed_tube(study, candidate.catheter, disturbance), vessel, disturbance);
+  with.tools[1].wire = wires.front();
+  with.options.spares.assign(wires.begin() + 1, wires.end());
+  return with;
+}
+
+simulate::TrialResult run_disturbed(const Study& study, const Candidate& candidate,
+                                    const simulate::VesselModel& vessel,
+                                    const Disturbance& disturbance) {
+  SharedTools none;
+  return run_disturbed(study, candidate, vessel, disturbance, none);
+}
+
+simulate::TrialResult run_disturbed(const Study& study, const Candidate& candidate,
+                                    const simulate::VesselModel& vessel,
+                                    const Disturbance& disturbance, SharedTools& shared) {
   simulate::TrialResult trial = run_guarded([&] {
-    if (tools) {
-      Study own = study;
-      own.insertion = insertion;
-      std::vector<simulate::Tool> both = tools_of(study, candidate);
-      both[0].wire = own_of(disturbed_tube(study, candidate.catheter, disturbance));
-      both[1].wire = wires.front();
-      simulate::ToolTrialOptions options = tool_options(own, candidate);
-      options.spares.assign(wires.begin() + 1, wires.end());
-      return simulate::run_tool_trial(both, introducer, study.goal, vessel, options,
-                                      candidate.steps);
+    if (candidate.catheter >= 0) {
+      if (!shared) {
+        const DisturbedTools with = disturb_tools(study, candidate, vessel, disturbance);
+        shared.emplace(with.tools, with.introducer, study.goal, vessel, with.options);
+      }
+      return shared->run(candidate.steps, study.insertion.length);
     }
-    return simulate::run_trial(wires.front(), introducer, study.goal, vessel, insertion,
+    return simulate::run_trial(disturbed_wires(study, candidate, vessel, disturbance).front(),
+                               disturbed_introducer(study, candidate, disturbance), study.goal,
+                               vessel, disturbed_insertion(study, vessel, disturbance),
                                candidate.moves);
   });
-  multiply_forces(trial, factor);
+  multiply_forces(trial, wall_factor_of(vessel, disturbance));
   return trial;
 }
 

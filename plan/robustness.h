@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "plan/batch.h"
 #include "plan/ranking.h"
 
 namespace wireplan::plan {
@@ -51,6 +52,7 @@ struct Disturbance {
   Eigen::Vector2d shift = Eigen::Vector2d::Zero();  //                                     [mm]
   double inward = 0.0;                              //                                     [mm]
   double tube = 0.5;                                // where every catheter's EI lies in its spread
+  bool operator==(const Disturbance&) const = default;
 };
 
 /// A Latin hypercube: every unknown takes each of `repeats` equal parts of its range once, in an
@@ -70,6 +72,15 @@ inline constexpr double kRepeatTolerance = 10.0;
 simulate::Wire disturbed_wire(const Study& study, int wire, const Disturbance& disturbance);
 simulate::Wire disturbed_tube(const Study& study, int catheter, const Disturbance& disturbance);
 
+/// A catheter and its wires under a disturbance, and how they are brought in.
+struct DisturbedTools {
+  std::vector<simulate::Tool> tools;  // from the outside in
+  simulate::Introducer introducer;
+  simulate::ToolTrialOptions options;
+};
+DisturbedTools disturb_tools(const Study& study, const Candidate& candidate,
+                             const simulate::VesselModel& vessel, const Disturbance& disturbance);
+
 /// The trial of a candidate under a disturbance; no shapes on the way, no forces per triangle.
 /// Never throws, as run_candidate does not.
 ///
@@ -78,6 +89,9 @@ simulate::Wire disturbed_tube(const Study& study, int catheter, const Disturbanc
 /// instead, and so is the support of sections that move, and all forces and works are multiplied by
 /// f afterwards. This is exact but for the contact law, which is then f times as stiff too. A lumen
 /// that is narrower by d: the wire's contact radius is larger by d instead.
+simulate::TrialResult run_disturbed(const Study& study, const Candidate& candidate,
+                                    const simulate::VesselModel& vessel,
+                                    const Disturbance& disturbance, SharedTools& shared);
 simulate::TrialResult run_disturbed(const Study& study, const Candidate& candidate,
                                     const simulate::VesselModel& vessel,
                                     const Disturbance& disturbance);

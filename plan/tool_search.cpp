@@ -141,7 +141,7 @@ std::vector<ToolPair> pairs_of(const Study& study) {
 Study tool_scout_study(const Study& study) {
   Study own = study;
   own.insertion.residual_tolerance = std::max(kScoutResidual, own.insertion.residual_tolerance);
-  own.insertion.record_every = 1e4;
+  own.insertion.record_every = kNoShapes;
   own.insertion.map_forces = false;
   return own;
 }

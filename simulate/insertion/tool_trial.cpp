@@ -560,19 +560,4 @@ TrialResult ToolTrial::finish() {
   return record_;
 }
 
-TrialResult run_tool_trial(const std::vector<Tool>& tools, const Introducer& introducer,
-                           const Goal& goal, const VesselModel& vessel,
-                           const ToolTrialOptions& options, const std::vector<ToolStep>& steps) {
-  ToolTrial trial(tools, introducer, goal, vessel, options);
-  const bool seats = !steps.empty() && steps.back().seats;
-  const std::size_t count = steps.size() - (seats ? 1 : 0);
-  for (std::size_t k = 0; k < count && !trial.ended(); ++k) {
-    trial.make(steps[k], k + 1 == count);
-  }
-  if (seats) trial.seat(steps.back());
-  TrialResult result = trial.finish();
-  result.support = trial.find_support();
-  return result;
-}
-
 }  // namespace wireplan::simulate

@@ -118,6 +118,9 @@ class ToolTrial {
   double measure(Until until, int tool) const;
   const std::vector<Push>& pushes() const { return record_.pushes; }
 
+  /// So far the last step may bring the foremost tip, in the place of what the options say [mm].
+  void bound(double length) { options_.insertion.length = length; }
+
   /// Makes the step that seats the outermost tool, unless the trial has ended otherwise than by
   /// reaching. Where the tool does not come so far, or anything else goes wrong, as where it draws
   /// the innermost back, all is as before.
@@ -168,7 +171,7 @@ class ToolTrial {
 
   const Goal goal_;
   const VesselModel& vessel_;
-  const ToolTrialOptions options_;
+  ToolTrialOptions options_;
   ToolBench bench_;
   double start_energy_ = 0.0;  // of the tools that are in use: what it is counted from   [N mm]
   double start_roll_ = 0.0;    //                                                          [rad]
@@ -182,11 +185,5 @@ class ToolTrial {
   double furthest_ = 0.0, since_furthest_ = 0.0;  // along the way, pushed since: of this step [mm]
   std::vector<double> peak_;                      // per triangle of the wall, largest force  [N]
 };
-
-/// Makes all steps, the last one until the goal is reached or the tip comes no further, and finds
-/// what the catheter bears then.
-TrialResult run_tool_trial(const std::vector<Tool>& tools, const Introducer& introducer,
-                           const Goal& goal, const VesselModel& vessel,
-                           const ToolTrialOptions& options, const std::vector<ToolStep>& steps);
 
 }  // namespace wireplan::simulate

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "preprocess/centerline/path_place.h"
-#include "simulate/insertion/tool_trial.h"
+#include "simulate/insertion/tool_script.h"
 #include "tests/shapes.h"
 #include "tests/simulate/tool_bench.h"
 

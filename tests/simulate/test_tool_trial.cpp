@@ -5,7 +5,7 @@
 #include <memory>
 #include <vector>
 
-#include "simulate/insertion/tool_trial.h"
+#include "simulate/insertion/tool_script.h"
 #include "tests/shapes.h"
 
 namespace wireplan::simulate {
@@ -156,6 +156,50 @@ TEST(ToolTrial, GoesOnFromAMarkAsItDidBefore) {
   EXPECT_EQ(trial.tip(0), once) << "bit for bit";
   EXPECT_EQ(trial.pushes().size(), pushes);
   EXPECT_NEAR(trial.insertion(0), 70.0, 1e-9);
+}
+
+TEST(ToolScripts, ComeToTheSameWhateverWasRunBefore) {
+  const auto script = [](double depth, double turn) {
+    return std::vector<ToolStep>{{.tool = 1, .push = 60.0},
+                                 {.tool = 0, .push = depth},
+                                 {.tool = 1, .push = -20.0},
+                                 {.tool = 0, .turn = turn},
+                                 {.tool = 1, .push = 30.0}};
+  };
+  const std::vector<std::vector<ToolStep>> scripts = {
+      script(40.0, 1.0), script(40.0, -1.0), script(30.0, 1.0), {{.tool = 1, .push = 60.0}}};
+  const std::vector<Tool> tools = {hooked_catheter(), straight_wire(20.0)};
+  ToolScriptRunner runner(tools, kUpward, kNowhere, aorta(), coarse());
+  std::vector<Vec3> tips;
+  for (const std::vector<ToolStep>& steps : scripts) {
+    SCOPED_TRACE(tips.size());
+    const TrialResult alone = run_tool_trial(tools, kUpward, kNowhere, aorta(), coarse(), steps);
+    const TrialResult shared = runner.run(steps, coarse().insertion.length);
+    EXPECT_EQ(shared.outcome, alone.outcome);
+    EXPECT_EQ(shared.reason, alone.reason);
+    ASSERT_EQ(shared.nodes.cols(), alone.nodes.cols());
+    EXPECT_EQ(shared.nodes, alone.nodes) << "bit for bit";
+    ASSERT_EQ(shared.pushes.size(), alone.pushes.size());
+    EXPECT_EQ(shared.steps, alone.steps);
+    EXPECT_EQ(shared.shapes.size(), alone.shapes.size());
+    for (std::size_t k = 0; k < alone.pushes.size(); ++k) {
+      EXPECT_EQ(shared.pushes[k].tip, alone.pushes[k].tip);
+      EXPECT_EQ(shared.pushes[k].push_work, alone.pushes[k].push_work);
+    }
+    tips.emplace_back(shared.nodes.rightCols<1>());
+  }
+  EXPECT_GT((tips[0] - tips[1]).norm(), 0.1) << "they are not all one script";
+  EXPECT_GT((tips[0] - tips[2]).norm(), 0.1);
+}
+
+TEST(ToolScripts, MayEndAtOtherInsertions) {
+  const std::vector<ToolStep> steps = {
+      {.tool = 1, .push = 40.0}, {.tool = 0, .push = 20.0}, {.tool = 1, .push = 60.0}};
+  ToolScriptRunner runner({hooked_catheter(), straight_wire(20.0)}, kUpward, kNowhere, aorta(),
+                          coarse());
+  for (const double length : {70.0, 90.0, 60.0}) {
+    EXPECT_NEAR(runner.run(steps, length).pushes.back().insertion, length, 1e-6);
+  }
 }
 
 TEST(ToolTrial, ACopyKnowsNothingOfWhatTheOtherDoesSince) {

@@ -1,0 +1,69 @@
+// Runs of catheter and wire that begin alike share their way up, which changes none of them.
+#include <gtest/gtest.h>
+
+#include <vector>
+
+#include "plan/trial_log.h"
+#include "tests/plan/memory_log.h"
+#include "tests/plan/two_renals.h"
+
+namespace wireplan::plan {
+namespace {
+
+using simulate::kBothTools;
+
+TEST(ToolRuns, ThatBeginAlikeComeToTheSameTogetherAndAlone) {
+  const Study study = toward(1.0);
+  const auto model = []() -> const simulate::VesselModel& { return aorta(); };
+  const PlanVessel vessel{
+      .path = study.goal.way->path(), .yields = false, .model = model, .rigid_model = model};
+  RobustnessOptions robustness;
+  robustness.repeats = 2;
+  const std::vector<Disturbance> disturbances = draw_disturbances(robustness, study.wires);
+  std::vector<plan::Run> runs;
+  for (const double turn : {0.5 * kPi, 0.4 * kPi, -0.5 * kPi}) {
+    Candidate script = first_candidate(study, {});
+    script.steps = {{.tool = 1, .push = 90.0},           {.tool = 0, .push = 75.0},
+                    {.tool = 1, .push = -40.0},          {.tool = 0, .turn = turn},
+                    {.tool = kBothTools, .push = -12.0}, {.tool = 1, .push = 60.0}};
+    runs.push_back({.candidate = script});
+    for (const Disturbance& disturbance : disturbances) {
+      runs.push_back({.candidate = script, .disturbance = disturbance});
+    }
+    for (const double insertion : {80.0 + turn, 85.0 - turn}) {
+      runs.push_back({.candidate = script, .elements = OtherElements{1.5, insertion, {}}});
+    }
+  }
+  std::vector<std::vector<Measured>> found;
+  std::vector<int> told;
+  for (const int threads : {1, 2}) {
+    MemoryLog log;
+    Spent spent;
+    BatchOptions batch{.threads = threads};
+    batch.progress = [&](int done, int count) {
+      told.push_back(done);
+      EXPECT_EQ(count, std::ssize(runs));
+    };
+    found.push_back(find_or_run(study, vessel, runs, log, batch, spent));
+    EXPECT_EQ(spent.runs, std::ssize(runs));
+    EXPECT_EQ(log.kept, std::ssize(runs));
+  }
+  ASSERT_EQ(told.size(), 2 * runs.size()) << "run by run";
+  EXPECT_EQ(told[runs.size() - 1], std::ssize(runs));
+  for (std::size_t k = 0; k < runs.size(); ++k) {
+    SCOPED_TRACE(k);
+    MemoryLog log;
+    Spent spent;
+    const Measured alone = find_or_run(study, vessel, {runs[k]}, log, {.threads = 1}, spent).at(0);
+    for (const std::vector<Measured>& together : found) {
+      EXPECT_EQ(together[k].reason, alone.reason);
+      EXPECT_EQ(together[k].metrics.insertion, alone.metrics.insertion);
+      EXPECT_EQ(together[k].metrics.peak_contact_force, alone.metrics.peak_contact_force);
+      ASSERT_EQ(together[k].nodes.cols(), alone.nodes.cols());
+      EXPECT_EQ(together[k].nodes, alone.nodes) << "bit for bit";
+    }
+  }
+}
+
+}  // namespace
+}  // namespace wireplan::plan
