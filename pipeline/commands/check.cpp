@@ -1,5 +1,6 @@
 #include "pipeline/commands/check.h"
 
+#include "pipeline/files/text.h"
 #include "pipeline/stages/makers.h"
 #include "preprocess/surface/surface.h"
 #include "preprocess/surface/surface_repair.h"
@@ -37,6 +38,22 @@ void check_volume(const Case& given, Problems& problems, std::vector<std::string
   for (const std::string& line : warn_of_values(image)) told.push_back("mind: " + line);
 }
 
+/// A target in the free ball round an access is reached before a wire is pushed.
+void expect_apart(Case given, const Surface& surface, Problems& problems) {
+  for (given.access = 0; given.access < given.accesses.size(); ++given.access) {
+    const Vec3 access = given.accesses[given.access].point;
+    const preprocess::InsideAnswer at = preprocess::locate_point(surface, access);
+    for (given.target = 0; at.inside && given.target < given.targets.size(); ++given.target) {
+      const TargetInput& target = given.targets[given.target];
+      if (target.beyond_mm > 0.0 || (target.point - access).norm() >= at.distance) continue;
+      problems.add(target_key(given) + ".point_mm", to_json(target.point).dump(),
+                   "a point further from " + access_key(given) + ".point_mm than the wall is, " +
+                       format("%.1f mm", at.distance),
+                   "a wire would be there before it is pushed");
+    }
+  }
+}
+
 std::vector<std::string> check_surface_file(const Case& given, Problems& problems) {
   const SurfaceInput& input = *given.surface_input;
   const preprocess::RepairedSurface repaired =
@@ -50,6 +67,7 @@ std::vector<std::string> check_surface_file(const Case& given, Problems& problem
     }
   };
   for (const auto& [key, point] : end_points(given)) expect_inside(key, point);
+  expect_apart(given, surface, problems);
   std::vector<std::string> told = preprocess::tell_mends(repaired.mends);
   for (std::string& line : told) line = "mended: " + line;
   return told;

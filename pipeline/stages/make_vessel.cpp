@@ -317,6 +317,21 @@ void require_inside(const Surface& surface, const fs::path& folder, const std::s
                                 : "it " + of_piece));
 }
 
+/// A way that ends in the lumen's ball round its start has no cross-section of its own there: what
+/// would be told of it is that of another direction.
+void require_apart(const Case& given, const Surface& surface, const Centerline& way) {
+  const plan::Study& study = given.study;
+  const bool onward = given.targets[given.target].beyond_mm > 0.0;
+  const double length = way.arc_length(way.arc_length.size() - 1), radius = way.radius(0),
+               wall = preprocess::locate_point(surface, study.access).distance,
+               apart = onward ? length : std::min(length, (study.goal.point - study.access).norm());
+  if (length >= radius && (onward || apart >= wall)) return;
+  throw Error(target_key(given) + ".point_mm is " + format("%.1f mm", apart) + " from " +
+              access_key(given) + ".point_mm, expected more than the lumen's radius there, " +
+              format("%.1f mm", std::max(radius, wall)) +
+              ": a wire would be there before it is pushed; move one of the two along the vessel");
+}
+
 }  // namespace
 
 std::vector<std::string> warn_of_values(const preprocess::Image& image) {
@@ -475,6 +490,7 @@ void make_centerline(Workspace& work, const fs::path& folder) {
   const Centerline line = preprocess::find_centerline(
       surface, study.access, study.goal.point,
       {.beyond_mm = given.targets[given.target].beyond_mm, .guide = guide});
+  require_apart(given, surface, line);
   preprocess::write_centerline(line, folder / "centerline.vtp");
   write_curve_markups(line.points, "centerline", folder / "centerline.mrk.json");
 

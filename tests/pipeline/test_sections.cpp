@@ -183,6 +183,25 @@ TEST_F(Sections, TellWhatIsWrongWithAllOfThemBeforeAnyIsPushed) {
   }
 }
 
+TEST_F(Sections, ATargetAtAnAccessIsRefused) {
+  // In a lumen of 4 mm radius, 3 mm on and 2 mm off its axis.
+  file_["targets"][0]["point_mm"] = {2.0, 0.0, 9.0};
+  write_json(file_, folder_ / "case.json");
+  for (const char* command : {"check case.json", "run case.json -o out"}) {
+    const Answer answer = run_program(folder_.path(), command);
+    EXPECT_EQ(answer.code, 2) << command;
+    EXPECT_NE(answer.log.find("targets[0].point_mm is "), std::string::npos) << answer.log;
+    EXPECT_NE(answer.log.find("accesses[0].point_mm"), std::string::npos) << answer.log;
+    EXPECT_NE(answer.log.find("a wire would be there before it is pushed"), std::string::npos)
+        << answer.log;
+    EXPECT_EQ(answer.log.find("accesses[1].point_mm"), std::string::npos) << answer.log;
+  }
+  file_["targets"][0]["point_mm"] = {2.0, 0.0, 11.0};  // 5 mm on
+  write_json(file_, folder_ / "case.json");
+  EXPECT_EQ(run_program(folder_.path(), "check case.json").code, 0);
+  EXPECT_EQ(run_program(folder_.path(), "run case.json -o out --to anatomy").code, 0);
+}
+
 TEST(Overview, PutsTheBetterAnswerAndThenMoreSafeRepeatsFirst) {
   const auto report = [](int safe, double score, bool plan = true, const char* answer = "feasible",
                          bool sensitive = false, bool tip_unsure = false) {
