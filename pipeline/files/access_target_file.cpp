@@ -11,8 +11,9 @@ namespace {
 
 constexpr Range kTurn{.min = -360.0, .max = 360.0};
 
-/// Sections are named by it, and so are folders: ACCESS--TARGET.
-std::string read_section_name(JsonReader& reader, std::set<std::string>& taken) {
+/// Sections are named by it, and so are folders: ACCESS--TARGET. The only one may do without.
+std::string read_section_name(JsonReader& reader, bool required, std::set<std::string>& taken) {
+  if (!required && !reader.has("name")) return {};
   const std::string name = reader.text("name", std::nullopt);
   const bool plain = name.size() <= kLongestName && !name.empty() &&
                      std::isalnum(static_cast<unsigned char>(name.front())) != 0 &&
@@ -71,14 +72,20 @@ TargetInput read_target(JsonReader& reader) {
   return target;
 }
 
-/// The only one, or each of the list with its name.
+/// The only one, or each of the list, with its name.
 template <typename Input>
 std::vector<Input> read_one_or_list(JsonReader& root, const std::string& one,
                                     const std::string& list, Input (*read)(JsonReader&)) {
   std::vector<Input> all;
+  std::set<std::string> taken;
+  const auto add = [&](JsonReader& reader, bool listed) {
+    const std::string name = read_section_name(reader, listed, taken);
+    all.push_back(read(reader));
+    all.back().name = name;
+  };
   if (!root.has(list)) {
     JsonReader reader = root.object(one, true);
-    all.push_back(read(reader));
+    add(reader, false);
     return all;
   }
   if (root.has(one)) {
@@ -86,13 +93,7 @@ std::vector<Input> read_one_or_list(JsonReader& root, const std::string& one,
                         one + " is for a case with only one");
     root.raw(one);
   }
-  std::vector<JsonReader> readers = root.objects(list, true);
-  std::set<std::string> taken;
-  for (JsonReader& reader : readers) {
-    const std::string name = read_section_name(reader, taken);
-    all.push_back(read(reader));
-    if (readers.size() > 1) all.back().name = name;
-  }
+  for (JsonReader& reader : root.objects(list, true)) add(reader, true);
   return all;
 }
 

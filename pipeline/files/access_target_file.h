@@ -9,13 +9,13 @@
 namespace wireplan::pipeline {
 
 struct AccessInput {
-  std::string name;           // empty for the only one of a case
+  std::string name;           // the only one of a case may have none
   Vec3 point = Vec3::Zero();  //                                                          [mm]
   std::vector<double> inclinations, azimuths;  //                                        [rad]
 };
 
 struct TargetInput {
-  std::string name;           // empty for the only one of a case
+  std::string name;           // the only one of a case may have none
   Vec3 point = Vec3::Zero();  //                                                          [mm]
   bool at_section = true;     // else a sphere of this radius
   double radius = 0.0;        //                                                          [mm]
@@ -27,7 +27,7 @@ struct AccessesAndTargets {
   std::vector<TargetInput> targets;
 };
 
-/// Reads the four keys. A list of one counts as the singular form.
+/// Reads the four keys. A list of one counts as the singular form, which may have a name too.
 AccessesAndTargets read_accesses_and_targets(JsonReader& root);
 
 /// The angles under a key, in degrees in the file [rad].

@@ -499,8 +499,8 @@ std::vector<std::pair<std::string, Vec3>> end_points(Case given) {
 }
 
 std::string section_name(const Case& given) {
-  const std::string &from = given.accesses[given.access].name,
-                    &to = given.targets[given.target].name;
+  const std::string from = given.accesses.size() > 1 ? given.accesses[given.access].name : "",
+                    to = given.targets.size() > 1 ? given.targets[given.target].name : "";
   return from + (from.empty() || to.empty() ? "" : " to ") + to;
 }
 

@@ -13,7 +13,7 @@ namespace wireplan::pipeline {
 inline constexpr const char* kOverviewSchema = "wireplan.overview/1";
 
 struct SectionReport {
-  std::string access, target;  // by name; the one that the case has only one of is empty
+  std::string access, target;  // by name; the only one of a case may have none
   std::string folder;          // below that of the overview
   Json report;                 // report.json of the section
 };

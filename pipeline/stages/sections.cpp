@@ -77,8 +77,11 @@ std::vector<std::optional<Artifact>> make_lines(const std::vector<Case>& section
 }  // namespace
 
 std::filesystem::path section_folder(const Case& section) {
-  const std::string access = folder_name(section.accesses[section.access].name),
-                    target = folder_name(section.targets[section.target].name);
+  const auto of = [](const auto& places, std::size_t chosen) {
+    return places.size() > 1 ? folder_name(places[chosen].name) : std::string();
+  };
+  const std::string access = of(section.accesses, section.access),
+                    target = of(section.targets, section.target);
   return access + (access.empty() || target.empty() ? "" : kBetweenNames) + target;
 }
 

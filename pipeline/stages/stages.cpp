@@ -344,9 +344,9 @@ Json used_parameters(const Case& given) {
   // What is chosen from; a catalogue that has changed is another case.
   parameters["access_limits"]["assumed"] = assumed_sizes(given.access_limits);
   if (given.suggest_catheters) parameters["catheters"] = catheters_json_of(given.catheters);
-  if (section_name(given).empty()) return parameters;
   const AccessInput& access = given.accesses[given.access];
   const TargetInput& target = given.targets[given.target];
+  if (section_name(given).empty() && access.name.empty() && target.name.empty()) return parameters;
   parameters["section"] = {{"access", access.name}, {"target", target.name}};
   parameters["access"] = access_json(access);
   parameters["target"] = target_json(target);

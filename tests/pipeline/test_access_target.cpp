@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include "pipeline/files/case_file.h"
+#include "pipeline/stages/sections.h"
 #include "tests/messages.h"
 #include "tests/pipeline/case_texts.h"
 
@@ -30,6 +31,15 @@ TEST_F(CaseFile, TakesListsOfNamedAccessesAndTargets) {
   one["targets"].erase(1);
   EXPECT_EQ(section_name(read(one)), "") << "a list of one is the singular form";
   EXPECT_TRUE(case_parameters(read(one)).contains("target"));
+  // Its name is kept; folders and sections are not called after it.
+  EXPECT_EQ(read(one).targets[0].name, one["targets"][0]["name"]);
+  EXPECT_EQ(section_folder(read(one)), "");
+  Json singular = case_parameters(read(one));
+  EXPECT_EQ(singular["access"]["name"], "right femoral");
+  EXPECT_EQ(case_parameters(read(singular)), singular);
+  one["targets"] = listed_case()["targets"];
+  EXPECT_EQ(section_folder(read(one)), "sac");
+  EXPECT_EQ(section_name(read(one)), "sac");
 }
 
 TEST_F(CaseFile, NamesMistakesOfListedAccessesAndTargets) {

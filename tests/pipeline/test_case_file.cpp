@@ -447,6 +447,8 @@ TEST_F(CaseFile, CodeAndSchemaAgreeOnKeysLimitsAndRequirements) {
   Json section = full_case(surface_case());
   section["target"].erase("radius_mm");
   section["target"]["beyond_mm"] = 10;
+  section["target"]["name"] = "renal";
+  section["access"]["name"] = "groin";
   SchemaWalk of_surface(schema, section, told);
   SchemaWalk of_lists(schema, listed_case(), told);
   Json other_order = listed_case();

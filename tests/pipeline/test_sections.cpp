@@ -183,6 +183,36 @@ TEST_F(Sections, TellWhatIsWrongWithAllOfThemBeforeAnyIsPushed) {
   }
 }
 
+TEST_F(Sections, KeepTheNameOfTheOnlyTarget) {
+  file_["targets"].erase(1);
+  file_["accesses"][0]["inclination_deg"] = file_["accesses"][1]["inclination_deg"] = {0};
+  write_json(file_, folder_ / "case.json");
+  const Answer result = run_program(folder_.path(), "run case.json -o out");
+  ASSERT_EQ(result.code, 0) << result.log;
+  EXPECT_EQ(result.out.find("near: from "), 0u) << result.out;
+  const fs::path out = folder_ / "out";
+  const std::optional<Json> overview = find_overview(out / "report.json");
+  ASSERT_TRUE(overview);
+  EXPECT_EQ(overview->at("targets")[0].at("target"), "near");
+  const Json report = read_report(out / "from-below" / "report.json");
+  EXPECT_EQ(report.at("provenance").at("parameters").at("section"),
+            (Json{{"access", "from below"}, {"target", "near"}}));
+  EXPECT_NE(compare_reports({out / "report.json"}).find("tube, from below, near"),
+            std::string::npos);
+  expect_follows_schemas(out);
+
+  // A case of one section has the two names, and its files where they were.
+  file_.erase("accesses");
+  file_["access"] = access("groin", 6.0);
+  file_["access"]["inclination_deg"] = {0};
+  write_json(file_, folder_ / "case.json");
+  ASSERT_EQ(run_program(folder_.path(), "run case.json -o one").code, 0);
+  const Json one = read_report(folder_ / "one" / "report.json");
+  EXPECT_EQ(one.at("provenance").at("parameters").at("section"),
+            (Json{{"access", "groin"}, {"target", "near"}}));
+  expect_follows_schemas(folder_ / "one");
+}
+
 TEST_F(Sections, ATargetAtAnAccessIsRefused) {
   // In a lumen of 4 mm radius, 3 mm on and 2 mm off its axis.
   file_["targets"][0]["point_mm"] = {2.0, 0.0, 9.0};
