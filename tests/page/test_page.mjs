@@ -292,6 +292,8 @@ if (!given.length) {
     assert.deepEqual(await clippedBlocks(page), []);
     const steps = await page.textContent("#sheet-plans .steps");
     for (let k = 1; k <= 9; ++k) assert.ok(steps.includes(`${k}. `), `step ${k} of: ${steps}`);
+    assert.match(steps, /turn [\d.]+\u00b0 /);
+    assert.doesNotMatch(steps, /\bdeg\b/);
     assert.match(await page.textContent("#sheet-why .more"), /^\d+ more below\.$/);
     assert.equal(await page.locator("#verdict li").count(), 28, "below are all");
     await close();
@@ -318,6 +320,7 @@ if (!given.length) {
       assert.deepEqual(links.map(([text]) => text).sort(), ["from above", "from above", "from below", "from below"]);
       for (const [, address] of links) assert.ok(statSync(new URL(address)).size > 1e5, address);
       assert.match(await page.textContent("main"), /Research use only/);
+      assert.match(await page.textContent("main"), /1\.0\d \(below mild\)/, "tortuosity");
       const heads = await page.locator("main thead").first().locator("th").allTextContents();
       assert.ok(heads.includes("Sheath") && heads.includes("Calcium"), heads.join());
       const wide = await page.evaluate(() => document.documentElement.scrollWidth - document.documentElement.clientWidth);

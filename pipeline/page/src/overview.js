@@ -2,7 +2,7 @@
 // first, with links to their own reports.
 import {el, name} from "./dom.js";
 import {degrees, number, shown, toolsName} from "./format.js";
-import {answerName} from "./sheet.js";
+import {answerName, sentence} from "./sheet.js";
 
 const mm = (value) => `${number(value)}\u00a0mm`;
 const two = (value) => number(Number(value.toPrecision(2)));
@@ -13,7 +13,7 @@ const heads = ["Access", "Answer", "Best plan", "Safe repeats", "Largest force o
 const planText = (plan) => {
   if (!plan) return "no safe plan";
   const angles = `tilt ${degrees(plan.inclination_deg)} toward ${degrees(plan.azimuth_deg)}, roll ${degrees(plan.roll_deg)}`;
-  return el("span", {}, name(toolsName(plan)), `, ${angles}`, plan.script ? `; ${shown(plan.script)}` : "");
+  return el("span", {}, name(toolsName(plan)), `, ${angles}`, plan.script ? `; ${sentence(plan.script)}` : "");
 };
 
 const graded = (value, grade) => (value === null ? "not known" : `${value} (${grade})`);
@@ -29,7 +29,7 @@ const cells = (row) => {
     mm(Math.round(table.way_mm)),
     `${mm(table.least_diameter_mm)}${table.device_fits ? "" : ": the device does not fit"}`,
     table.sheath_fits === null ? "not weighed" : `${table.sheath_fits ? "fits" : "does not fit"} in ${mm(table.least_diameter_at_sheath_mm)}`,
-    graded(table.tortuosity === null ? null : number(table.tortuosity), table.tortuosity_grade),
+    graded(table.tortuosity === null ? null : table.tortuosity.toFixed(2), table.tortuosity_grade),
     table.sharpest_bend_at_ostium_of === null
       ? graded(degrees(Math.round(table.sharpest_bend_deg)), table.sharpest_bend_grade)
       : `${degrees(Math.round(table.sharpest_bend_deg))}, the turn into ${shown(table.sharpest_bend_at_ostium_of)}`,

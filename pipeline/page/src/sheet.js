@@ -29,7 +29,7 @@ const kUnknowns = {
 
 const two = (value) => number(Number(value.toPrecision(2)));
 const wholePercent = (part) => `${Math.round(100 * part)}\u00a0%`;
-const sentence = (text) => shown(text).replace(/ deg\b/g, "\u00b0");
+export const sentence = (text) => shown(text).replace(/ deg\b/g, "\u00b0");
 const mm = (value) => `${number(value)}\u00a0mm`;
 /** A place on the way: whole millimetres, as far as they tell something. */
 const along = (value) => mm(value < 10 ? Number(value.toFixed(1)) : Math.round(value));
@@ -81,8 +81,8 @@ const stepList = (plan, rank) => {
   const steps = plan.step_views ?? [{text: plan.script, view: null}];
   const seen = steps.map((step) => (step.view ? `${step.view}, ${shown(step.at)}` : ""));
   const same = seen.every((view) => view === seen[0]);
-  const text = steps.map((step, k) => `${steps.length > 1 ? `${k + 1}. ` : ""}${shown(step.text)}${same || !seen[k] ? "" : ` [${seen[k]}]`}`);
-  const others = (plan.steps ?? []).map((step, k) => (step.otherwise ? ` Step ${k + 1}: ${shown(step.otherwise)}` : ""));
+  const text = steps.map((step, k) => `${steps.length > 1 ? `${k + 1}. ` : ""}${sentence(step.text)}${same || !seen[k] ? "" : ` [${seen[k]}]`}`);
+  const others = (plan.steps ?? []).map((step, k) => (step.otherwise ? ` Step ${k + 1}: ${sentence(step.otherwise)}` : ""));
   return el("p", {class: "steps"}, el("strong", {}, `Steps of plan ${rank}${same && seen[0] ? ` [${seen[0]}]` : ""}: `), text.join("; "), ".", others.join(""));
 };
 
