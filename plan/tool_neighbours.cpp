@@ -130,7 +130,7 @@ std::vector<ToolScript> list_neighbours(const ToolScript& script) {
     const auto found = std::find_if(script.rbegin(), script.rend(), is_it);
     return found == script.rend() ? script.end() : found.base() - 1;
   };
-  add(last([](const ToolStep& s) { return s.tool == simulate::kBothTools && s.push < 0.0; }),
+  add(last([](const ToolStep& s) { return s.tool == simulate::kBothTools && s.push != 0.0; }),
       kNeighbourDepth);
   add(last([](const ToolStep& s) { return s.turn != 0.0; }), kNeighbourTurn);
   // The first advance of the catheter is over the wire, in the trunk.

@@ -15,7 +15,7 @@ using ToolScript = std::vector<simulate::ToolStep>;
 inline constexpr double kNeighbourDepth = 2.0;               // of the pull, of the advance    [mm]
 inline constexpr double kNeighbourTurn = 15.0 * kRadPerDeg;  // of the hub, or where it looks [rad]
 
-/// The script itself, then with the last pull of both tools ended earlier and later, the last
+/// The script itself, then with the last move of both tools ended earlier and later, the last
 /// turn less and more, and the catheter advanced less and further where it follows the wire into
 /// the branch: five to seven in all, fewer where the script has no such steps.
 std::vector<ToolScript> list_neighbours(const ToolScript& script);

@@ -16,9 +16,11 @@ using simulate::Until;
 
 /// All chosen.
 struct Template {
-  double beyond = 60.0;      // of the wire past the ostium, at most                          [mm]
-  double before_end = 10.0;  // of it short of where the image ends                           [mm]
-  double leads = 12.0;       // of the wire ahead of the catheter, at least                   [mm]
+  double beyond = 60.0;     // of the wire past the ostium, at most                          [mm]
+  double before_end = 9.0;  // of its tip, short of where the image ends                     [mm]
+  int lower = 2;            // pushes less, where the catheter straightens it out of the image
+  double short_of = 30.0;   // the ostium, of a wire that leads a catheter to below it          [mm]
+  double leads = 12.0;      // of the wire ahead of the catheter, at least                   [mm]
   double above[2] = {12.0, 35.0};  // of the catheter's tip past the ostium                    [mm]
   double depths_apart = 10.0;      // of these two, where the vessel is not seen that far      [mm]
   double below = 15.0;             // ... and before it, in pulls                               [mm]
@@ -261,8 +263,8 @@ class ToolSearch {
         [&](const ToolScript& script) { return find_broken(script).empty(); }, cancelled_, chosen);
   }
 
-  /// Beyond the ostium, or as far as the vessel goes there. False where that is not far enough to
-  /// lead the catheter.
+  /// Beyond the ostium, or as far as the vessel is seen there. False where that is not far enough
+  /// to lead the catheter.
   bool wire_up() {
     // Steered as far as it can be, then looked at after each push.
     const double far = ostium_.arc - simulate::kSteerNear - insertion(kWire);
@@ -271,19 +273,26 @@ class ToolSearch {
       return false;
     }
     const double to = std::floor(ostium_.arc) + kTemplate.beyond;
-    while (to - insertion(kWire) > 1e-9 && !stop()) {
-      const double by = std::min(kTemplate.out, to - insertion(kWire));
-      if (!go({.tool = kWire, .push = by})) break;
+    ups_ = {{here(), trial_.tip(kWire)}};
+    bool ends = false;  // as where the image does
+    while (!ends && to - insertion(kWire) > 1e-9 && !stop()) {
+      ends = !go({.tool = kWire, .push = std::min(kTemplate.out, to - insertion(kWire))});
+      if (!ends) ups_.push_back({here(), trial_.tip(kWire)});
     }
-    if (insertion(kWire) < to - 1e-9) {  // back from where it ended
-      const double slack = std::min(kTemplate.before_end, insertion(kWire) - 5.0);
-      if (slack > 0.0) go({.tool = kWire, .push = -slack});
-    }
+    if (ends) stay_short_of(ups_.back().tip);
     // A wire cuts bends short: it may lie beyond with less of it in than the way is long.
-    const bool beyond =
-        std::max(insertion(kWire) - ostium_.arc, trial_.measure(Until::kLevel, kWire)) > 0.0;
+    const bool beyond = std::max(insertion(kWire) - ostium_.arc,
+                                 trial_.measure(Until::kLevel, kWire)) > -kTemplate.short_of;
     if (beyond) findings_.stopped.clear();
     return beyond && findings_.found.empty();
+  }
+
+  /// To where the wire had been led before its tip came near to that end.
+  void stay_short_of(const Vec3& end) {
+    while (ups_.size() > 1 && (ups_.back().tip - end).norm() < kTemplate.before_end) {
+      ups_.pop_back();
+    }
+    back_to(ups_.back().state);
   }
 
   /// As often as the rules let the catheter be turned; once without.
@@ -293,8 +302,20 @@ class ToolSearch {
     return most < simulate::kSteerTurn - 1e-9 ? 1 : kTemplate.steers;
   }
 
-  /// Over the wire, to two depths, as far as it comes; the deeper one first.
+  /// Over the wire, to two depths, as far as it comes; the deeper one first. Where it straightens
+  /// the wire out of the image, with the wire less far in.
   std::vector<RaisedTools> catheter_up() {
+    std::vector<RaisedTools> depths = catheter_to_depths();
+    for (int lower = 0; lower < kTemplate.lower && depths.empty() && !stop(); ++lower) {
+      if (ups_.size() < 2) break;
+      ups_.pop_back();
+      back_to(ups_.back().state);
+      depths = catheter_to_depths();
+    }
+    return depths;
+  }
+
+  std::vector<RaisedTools> catheter_to_depths() {
     const double deepest =
         std::min(std::floor(ostium_.arc + kTemplate.above[1]), insertion(kWire) - kTemplate.leads);
     const double first =
@@ -407,15 +428,24 @@ class ToolSearch {
     return find_broken_rule(steps, catheter_, wire_, study_.tool_rules);
   }
 
-  /// Adds the best states of a pull from here, and comes back here.
+  /// Adds the best states of a pull from here, and comes back here. From below the ostium, as where
+  /// the image ends too near above it, of a push as well.
   void pull_past(std::vector<State>& hooks) {
     if (looks_away()) return;
     const State turned = here();
+    move_past(-kTemplate.pull, hooks);
+    if (turned.level < 0.0) move_past(kTemplate.pull, hooks);
+  }
+
+  /// The same by moves of so much.
+  void move_past(double by, std::vector<State>& hooks) {
+    const State turned = here();
     std::vector<State> own = {here(off())};
-    const int pulls = static_cast<int>(std::ceil(kTemplate.most_pull / kTemplate.pull));
-    for (int pull = 0; pull < pulls && !stop(); ++pull) {
-      if (own.back().level < -kTemplate.below) break;
-      if (!go({.tool = kBothTools, .push = -kTemplate.pull})) break;
+    const int moves = static_cast<int>(std::ceil(kTemplate.most_pull / kTemplate.pull));
+    for (int move = 0; move < moves && !stop(); ++move) {
+      const double past = by > 0.0 ? own.back().level : -own.back().level;
+      if (past > kTemplate.below) break;
+      if (!go({.tool = kBothTools, .push = by})) break;
       broken_ = find_broken(steps_);  // a longer pull may not
       own.push_back(here(broken_.empty() ? off() : HUGE_VAL));
       own.back().facing = turned.facing;
@@ -499,7 +529,7 @@ class ToolSearch {
     const auto pull = std::find_if(steps_.rbegin(), turn,
                                    [](const ToolStep& step) { return step.tool == kBothTools; });
     if (pull != turn && std::isfinite(hook.level)) {
-      pull->push -= kTemplate.slack;
+      pull->push += pull->push > 0.0 ? kTemplate.slack : -kTemplate.slack;
       end_at(*pull, Until::kLevel, hook.level);
     }
   }
@@ -514,6 +544,11 @@ class ToolSearch {
   const simulate::Wire& wire_;
   ToolTrial& trial_;
   State begin_;  // that the steps searched for begin at
+  struct Up {
+    State state;
+    Vec3 tip;
+  };
+  std::vector<Up> ups_;  // of the wire on its way past the ostium
   std::vector<ToolStep> steps_;
   const State* hook_ = nullptr;  // that the wire is brought out of
   StartFindings findings_;

@@ -287,6 +287,22 @@ TEST(ToolNeighbours, DifferInOneStepByWhatAHandDoesNotFeel) {
   EXPECT_NEAR(others[3][4].at, 0.2 + kNeighbourTurn, 1e-12);
 }
 
+TEST(ToolNeighbours, OfAPushFromBelowEndItEarlierAndLater) {
+  const ToolScript script = {{.tool = 1, .push = 100.0},
+                             {.tool = 0, .push = 80.0},
+                             {.tool = 1, .push = -40.0},
+                             {.tool = kBothTools, .push = 34.0, .until = Until::kLevel, .at = -3.0},
+                             {.tool = 1, .push = 60.0}};
+  std::vector<double> levels;
+  for (const ToolScript& neighbour : list_neighbours(script)) levels.push_back(neighbour[3].at);
+  ASSERT_EQ(levels.size(), 3U) << "no turn, and no second advance of the catheter";
+  EXPECT_EQ(levels, (std::vector<double>{-3.0, -5.0, -1.0}));
+  EXPECT_EQ(
+      describe_steps(script, 170.0)[3].text,
+      "advance catheter and wire together until the catheter's tip is 3 mm short of the level "
+      "of the ostium, by 34 mm at most");
+}
+
 double turned(const Candidate& candidate) {
   double sum = 0.0;
   for (const ToolStep& step : candidate.steps) sum += step.turn;
