@@ -1,6 +1,7 @@
 // The artifact store, the digests below it and the keys of the stages above it.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <fstream>
 #include <map>
 #include <optional>
@@ -213,6 +214,10 @@ class StageKeys : public testing::Test {
     return names;
   }
 
+  std::size_t number_of(const std::string& stage) const {
+    return static_cast<std::size_t>(std::find(all_.begin(), all_.end(), stage) - all_.begin());
+  }
+
   TemporaryFolder folder_;
   const std::vector<std::string> all_ = {"surface", "centerline", "anatomy", "wall",
                                          "trials",  "manoeuvres", "plans",   "report"};
@@ -253,20 +258,21 @@ TEST_F(StageKeys, ADryRunSaysWhatWouldRunAndWhyAndRunsNothing) {
   const RunResult dry = run({"wall.thickness_mm=2"}, /*dry=*/true);
   EXPECT_EQ(not_cached(dry),
             (std::vector<std::string>{"wall", "trials", "manoeuvres", "plans", "report"}));
-  EXPECT_EQ(dry.stages[3].reasons,
+  EXPECT_EQ(dry.stages[number_of("wall")].reasons,
             std::vector<std::string>{"parameter wall.thickness_mm: 1.0 -> 2.0"});
-  ASSERT_EQ(dry.stages[4].reasons.size(), 1u);
-  EXPECT_EQ(dry.stages[4].reasons[0].substr(0, 12), "input wall: ");
+  ASSERT_EQ(dry.stages[number_of("trials")].reasons.size(), 1u);
+  EXPECT_EQ(dry.stages[number_of("trials")].reasons[0].substr(0, 12), "input wall: ");
   EXPECT_EQ(not_cached(run({"wall.thickness_mm=2"}, /*dry=*/true)), not_cached(dry));
 }
 
 TEST_F(StageKeys, ADamagedArtifactIsMadeAgainWithTheSameContents) {
   start_finished();
   const RunResult first = run({});
-  overwrite(first.artifacts[3].folder / "wall.vtu", "");
+  overwrite(first.artifacts[number_of("wall")].folder / "wall.vtu", "");
   const RunResult second = run({});
   EXPECT_EQ(not_cached(second), std::vector<std::string>{"wall"});
-  EXPECT_EQ(second.artifacts[3].contents(), first.artifacts[3].contents());
+  EXPECT_EQ(second.artifacts[number_of("wall")].contents(),
+            first.artifacts[number_of("wall")].contents());
 }
 
 TEST_F(StageKeys, AnInterruptedRunGoesOnFromItsFinishedTrials) {
@@ -293,8 +299,9 @@ TEST_F(StageKeys, AnInterruptedRunGoesOnFromItsFinishedTrials) {
 
 TEST_F(StageKeys, ANewWireAddsItsTrialsOnly) {
   start_finished();
-  const auto trials_run = [](const RunResult& result) {
-    return read_json(result.artifacts[4].folder / kTimingFile, "wireplan.timing/1")
+  const auto trials_run = [this](const RunResult& result) {
+    return read_json(result.artifacts[number_of("trials")].folder / kTimingFile,
+                     "wireplan.timing/1")
         .at("trials_run")
         .get<int>();
   };
@@ -307,8 +314,8 @@ TEST_F(StageKeys, ANewWireAddsItsTrialsOnly) {
   // Before the other, so that the old trials get new numbers.
   const RunResult both = run({"wires=" + Json::array({stiff, soft}).dump()});
   EXPECT_EQ(trials_run(both), 2);
-  EXPECT_EQ(read_text(both.artifacts[4].folder / "trials/0002.json"),
-            read_text(alone.artifacts[4].folder / "trials/0000.json"));
+  EXPECT_EQ(read_text(both.artifacts[number_of("trials")].folder / "trials/0002.json"),
+            read_text(alone.artifacts[number_of("trials")].folder / "trials/0000.json"));
   // Each angle is a trial of its own too; another stiffness makes all trials of its wire anew.
   EXPECT_EQ(trials_run(run({"access.inclination_deg=[0, 10, 20]"})), 1);
   EXPECT_EQ(trials_run(run({"friction=0.1"})), 2);
@@ -318,7 +325,7 @@ TEST_F(StageKeys, AKeptTrialThatIsDamagedIsComputedAgain) {
   start_finished();
   const RunResult first = run({});
   // The trial of the cache and the one kept are the same bytes on the disk.
-  const fs::path trial = first.artifacts[4].folder / "trials/0000.json";
+  const fs::path trial = first.artifacts[number_of("trials")].folder / "trials/0000.json";
   const std::string whole = read_text(trial);
   std::string flipped = whole;
   flipped[whole.find("insertion_mm") + 20] ^= 1;
