@@ -3,6 +3,8 @@
 #include <Eigen/Geometry>
 #include <array>
 #include <cmath>
+#include <string>
+#include <vector>
 
 #include "simulate/equilibrium/problem.h"
 #include "simulate/wire/twist_chain.h"
@@ -39,6 +41,14 @@ inline Mat3 symmetric_product(const Vec3& a, const Vec3& b) {
 // hessian(i, j, H) for x_i x_j, hessian_scaled(i, j, s, H) for s H, hessian_of_edge(i, H) for edge
 // i's twice, hessian_theta(edge, i, h) for theta x_i, hessian_theta_theta(e, f, h). Both halves of
 // the symmetric matrix are implied: a pair i != j is given once.
+
+/// What the elements of this rod are called in results.
+inline std::vector<std::string> name_elements(const Rod& rod) {
+  std::vector<std::string> names = {"stretch", "bend"};
+  if (rod.twisted) names.push_back("twist");
+  if (!rod.strip.isZero(0.0)) names.push_back("strip");
+  return names;
+}
 
 /// Stretch of edge i, paper Eq. (5): W = k_s/4 (|e|^2 - l^2)^2 with k_s = EA/(2 l^3).
 template <class Sink>

@@ -32,9 +32,7 @@ Mat3 free_directions(const EndSupport& support) {
 
 std::vector<std::string> name_terms(const Rod& rod, const std::vector<std::string>& own,
                                     const VesselModel* vessel, double friction) {
-  std::vector<std::string> terms = {"stretch", "bend"};
-  if (rod.twisted) terms.push_back("twist");
-  if (!rod.strip.isZero(0.0)) terms.push_back("strip");
+  std::vector<std::string> terms = name_elements(rod);
   terms.insert(terms.end(), own.begin(), own.end());
   if (vessel == nullptr) return terms;
   terms.push_back("contact");
