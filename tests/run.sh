@@ -105,6 +105,13 @@ fuzz_parsers() {
   bash tests/fuzz/run.sh 20000 && bash tests/fuzz/run.sh 2000 repair inspect dicom
 }
 
+# What a package is made of is all there, and the program runs from where it is installed.
+check_install() {
+  rm -rf build/installed
+  cmake --install build/release --prefix "$PWD/build/installed" >/dev/null || return 1
+  build/installed/bin/wireplan devices >/dev/null
+}
+
 # Cases start from nothing, not from what earlier runs left in the user's cache.
 case_cache=$PWD/build/case-cache
 rm -rf "$case_cache"
@@ -158,6 +165,7 @@ step "formatting" check_formatting
 beside "clang-tidy on simulate and plan" check_tidy
 step "release build" bash tests/build.sh release
 beside "thread sanitizer build of simulate and plan" nice -n 19 bash tests/build.sh tsan
+step "installation" check_install
 step "tests" run_suite release
 step "bundled case" run_bundled_case
 step "cases on real data" run_real_cases
