@@ -36,19 +36,6 @@ bool is_beside(const Vec3& point, const Centerline& way, double within) {
   return false;
 }
 
-/// Whether one of the six voxels that share a face with a voxel is such.
-template <typename Is>
-bool has_neighbour(const Grid& grid, std::size_t n, const Is& is) {
-  std::size_t stride = 1;
-  for (int axis = 0; axis < 3; ++axis) {
-    const auto size = static_cast<std::size_t>(grid.size[axis]);
-    const std::size_t at = n / stride % size;
-    if ((at > 0 && is(n - stride)) || (at + 1 < size && is(n + stride))) return true;
-    stride *= size;
-  }
-  return false;
-}
-
 }  // namespace
 
 Calcium measure_calcium(const Image& image, const Mask& lumen, const Centerline& way,
@@ -68,7 +55,9 @@ Calcium measure_calcium(const Image& image, const Mask& lumen, const Centerline&
   for (std::size_t n = 0; n < values.size(); ++n) {
     if (!is_bright(n) || static_cast<double>(distance[n]) > farthest) continue;
     const bool in_lumen = labels[n] != 0;
-    if (in_lumen && !has_neighbour(grid, n, is_bright)) continue;
+    bool alone = true;
+    for_each_face_neighbour(grid, n, [&](std::size_t m) { alone = alone && !is_bright(m); });
+    if (in_lumen && alone) continue;
     const Vec3 at = center_of(grid, n);
     if (!is_beside(at, way, options.within_mm)) continue;
     ++(in_lumen ? inside : beside);
