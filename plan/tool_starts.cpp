@@ -432,9 +432,9 @@ class ToolSearch {
   /// the image ends too near above it, of a push as well.
   void pull_past(std::vector<State>& hooks) {
     if (looks_away()) return;
-    const State turned = here();
+    const double level = trial_.measure(Until::kLevel, kCatheter);
     move_past(-kTemplate.pull, hooks);
-    if (turned.level < 0.0) move_past(kTemplate.pull, hooks);
+    if (level < 0.0) move_past(kTemplate.pull, hooks);
   }
 
   /// The same by moves of so much.
