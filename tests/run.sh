@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# The whole suite: formatting, the tests in a release build, cases end to end, the tests with Clang under
+# The whole suite: formatting, a release build, installed and tested, cases end to end, the tests with Clang under
 # address and undefined behaviour sanitizers, what starts threads under the thread sanitizer, clang-tidy
 # on simulate and plan, the program without ITK and Node, the parsers fuzzed, the workflow for clusters.
 # Stops at the first step that fails and names it.
