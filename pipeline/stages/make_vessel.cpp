@@ -1,5 +1,6 @@
 // The stages from the input to the wall.
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <utility>
 
@@ -304,17 +305,26 @@ std::vector<Vec3> known_way(const Workspace& work, const Vec3& access, const Vec
   return known;
 }
 
-void require_inside(const Surface& surface, const fs::path& folder, const std::string& key,
-                    const Vec3& point) {
-  const preprocess::InsideAnswer answer = preprocess::locate_point(surface, point);
-  if (answer.inside) return;
-  const std::string of_piece = preprocess::tell_dropped(read_dropped(folder), surface, point);
-  throw Error(key + " is " + to_json(point).dump() + ", " +
-              Json(std::round(answer.distance * 10.0) / 10.0).dump() +
-              " mm outside the vessel, expected a point inside it; " +
-              (of_piece.empty() ? "look at surface.vtp and move the point, or mend the "
-                                  "segmentation that left its place out"
-                                : "it " + of_piece));
+/// Refuses the section's access and target outside the vessel, by their keys, both at once.
+void require_inside(const Surface& surface, const fs::path& folder, const Case& given) {
+  const std::array<std::pair<std::string, Vec3>, 2> ends = {
+      {{access_key(given) + ".point_mm", given.study.access},
+       {target_key(given) + ".point_mm", given.study.goal.point}}};
+  std::string outside, pieces;
+  int found = 0;
+  for (const auto& [key, point] : ends) {
+    const preprocess::InsideAnswer answer = preprocess::locate_point(surface, point);
+    if (answer.inside) continue;
+    outside += (found++ > 0 ? "; " : "") + key + " is " + to_json(point).dump() + ", " +
+               Json(std::round(answer.distance * 10.0) / 10.0).dump() + " mm outside the vessel";
+    const std::string of_piece = preprocess::tell_dropped(read_dropped(folder), surface, point);
+    if (!of_piece.empty()) pieces += "; " + key + " " + of_piece;
+  }
+  if (found == 0) return;
+  throw Error(outside + (found > 1 ? "; expected points" : "; expected a point") + " inside it" +
+              (pieces.empty() ? "; look at surface.vtp and move what lies outside, or mend the "
+                                "segmentation that left its place out"
+                              : pieces));
 }
 
 /// A way that ends in the lumen's ball round its start has no cross-section of its own there: what
@@ -477,13 +487,10 @@ void make_surface(Workspace& work, const fs::path& folder) {
 }
 
 void make_centerline(Workspace& work, const fs::path& folder) {
-  // Both ends must lie inside, told by their keys.
   const Surface& surface = work.surface();
   const plan::Study& study = work.given().study;
   const Case& given = work.given();
-  const fs::path& folder_of_surface = work.artifact("surface").folder;
-  require_inside(surface, folder_of_surface, access_key(given) + ".point_mm", study.access);
-  require_inside(surface, folder_of_surface, target_key(given) + ".point_mm", study.goal.point);
+  require_inside(surface, work.artifact("surface").folder, given);
 
   work.begin_field();
   const std::vector<Vec3> guide = known_way(work, study.access, study.goal.point);

@@ -15,6 +15,7 @@
 #include "pipeline/report/page.h"
 #include "pipeline/report/report.h"
 #include "pipeline/stages/sections.h"
+#include "tests/messages.h"
 #include "tests/pipeline/program.h"
 #include "tests/pipeline/small_case.h"
 
@@ -181,6 +182,18 @@ TEST_F(Sections, TellWhatIsWrongWithAllOfThemBeforeAnyIsPushed) {
     EXPECT_NE(text.find("targets[1].point_mm"), std::string::npos) << text;
     EXPECT_NE(text.find("accesses[1].point_mm"), std::string::npos) << text;
   }
+}
+
+TEST_F(Sections, OfOneTellBothItsEndsOutsideTheVesselAtOnce) {
+  file_["targets"] = Json::array({file_["targets"][0]});
+  file_["accesses"] = Json::array({file_["accesses"][0]});
+  file_["targets"][0]["point_mm"] = {20.0, 0.0, 20.0};
+  file_["accesses"][0]["point_mm"] = {0.0, 30.0, 20.0};
+  write_json(file_, folder_ / "case.json");
+  const Answer answer = run_program(folder_.path(), "run case.json -o out");
+  EXPECT_EQ(answer.code, 2);
+  EXPECT_TRUE(holds(answer.log, "access.point_mm is [0.0,30.0,20.0], ")) << answer.log;
+  EXPECT_TRUE(holds(answer.log, "target.point_mm is [20.0,0.0,20.0], ")) << answer.log;
 }
 
 TEST_F(Sections, KeepTheNameOfTheOnlyTarget) {
