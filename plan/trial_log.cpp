@@ -67,9 +67,11 @@ std::vector<std::vector<std::size_t>> group_runs(const std::vector<Run>& runs,
   const std::size_t most = std::max<std::size_t>(1, missing.size() / at_once);
   std::vector<std::vector<std::size_t>> groups;
   for (const std::size_t k : missing) {
-    const auto group = std::find_if(groups.begin(), groups.end(), [&](const auto& own) {
-      return own.size() < most && begin_alike(runs[own.front()], runs[k]);
-    });
+    const bool alone = runs[k].candidate.catheter < 0;  // such runs are many, and share no way up
+    const auto group =
+        alone ? groups.end() : std::find_if(groups.begin(), groups.end(), [&](const auto& own) {
+          return own.size() < most && begin_alike(runs[own.front()], runs[k]);
+        });
     if (group == groups.end()) {
       groups.push_back({k});
     } else {
