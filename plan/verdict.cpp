@@ -118,9 +118,11 @@ class Weighing {
     }
     if (all.reached < all.trials) find(answer, how_trials_ended(all, fine));
     tell_scripts(answer);
-    if (answer == Answer::kNotFeasible) tell_rigid(answer, all, full);
+    const bool rigid_is_enough = answer == Answer::kNotFeasible && full.trials == 0;
+    if (rigid_is_enough) tell_rigid(answer, all);
     for (std::string& text : changes_by(all, known_, "trial")) change(std::move(text));
-    if (full.trials < all.trials) {
+    const bool nothing_to_learn = rigid_is_enough && all.held_by_wall() == 0;
+    if (full.trials < all.trials && !nothing_to_learn) {
       change("Running all trials in full detail: the wall was taken for rigid in " +
              part_of(all.trials - full.trials, all.trials, "trial") + ".");
     }
@@ -157,8 +159,7 @@ class Weighing {
   }
 
   /// Why trials against a rigid wall are enough for that answer.
-  void tell_rigid(Answer answer, const Endings& all, const Endings& full) {
-    if (full.trials > 0) return;
+  void tell_rigid(Answer answer, const Endings& all) {
     find(answer,
          "The wall was taken for rigid, which is enough here: " +
              part_of(all.trials - all.held_by_wall(), all.trials, "trial") +

@@ -543,10 +543,13 @@ TEST(Verdict, AnAssumedSheathLongerThanTheWayIsNotWeighed) {
 TEST(Verdict, OfARigidWallAloneSaysWhyThatIsEnoughOrIsUnsure) {
   WhatIsKnown bench;
   bench.add_many(8, Outcome::kPassedBy, Level::kProbe);
+  EXPECT_TRUE(tells(bench.verdict().reasons, "rigid, which is enough here: all 8 trials ended in"));
+  EXPECT_FALSE(tells(bench.verdict().changes, "full detail")) << "it would change nothing";
   bench.add_many(2, Outcome::kStuck, Level::kProbe);
   const Verdict clear = bench.verdict();
   EXPECT_EQ(clear.answer, Answer::kNotFeasible);
   EXPECT_TRUE(tells(clear.reasons, "rigid, which is enough here: 8 of 10 trials ended in"));
+  EXPECT_TRUE(tells(clear.changes, "Running all trials in full detail"));
   bench.add_many(7, Outcome::kStuck, Level::kProbe);
   const Verdict held = bench.verdict();
   EXPECT_EQ(held.answer, Answer::kUnsure);
