@@ -1,7 +1,10 @@
 // Shapes of the tools that solves of ToolBench start from, and their angles.
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <limits>
+#include <span>
 
 #include "simulate/insertion/tool_bench.h"
 #include "simulate/wire/bend_to.h"
@@ -21,6 +24,48 @@ auto between_middles(double s, double h, Eigen::Index edges, const At& at) {
   using Value = std::decay_t<decltype(at(e))>;
   return Value((1.0 - part) * at(e) + part * at(e + 1));
 }
+
+/// A column of values between whole ones; beyond the ends that of the ends.
+template <class Values>
+auto between_columns(const Values& values, double place) {
+  const Eigen::Index last = values.cols() - 1;
+  const double at = std::clamp(place, 0.0, static_cast<double>(last));
+  const Eigen::Index i =
+      std::min(static_cast<Eigen::Index>(at), std::max<Eigen::Index>(last - 1, 0));
+  const double part = at - static_cast<double>(i);
+  return ((1.0 - part) * values.col(i) + part * values.col(std::min(i + 1, last))).eval();
+}
+
+/// Where on the centreline of before the place was that has the same tips about it, in nodes: what
+/// tools do where they end or are curved goes along with their tips.
+class AlongTips {
+ public:
+  AlongTips(std::span<const ToolPlace> before, double h_before, std::span<const ToolPlace> after,
+            double h_after)
+      : count_(before.size()) {
+    before_.fill(std::numeric_limits<double>::infinity());
+    after_ = before_;
+    for (std::size_t i = 0; i < count_; ++i) {
+      before_.at(i) = before[i].insertion / h_before;
+      after_.at(i) = after[i].insertion / h_after;
+    }
+    std::sort(before_.begin(), before_.end());
+    std::sort(after_.begin(), after_.end());
+  }
+
+  double before(double node) const {
+    std::size_t k = 0;  // the first tip at it or ahead of it
+    while (k + 1 < count_ && node > after_[k]) ++k;
+    const bool level = k > 0 && node >= after_[k];  // past all tips, by rounding
+    if (k == 0 || level) return node - (after_[k] - before_[k]);
+    const double part = (node - after_[k - 1]) / (after_[k] - after_[k - 1]);
+    return before_[k - 1] + part * (before_[k] - before_[k - 1]);
+  }
+
+ private:
+  std::size_t count_;
+  std::array<double, kMostTools> before_, after_;  // of the tips, from the hindmost on
+};
 
 /// Straight tools whose end comes nearer to its start get the shape of a column that buckles;
 /// unlike buckle_column() they bend the more, the softer they are.
@@ -110,8 +155,8 @@ ToolBench::Shape ToolBench::follow(const State& to) const {
   return next;
 }
 
-/// The shape that was followed, and what the tools came off such shapes before, `drift` per part;
-/// its end where it is held.
+/// The shape that was followed, and what the tools came off such shapes before, `drift` per part,
+/// about the same tips; its end where it is held.
 RodState ToolBench::guess(const State& to, const Shape& followed, const Shape& drift,
                           double part) const {
   RodState state;
@@ -119,14 +164,22 @@ RodState ToolBench::guess(const State& to, const Shape& followed, const Shape& d
   state.sections = now_.state.sections;
   Eigen::MatrixXd turned = followed.angles;
   if (drift.x.cols() > 0) {
-    const Eigen::Matrix3Xd x = followed.x + part * drift.x;
+    const AlongTips tips(now_.places, now_.composite.edge_length(), to.places,
+                         to.composite.edge_length());
+    Eigen::Matrix3Xd x = followed.x;
+    for (Eigen::Index i = 1; i < x.cols(); ++i) {
+      x.col(i) += part * between_columns(drift.x, tips.before(static_cast<double>(i)));
+    }
     for (Eigen::Index e = 0; e + 1 < x.cols(); ++e) {  // no edge gets longer by that
       const Vec3 edge = x.col(e + 1) - x.col(e);
       const double length = (followed.x.col(e + 1) - followed.x.col(e)).norm();
       state.x.col(e + 1) = state.x.col(e) + (length / edge.norm()) * edge;
     }
     bend_to_support(to, state.x);
-    turned += part * drift.angles;
+    for (Eigen::Index e = 0; e < turned.rows(); ++e) {
+      const double middle = tips.before(static_cast<double>(e) + 0.5) - 0.5;
+      turned.row(e) += part * between_columns(drift.angles.transpose(), middle).transpose();
+    }
   }
   set_frames(turned, state);
   return state;
