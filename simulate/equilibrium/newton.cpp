@@ -185,7 +185,7 @@ class Newton {
     if constexpr (D == 3) {
       hessian_.resize(count_);  // the wire's blocks are set, all of each
     } else {
-      hessian_.reset(count_, chain_.without_theta());
+      hessian_.reset(count_, chain_.without_theta(), chain_.loose);
     }
     if (sections_ > 0) memory_.sections.reset(count_, sections_);
     BandSink<D> both{gradient, hessian_, memory_.sections};
@@ -392,13 +392,14 @@ class Newton {
   double try_trial(double length) {
     if constexpr (D > 3) {
       const int n = rod_.nodes();
-      for (int k = chain_.without_theta(); k < count_ && problem_.first + k < n - 1; ++k) {
+      const int last_edge = std::min({n - 2, problem_.last - 1, chain_.loose - 1});
+      for (int k = chain_.without_theta(); problem_.first + k <= last_edge; ++k) {
         for (int r = 3, e = problem_.first + k; r < D; ++r, e += n - 1) {
           trial_.theta[e] = state_.theta[e] + length * step_[D * k + r];
         }
       }
-      transport_frames(state_, trial_, std::max(0, problem_.first - 1),
-                       std::min(n - 2, problem_.last - 1), chain_.first, chain_.edges());
+      transport_frames(state_, trial_, std::max(0, problem_.first - 1), last_edge, chain_.first,
+                       chain_.edges());
     }
     double trial_energy;
     if (contact_ == nullptr) {

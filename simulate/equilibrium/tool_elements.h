@@ -279,7 +279,7 @@ void add_tools(const Problem& problem, const RodState& state, const TwistChain& 
   const Eigen::Index edges = state.director.cols();
   energy.bend += tools.stored;
   for (int i = std::max(1, problem.first - 1); i <= std::min(n - 2, problem.last); ++i) {
-    if (chain.has(i)) continue;  // it is straight too
+    if (chain.skips(i)) continue;  // it is straight too
     for (int t = 0; t < tools.twists(); ++t) {
       OneTool<Sink> own{sink, t};
       energy.twist += add_twist(tools.twist(t, i), state, i, own, t);

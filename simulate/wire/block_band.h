@@ -1,11 +1,12 @@
 #pragma once
 /// Symmetric block-pentadiagonal matrices: a wire is a chain, its Hessian couples a node with two
 /// neighbours on each side. Factored linearly in the number of nodes, nothing allocated.
-/// Leading block rows may lack their last unknown: those of the part of a wire whose twist is no
-/// unknown (twist_chain.h).
+/// Block rows at either end may lack their last unknown: those of the parts of a wire whose twist
+/// is no unknown (twist_chain.h).
 #include <Eigen/Core>
 #include <algorithm>
 #include <array>
+#include <limits>
 #include <vector>
 
 namespace wireplan::simulate {
@@ -14,23 +15,27 @@ template <int D>
 class BlockBand {
  public:
   using Block = Eigen::Matrix<double, D, D>;
+  static constexpr int kNoRow = std::numeric_limits<int>::max();
 
-  /// n block rows of zeros, of which the first `narrow` lack their last unknown: it has the
-  /// identity's row and column, and must stay 0 in vectors. Memory only ever grows.
-  void reset(int n, int narrow = 0) {
+  /// n block rows of zeros, of which the first `narrow` and those from `narrow_again` on lack their
+  /// last unknown: it has the identity's row and column, and must stay 0 in vectors. Memory only
+  /// ever grows.
+  void reset(int n, int narrow = 0, int narrow_again = kNoRow) {
     resize(n);
     narrow_ = narrow;
+    // The first two couple with all unknowns of those before them.
+    wide_end_ = std::max(narrow, narrow_again < n - 2 ? narrow_again + 2 : n);
     for (int i = 0; i < n; ++i) {
       Row& row = rows_[static_cast<std::size_t>(i)];
       row.own.setZero();
       row.one.setZero();
       row.two.setZero();
-      if (i < narrow) row.own(D - 1, D - 1) = 1.0;
+      if (i < narrow || i >= narrow_again) row.own(D - 1, D - 1) = 1.0;
     }
   }
   /// n block rows of anything, none of them narrow.
   void resize(int n) {
-    size_ = n;
+    size_ = wide_end_ = n;
     narrow_ = 0;
     if (static_cast<int>(rows_.size()) < n) rows_.resize(static_cast<std::size_t>(n));
   }
@@ -46,12 +51,14 @@ class BlockBand {
   bool factor(const BlockBand& matrix, double shift = 0.0) {
     size_ = matrix.size_;
     narrow_ = matrix.narrow_;
+    wide_end_ = matrix.wide_end_;
     rows_.resize(std::max(rows_.size(), matrix.rows_.size()));
     for (int i = 0; i < size_; ++i) {
       Row& row = rows_[static_cast<std::size_t>(i)];
       row = matrix.rows_[static_cast<std::size_t>(i)];
       row.own.diagonal().array() += shift;
-      if (!(i < narrow_ ? factor_row<D - 1>(i) : factor_row<D>(i))) return false;
+      const bool narrow = i < narrow_ || i >= wide_end_;
+      if (!(narrow ? factor_row<D - 1>(i) : factor_row<D>(i))) return false;
     }
     return true;
   }
@@ -68,7 +75,8 @@ class BlockBand {
     // The two unknowns before (or after) the one at hand stay in registers.
     Pair<K> known;
     for (int i = first; i < narrow_; ++i) solve_forward<D - 1, K>(i, b, known);
-    for (int i = std::max(first, narrow_); i < size_; ++i) solve_forward<D, K>(i, b, known);
+    for (int i = std::max(first, narrow_); i < wide_end_; ++i) solve_forward<D, K>(i, b, known);
+    for (int i = std::max(first, wide_end_); i < size_; ++i) solve_forward<D - 1, K>(i, b, known);
   }
   /// b <- D^-1 b, for what needs no more than that half: b' A^-1 b is L^-1 b times D^-1 L^-1 b.
   void divide_by_pivots(Eigen::Ref<Eigen::VectorXd> b) const {
@@ -81,7 +89,8 @@ class BlockBand {
     Pair<1> known;
     // The last two narrow rows couple with all unknowns of those after them.
     const int narrow = std::max(0, narrow_ - 2);
-    for (int i = size_ - 1; i >= narrow; --i) solve_back<D, 1>(i, {b.data()}, known);
+    for (int i = size_ - 1; i >= wide_end_; --i) solve_back<D - 1, 1>(i, {b.data()}, known);
+    for (int i = wide_end_ - 1; i >= narrow; --i) solve_back<D, 1>(i, {b.data()}, known);
     for (int i = narrow - 1; i >= 0; --i) solve_back<D - 1, 1>(i, {b.data()}, known);
   }
 
@@ -192,7 +201,7 @@ class BlockBand {
     }
   }
 
-  int size_ = 0, narrow_ = 0;
+  int size_ = 0, narrow_ = 0, wide_end_ = 0;
   std::vector<Row> rows_;
 };
 

@@ -6,6 +6,7 @@
 /// a strip. Used by Newton's method.
 #include <Eigen/Core>
 #include <Eigen/LU>
+#include <limits>
 
 #include "simulate/wire/block_band.h"
 #include "simulate/wire/rod.h"
@@ -19,14 +20,21 @@ namespace wireplan::simulate {
 /// roll: 1/k has its lead's too then, and theta of edge first-1 is no unknown either. During a
 /// solve the directors of the edges first to last-1 are not kept, since they follow the edge behind
 /// them without twist. The reference twist of all these nodes then stands at node `last`.
+///
+/// A tool's tip is free: past its last curve it carries no torque, and the centreline of the others
+/// goes on beyond it. So from edge `loose` on thetas are no unknowns either, nor are directors kept
+/// or nodes twisted: edges turn with the one behind them.
 struct TwistChain {
   int first = 0, last = -1;  // none where last <= first
   double stiffness = 0.0;    // k                                                       [N mm]
   double start = 0.0;        // theta that it begins with                                [rad]
   double lead = 0.0;         // of a tool, from its hub to edge first-1; else 0         [N mm]
+  int loose = std::numeric_limits<int>::max();  // of a tool; else none is
 
   bool exists() const { return last > first; }
   bool has(int node) const { return exists() && node >= first && node <= last; }
+  /// Whether the node has no term of its own.
+  bool skips(int node) const { return has(node) || node >= loose; }
   int edges() const { return exists() ? last - first : 0; }     // that keep no director
   int without_theta() const { return edges() + (lead > 0.0); }  // whose thetas are no unknowns
   double angle(const RodState& state) const {
@@ -61,11 +69,17 @@ inline TwistChain find_chain(const Rod& rod, int first, const RodState& state) {
 
 /// The chain of the one tool that twists, whose nodes are free from the introducer's on.
 inline TwistChain find_chain(const ToolTerms& tools) {
-  if (!tools.is_straight(0)) return {};
-  return as_long_as(
-      {.first = 1, .start = tools.roll[0], .lead = tools.lead[0]},
-      static_cast<int>(tools.rest.cols()), [&](int i) { return tools.is_straight(i); },
-      [&](int i) { return tools.twist(0, i); });
+  const int nodes = static_cast<int>(tools.rest.cols());
+  TwistChain chain;
+  if (tools.is_straight(0)) {
+    chain = as_long_as(
+        {.first = 1, .start = tools.roll[0], .lead = tools.lead[0]}, nodes,
+        [&](int i) { return tools.is_straight(i); }, [&](int i) { return tools.twist(0, i); });
+  }
+  int curved = nodes - 1;  // the last node that is
+  while (curved >= 0 && tools.is_straight(curved)) --curved;
+  if (curved >= 0) chain.loose = curved + 1;
+  return chain;
 }
 
 /// Moves the reference twist of all the chain's nodes to its last one.
@@ -76,25 +90,33 @@ inline void gather_chain(const TwistChain& chain, RodState& state) {
   }
 }
 
-/// Gives the chain's edges their directors and thetas back, so that all carry one torque;
-/// `twist(i)` is T of node i.
+/// Gives the chain's edges their directors and thetas back, so that all carry one torque, and the
+/// loose ones, which carry none; `twist(i)` is T of node i.
 template <class Twist>
 void spread_chain(const TwistChain& chain, const Twist& twist, RodState& state) {
-  if (!chain.exists()) return;
-  const double torque = chain.stiffness * chain.angle(state);
-  if (chain.lead > 0.0) state.theta[chain.first - 1] = chain.start + torque / chain.lead;
   const auto tangent = [&](int e) -> Vec3 {
     return (state.x.col(e + 1) - state.x.col(e)).normalized();
   };
-  Vec3 before = tangent(chain.first - 1);
-  for (int e = chain.first; e < chain.last; ++e) {
-    const Vec3 t = tangent(e);
-    Vec3 d = parallel_transport(state.director.col(e - 1), before, t);
-    d -= d.dot(t) * t;
-    state.director.col(e) = d.normalized();
-    state.theta[e] = state.theta[e - 1] + torque / twist(e);
-    before = t;
+  const auto carry_on = [&](int from, int to, double torque) {
+    if (to <= from) return;
+    Vec3 before = tangent(from - 1);
+    for (int e = from; e < to; ++e) {
+      const Vec3 t = tangent(e);
+      Vec3 d = parallel_transport(state.director.col(e - 1), before, t);
+      d -= d.dot(t) * t;
+      state.director.col(e) = d.normalized();
+      state.theta[e] = state.theta[e - 1] + torque / twist(e);
+      before = t;
+    }
+  };
+  if (chain.exists()) {
+    const double torque = chain.stiffness * chain.angle(state);
+    if (chain.lead > 0.0) state.theta[chain.first - 1] = chain.start + torque / chain.lead;
+    carry_on(chain.first, chain.last, torque);
   }
+  const int edges = static_cast<int>(state.director.cols());
+  for (int e = chain.loose; e < edges; ++e) state.reference_twist[e] = 0.0;
+  carry_on(chain.loose, edges, 0.0);
 }
 
 /// Solves with a banded matrix A = L D L' that has been factored and what add_chain() left out of

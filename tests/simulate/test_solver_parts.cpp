@@ -212,21 +212,23 @@ TEST(WirePass, SumsWhatTheElementsAreOneByOne) {
 }
 
 /// A random diagonally dominant matrix of n blocks, twice. The last unknown of the first `narrow`
-/// blocks couples with nothing.
+/// blocks, and of those from `narrow_again` on, couples with nothing.
 template <int D>
-void fill_at_random(int n, int narrow, BlockBand<D>& band, Eigen::MatrixXd& dense) {
+void fill_at_random(int n, int narrow, int narrow_again, BlockBand<D>& band,
+                    Eigen::MatrixXd& dense) {
   using Block = Eigen::Matrix<double, D, D>;
   std::mt19937_64 random(6);
   dense = Eigen::MatrixXd::Zero(D * n, D * n);
-  band.reset(n, narrow);
+  const auto is_narrow = [&](int i) { return i < narrow || i >= narrow_again; };
+  band.reset(n, narrow, narrow_again);
   for (int i = 0; i < n; ++i) {
     for (int j = std::max(0, i - 2); j <= i; ++j) {
       Block block;
       for (int k = 0; k < D * D; ++k) block(k / D, k % D) = uniform(random);
       if (i == j) block = (block + block.transpose() + 4.0 * D * Block::Identity()).eval();
-      if (i < narrow) block.row(D - 1).setZero();
-      if (j < narrow) block.col(D - 1).setZero();
-      if (i == j && i < narrow) block(D - 1, D - 1) = 1.0;
+      if (is_narrow(i)) block.row(D - 1).setZero();
+      if (is_narrow(j)) block.col(D - 1).setZero();
+      if (i == j && is_narrow(i)) block(D - 1, D - 1) = 1.0;
       dense.template block<D, D>(D * i, D * j) = block;
       dense.template block<D, D>(D * j, D * i) = block.transpose();
       (i == j ? band.own(i) : i == j + 1 ? band.one(i) : band.two(i)) = block;
@@ -238,7 +240,7 @@ TEST(BlockBand, SolvesWhatADenseFactorisationSolves) {
   const int n = 7;
   BlockBand<3> band, factors;
   Eigen::MatrixXd dense;
-  fill_at_random(n, 0, band, dense);
+  fill_at_random(n, 0, n, band, dense);
   for (const double shift : {0.0, 2.0}) {
     Eigen::VectorXd b = Eigen::VectorXd::LinSpaced(3 * n, -1.0, 1.0), x = b;
     ASSERT_TRUE(factors.factor(band, shift));
@@ -249,15 +251,19 @@ TEST(BlockBand, SolvesWhatADenseFactorisationSolves) {
 
 TEST(BlockBand, LeavesOutTheLastUnknownOfNarrowRowsAndSolvesByHalves) {
   const int n = 9;
-  for (const int narrow : {1, 2, 3, 6, 9}) {
-    SCOPED_TRACE(narrow);
+  const std::vector<std::pair<int, int>> ends = {{1, n}, {2, n}, {3, n}, {6, n}, {9, n},
+                                                 {0, 1}, {0, 4}, {2, 4}, {3, 7}, {3, 8}};
+  for (const auto& [narrow, again] : ends) {
+    SCOPED_TRACE(testing::Message() << narrow << " and from " << again << " on");
     BlockBand<4> matrix, band;
     Eigen::MatrixXd dense;
-    fill_at_random(n, narrow, matrix, dense);
+    fill_at_random(n, narrow, again, matrix, dense);
     Eigen::MatrixXd b = Eigen::MatrixXd::NullaryExpr(4 * n, 3, [](Eigen::Index i, Eigen::Index k) {
       return std::sin(1.0 + static_cast<double>(i * (k + 1)));
     });
-    for (int i = 0; i < narrow; ++i) b.row(4 * i + 3).setZero();
+    for (int i = 0; i < n; ++i) {
+      if (i < narrow || i >= again) b.row(4 * i + 3).setZero();
+    }
     Eigen::MatrixXd x = b;
     ASSERT_TRUE(band.factor(matrix));
     band.solve_lower<2>({x.col(0).data(), x.col(1).data()});
@@ -296,7 +302,7 @@ TEST(UnsymmetricBand, SolvesWhatADenseFactorisationSolves) {
     SCOPED_TRACE(n);
     BlockBand<3> symmetric;
     Eigen::MatrixXd dense;
-    fill_at_random(n, 0, symmetric, dense);
+    fill_at_random(n, 0, n, symmetric, dense);
     UnsymmetricBand band;
     band.take(symmetric);
     std::mt19937_64 random(7);
