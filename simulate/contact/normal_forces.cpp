@@ -24,7 +24,7 @@ void NormalForces::begin() {
 void NormalForces::find(const ContactPoints& points, const std::vector<std::int32_t>& triangle,
                         ContactSample& sample) {
   sample.energy = {};
-  stiffness_known_ = false;
+  stiffness_known_ = slopes_known_ = false;
   if (yielding_) {
     find_together(points, triangle, sample);
     return;
@@ -122,12 +122,13 @@ void NormalForces::find_stiffness(const ContactPoints& points, const ContactSamp
   }
   if (!yielding_) return;
   coupling_.find_stiffness(law_stiffness_);
-  find_slopes(sample);
   find_folded(points, sample);
 }
 
 /// How the compliance changes as the active points move along the wall.
 void NormalForces::find_slopes(const ContactSample& sample) {
+  if (slopes_known_) return;
+  slopes_known_ = true;
   foot_slopes_.resize(sample.active.size());
   for (std::size_t k = 0; k < sample.active.size(); ++k) {
     foot_slopes_[k] = feet_.weight_slopes(sample.active[k], coupled_feet_[k]);
@@ -135,14 +136,26 @@ void NormalForces::find_slopes(const ContactSample& sample) {
   coupling_.find_slopes(coupled_feet_, foot_slopes_);
 }
 
+/// The first active point that couples with the k-th, or it itself, for which a block-banded
+/// Hessian has a place.
+int NormalForces::first_in_band(const ContactPoints& points, const ContactSample& sample,
+                                int k) const {
+  const auto point = [&](int i) {
+    return points[sample.active[static_cast<std::size_t>(i)].point];
+  };
+  const int first_coupled = coupling_.first_coupled(k);
+  int first = k;
+  while (first > first_coupled && in_band(point(k), point(first - 1))) --first;
+  return first;
+}
+
 /// The sizes of the entries that have no place in the band.
 void NormalForces::find_folded(const ContactPoints& points, const ContactSample& sample) {
   const int m = static_cast<int>(sample.active.size());
   folded_.setZero(m);
   for (int i = 0; i < m; ++i) {
-    const ContactPoint& point = points[sample.active[static_cast<std::size_t>(i)].point];
-    for (int j = coupling_.first_coupled(i); j < i; ++j) {
-      if (in_band(point, points[sample.active[static_cast<std::size_t>(j)].point])) continue;
+    const int end = first_in_band(points, sample, i);
+    for (int j = coupling_.first_coupled(i); j < end; ++j) {
       const double size = std::abs(coupling_.stiffness(i, j));
       folded_[i] += size;
       folded_[j] += size;
@@ -165,6 +178,7 @@ void NormalForces::find_fall(const ContactPoints& points, const ContactSample& s
   fall_ = approach_;
   if (yielding_) {
     if (sample.own_lag && !feet_.held()) {
+      find_slopes(sample);
       coupling_.add_change_of_compliance(motion_, forces_, fall_);
     }
     coupling_.multiply_by_stiffness(fall_);
@@ -192,9 +206,7 @@ NormalForces::Change NormalForces::find_change(const ContactPoints& points,
   if (!yielding_) return {fall_, left_out_};
   left_out_ = fall_ - folded_.cwiseProduct(approach_);
   for (int i = 0; i < m; ++i) {
-    const ContactPoint& point = points[sample.active[static_cast<std::size_t>(i)].point];
-    for (int j = coupling_.first_coupled(i); j <= i; ++j) {
-      if (!in_band(point, points[sample.active[static_cast<std::size_t>(j)].point])) continue;
+    for (int j = first_in_band(points, sample, i); j <= i; ++j) {
       const double s = coupling_.stiffness(i, j);
       left_out_[i] -= s * approach_[j];
       if (j < i) left_out_[j] -= s * approach_[i];

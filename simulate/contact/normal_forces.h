@@ -70,6 +70,7 @@ class NormalForces {
   void couple(const std::vector<std::int32_t>& triangle, const ContactSample& sample);
   void find_stiffness(const ContactPoints& points, const ContactSample& sample);
   void find_slopes(const ContactSample& sample);
+  int first_in_band(const ContactPoints& points, const ContactSample& sample, int k) const;
   void find_folded(const ContactPoints& points, const ContactSample& sample);
   void find_fall(const ContactPoints& points, const ContactSample& sample,
                  const WireMotion& motion);
@@ -79,7 +80,8 @@ class NormalForces {
   const bool yielding_;
   const double radius_;
   Eigen::VectorXd expected_;      // per point                                              [N]
-  bool stiffness_known_ = false;  // of the sample that find() had last
+  bool stiffness_known_ = false;  // of the sample that find() had last, as ...
+  bool slopes_known_ = false;     // ... how the compliance changes
   Eigen::VectorXd law_stiffness_;
 
   // The yielding wall: feet, and the coupling of those that were active.
@@ -105,7 +107,6 @@ void NormalForces::add(const ContactPoints& points, const ContactSample& sample,
   if constexpr (Sink::kHessian) find_stiffness(points, sample);
   for (int k = 0; k < static_cast<int>(sample.active.size()); ++k) {
     const ActivePoint& active = sample.active[static_cast<std::size_t>(k)];
-    const ContactPoint& point = points[active.point];
     const Vec3& n = active.wall.gradient;
     points.add_gradient(sink, active.point, -active.force * n);
     if constexpr (Sink::kHessian) {
@@ -116,10 +117,8 @@ void NormalForces::add(const ContactPoints& points, const ContactSample& sample,
       points.add_hessian(sink, active.point, -force * n, [&](int r, int c) {
         return stiffness * n[r] * n[c] - force * active.wall.hessian(r, c);
       });
-      for (int j = yielding_ ? coupling_.first_coupled(k) : k; j < k; ++j) {
+      for (int j = yielding_ ? first_in_band(points, sample, k) : k; j < k; ++j) {
         const ActivePoint& other = sample.active[static_cast<std::size_t>(j)];
-        const ContactPoint& other_point = points[other.point];
-        if (!in_band(point, other_point)) continue;
         points.add_hessian_between(sink, active.point, n, other.point, other.wall.gradient,
                                    coupling_.stiffness(k, j));
       }

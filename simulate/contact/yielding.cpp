@@ -71,6 +71,21 @@ void Yielding::find_entry(int a, int b) {
                                                       *half_[static_cast<std::size_t>(b)]);
 }
 
+void Yielding::find_known(const std::vector<SurfacePoint>& feet) {
+  constexpr std::size_t kMostGone = 8;  // in a row; chosen
+  known_.assign(feet.size(), -1);
+  std::size_t next = 0;
+  for (std::size_t i = 0; i < feet.size(); ++i) {
+    const std::size_t end = std::min(feet_.size(), next + kMostGone);
+    for (std::size_t k = next; k < end; ++k) {
+      if (feet_[k].triangle != feet[i].triangle || feet_[k].weight != feet[i].weight) continue;
+      known_[i] = static_cast<int>(k);
+      next = k + 1;
+      break;
+    }
+  }
+}
+
 void Yielding::set_feet(const WallCompliance& wall, const std::vector<SurfacePoint>& feet) {
   row_.resize(static_cast<std::size_t>(wall.normals().cols()), kNoRow);
   const std::size_t m = feet.size();
@@ -89,6 +104,9 @@ void Yielding::set_feet(const WallCompliance& wall, const std::vector<SurfacePoi
   // Rows of C, each from the first foot that moves under a force at its own. What the table does
   // not know yet makes a sum that is no number.
   const auto compliance_between = [&](std::size_t i, std::size_t j) {
+    if (known_[i] >= 0 && known_[j] >= 0) {
+      return known_[j] >= before_.first(known_[i]) ? before_.row(known_[i])[known_[j]] : 0.0;
+    }
     if (!may_couple(i, j)) return 0.0;
     const std::array<int, 3>&rows = foot_rows_[i], &columns = foot_rows_[j];
     const Vec3 &u = feet[i].weight, &v = feet[j].weight;
@@ -106,6 +124,8 @@ void Yielding::set_feet(const WallCompliance& wall, const std::vector<SurfacePoi
     }
     return sum();
   };
+  find_known(feet);
+  std::swap(compliance_, before_);
   compliance_.clear();
   for (std::size_t i = 0; i < m; ++i) {
     std::size_t first = 0;
@@ -114,6 +134,7 @@ void Yielding::set_feet(const WallCompliance& wall, const std::vector<SurfacePoi
     double* row = compliance_.row(static_cast<int>(i));
     for (std::size_t j = first; j <= i; ++j) row[j] = compliance_between(i, j);
   }
+  feet_ = feet;
 }
 
 void Yielding::find_slopes(const std::vector<SurfacePoint>& feet, const std::vector<Mat3>& slopes) {

@@ -83,6 +83,10 @@ class Yielding {
   void factor();
   void solve_factored(Eigen::VectorXd& v);
 
+  /// Which of the feet before each of these is, in the same place; -1: none. Both are in the order
+  /// of the wire.
+  void find_known(const std::vector<SurfacePoint>& feet);
+
   /// Compliances between the vertices that feet stood on lately, NaN where not asked for yet.
   static constexpr std::size_t kSmallestTable = 300;
   static constexpr int kNoRow = -1;
@@ -96,8 +100,11 @@ class Yielding {
   std::vector<std::array<int, 3>> foot_rows_;  // kNoRow: without a foot
   Eigen::Matrix3Xd foot_place_;                // a vertex under each                  [mm]
   double squared_reach_ = 0.0;                 // of the wall                        [mm^2]
+  std::vector<SurfacePoint> feet_;             // of `compliance_`
+  std::vector<int> known_;                     // see find_known()
 
   Envelope compliance_, factor_, inverse_;  // of all points; of those with a stiff law
+  Envelope before_;                         // the compliance of the feet before; scratch
   std::vector<int> stiff_, place_;          // those, in order; the place of each point there, or -1
   std::vector<double> reciprocal_;          // of the factor's diagonal
   std::vector<int> last_coupled_;           // of the factor: last row with an entry in each column
