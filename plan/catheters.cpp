@@ -278,14 +278,19 @@ std::string turned_by(double angle) {
          (angle > 0.0 ? "clockwise" : "counterclockwise");
 }
 
-/// "If it passes by the branch, ...": what a hand does then; empty of steps without tries.
+/// "If it passes by the branch ...": what a hand does then; empty of steps without tries.
 std::string tell_tries(const ToolStep& step) {
   if (step.tries == 0) return {};
   const std::string length = whole_number(step.try_pull) + " mm ";
-  return "If it passes by the branch, withdraw it and try again, " + count_of_times(step.tries) +
-         " at most. First try with both tools " + length + "back from where they were, then " +
-         length + "on. Then try with the catheter turned " + turned_by(step.try_turn) +
-         ", then turned to the other side. Then do the same by twice as much.";
+  return "If it passes by the branch or comes no further, withdraw it and try again, " +
+         count_of_times(step.tries) + " at most. First try with both tools " + length +
+         "back from where they were, then " + length + "on. Then try with the catheter turned " +
+         turned_by(step.try_turn) +
+         ", then turned to the other side. Then do the same again, each time by twice the length "
+         "and " +
+         whole_number(std::abs(step.try_turn) / kRadPerDeg) +
+         " degrees more, but no further on than " + whole_number(simulate::kTryBeyond) +
+         " mm beyond the ostium or where they were.";
 }
 
 /// "If it goes into another vessel ...": as above, of steps that are steered.
@@ -303,7 +308,8 @@ std::string tell_steers(const ToolStep& step) {
             " mm further back and with the catheter turned on by " +
             turned_by(simulate::kSteerTurn) + ". ";
   }
-  return text + "Then bring the catheter back to where it was.";
+  return text + "Then bring the catheter back to where it was. Stop the wire " +
+         whole_number(simulate::kSteerBeforeEnd) + " mm before where the image ends.";
 }
 
 }  // namespace

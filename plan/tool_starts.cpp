@@ -43,7 +43,7 @@ struct Template {
   double spare = 40.0;  // of the last push, for patients who differ ...                  [mm]
   double slack = 12.0;  // ... and of pushes and pulls that end by what is seen           [mm]
   double turn_slack = 30.0 * kRadPerDeg;  // ... and of turns
-  int again = 8;  // tries more of a wire that passes the ostium by, from so far beside
+  int rounds = 4;  // of tries of a wire that passes the ostium by, at most, from so far beside
   double again_pull = 3.0, again_turn = 15.0 * kRadPerDeg;  //                          [mm, rad]
   int steers = 8;                                           // of a wire on its way up, at most
   std::size_t weighed = 5;  // scripts of a start whose neighbours are tried
@@ -212,9 +212,11 @@ class ToolSearch {
   /// A wire that passes the ostium by is withdrawn and led out again with the catheter turned a
   /// little, first the way that it was turned before.
   void let_try_again(std::vector<ToolStep>& steps) const {
-    const ToolRules& rules = study_.tool_rules;  // from twice to one side to twice to the other
+    const ToolRules& rules = study_.tool_rules;  // the last round turns from one side to the other
     const double most = std::min(rules.most_turn, rules.turn_per_length * kTemplate.again_pull);
-    if (4.0 * kTemplate.again_turn > most) return;
+    const double allowed = std::floor(most / (2.0 * kTemplate.again_turn) + 1e-9);
+    const int rounds = static_cast<int>(std::min<double>(kTemplate.rounds, allowed));
+    if (rounds == 0) return;
     double side = 1.0;
     ToolStep* out = nullptr;
     for (std::size_t k = begin_.steps.size(); k < steps.size(); ++k) {
@@ -224,7 +226,7 @@ class ToolSearch {
       if (step.tool == kWire && step.push > 0.0 && out == nullptr) out = &step;
     }
     if (out == nullptr) return;
-    out->tries = kTemplate.again;
+    out->tries = rounds * simulate::kTriesOfRound;
     out->try_pull = kTemplate.again_pull;
     out->try_turn = side * kTemplate.again_turn;
   }

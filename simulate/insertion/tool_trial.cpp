@@ -26,7 +26,9 @@ constexpr double kLongestEdge = 1.45;      // ... of it: ToolBench::divide()
 constexpr double kDivideShorter = 0.67;    // ... or shorter: the centreline is divided anew
 constexpr double kAtEnd = 0.02;            // of a part: so near, a step is at what ends it; chosen
 constexpr double kShortestToEnd = 0.1;     // of a part, near what ends it; chosen
-constexpr double kTryOut = 20.0, kTryIn = 5.0;  // of a tool that passes a branch by: ToolStep  [mm]
+// Of a tool that passes a branch by: ToolStep; the last from where the image ends            [mm]
+constexpr double kTryOut = 20.0, kTryIn = 5.0, kTryBeforeEnd = 2.0;
+constexpr double kEndReach = 1.5;      // of such an end, in its radii
 constexpr double kSteerAstray = 10.0;  // pushed on in another vessel: less may pass its mouth [mm]
 constexpr int kSteerPlaces = 4;        // each so much further back; near the access ...
 constexpr double kSteerShare = 0.6, kSteerShareLess = 0.1;  // ... so much of the insertion
@@ -147,7 +149,7 @@ bool ToolTrial::make(const ToolStep& step, bool last) {
   expects(std::min(step.tries, step.steers) == 0);
   expects(std::max(step.tries, step.steers) == 0 || (step.tool > 0 && step.push > 0.0));
   ++step_;
-  const double from = step.tries > 0 ? insertion(step.tool) : 0.0;
+  const TryPlace from = step.tries > 0 ? place_of_try(step.tool) : TryPlace{};
   if (step.spare >= 0) {
     exchange(step);
   } else if (step.steers > 0) {
@@ -168,8 +170,8 @@ void ToolTrial::keep_end_of_step() {
   record_.shapes.push_back(shape_here());
 }
 
-/// Part by part. True where it stops since the tool passes the branch by, if that is looked for, or
-/// loses the way, if it is to be steered.
+/// Part by part. True where it stops since the tool passes the branch by or comes no further, if
+/// that is looked for, or loses the way, if it is to be steered.
 bool ToolTrial::advance(const ToolStep& step, bool last, bool looks) {
   const double whole = std::abs(step.push) + std::abs(step.turn) / kToolTurnStep;
   const double most = step.turn == 0.0 ? kStepsPerRecord * options_.insertion.step : 1.0;
@@ -194,6 +196,10 @@ bool ToolTrial::advance(const ToolStep& step, bool last, bool looks) {
     if (!leads || step.push <= 0.0) continue;
     if (step.steers > 0 && may_lose_way()) {
       if (loses_way(by)) return true;
+    } else if (step.steers > 0 && is_near_end(step.tool, kSteerBeforeEnd)) {
+      break;
+    } else if (looks && goal_.way) {
+      if (!comes_further(by) && since_furthest_ > kToolPatience) return true;
     } else if (last && !check_advance(by)) {
       break;
     }
@@ -204,28 +210,53 @@ bool ToolTrial::advance(const ToolStep& step, bool last, bool looks) {
 /// Whether the tool has come out of the one outside it, and not into the branch.
 bool ToolTrial::passes_by(const ToolStep& step) const {
   const double out = insertion(step.tool) - insertion(step.tool - 1);
-  return out >= kTryOut && measure(Until::kInBranch, step.tool) < kTryIn;
+  const bool comes_out = out >= kTryOut || (out > 0.0 && is_near_end(step.tool, kTryBeforeEnd));
+  return comes_out && measure(Until::kInBranch, step.tool) < kTryIn;
+}
+
+/// Whether the tool's tip is so near to where the image ends: a hand that leads it on does so
+/// unseen.
+bool ToolTrial::is_near_end(int tool, double within) const {
+  const Vec3 here = tip(tool);
+  const auto ends = [&](const preprocess::Opening& opening) {
+    const Vec3 off = here - opening.center;
+    const double height = opening.normal.dot(off);
+    return std::abs(height) < within &&
+           (off - height * opening.normal).norm() < kEndReach * opening.radius;
+  };
+  const auto& openings = vessel_.lumen.openings();
+  return std::any_of(openings.begin(), openings.end(), ends);
+}
+
+ToolTrial::TryPlace ToolTrial::place_of_try(int tool) const {
+  return {insertion(tool - 1), insertion(tool) - insertion(tool - 1),
+          measure(Until::kLevel, tool - 1)};
 }
 
 /// Takes the tool of a push back to where the push began, and brings all to where the next try
-/// begins.
-void ToolTrial::try_again(const ToolStep& step, double from, int tried) {
+/// begins. The outer one's tip is not pushed on past the ostium, where it only gets further off.
+void ToolTrial::try_again(const ToolStep& step, const TryPlace& from, int tried) {
+  const int outer = step.tool - 1;
   struct Place {
     double push = 0.0, turn = 0.0;
   };
   const auto place = [&](int k) -> Place {
     if (k == 0) return {};
-    const int size = 1 + (k - 1) / 4;
+    const int round = (k - 1) / kTriesOfRound;
     const double side = k % 2 == 1 ? 1.0 : -1.0;
-    return (k - 1) % 4 < 2 ? Place{.push = -side * size * step.try_pull}
-                           : Place{.turn = side * size * step.try_turn};
+    return (k - 1) % kTriesOfRound < 2 ? Place{.push = -side * std::ldexp(step.try_pull, round)}
+                                       : Place{.turn = side * (1 + round) * step.try_turn};
   };
   ++tries_;
   const Place before = place(tried - 1), next = place(tried);
-  const double start = from + before.push;
-  advance({.tool = step.tool, .push = start - insertion(step.tool)}, false, false);
-  const ToolStep moves[] = {{.tool = step.tool - 1, .turn = next.turn - before.turn},
-                            {.tool = kBothTools, .push = next.push - before.push}};
+  advance({.tool = step.tool, .push = insertion(outer) + from.ahead - insertion(step.tool)}, false,
+          false);
+  const double push = from.outer + next.push - insertion(outer);
+  const ToolStep moves[] = {{.tool = outer, .turn = next.turn - before.turn},
+                            {.tool = kBothTools,
+                             .push = push,
+                             .until = push > 0.0 ? Until::kLevel : Until::kMade,
+                             .at = std::max(from.level, 0.0) + kTryBeyond}};
   for (const ToolStep& move : moves) {
     if (!ended() && (move.push != 0.0 || move.turn != 0.0)) advance(move, false, false);
   }

@@ -24,6 +24,10 @@ inline constexpr double kLongestToolPart = 0.5;  //                             
 /// Of a tool that is led past another vessel: see ToolStep. Chosen.
 inline constexpr double kSteerBack = 30.0, kSteerFurther = 10.0, kSteerBehind = 30.0;  //  [mm]
 inline constexpr double kSteerTurn = 45.0 * kRadPerDeg;
+inline constexpr double kSteerBeforeEnd = 5.0;  //                                          [mm]
+/// Of a tool that passes a branch by: see ToolStep. Chosen.
+inline constexpr int kTriesOfRound = 4;
+inline constexpr double kTryBeyond = 6.0;  //                                               [mm]
 /// No catheter is pressed harder for its support: more than a hand pushes on a wire; chosen.
 inline constexpr double kMostSupport = 5.0;  //                                             [N]
 
@@ -62,12 +66,16 @@ struct ToolStep {
   /// and it is led on. The next times the outer one is turned on by kSteerTurn, and both are
   /// kSteerFurther back, three times as much at most, then again as at first. Near the access all
   /// lengths are shorter. Once the tool is up, the outer one is taken back as it was. Where all is
-  /// in vain and the tip in another vessel, the trial ends.
+  /// in vain and the tip in another vessel, the trial ends. Past the take-off it is stopped
+  /// kSteerBeforeEnd short of where the image ends.
   int steers = 0;
-  /// Of a push of a tool that leads: where it is 20 mm out of the one outside it, and not in the
-  /// branch, it is withdrawn to where the step began, and the push begins anew with both pulled
-  /// back by `try_pull` from where they were, then pushed on by it, then the outer one turned by
-  /// `try_turn`, then to the other side, then all that by twice as much, ...; so often. Chosen.
+  /// Of a push of a tool that leads: where it is 20 mm out of the one outside it, or comes near to
+  /// where the image ends, and is not in the branch, or comes no further along the way, it is
+  /// withdrawn to where the step began, and the push begins anew with both pulled back by
+  /// `try_pull` from where they were, then pushed on by it, then the outer one turned by
+  /// `try_turn`, then to the other side; then all that with the pull doubled and `try_turn` more,
+  /// ...; so often. The outer one's tip goes no further on than kTryBeyond past the ostium, or past
+  /// where it was if that is beyond.
   int tries = 0;
   double try_pull = 0.0, try_turn = 0.0;  //                                        [mm, rad]
   /// Of the innermost, in the place of a push or turn: it is withdrawn whole out of the body, the
@@ -148,7 +156,14 @@ class ToolTrial {
  private:
   bool advance(const ToolStep& step, bool last, bool looks);
   bool passes_by(const ToolStep& step) const;
-  void try_again(const ToolStep& step, double from, int tried);
+  bool is_near_end(int tool, double within) const;
+  /// Where the first try of a push begins.
+  struct TryPlace {
+    double outer = 0.0, ahead = 0.0;  // of the outer tool, and of the tool ahead of it      [mm]
+    double level = 0.0;               // of the outer one's tip                              [mm]
+  };
+  TryPlace place_of_try(int tool) const;
+  void try_again(const ToolStep& step, const TryPlace& from, int tried);
   void make_steered(const ToolStep& step, bool last);
   void exchange(const ToolStep& step);
   void keep_end_of_step();

@@ -229,13 +229,15 @@ TEST(ToolSteps, SayWhatEndsThemAndWhatElseToDo) {
       "to 30 mm before where that began. Bring the catheter up to 30 mm behind the wire's tip "
       "and advance the wire again. Do this 7 times at most, each new time 10 mm further back "
       "and with the catheter turned on by 45 degrees clockwise. Then bring the catheter back "
-      "to where it was.");
+      "to where it was. Stop the wire 5 mm before where the image ends.");
   EXPECT_EQ(
       told[5].otherwise,
-      "If it passes by the branch, withdraw it and try again, 8 times at most. First try with "
+      "If it passes by the branch or comes no further, withdraw it and try again, 8 times at most. "
+      "First try with "
       "both tools 3 mm back from where they were, then 3 mm on. Then try with the catheter "
-      "turned 15 degrees counterclockwise, then turned to the other side. Then do the same by "
-      "twice as much.");
+      "turned 15 degrees counterclockwise, then turned to the other side. Then do the same again, "
+      "each time by twice the length and 15 degrees more, but no further on than 6 mm beyond the "
+      "ostium or where they were.");
   const std::string script = describe_script(steps, 247.4);
   EXPECT_EQ(
       script.find("advance the wire to 220 mm; advance the catheter over the wire to 212 mm; "),

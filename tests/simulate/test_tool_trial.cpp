@@ -5,6 +5,7 @@
 #include <memory>
 #include <vector>
 
+#include "preprocess/surface/openings.h"
 #include "simulate/insertion/tool_script.h"
 #include "tests/shapes.h"
 
@@ -15,21 +16,30 @@ namespace {
 // at 110 mm; all ends are flat and closed.
 constexpr double kOstium = 110.0, kAorta = 9.0, kRenal = 3.0;
 
+Surface aorta_surface() {
+  return shapes::level_set(
+      [](const Vec3& p) {
+        const auto renal = [&](double x) {
+          return shapes::depth_in_tube(p, Vec3(0.0, 0.0, kOstium), Vec3(x, 0.0, kOstium), kRenal);
+        };
+        const double trunk =
+            shapes::depth_in_tube(p, Vec3(0.0, 0.0, 0.0), Vec3(0.0, 0.0, 170.0), kAorta);
+        const auto soft = [](double depth) { return std::exp(depth / 0.5); };
+        return 0.5 * std::log(soft(trunk) + soft(renal(40.0)) + soft(renal(-40.0)));
+      },
+      Vec3(-41.0, -10.0, -1.5), Vec3(41.0, 10.0, 171.5), 1.0);
+}
+
 const VesselModel& aorta() {
+  static const VesselModel vessel(aorta_surface(), LumenOptions{.grid_spacing = 0.6});
+  return vessel;
+}
+
+/// The same as an image shows it, whose vessels go on at their flat ends.
+const VesselModel& open_aorta() {
+  static const Surface surface = aorta_surface();
   static const VesselModel vessel(
-      shapes::level_set(
-          [](const Vec3& p) {
-            const auto renal = [&](double x) {
-              return shapes::depth_in_tube(p, Vec3(0.0, 0.0, kOstium), Vec3(x, 0.0, kOstium),
-                                           kRenal);
-            };
-            const double trunk =
-                shapes::depth_in_tube(p, Vec3(0.0, 0.0, 0.0), Vec3(0.0, 0.0, 170.0), kAorta);
-            const auto soft = [](double depth) { return std::exp(depth / 0.5); };
-            return 0.5 * std::log(soft(trunk) + soft(renal(40.0)) + soft(renal(-40.0)));
-          },
-          Vec3(-41.0, -10.0, -1.5), Vec3(41.0, 10.0, 171.5), 1.0),
-      LumenOptions{.grid_spacing = 0.6});
+      surface, LumenOptions{.grid_spacing = 0.6, .openings = preprocess::find_openings(surface)});
   return vessel;
 }
 
@@ -260,7 +270,8 @@ TEST(ToolTrial, AWireThatComesUpInsideTheCatheterIsNotTakenForStuck) {
 }
 
 /// Along the aorta and out into the branch toward +x; steps may end at that.
-ToolTrial watched_trial(double stiffness = 1.0) {
+ToolTrial watched_trial(double stiffness = 1.0, const VesselModel& vessel = aorta(),
+                        double target = kRenal) {
   Centerline path;
   path.points.resize(3, 136);
   path.radius.resize(136);
@@ -269,6 +280,7 @@ ToolTrial watched_trial(double stiffness = 1.0) {
     path.points.col(k) = Vec3(s - up, 0.0, 5.0 + up);
     path.radius[k] = s - up > kAorta - 1.0 ? kRenal : kAorta;
   }
+  path.radius[135] = target;
   path.arc_length = Eigen::VectorXd::LinSpaced(136, 0.0, 135.0);
   const auto way = std::make_shared<Way>(path);
   const Goal goal{.point = way->section().center, .radius = 3.0, .at_section = true, .way = way};
@@ -277,7 +289,7 @@ ToolTrial watched_trial(double stiffness = 1.0) {
       .arc = kOstium - 5.0 + kAorta, .point = Vec3(kAorta, 0.0, kOstium), .trunk = Vec3::UnitZ()};
   Tool hook = hooked_catheter();
   for (Section& section : hook.wire.sections) section.bending_stiffness *= stiffness;
-  return {{hook, straight_wire(20.0 * stiffness)}, kUpward, goal, aorta(), options};
+  return {{hook, straight_wire(20.0 * stiffness)}, kUpward, goal, vessel, options};
 }
 
 /// The hook turned into the branch, on a wire that is led out of it.
@@ -397,6 +409,66 @@ TEST(ToolTrial, StepsEndByWhatIsSeenOfTheTip) {
     ASSERT_TRUE(trial.make({.tool = kBothTools, .push = -2.0, .until = Until::kLevel, .at = -9.0}));
     EXPECT_NEAR(trial.insertion(0), insertion - 2.0, 1e-9) << "and no more than the step";
   }
+}
+
+/// Up, the wire back, turned to look so far from the branch and pulled to a level.
+bool hooks(ToolTrial& trial, double facing, double level) {
+  return trial.make({.tool = 1, .push = 120.0}) && trial.make({.tool = 0, .push = 110.0}) &&
+         trial.make({.tool = 1, .push = -40.0}) &&
+         trial.make({.tool = 0, .turn = 2.0 * kPi, .until = Until::kFacing, .at = facing}) &&
+         trial.make({.tool = kBothTools, .push = -60.0, .until = Until::kLevel, .at = level});
+}
+
+TEST(ToolTrial, TriesGoFurtherBackEachRoundAndNotOnPastTheOstium) {
+  ToolTrial trial = watched_trial();
+  ASSERT_TRUE(hooks(trial, 0.5 * kPi, -12.0)) << "it looks aside of both branches";
+  ASSERT_NEAR(trial.measure(Until::kLevel, 0), -12.0, 0.3);
+  const double begun = trial.insertion(0), ahead = trial.insertion(1) - begun;
+  const std::size_t before = trial.pushes().size();
+  trial.make({.tool = 1, .push = 80.0, .tries = 16, .try_pull = 3.0});
+  ASSERT_FALSE(trial.reached());
+  // The catheter looks across, and lets the wire by.
+  const TrialResult record = trial.finish();
+  EXPECT_NE(record.reason.find("tried again 16 times"), std::string::npos) << record.reason;
+  double least = begun, most = begun;
+  for (std::size_t k = before; k < record.tools[0].insertion.size(); ++k) {
+    least = std::min(least, record.tools[0].insertion[k]);
+    most = std::max(most, record.tools[0].insertion[k]);
+  }
+  EXPECT_NEAR(begun - least, 24.0, 1e-6) << "3, 6, 12 and 24 mm";
+  EXPECT_GT(most - begun, 12.1) << "from 12 mm short of the ostium to 6 mm past it";
+  EXPECT_LT(most - begun, 22.0);
+  EXPECT_GT(trial.insertion(1) - trial.insertion(0), ahead + 20.0) << "led out from there";
+}
+
+TEST(ToolTrial, AWireOnItsWayUpIsStoppedShortOfTheEndOfTheImage) {
+  ToolTrial trial = watched_trial(1.0, open_aorta());  // whose aorta ends at 170 mm
+  ASSERT_TRUE(trial.make({.tool = 1, .push = 300.0, .steers = 8})) << trial.reason();
+  EXPECT_LT(trial.tip(1).z(), 170.0 - kSteerBeforeEnd + 1.5) << "a part of a push further";
+  EXPECT_GT(trial.tip(1).z(), 170.0 - kSteerBeforeEnd - 0.5);
+  ToolTrial unseen = watched_trial(1.0, open_aorta());
+  EXPECT_FALSE(unseen.make({.tool = 1, .push = 300.0}));
+  EXPECT_EQ(unseen.finish().outcome, Outcome::kLeftImage);
+}
+
+TEST(ToolTrial, AWireThatComesToTheEndOfTheImageHasPassedTheBranchBy) {
+  ToolTrial trial = watched_trial(1.0, open_aorta());
+  ASSERT_TRUE(trial.make({.tool = 1, .push = 150.0}) && trial.make({.tool = 0, .push = 150.0}));
+  ASSERT_LT(170.0 - trial.tip(0).z(), 19.0) << "less than what else tells that";
+  trial.make({.tool = 1, .push = 80.0, .tries = 4, .try_pull = 3.0});
+  const TrialResult record = trial.finish();
+  EXPECT_EQ(record.outcome, Outcome::kLeftImage);
+  EXPECT_NE(record.reason.find("tried again 4 times"), std::string::npos) << record.reason;
+}
+
+TEST(ToolTrial, AWireThatComesNoFurtherIsLedOutAnew) {
+  // In a branch that ends 10 mm behind a cross-section too small to be passed.
+  ToolTrial trial = watched_trial(1.0, aorta(), 1e-3);
+  ASSERT_TRUE(hooks(trial, 0.0, -1.0));
+  trial.make({.tool = 1, .push = 200.0, .tries = 2, .try_pull = 3.0}, true);
+  EXPECT_GT(trial.tip(1).x(), 25.0);
+  const TrialResult record = trial.finish();
+  EXPECT_NE(record.reason.find("tried again 2 times"), std::string::npos) << record.reason;
 }
 
 // A trunk of 6 mm radius along z from 0 to 200 mm with a branch of 4 mm that leaves it at 70 mm, by
