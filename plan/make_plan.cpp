@@ -1,6 +1,7 @@
 #include "plan/make_plan.h"
 
 #include <algorithm>
+#include <iterator>
 #include <utility>
 
 #include "plan/judge.h"
@@ -41,23 +42,58 @@ std::vector<Run> refinement_runs(int id, const Candidate& candidate, double inse
   return runs;
 }
 
-Refinement estimate_error_of(const Study& study, int id, const std::vector<Run>& runs,
-                             const std::vector<Measured>& trials) {
-  expects(runs.size() == trials.size());
+namespace {
+
+/// What was run to tell a plan's error.
+struct ErrorRuns {
   std::vector<RefinedRun> rows;
   std::vector<SettingRun> others;
-  double insertion = 0.0;
+  std::optional<double> insertion;  // to which all were pushed; none: to the target          [mm]
+};
+
+ErrorRuns error_runs_of(const Study& study, int id, const std::vector<Run>& runs,
+                        const std::vector<Measured>& trials) {
+  expects(runs.size() == trials.size());
+  ErrorRuns own;
   for (std::size_t k = 0; k < runs.size(); ++k) {
     if (runs[k].id != id || !runs[k].elements) continue;
     const auto& [factor, to, setting] = *runs[k].elements;
-    insertion = to;
+    Measured trial = trials[k];
+    if (runs[k].candidate.catheter < 0) {
+      own.insertion = to;
+    } else if (trial.outcome == simulate::Outcome::kReached) {
+      trial.nodes = cut_at_goal(trial.nodes, study.goal);
+    }
     if (setting) {
-      others.push_back({*setting, trials[k]});
+      own.others.push_back({*setting, std::move(trial)});
     } else {
-      rows.push_back({factor * element_length_of(study, runs[k].candidate), trials[k]});
+      own.rows.push_back({factor * element_length_of(study, runs[k].candidate), std::move(trial)});
     }
   }
-  return estimate_error(id, insertion, rows, others);
+  return own;
+}
+
+}  // namespace
+
+std::vector<Run> finest_runs(const Study& study, const std::vector<Run>& runs,
+                             const std::vector<Measured>& trials) {
+  std::vector<Run> finest;
+  for (const Run& run : runs) {
+    const bool first =
+        run.elements && !run.elements->setting && run.elements->factor == kRefineFactors.front();
+    if (!first || run.candidate.catheter < 0) continue;
+    const ErrorRuns own = error_runs_of(study, run.id, runs, trials);
+    if (!needs_finest(own.rows)) continue;
+    finest.push_back(run);
+    finest.back().elements->factor = kFinestFactor;
+  }
+  return finest;
+}
+
+Refinement estimate_error_of(const Study& study, int id, const std::vector<Run>& runs,
+                             const std::vector<Measured>& trials) {
+  ErrorRuns own = error_runs_of(study, id, runs, trials);
+  return estimate_error(id, own.insertion, std::move(own.rows), own.others);
 }
 
 namespace {
@@ -326,12 +362,23 @@ class Planner {
             refinement_runs(id, candidate(id), trial(id).metrics.insertion);
         runs.insert(runs.end(), own.begin(), own.end());
       }
-      const std::vector<Measured> found =
-          find_or_run(study_, vessel_, runs, log_, silent_, plan_.full);
-      for (const int id : chosen) {
-        plan_.refinements.push_back(estimate_error_of(study_, id, runs, found));
+      for (Refinement& refined : find_errors(std::move(runs), chosen)) {
+        plan_.refinements.push_back(std::move(refined));
       }
     }
+  }
+
+  // What these runs, and those that they ask for, come to, for each id.
+  std::vector<Refinement> find_errors(std::vector<Run> runs, const std::vector<int>& ids) {
+    std::vector<Measured> found = find_or_run(study_, vessel_, runs, log_, silent_, plan_.full);
+    const std::vector<Run> finest = finest_runs(study_, runs, found);
+    std::vector<Measured> more = find_or_run(study_, vessel_, finest, log_, silent_, plan_.full);
+    runs.insert(runs.end(), finest.begin(), finest.end());
+    found.insert(found.end(), std::make_move_iterator(more.begin()),
+                 std::make_move_iterator(more.end()));
+    std::vector<Refinement> errors;
+    for (const int id : ids) errors.push_back(estimate_error_of(study_, id, runs, found));
+    return errors;
   }
 
   // Repeats the best under disturbances until the best are repeated ones, the very best at least;

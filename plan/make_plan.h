@@ -67,9 +67,12 @@ struct Plan {
   Spent scouts, probes, full, repeats;
 };
 
-/// The runs that tell a plan's error: with other elements, then with a setting changed. And the
-/// error that those of `runs` with its id come to.
+/// The runs that tell a plan's error: with other elements, then with a setting changed. Those that
+/// they ask for once they have been made (needs_finest). And the error that those of `runs` with
+/// its id come to, with the latter behind the others.
 std::vector<Run> refinement_runs(int id, const Candidate& candidate, double insertion);
+std::vector<Run> finest_runs(const Study& study, const std::vector<Run>& runs,
+                             const std::vector<Measured>& trials);
 Refinement estimate_error_of(const Study& study, int id, const std::vector<Run>& runs,
                              const std::vector<Measured>& trials);
 

@@ -1,7 +1,9 @@
 #pragma once
 /// The numerical error of the best plans: each is run again with elements and contact spacing twice
-/// and half as long, and with settings changed that should not matter. This also gives the error
-/// against run time of the case at hand (design section 8).
+/// and half as long, and with settings changed that should not matter. Of a script of catheter and
+/// wire that does not reach with the longer elements, a run with elements of a quarter stands in
+/// that one's place. This also gives the error against run time of the case at hand (design
+/// section 8).
 #include <array>
 #include <optional>
 #include <string>
@@ -44,6 +46,8 @@ struct Refinement {
   std::string reason;                    // why something is missing above; else empty
   std::vector<double> cpu_seconds;       // per row; timing, so never twice the same        [s]
   std::vector<OtherEnd> others = {};     // per setting; empty where the plan itself has no end
+  std::string left_out = {};             // why the run with longer elements does not count, if so
+  std::string not_finer = {};  // of a script: how runs with shorter elements end that do not reach
 };
 
 /// Why the plan's end hangs on how it is solved, "with pushes half as long its tip ends 4.6 mm
@@ -62,15 +66,27 @@ struct SettingRun {
   Measured trial;
 };
 
-/// Each plan is run with elements of these multiples of the study's length.
+/// Each plan is run with elements of these multiples of the study's length, ...
 inline constexpr std::array kRefineFactors = {2.0, 1.0, 0.5};
+/// ... and of this one where the first does not count.
+inline constexpr double kFinestFactor = 0.25;
 
 /// The study of one such run: elements and contact points `factor` times as far apart, and pushed
 /// to the insertion that the plan ended at, past the goal if need be, so that shapes of equal
-/// insertion are compared. Of scripts of tools the way is kept, since their steps end by what is
-/// seen along it.
+/// insertion are compared. Scripts of tools end where the tip is seen at the target instead, as
+/// their steps end by what is seen: where more or less of the wire lies in bends, or a try more was
+/// made, the hand goes on as far as it needs to.
 Study refined_study(const Study& study, const Candidate& candidate, double factor,
                     double insertion);
+
+/// A wire up to where it is at the goal, so that two that were stopped by sight can be compared: to
+/// where it passes the cross-section, in a straight line on from its tip if that was drawn back, or
+/// of a sphere to where it is nearest to the point. Nodes are (3, k), proximal to distal.
+Eigen::Matrix3Xd cut_at_goal(const Eigen::Matrix3Xd& nodes, const simulate::Goal& goal);
+
+/// Whether of a script's runs with three element lengths that with the longest alone does not
+/// reach.
+bool needs_finest(const std::vector<RefinedRun>& runs);
 
 /// The plans to refine next, as trials, best first: those of the first `options.plans` that are not
 /// in `known` yet, and those tied with the first plan, since their error may change which is first,
@@ -81,7 +97,8 @@ std::vector<int> choose_plans_to_refine(const Ranking& ranking,
                                         const std::vector<Refinement>& known,
                                         const RefineOptions& options);
 
-/// Richardson's estimate from three runs to the same `insertion`, with elements of 2h, h and h/2.
+/// Richardson's estimate from three runs to the same `insertion`, without one to where the tip is
+/// seen at the target (cut_at_goal), with elements of 2h, h and h/2.
 /// With d the change from one run to the next finer one, the error of the longer elements is
 /// d 2^p / (2^p - 1), which is 4/3 d for p = 2, and that of the shorter ones d / (2^p - 1). The
 /// observed order is log2(d_coarse / d_fine) of the positions. p is the observed order kept within
@@ -95,7 +112,13 @@ std::vector<int> choose_plans_to_refine(const Ranking& ranking,
 ///
 /// Neither is it less than what any of `others` ends apart from the run with elements of h, which
 /// they follow but for a setting that should not matter.
-Refinement estimate_error(int trial, double insertion, const std::vector<RefinedRun>& runs,
+///
+/// With a fourth run, of h/4, that of 2h is left out, as it does not reach: it tells of another end
+/// and not of an error of this one. A change from h to h/2 that is small by chance is seen by the
+/// run of h/4 then: the error is no less than the change from h to h/4 and that run's own error, by
+/// half an order of the last change, too. (Where changes do follow half an order, both are equal.)
+/// A script that does not reach with h/2 or h/4 is a sensitive one.
+Refinement estimate_error(int trial, std::optional<double> insertion, std::vector<RefinedRun> runs,
                           const std::vector<SettingRun>& others = {});
 
 /// Largest distance between two wires at equal arc length from their tips, taken at the nodes of

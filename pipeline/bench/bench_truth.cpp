@@ -98,9 +98,8 @@ class TruthRuns {
     if (with_fine_push) add({.factor = kPushFactor, .insertion = insertion});
     const std::vector<Measured> ends = run_all(runs);
 
-    row.stated =
-        plan::estimate_error_of(study_, chosen.id, {runs.begin(), runs.begin() + stated_count},
-                                {ends.begin(), ends.begin() + stated_count});
+    row.stated = estimate({runs.begin(), runs.begin() + stated_count},
+                          {ends.begin(), ends.begin() + stated_count});
     row.note = row.stated.reason;
     const Measured& base = ends[1];  // with the study's own elements, to that insertion
     if (!came_as_far(base, insertion)) return row;
@@ -120,6 +119,15 @@ class TruthRuns {
       row.fine_push_force = ends.back().metrics.peak_push_force;
     }
     return row;
+  }
+
+  /// The error as a plan's is stated, by these runs of one trial.
+  plan::Refinement estimate(std::vector<Run> runs, std::vector<Measured> ends) {
+    for (const Run& finest : plan::finest_runs(study_, runs, ends)) {
+      runs.push_back(finest);
+      ends.push_back(run_all({finest}).front());
+    }
+    return plan::estimate_error_of(study_, runs.front().id, runs, ends);
   }
 
   std::string case_name_;

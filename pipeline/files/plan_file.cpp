@@ -171,10 +171,14 @@ Json refinement_to_json(const plan::Refinement& refinement) {
                       {"change", error_to_json(other.change)},
                       {"incomplete", other.incomplete}});
   }
-  return {
-      {"trial", refinement.trial},   {"rows", std::move(rows)},
-      {"error", std::move(error)},   {"observed_order", number_or_null(refinement.observed_order)},
-      {"reason", refinement.reason}, {"others", std::move(others)}};
+  return {{"trial", refinement.trial},
+          {"rows", std::move(rows)},
+          {"error", std::move(error)},
+          {"observed_order", number_or_null(refinement.observed_order)},
+          {"reason", refinement.reason},
+          {"others", std::move(others)},
+          {"left_out", refinement.left_out},
+          {"not_finer", refinement.not_finer}};
 }
 
 plan::Refinement refinement_of(const Json& json) {
@@ -182,6 +186,8 @@ plan::Refinement refinement_of(const Json& json) {
   refinement.trial = json.at("trial");
   refinement.observed_order = optional_of(json.at("observed_order"));
   refinement.reason = json.at("reason");
+  refinement.left_out = json.at("left_out");
+  refinement.not_finer = json.at("not_finer");
   for (const Json& row : json.at("rows")) {
     refinement.rows.push_back({.element_length = row.at("element_length_mm"),
                                .position_error = optional_of(row.at("position_error_mm")),

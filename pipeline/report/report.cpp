@@ -408,6 +408,7 @@ Json numerics_json(const ReportInput& input) {
     row.put("settings", std::move(others));
     row.put_optional("observed_order", refinement.observed_order,
                      refinement.reason.empty() ? "the runs do not differ" : refinement.reason);
+    if (!refinement.left_out.empty()) row.put("left_out", refinement.left_out);
     plans.push_back(row.finish());
   }
   const Json& trials = input.figures.at("trials");

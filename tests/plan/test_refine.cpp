@@ -1,6 +1,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <cstdio>
 #include <functional>
 
 #include "plan/judge.h"
@@ -8,6 +9,7 @@
 #include "plan/refine.h"
 #include "tests/plan/memory_log.h"
 #include "tests/plan/tube_case.h"
+#include "tests/plan/two_renals.h"
 #include "tests/shapes.h"
 
 namespace wireplan::plan {
@@ -197,6 +199,136 @@ TEST(EstimateError, IsNoLessThanWhatSettingsMakeOfIt) {
   const Refinement same = estimate_error(0, kLength, runs_of_order(2.0, 0.03),
                                          {end_of(Setting::kFriction, 0.02, 1.03)});
   EXPECT_NEAR(same.error.value().tip, 0.75 * 0.03 * kHalfOrder, 1e-13);
+}
+
+/// A script's runs at 2, 1, 0.5 and 0.25 mm whose tips lie so far aside; all but the first reach.
+std::vector<RefinedRun> runs_of_script(const std::vector<double>& aside) {
+  std::vector<RefinedRun> runs;
+  double h = 2.0;
+  for (const double y : aside) {
+    runs.push_back(run_of(
+        h, [&](double, double) { return y; }, 1.0));
+    runs.back().trial.outcome = Outcome::kReached;
+    h *= 0.5;
+  }
+  runs.front().trial.outcome = Outcome::kWrongBranch;
+  runs.front().trial.reason = "the tip is in branch 7";
+  return runs;
+}
+
+TEST(EstimateError, WithTheFinestRunLeavesTheLongestOut) {
+  // Changes of half an order, 0.1 mm and 0.1 / sqrt(2): what is left of 0.1 mm is the whole series.
+  const double next = 0.1 / std::sqrt(2.0);
+  const Refinement result = estimate_error(0, {}, runs_of_script({60.0, 0.0, 0.1, 0.1 + next}));
+  double series = 0.0;
+  for (int k = 0; k < 200; ++k) series += 0.1 * std::pow(2.0, -0.5 * k);
+  EXPECT_NEAR(result.error.value().tip, series, 1e-12);
+  EXPECT_NEAR(result.error.value().position, series, 1e-12);
+  EXPECT_NEAR(result.observed_order.value(), 0.5, 1e-9);
+  ASSERT_EQ(result.rows.size(), 3U);
+  EXPECT_EQ(result.rows.front().element_length, 1.0);
+  EXPECT_EQ(result.left_out,
+            "with elements of 2 mm the target is not reached: the tip is in branch 7");
+  EXPECT_EQ(result.reason, "");
+  EXPECT_EQ(result.not_finer, "");
+}
+
+TEST(EstimateError, AChangeThatHappensToBeSmallIsSeenByTheFinestRun) {
+  const Refinement result = estimate_error(0, {}, runs_of_script({60.0, 0.0, 0.001, 0.5}));
+  // The finest is 0.5 mm away, and its own error by half an order of the last change more.
+  EXPECT_NEAR(result.error.value().tip, 0.5 + 0.499 / (std::sqrt(2.0) - 1.0), 1e-12);
+}
+
+TEST(EstimateError, OfAScriptNamesFinerRunsThatDoNotReach) {
+  auto runs = runs_of_script({60.0, 0.0, 0.1, 44.0});
+  runs[3].trial.outcome = Outcome::kPassedBy;
+  runs[3].trial.reason = "the tip is in the aorta";
+  SettingRun step = end_of(Setting::kStep, 0.0, 1.0);
+  step.trial.outcome = Outcome::kReached;
+  const std::string told =
+      "with elements of 0.25 mm the target is not reached: the tip is in the aorta";
+  const Refinement result = estimate_error(0, {}, runs, {step});
+  EXPECT_NEAR(result.error.value().tip, 0.1 * kHalfOrder, 1e-12);
+  EXPECT_EQ(find_sensitivity(result), told);
+  EXPECT_EQ(result.reason, told);
+  // Without that of half the length there is no error.
+  runs.pop_back();
+  runs[0].trial.outcome = Outcome::kReached;
+  runs[2].trial.outcome = Outcome::kPassedBy;
+  const Refinement none = estimate_error(0, {}, runs, {step});
+  EXPECT_FALSE(none.error.has_value());
+  EXPECT_EQ(find_sensitivity(none), "with elements of 0.5 mm the target is not reached: passed_by");
+}
+
+TEST(NeedsFinest, WhereTheLongestAloneDoesNotReach) {
+  auto runs = runs_of_script({60.0, 0.0, 0.1});
+  EXPECT_TRUE(needs_finest(runs));
+  runs[2].trial.outcome = Outcome::kPassedBy;
+  EXPECT_FALSE(needs_finest(runs)) << "the plan's own end is in doubt";
+  runs[2].trial.outcome = runs[0].trial.outcome = Outcome::kReached;
+  EXPECT_FALSE(needs_finest(runs));
+}
+
+/// A wire that comes along the axis of the aorta and turns into the branch, to so far out, `up` mm
+/// above its axis.
+Eigen::Matrix3Xd into_branch(double out, double up) {
+  std::vector<Vec3> points;
+  for (double z = 5.0; z < kLevel; z += 1.5) points.emplace_back(0.0, 0.0, z);
+  for (double x = 0.0; x < out; x += 1.5) points.emplace_back(x, 0.0, kLevel + up);
+  points.emplace_back(out, 0.0, kLevel + up);
+  Eigen::Matrix3Xd nodes(3, static_cast<Eigen::Index>(points.size()));
+  for (std::size_t k = 0; k < points.size(); ++k) {
+    nodes.col(static_cast<Eigen::Index>(k)) = points[k];
+  }
+  return nodes;
+}
+
+TEST(CutAtGoal, EndsWhereTheWirePassesTheCrossSection) {
+  const simulate::Goal goal = toward(1.0).goal;                          // 35 mm out
+  for (const double out : {35.2, 36.0, 37.9, 35.0 - 1.3, 35.0 - 3.0}) {  // the last were drawn back
+    SCOPED_TRACE(out);
+    const Vec3 tip = cut_at_goal(into_branch(out, 0.4), goal).rightCols<1>();
+    EXPECT_LT((tip - Vec3(35.0, 0.0, kLevel + 0.4)).norm(), 1e-9);
+  }
+  // One that is far from it ends where it ends.
+  const Vec3 far = cut_at_goal(into_branch(20.0, 0.4), goal).rightCols<1>();
+  EXPECT_LT((far - Vec3(20.0, 0.0, kLevel + 0.4)).norm(), 1e-9);
+}
+
+TEST(CutAtGoal, EndsWhereTheWireIsNearestToAPoint) {
+  const simulate::Goal goal{.point = Vec3(30.0, 2.0, kLevel), .radius = 3.0};
+  for (const double out : {31.0, 33.3}) {
+    const Vec3 tip = cut_at_goal(into_branch(out, 0.0), goal).rightCols<1>();
+    EXPECT_LT((tip - Vec3(30.0, 0.0, kLevel)).norm(), 1e-9);
+  }
+}
+
+TEST(FinestRuns, AreOfScriptsAlone) {
+  const Study study = toward(1.0);
+  for (const int catheter : {0, -1}) {
+    const std::vector<plan::Run> runs = refinement_runs(3, {.catheter = catheter}, 100.0);
+    Measured there;
+    there.nodes = into_branch(36.0, 0.0);
+    there.metrics.insertion = 100.0;
+    there.outcome = Outcome::kReached;
+    std::vector<Measured> trials(runs.size(), there);
+    EXPECT_TRUE(finest_runs(study, runs, trials).empty());
+    trials[0].outcome = Outcome::kWrongBranch;
+    const std::vector<plan::Run> finest = finest_runs(study, runs, trials);
+    ASSERT_EQ(finest.size(), catheter >= 0 ? 1U : 0U);
+    if (finest.empty()) continue;
+    EXPECT_EQ(finest[0].id, 3);
+    EXPECT_EQ(finest[0].elements.value().factor, 0.25);
+    // Half a millimetre further on is no error, as long as it passes the same place: 0.2 mm aside.
+    std::vector<plan::Run> all = runs;
+    all.push_back(finest[0]);
+    trials.push_back(there);
+    trials.back().nodes = into_branch(36.5, 0.2);
+    trials.back().metrics.insertion = 100.5;
+    const Refinement result = estimate_error_of(study, 3, all, trials);
+    EXPECT_NE(result.left_out, "");
+    EXPECT_NEAR(result.error.value().tip, 0.2 / (1.0 - std::sqrt(0.5)), 1e-9);
+  }
 }
 
 TEST(Sensitivity, IsToldWithTheSettingAndHowFarAwayItEnds) {
