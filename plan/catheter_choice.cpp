@@ -13,6 +13,18 @@ constexpr double kShapeStep = 0.25;  // along a shape [mm]
 
 double in_degrees(double angle) { return angle / kRadPerDeg; }
 
+/// Of branches that ask for a hooked curve [deg].
+constexpr double kHookedFrom = 60.0, kHookedTo = 120.0;
+
+/// How far a branch's take-off is from those that ask for that kind, in whole degrees, as well as
+/// it is known.
+double angle_off(CurveKind kind, double take_off) {
+  const double angle = std::round(in_degrees(take_off));
+  if (kind == CurveKind::kSimple) return std::max(0.0, angle - kHookedFrom);
+  if (kind == CurveKind::kReversed) return std::max(0.0, kHookedTo - angle);
+  return std::max({0.0, kHookedFrom - angle, angle - kHookedTo});
+}
+
 double take_off_of(const Ostium& ostium) {
   return std::acos(std::clamp(ostium.trunk.dot(ostium.branch), -1.0, 1.0));
 }
@@ -80,9 +92,9 @@ double curved_length(const simulate::Wire& tube, bool first) {
 }
 
 CurveKind asked_for(double take_off) {
-  return in_degrees(take_off) < 60.0    ? CurveKind::kSimple
-         : in_degrees(take_off) > 120.0 ? CurveKind::kReversed
-                                        : CurveKind::kHooked;
+  return in_degrees(take_off) < kHookedFrom ? CurveKind::kSimple
+         : in_degrees(take_off) > kHookedTo ? CurveKind::kReversed
+                                            : CurveKind::kHooked;
 }
 
 std::vector<Suggestion> suggest_catheters(const std::vector<Catheter>& catheters,
@@ -90,7 +102,7 @@ std::vector<Suggestion> suggest_catheters(const std::vector<Catheter>& catheters
   const double take_off = take_off_of(ostium);
   const CurveKind kind = asked_for(take_off);
   struct Row {
-    int kinds_off = 0;  // from what is asked for
+    double angle_off = 0.0;  // from what is asked for
     double misfit = 0.0;
     int catheter = 0;
     CurveShape shape;
@@ -101,20 +113,20 @@ std::vector<Suggestion> suggest_catheters(const std::vector<Catheter>& catheters
     const CurveShape shape = find_shape(tube);
     if (shape.kind == CurveKind::kStraight || shape.kind == CurveKind::kRing) continue;
     if (2.0 * tube.radius >= ostium.branch_diameter) continue;
-    rows.push_back({std::abs(static_cast<int>(shape.kind) - static_cast<int>(kind)),
-                    std::abs(shape.reach - ostium.trunk_diameter), c, shape});
+    rows.push_back(
+        {angle_off(shape.kind, take_off), std::abs(shape.reach - ostium.trunk_diameter), c, shape});
   }
   std::sort(rows.begin(), rows.end(), [](const Row& a, const Row& b) {
-    return std::tie(a.kinds_off, a.misfit, a.catheter) <
-           std::tie(b.kinds_off, b.misfit, b.catheter);
+    return std::tie(a.angle_off, a.misfit, a.catheter) <
+           std::tie(b.angle_off, b.misfit, b.catheter);
   });
   std::vector<Suggestion> suggestions;
   for (const Row& row : rows) {
     if (suggestions.size() == most) break;
     std::string reason = "the branch turns by " + three_digits(in_degrees(take_off)) +
                          " degrees from its trunk, which asks for a " + kind_name(kind);
-    if (row.kinds_off > 0) {
-      reason += rows.front().kinds_off > 0 ? ", of which none is there" : "";
+    if (row.shape.kind != kind) {
+      reason += rows.front().shape.kind != kind ? ", of which none is there" : "";
       reason += std::string("; a ") + kind_name(row.shape.kind) + " comes next";
     }
     reason += "; this one's whole shape is " + three_digits(row.shape.reach) +

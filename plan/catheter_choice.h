@@ -36,13 +36,14 @@ struct Suggestion {
 };
 
 /// At most `most`, best first: of the kind that the take-off asks for, no thicker than the branch,
-/// as wide as the trunk as can be, since a curve rests on the wall opposite; then of the next
-/// kinds. Empty where nothing goes into the branch.
+/// as wide as the trunk as can be, since a curve rests on the wall opposite; then of the kind that
+/// the nearest take-offs ask for, and of the last. Empty where nothing goes into the branch.
 std::vector<Suggestion> suggest_catheters(const std::vector<Catheter>& catheters,
                                           const Ostium& ostium, std::size_t most = 9);
 
 /// Leaves the study the catheters that its ostium asks for, none where its way takes no branch, and
-/// tells why. The search tries the first three, and the next where none of them holds.
+/// tells why. The first three are tried, and the next where none of them has a script that holds,
+/// also in full and in most of a few repeats.
 void keep_suggested(Study& study);
 
 }  // namespace wireplan::plan

@@ -18,6 +18,11 @@ constexpr std::size_t kPlansTried = 3;
 constexpr int kTries = 8;
 // Turns of the hub in one script: that scouts find, and that are searched for in full.
 constexpr int kTurnsOfScouts = 3, kTurns = 1;
+// Of scripts of tools the best so many are refined, and of those that end surely this many are
+// tried so often; one that is safe in that part of them is enough, and no more catheters are tried.
+// Of 8 that are 7: one with 6 was safe in 11 of 16.
+constexpr std::size_t kScriptsRefined = 4, kScriptsTried = 2;
+constexpr double kMostOfTries = 0.85;
 // Neighbours of a script of tools that are run in full in its place.
 constexpr std::size_t kSparesTried = 2;
 // Which plans are the best is found from so many repeats of each that may be. Plans that fall
@@ -189,21 +194,74 @@ class Planner {
     }
     ToolScripts search =
         find_tool_scripts(study_, vessel_.scout_model(), options_.batch, options_.early.script);
+    while (has_more_pairs(study_, search) && !has_steady_script(search)) {
+      search_on(study_, vessel_.scout_model(), options_.batch, options_.early.script, search);
+    }
     find_exchanges(study_, vessel_.scout_model(), options_.batch, search);
     if (options_.batch.cancelled && options_.batch.cancelled()) throw Interrupted();
     plan_.scripts.branches += search.branches;
-    add_seats(study_, search);
-    std::vector<Run> runs;
-    for (const Candidate& found : search.found) runs.push_back({.candidate = found});
-    std::vector<Measured> trials =
-        find_or_run(study_, vessel_, runs, log_, options_.batch, plan_.full);
-    try_spares(search, runs, trials);
-    leave_out_seats(runs, trials);
+    const auto [runs, trials] = run_in_full(search, options_.batch);
     for (PairFindings& pair : search.pairs) {
       const bool exchanged = keep_scripts_of(pair, true, runs, trials);
       keep_scripts_of(pair, false, runs, trials, exchanged);
     }
     plan_.scripts.pairs = std::move(search.pairs);
+  }
+
+  // What was found, with the catheter seated where it follows, or what stands in for it.
+  std::pair<std::vector<Run>, std::vector<Measured>> run_in_full(ToolScripts& search,
+                                                                 const BatchOptions& batch) {
+    add_seats(study_, search);
+    std::vector<Run> runs;
+    for (const Candidate& found : search.found) runs.push_back({.candidate = found});
+    std::vector<Measured> trials = find_or_run(study_, vessel_, runs, log_, batch, plan_.full);
+    try_spares(search, runs, trials);
+    leave_out_seats(runs, trials);
+    return {std::move(runs), std::move(trials)};
+  }
+
+  // Whether one of the best scripts is a plan that a person may lean on: its end is known, and it
+  // is safe in most of the first repeats. All that is run for it is what its error and its repeats
+  // take later. Else the next catheters that the anatomy suggests are tried too.
+  bool has_steady_script(ToolScripts search) {
+    const auto [runs, trials] = run_in_full(search, silent_);
+    const Yardstick by;
+    std::vector<std::pair<double, std::size_t>> plans;  // score and place
+    for (std::size_t k = 0; k < runs.size(); ++k) {
+      const Repeat as_assumed = judge_repeat(trials[k], study_, by.limits, by.weights);
+      if (as_assumed.safe) plans.emplace_back(as_assumed.score, k);
+    }
+    std::sort(plans.begin(), plans.end());
+    plans.resize(std::min(kScriptsRefined, plans.size()));
+    std::size_t tried = 0;
+    for (const auto& [score, place] : plans) {
+      const Candidate& script = runs[place].candidate;
+      if (tried == kScriptsTried || !ends_surely(script, trials[place])) continue;
+      ++tried;
+      if (is_safe_in_most(script)) return true;
+    }
+    return false;
+  }
+
+  bool ends_surely(const Candidate& script, const Measured& trial) {
+    const int id = -1;  // not known yet
+    const Refinement refined =
+        find_errors(refinement_runs(id, script, trial.metrics.insertion), {id}).front();
+    return refined.error && find_sensitivity(refined) == "" &&
+           refined.error->tip < tip_room(study_.goal, trial.metrics);
+  }
+
+  bool is_safe_in_most(const Candidate& script) {
+    const int repeats = options_.robustness.repeats, tries = std::min(kTries, repeats);
+    std::vector<Disturbance> first = draw_disturbances(unknowns(repeats), study_.wires);
+    first.resize(static_cast<std::size_t>(tries));
+    const Yardstick by;
+    const std::vector<Measured> ends = find_or_run(
+        study_, vessel_, disturbed_runs(-1, script, first), log_, silent_, plan_.repeats);
+    const auto safe = std::count_if(ends.begin(), ends.end(), [&](const Measured& trial) {
+      return judge_repeat(trial, study_, by.limits, by.weights).safe;
+    });
+    return static_cast<double>(safe) >= kMostOfTries * tries;
   }
 
   // Of a pair's scripts, those with an exchange or the others, what reaches in full; true where
@@ -306,8 +364,9 @@ class Planner {
       return judge_repeat(trial, study_, by.limits, by.weights).safe;
     };
     return std::any_of(plans.begin(), plans.end(), [&](const auto& plan) {
-      const std::vector<Measured> trials = find_or_run(
-          study_, vessel_, disturbed_runs(plan.second, tries), log_, silent_, plan_.repeats);
+      const std::vector<Measured> trials =
+          find_or_run(study_, vessel_, disturbed_runs(plan.second, candidate(plan.second), tries),
+                      log_, silent_, plan_.repeats);
       return 2 * std::count_if(trials.begin(), trials.end(), works) >= kTries;
     });
   }
@@ -460,10 +519,11 @@ class Planner {
     return options;
   }
 
-  std::vector<Run> disturbed_runs(int id, const std::vector<Disturbance>& disturbances) const {
+  static std::vector<Run> disturbed_runs(int id, const Candidate& candidate,
+                                         const std::vector<Disturbance>& disturbances) {
     std::vector<Run> runs;
     for (const Disturbance& disturbance : disturbances) {
-      runs.push_back({.id = id, .candidate = candidate(id), .disturbance = disturbance});
+      runs.push_back({.id = id, .candidate = candidate, .disturbance = disturbance});
     }
     return runs;
   }

@@ -146,14 +146,19 @@ Study tool_scout_study(const Study& study) {
   return own;
 }
 
-ToolScripts find_tool_scripts(const Study& study, const simulate::VesselModel& vessel,
-                              const BatchOptions& options,
-                              const std::function<void(const Candidate&)>& on_first) {
-  ToolScripts all;
+bool has_more_pairs(const Study& study, const ToolScripts& all) {
+  return all.groups < tried_together(study, all.pairs).size();
+}
+
+void search_on(const Study& study, const simulate::VesselModel& vessel, const BatchOptions& options,
+               const std::function<void(const Candidate&)>& on_first, ToolScripts& all) {
   const std::optional<Ostium> ostium = find_ostium(study.goal);
-  for (const ToolPair& pair : pairs_of(study)) all.pairs.emplace_back().pair = pair;
+  if (all.groups == 0) {
+    for (const ToolPair& pair : pairs_of(study)) all.pairs.emplace_back().pair = pair;
+  }
   const Study scout = tool_scout_study(study);
-  std::atomic<bool> told = false;
+  std::atomic<bool> told = std::any_of(all.pairs.begin(), all.pairs.end(),
+                                       [](const PairFindings& pair) { return pair.found > 0; });
   const auto tell = [&](const ToolPair& pair, const StartFindings& findings) {
     if (!on_first || findings.found.empty() || told.exchange(true)) return;
     Candidate candidate = first_candidate(study, pair);
@@ -161,7 +166,9 @@ ToolScripts find_tool_scripts(const Study& study, const simulate::VesselModel& v
     candidate.steps = seated_steps(study, *ostium, candidate);
     on_first(candidate);
   };
-  for (const std::vector<std::size_t>& slots : tried_together(study, all.pairs)) {
+  const std::vector<std::vector<std::size_t>> groups = tried_together(study, all.pairs);
+  for (bool holds = false; !holds && all.groups < groups.size(); ++all.groups) {
+    const std::vector<std::size_t>& slots = groups[all.groups];
     std::vector<WayUp> ways(slots.size());
     for_each_slot(
         static_cast<int>(slots.size()),
@@ -187,14 +194,19 @@ ToolScripts find_tool_scripts(const Study& study, const simulate::VesselModel& v
           tell(pair, start.findings);
         },
         options);
-    bool holds = false;
     for (std::size_t k = 0; k < slots.size(); ++k) {
       PairFindings& pair = all.pairs[slots[k]];
       gather(study, starts, k, ways[k].findings, pair, all);
       holds = holds || pair.held >= kSteadyShare;
     }
-    if (holds) break;
   }
+}
+
+ToolScripts find_tool_scripts(const Study& study, const simulate::VesselModel& vessel,
+                              const BatchOptions& options,
+                              const std::function<void(const Candidate&)>& on_first) {
+  ToolScripts all;
+  search_on(study, vessel, options, on_first, all);
   return all;
 }
 

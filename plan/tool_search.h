@@ -54,6 +54,7 @@ struct ToolScripts {
                                                // stand in for it; only where most of it did
   std::vector<PairFindings> pairs;             // of all pairs, in the order of list_pairs()
   long branches = 0;                           // states that were gone on from
+  std::size_t groups = 0;                      // of pairs that are tried together: searched so far
 };
 
 /// Adds scripts of a pair, which begin as that candidate, with their spares where they hold.
@@ -79,5 +80,13 @@ Study tool_scout_study(const Study& study);
 ToolScripts find_tool_scripts(const Study& study, const simulate::VesselModel& vessel,
                               const BatchOptions& options,
                               const std::function<void(const Candidate&)>& on_first = nullptr);
+
+/// Whether there are pairs that `all` does not tell of yet: of catheters that the anatomy suggests
+/// three are tried together, then the next, else all at once.
+bool has_more_pairs(const Study& study, const ToolScripts& all);
+
+/// Goes on with these until one of them has a script that holds, and adds what it finds.
+void search_on(const Study& study, const simulate::VesselModel& vessel, const BatchOptions& options,
+               const std::function<void(const Candidate&)>& on_first, ToolScripts& all);
 
 }  // namespace wireplan::plan

@@ -298,8 +298,11 @@ std::vector<Stage> stages_of(const Case& given) {
   read_too(manoeuvres, {"/manoeuvres"});
   const bool tools = !given.catheters.empty();
   if (tools) read_too(manoeuvres, {"/catheters", "/tool_rules"});
-  if (given.manoeuvres == Manoeuvring::kWhenNeeded) {
-    // Plans are tried under disturbances.
+  const bool scripts_tried =
+      tools && given.suggest_catheters && given.manoeuvres != Manoeuvring::kNever;
+  if (scripts_tried) read_too(manoeuvres, {"/robustness/repeats"});
+  if (given.manoeuvres == Manoeuvring::kWhenNeeded || scripts_tried) {
+    // Plans, and scripts of suggested catheters, are tried under disturbances.
     if (voxels != nullptr) manoeuvres.after.emplace_back(voxels);
     read_too(manoeuvres, {"/robustness/seed", "/robustness/friction_factor",
                           "/robustness/stiffness_factor", "/robustness/wall_factor",

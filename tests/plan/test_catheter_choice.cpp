@@ -71,6 +71,9 @@ TEST(CatheterChoice, FollowsTheTakeOffAndTheTrunk) {
       << "Cobras, the wider one first";
   EXPECT_EQ(chosen(90.0, 8.0, 5.0), (std::vector<int>{1, 2, 0, 3}));
   EXPECT_EQ(chosen(30.0, 22.0, 5.0), (std::vector<int>{0, 2, 1, 3}));
+  // Simple curves begin 60 degrees off, reversed ones 120.
+  EXPECT_EQ(chosen(106.0, 8.0, 5.0), (std::vector<int>{1, 2, 3, 0})) << "nearer to reversed";
+  EXPECT_EQ(chosen(74.0, 40.0, 5.0), (std::vector<int>{2, 1, 0, 3})) << "nearer to simple";
   EXPECT_TRUE(chosen(90.0, 22.0, 1.6).empty()) << "thicker than the branch";
   const std::vector<Suggestion> simmons = suggest_catheters(known, turning_by(150.0, 22.0, 5.0));
   EXPECT_EQ(simmons.at(0).reason.find("the branch turns by 150 degrees from its trunk, which asks "

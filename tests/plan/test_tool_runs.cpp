@@ -3,6 +3,7 @@
 
 #include <vector>
 
+#include "plan/make_plan.h"
 #include "plan/trial_log.h"
 #include "tests/plan/memory_log.h"
 #include "tests/plan/two_renals.h"
@@ -62,6 +63,49 @@ TEST(ToolRuns, ThatBeginAlikeComeToTheSameTogetherAndAlone) {
       ASSERT_EQ(together[k].nodes.cols(), alone.nodes.cols());
       EXPECT_EQ(together[k].nodes, alone.nodes) << "bit for bit";
     }
+  }
+}
+
+/// In which other elements and pushes bring all to the same end, and so many of four repeats pass
+/// the branch by.
+class LogOfRepeats : public MemoryLog {
+ public:
+  explicit LogOfRepeats(int failures) : failures_(failures) {}
+  std::optional<Measured> find(const Run& run) override {
+    Run plain = run;
+    plain.elements.reset();
+    plain.disturbance.reset();
+    std::optional<Measured> end = MemoryLog::find(plain);
+    if (!end || !run.disturbance) return end;
+    if (repeats++ % 4 < failures_) {
+      end->outcome = simulate::Outcome::kPassedBy;
+      end->metrics.reached = false;
+    }
+    return end;
+  }
+  int repeats = 0;
+
+ private:
+  int failures_;
+};
+
+TEST(ToolRuns, MakePlanTriesTheNextCathetersWhereNoScriptHoldsInMostRepeats) {
+  const auto model = []() -> const simulate::VesselModel& { return aorta(); };
+  Study study = toward(1.0);
+  const Catheter hook = study.catheters.front(), wide = catheter_of(650.0, 1.0, 21.0);
+  study.catheters = {hook, wide, wide, hook};
+  study.suggested.assign(4, "suggested");
+  const PlanVessel vessel{
+      .path = study.goal.way->path(), .yields = false, .model = model, .rigid_model = model};
+  PlanOptions options{.until = PlanOptions::Until::kManoeuvres};
+  options.robustness.repeats = 4;
+  for (const int failures : {0, 1}) {
+    SCOPED_TRACE(failures);
+    LogOfRepeats log(failures);
+    const Plan plan = make_plan(study, vessel, options, log);
+    ASSERT_GT(plan.scripts.pairs.at(0).found, 0);
+    EXPECT_EQ(plan.scripts.pairs.at(3).tried(), failures > 0);
+    EXPECT_EQ(log.repeats, failures > 0 ? 8 : 4) << "of one script, or of two";
   }
 }
 

@@ -491,6 +491,12 @@ TEST(ToolSearch, TriesSuggestedCathetersThreeAtATime) {
   const ToolScripts first = find_tool_scripts(study, aorta(), {.threads = 2});
   EXPECT_GT(first.pairs[1].found, 0);
   EXPECT_FALSE(first.pairs[3].tried()) << "one before it holds";
+  ASSERT_TRUE(has_more_pairs(study, first));
+  ToolScripts all = first;
+  search_on(study, aorta(), {.threads = 2}, nullptr, all);
+  EXPECT_TRUE(all.pairs[3].tried());
+  EXPECT_GT(all.found.size(), first.found.size());
+  EXPECT_FALSE(has_more_pairs(study, all));
   study.suggested.clear();
   EXPECT_TRUE(find_tool_scripts(study, aorta(), {.threads = 2}).pairs[3].tried());
 }
