@@ -114,6 +114,12 @@ std::optional<Ostium> find_ostium(const simulate::Goal& goal) {
     here.narrowest = 2.0 * path.radius.head(before + 1).minCoeff();
     here.branch_diameter = 2.0 * mean_radius(path, junction.arc + 2.0, kInto);
     here.end = end;
+    const auto& tree = goal.way->tree();
+    if (junction.trunk >= 0) {
+      const Eigen::Matrix3Xd& trunk = tree[static_cast<std::size_t>(junction.trunk)].line.points;
+      here.trunk_beyond =
+          std::max(0.0, (here.trunk.transpose() * (trunk.colwise() - here.point)).maxCoeff());
+    }
   }
   return last;
 }

@@ -40,10 +40,11 @@ struct ToolRules {
 
 /// Where scripts are to bring the tip: the last vessel that the way takes from a wider one.
 struct Ostium : simulate::TakeOff {
-  double trunk_diameter = 0.0;   // just before                                          [mm]
-  double branch_diameter = 0.0;  // of the way, mean over 10 mm beyond it               [mm]
-  double end = 0.0;              // of the way, the target's place                       [mm]
-  double narrowest = HUGE_VAL;   // of the way up to the ostium, inscribed               [mm]
+  double trunk_diameter = 0.0;     // just before                                          [mm]
+  double branch_diameter = 0.0;    // of the way, mean over 10 mm beyond it               [mm]
+  double end = 0.0;                // of the way, the target's place                       [mm]
+  double narrowest = HUGE_VAL;     // of the way up to the ostium, inscribed               [mm]
+  double trunk_beyond = HUGE_VAL;  // of the trunk past the ostium, to where the image ends [mm]
 };
 
 /// None where the way takes none, as out of a branch into a wider vessel, or is not known.

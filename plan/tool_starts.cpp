@@ -560,6 +560,8 @@ class ToolSearch {
 
 }  // namespace
 
+double room_beyond() { return kTemplate.above[0] + kTemplate.leads + kTemplate.before_end; }
+
 WayUp go_up(const Study& study, const ToolPair& pair, const Ostium& ostium,
             const simulate::VesselModel& vessel, const std::function<bool()>& cancelled) {
   WayUp up;

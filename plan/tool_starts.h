@@ -33,6 +33,10 @@ struct WayUp {
   StartFindings findings;                      // scripts that reached on it
 };
 
+/// So much of the trunk past the ostium it takes to lead a catheter up over a wire and pull it down
+/// into the branch [mm].
+double room_beyond();
+
 /// The wire beyond the ostium, and the catheter over it.
 WayUp go_up(const Study& study, const ToolPair& pair, const Ostium& ostium,
             const simulate::VesselModel& vessel, const std::function<bool()>& cancelled);

@@ -2,10 +2,12 @@
 
 #include <algorithm>
 #include <cctype>
+#include <cmath>
 #include <utility>
 
 #include "plan/catheter_choice.h"
 #include "plan/number_text.h"
+#include "plan/tool_starts.h"
 
 namespace wireplan::plan {
 namespace {
@@ -36,6 +38,66 @@ std::string tell_astray(const Endings& endings, const std::string& noun) {
                                                  : endings.passed_by == 0
                                                      ? " went into another branch"
                                                      : " went past the branch or into another one");
+}
+
+/// The first five, and how many more there are.
+std::vector<std::string> first_of(std::vector<std::string> names) {
+  constexpr std::size_t kNamed = 5;
+  if (names.size() <= kNamed + 1) return names;
+  const std::size_t more = names.size() - kNamed;
+  names.resize(kNamed);
+  names.push_back(std::to_string(more) + " more");
+  return names;
+}
+
+/// So near to the ostium a catheter's tip lies at it; chosen [mm].
+constexpr double kAtOstium = 3.0;
+
+/// "cobra-c1 (4.3 mm), rdc (5.0 mm)": catheters, each once, by how near their tips came.
+std::vector<std::string> names_with_hooks(std::vector<PairFindings> pairs, const Known& known) {
+  std::stable_sort(pairs.begin(), pairs.end(), [](const PairFindings& a, const PairFindings& b) {
+    return a.nearest_hook < b.nearest_hook;
+  });
+  std::vector<std::string> texts;
+  std::vector<std::string> names;
+  for (const PairFindings& pair : pairs) {
+    const std::string name = catheter_name(known, pair);
+    if (std::find(names.begin(), names.end(), name) != names.end()) continue;
+    names.push_back(name);
+    texts.push_back(name + " (" + one_decimal(pair.nearest_hook) + " mm)");
+  }
+  return first_of(texts);
+}
+
+/// What of the catheters that were tried stops their scripts, and which tool that asks for.
+std::string tell_hooks(const Known& known) {
+  const std::optional<Ostium> ostium = find_ostium(known.study.goal);
+  std::vector<PairFindings> at, off;
+  for (const PairFindings& pair : known.plan.scripts.pairs) {
+    if (pair.found > 0) return {};  // in the patient as assumed nothing stops them
+    if (!pair.tried() || pair.nearest_hook < 0.0) continue;
+    (pair.nearest_hook <= kAtOstium ? at : off).push_back(pair);
+  }
+  if (!ostium || (at.empty() && off.empty())) return {};
+  const double take_off = std::acos(std::clamp(ostium->trunk.dot(ostium->branch), -1.0, 1.0));
+  if (at.empty()) {
+    return " No catheter's tip came to the ostium: " + list_words(names_with_hooks(off, known)) +
+           ". The branch turns by " + one_decimal(take_off / kRadPerDeg) +
+           " degrees from a trunk that is " + one_decimal(ostium->trunk_diameter) +
+           " mm wide, which asks for a catheter with a " + kind_name(asked_for(take_off)) +
+           " about as wide across.";
+  }
+  const PairFindings& best =
+      *std::min_element(at.begin(), at.end(), [](const PairFindings& a, const PairFindings& b) {
+        return std::pair(-a.furthest, a.nearest_hook) < std::pair(-b.furthest, b.nearest_hook);
+      });
+  const simulate::Wire& wire = known.study.wires[static_cast<std::size_t>(best.pair.wire)];
+  return " The catheter's tip came to the ostium (" + list_words(names_with_hooks(at, known)) +
+         "), but the wire out of it no further than " + one_decimal(best.furthest) + " of " +
+         one_decimal(ostium->end) +
+         " mm along the way: that asks for a wire with a softer tip than " + wire.name + " (" +
+         three_digits(wire.sections.front().bending_stiffness) +
+         " N mm^2), or one with an angled tip.";
 }
 
 /// Of a case that names catheters: `went` is how many went past the branch.
@@ -71,20 +133,34 @@ std::string change_of_catheters(const std::string& went, const Known& known) {
   const std::string was = names.size() == 1 ? " was tried" : " were tried";
   if (others.empty()) {
     return "Another access, or a catheter of another width: " + went + ", though " +
-           list_words(names) + was + ".";
+           list_words(names) + was + "." + tell_hooks(known);
   }
   return "A catheter of another shape: " + went + ", though " + list_words(names) + was + "; " +
-         list_words(others) + (others.size() == 1 ? " was not." : " were not.");
+         list_words(others) + (others.size() == 1 ? " was not." : " were not.") + tell_hooks(known);
 }
 
-/// The first five, and how many more there are.
-std::vector<std::string> first_of(std::vector<std::string> names) {
-  constexpr std::size_t kNamed = 5;
-  if (names.size() <= kNamed + 1) return names;
-  const std::size_t more = names.size() - kNamed;
-  names.resize(kNamed);
-  names.push_back(std::to_string(more) + " more");
-  return names;
+/// How much more of the trunk would have to be seen for a catheter to be led up past the branch and
+/// pulled down into it [mm]; 0 where there is room, or no catheter was tried.
+double missing_room(const Known& known) {
+  const std::vector<PairFindings>& pairs = known.plan.scripts.pairs;
+  const std::optional<Ostium> ostium = find_ostium(known.study.goal);
+  const bool tried = std::any_of(pairs.begin(), pairs.end(),
+                                 [](const PairFindings& pair) { return pair.tried(); });
+  return tried && ostium ? std::max(0.0, room_beyond() - ostium->trunk_beyond) : 0.0;
+}
+
+std::string change_of_image(const Endings& endings, const Known& known, const std::string& noun) {
+  const double missing = missing_room(known);
+  const std::string ended =
+      part_of(endings.left_image, endings.trials, noun) + " came to an end of the imaged vessel";
+  if (missing == 0.0) return "A scan that shows more of the vessel: " + ended + ".";
+  return "A scan that shows " + std::to_string(std::lround(std::ceil(missing))) +
+         " mm more of the vessel past the branch: " +
+         (endings.left_image > 0 ? ended + ". I" : "i") + "t ends " +
+         one_decimal(room_beyond() - missing) + " mm past the ostium, and " +
+         one_decimal(room_beyond()) +
+         " mm are what it takes to lead a catheter up over a wire and pull it down into the "
+         "branch.";
 }
 
 std::string change_at_branch(const Endings& endings, const Known& known, const std::string& noun) {
@@ -297,9 +373,8 @@ std::vector<std::string> changes_by(const Endings& endings, const Known& known,
           " ended before the target with all of the wire in.");
   add(endings.all_wire_in, change_of_wire_length(endings, known, noun));
   add(endings.missed, change_of_aim(endings, known, noun));
-  add(endings.left_image,
-      "A scan that shows more of the vessel: " + part_of(endings.left_image, endings.trials, noun) +
-          " came to an end of the imaged vessel.");
+  const int past = endings.passed_by + endings.wrong_branch + endings.left_image;
+  add(missing_room(known) > 0.0 ? past : endings.left_image, change_of_image(endings, known, noun));
   add(endings.crossed,
       "A stiffer wire, or a catheter around it: " + part_of(endings.crossed, endings.trials, noun) +
           " looped until the wire crossed itself.");

@@ -1,0 +1,88 @@
+// What stops scripts of catheter and wire, and which tool or length that asks for.
+#include <gtest/gtest.h>
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "plan/tool_starts.h"
+#include "tests/plan/known_plans.h"
+#include "tests/plan/two_renals.h"
+
+namespace wireplan::plan {
+namespace {
+
+/// As toward(1.0), with the aorta seen up to that height.
+simulate::Goal goal_below(double top) {
+  const auto way = std::make_shared<simulate::Way>(
+      line_through({{0.0, 0.0, 5.0}, {0.0, 0.0, kLevel}, {35.0, 0.0, kLevel}}),
+      std::vector<preprocess::Branch>{
+          {line_through({{0.0, 0.0, 5.0}, {0.0, 0.0, top}}), -1, 0.0},
+          {line_through({{0.0, 0.0, kLevel}, {44.0, 0.0, kLevel}}), 0, kLevel - 5.0}});
+  return {.point = way->section().center,
+          .radius = way->section().radius,
+          .at_section = true,
+          .way = way};
+}
+
+/// Ten trials that end so, and a pair whose catheter's tip came so near to the ostium.
+WhatIsKnown tried(double top, Outcome outcome, double nearest_hook) {
+  WhatIsKnown known;
+  known.study.goal = goal_below(top);
+  known.study.catheters = {catheter_of(650.0, 1.0, 8.0)};
+  known.add_many(10, outcome);
+  PairFindings& pair = known.plan.scripts.pairs.emplace_back();
+  pair.pair = {.catheter = 0, .wire = 0};
+  pair.nearest_hook = nearest_hook;
+  pair.furthest = 61.0;
+  pair.stopped = "the wire comes no further";
+  return known;
+}
+
+bool changes_by_words(const WhatIsKnown& known, const std::string& words) {
+  for (const std::string& text : known.verdict().changes) {
+    if (text.find(words) != std::string::npos) return true;
+  }
+  return false;
+}
+
+TEST(ToolVerdict, TheTrunkBeyondTheOstiumIsWhatIsSeenOfIt) {
+  EXPECT_NEAR(find_ostium(goal_below(128.0)).value().trunk_beyond, 128.0 - kLevel, 1.0);
+  EXPECT_NEAR(find_ostium(goal_below(75.0)).value().trunk_beyond, 75.0 - kLevel, 1.0);
+}
+
+TEST(ToolVerdict, AsksForSoMuchMoreOfTheVesselAsALedCatheterTakes) {
+  ASSERT_NEAR(room_beyond(), 33.0, 1e-9);
+  // 15 mm are seen past the ostium; the line's points are 1 mm apart.
+  const WhatIsKnown left = tried(75.0, Outcome::kLeftImage, 2.0);
+  EXPECT_TRUE(changes_by_words(
+      left,
+      "18 mm more of the vessel past the branch: all 10 trials came to an end of the imaged "
+      "vessel. It ends 15.0 mm past the ostium, and 33.0 mm are what it takes"));
+  EXPECT_TRUE(changes_by_words(tried(75.0, Outcome::kPassedBy, 2.0),
+                               "18 mm more of the vessel past the branch: it ends 15.0 mm past"));
+  // With room, and without a catheter, that is not what is missing.
+  EXPECT_FALSE(changes_by_words(tried(128.0, Outcome::kPassedBy, 2.0), "more of the vessel"));
+  WhatIsKnown wires = left;
+  wires.study.catheters.clear();
+  wires.plan.scripts.pairs.clear();
+  EXPECT_TRUE(changes_by_words(wires, "A scan that shows more of the vessel: all 10 trials"));
+}
+
+TEST(ToolVerdict, TellsACatheterThatDoesNotComeToTheOstiumFromAWireThatDoesNotTurnIn) {
+  EXPECT_TRUE(changes_by_words(
+      tried(128.0, Outcome::kPassedBy, 9.66),
+      "No catheter's tip came to the ostium: hook (9.7 mm). The branch turns by 90.0 degrees from "
+      "a trunk that is 18.0 mm wide, which asks for a catheter with a hooked curve about as wide"));
+  EXPECT_TRUE(changes_by_words(
+      tried(128.0, Outcome::kPassedBy, 0.4),
+      "The catheter's tip came to the ostium (hook (0.4 mm)), but the wire out of it no further "
+      "than 61.0 of 90.0 mm along the way: that asks for a wire with a softer tip than straight "
+      "(50 N mm^2), or one with an angled tip."));
+  WhatIsKnown found = tried(128.0, Outcome::kPassedBy, 0.4);
+  found.plan.scripts.pairs[0].found = 2;
+  EXPECT_FALSE(changes_by_words(found, "came to the ostium"));
+}
+
+}  // namespace
+}  // namespace wireplan::plan
