@@ -6,8 +6,6 @@
 #include <optional>
 #include <utility>
 
-#include "preprocess/centerline/path_place.h"
-
 namespace wireplan::plan {
 namespace {
 
@@ -59,7 +57,8 @@ class Search {
  public:
   Search(const Study& study, const Candidate& start, const Centerline& path,
          const simulate::VesselModel& vessel, const std::function<bool()>& cancelled)
-      : path_(path),
+      : study_(study),
+        path_(path),
         step_(study.insertion.step),
         cancelled_(cancelled),
         trial_(study.wires[static_cast<std::size_t>(start.wire)], make_introducer(study, start),
@@ -116,7 +115,7 @@ class Search {
 
   double progress_here() const {
     if (trial_.pushes().empty()) return 0.0;
-    return preprocess::find_progress(trial_.pushes().back().tip, path_);
+    return find_progress(trial_.pushes().back().tip, study_, path_);
   }
 
   /// Tries turns, and pulls after them, round where the attempt left the path. Keeps what came
@@ -167,6 +166,7 @@ class Search {
     }
   }
 
+  const Study& study_;
   const Centerline& path_;
   double step_;  //                                                                       [mm]
   const std::function<bool()>& cancelled_;

@@ -112,16 +112,22 @@ Metrics compute_metrics(const simulate::TrialResult& trial, const Study& study,
   return metrics;
 }
 
-double find_progress(const simulate::TrialResult& trial, const Centerline& path) {
+double find_progress(const Vec3& tip, const Study& study, const Centerline& path) {
+  const std::shared_ptr<const simulate::Way>& way = study.goal.way;
+  return way ? way->find_progress(tip) : preprocess::find_progress(tip, path);
+}
+
+double find_progress(const simulate::TrialResult& trial, const Study& study,
+                     const Centerline& path) {
   double progress = 0.0;
   for (const simulate::Push& push : trial.pushes) {
-    progress = std::max(progress, preprocess::find_progress(push.tip, path));
+    progress = std::max(progress, find_progress(push.tip, study, path));
   }
   return progress;
 }
 
 std::vector<ToolMetrics> compute_tool_metrics(const simulate::TrialResult& trial,
-                                              const Centerline& path) {
+                                              const Study& study, const Centerline& path) {
   std::vector<ToolMetrics> all;
   // Of a track from one change of its tool to the next.
   const auto add = [&](const simulate::ToolTrack& track, const std::string& name, std::size_t from,
@@ -139,7 +145,7 @@ std::vector<ToolMetrics> compute_tool_metrics(const simulate::TrialResult& trial
     tool.insertion = track.insertion[to - 1];
     if (trial.nodes.cols() > 1 && to == track.insertion.size()) {
       tool.progress =
-          preprocess::find_progress(simulate::point_at_arc(trial.nodes, tool.insertion), path);
+          find_progress(simulate::point_at_arc(trial.nodes, tool.insertion), study, path);
     }
   };
   for (const simulate::ToolTrack& track : trial.tools) {
@@ -167,7 +173,7 @@ ScriptMetrics compute_script_metrics(const simulate::TrialResult& trial, const S
   for (const simulate::ToolTrack& track : trial.tools) {
     script.exchanges += static_cast<int>(track.changes.size());
   }
-  const std::vector<ToolMetrics> tools = compute_tool_metrics(trial, path);
+  const std::vector<ToolMetrics> tools = compute_tool_metrics(trial, study, path);
   for (const ToolMetrics& tool : tools) {
     script.hand_force = std::max(script.hand_force, tool.peak_push_force);
     script.hub_torque = std::max(script.hub_torque, tool.peak_hub_torque);
@@ -196,11 +202,11 @@ Measured measure(const simulate::TrialResult& trial, const Study& study, const C
           .reason = trial.reason,
           .terms = trial.terms,
           .metrics = std::move(metrics),
-          .progress = find_progress(trial, path),
+          .progress = find_progress(trial, study, path),
           .last_tip = trial.pushes.empty() ? study.access : trial.pushes.back().tip,
           .nodes = trial.nodes,
           .sections = trial.sections,
-          .tools = compute_tool_metrics(trial, path)};
+          .tools = compute_tool_metrics(trial, study, path)};
 }
 
 }  // namespace wireplan::plan

@@ -145,7 +145,7 @@ inline constexpr std::array kToolMetricFields = {
 /// Of each tool of a trial that has several; else empty. From the outside in, those that were
 /// exchanged in the order of their use.
 std::vector<ToolMetrics> compute_tool_metrics(const simulate::TrialResult& trial,
-                                              const Centerline& path);
+                                              const Study& study, const Centerline& path);
 
 /// Expects a study with catheters.
 ScriptMetrics compute_script_metrics(const simulate::TrialResult& trial, const Study& study,
@@ -168,8 +168,12 @@ struct Measured {
 /// Whether the trial reached, and its catheter did not follow by the script's last step.
 bool stays_unseated(const Candidate& script, const Measured& trial);
 
-/// How far along the path the tip came in any push while it was in the path's lumen [mm].
-double find_progress(const simulate::TrialResult& trial, const Centerline& path);
+/// How far along the way a tip is (simulate::Way); of a study without one along the path [mm].
+double find_progress(const Vec3& tip, const Study& study, const Centerline& path);
+
+/// How far along it the tip came in any push [mm].
+double find_progress(const simulate::TrialResult& trial, const Study& study,
+                     const Centerline& path);
 
 Measured measure(const simulate::TrialResult& trial, const Study& study, const Centerline& path);
 

@@ -4,8 +4,6 @@
 #include <cmath>
 #include <utility>
 
-#include "preprocess/centerline/path_place.h"
-
 namespace wireplan::plan {
 namespace {
 
@@ -92,7 +90,6 @@ class ToolSearch {
       : study_(study),
         ostium_(ostium),
         cancelled_(cancelled),
-        path_(study.goal.way->path()),
         catheter_(study.catheters[static_cast<std::size_t>(pair.catheter)]),
         wire_(study.wires[static_cast<std::size_t>(pair.wire)]),
         trial_(trial) {}
@@ -134,7 +131,7 @@ class ToolSearch {
 
   double insertion(int tool) const { return trial_.insertion(tool); }
   double progress() const {
-    return trial_.pushes().empty() ? 0.0 : preprocess::find_progress(trial_.foremost_tip(), path_);
+    return trial_.pushes().empty() ? 0.0 : study_.goal.way->find_progress(trial_.foremost_tip());
   }
   State here(double off = 0.0) const {
     return {{steps_, trial_.save()},
@@ -165,7 +162,7 @@ class ToolSearch {
     trial_.make(step);
     double furthest = 0.0;
     for (std::size_t k = pushes; k < trial_.pushes().size(); ++k) {
-      furthest = std::max(furthest, preprocess::find_progress(trial_.pushes()[k].tip, path_));
+      furthest = std::max(furthest, study_.goal.way->find_progress(trial_.pushes()[k].tip));
     }
     if (furthest > findings_.furthest) {
       findings_.furthest = furthest;
@@ -541,7 +538,6 @@ class ToolSearch {
   const Study& study_;
   const Ostium& ostium_;
   const std::function<bool()>& cancelled_;
-  const Centerline& path_;
   const Catheter& catheter_;
   const simulate::Wire& wire_;
   ToolTrial& trial_;

@@ -6,7 +6,6 @@
 
 #include "plan/number_text.h"
 #include "plan/tool_starts.h"
-#include "preprocess/centerline/path_place.h"
 
 namespace wireplan::plan {
 namespace {
@@ -43,7 +42,6 @@ class SeatedSearch {
       : study_(study),
         ostium_(ostium),
         cancelled_(cancelled),
-        path_(study.goal.way->path()),
         catheter_(study.catheters.at(static_cast<std::size_t>(candidate.catheter))),
         first_(study.wires.at(static_cast<std::size_t>(candidate.first_wire))),
         wire_(study.wires.at(static_cast<std::size_t>(candidate.wire))),
@@ -180,7 +178,7 @@ class SeatedSearch {
     const bool goes_on = go({.tool = kBroughtIn, .push = push}, /*last=*/true);
     double progress = 0.0;
     for (std::size_t k = pushes; k < trial_.pushes().size(); ++k) {
-      progress = std::max(progress, preprocess::find_progress(trial_.pushes()[k].tip, path_));
+      progress = std::max(progress, study_.goal.way->find_progress(trial_.pushes()[k].tip));
     }
     if (trial_.reached()) return keep(depth, progress);
     tell_stop(goes_on ? "its last push ends before the target" : trial_.reason(), progress);
@@ -204,7 +202,6 @@ class SeatedSearch {
   const Study& study_;
   const Ostium& ostium_;
   const std::function<bool()>& cancelled_;
-  const Centerline& path_;
   const Catheter& catheter_;
   const simulate::Wire &first_, &wire_;
   ToolScript steps_;

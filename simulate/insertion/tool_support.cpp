@@ -58,7 +58,7 @@ std::optional<CatheterSupport> ToolTrial::find_support() const {
   ToolBench bench(bench_);
   const auto depth = [&] {
     const Vec3 tip = bench.at_rest(bench.nodes_of(0).rightCols<1>());
-    return preprocess::find_progress(tip, goal_.way->path()) - options_.take_off->arc;
+    return goal_.way->find_progress(tip) - options_.take_off->arc;
   };
   const double seated = measure(Until::kInBranch, 0);
   if (!(seated > 0.0)) return {};

@@ -120,7 +120,7 @@ double ToolTrial::measure(Until until, int tool) const {
   const TakeOff& branch = *options_.take_off;
   const int watched = tool == kBothTools ? 0 : tool;
   if (until == Until::kInBranch) {
-    return preprocess::find_progress(tip(watched), goal_.way->path()) - branch.arc;
+    return goal_.way->find_progress(tip(watched)) - branch.arc;
   }
   if (until == Until::kLevel) return (tip(watched) - branch.point).dot(branch.trunk);
   const Vec3 looks = tip_direction(watched);
@@ -526,7 +526,7 @@ void ToolTrial::check_place() {
 
 /// Whether a push brings the tip further along the way than this step has yet.
 bool ToolTrial::comes_further(double pushed) {
-  const double progress = preprocess::find_progress(foremost_tip(), goal_.way->path());
+  const double progress = goal_.way->find_progress(foremost_tip());
   const bool further = progress > furthest_;
   since_furthest_ = further ? 0.0 : since_furthest_ + pushed;
   if (further) furthest_ = progress;
@@ -538,7 +538,7 @@ bool ToolTrial::check_advance(double pushed) {
   if (!goal_.way || ended()) return !ended();
   if (comes_further(pushed) || since_furthest_ <= kToolPatience) return true;
   const Push& push = record_.pushes.back();
-  const double progress = preprocess::find_progress(foremost_tip(), goal_.way->path());
+  const double progress = goal_.way->find_progress(foremost_tip());
   end_where_it_is(progress > 0.0 ? Outcome::kStuck : Outcome::kMissed,
                   "the tip came no further than " + in_mm(furthest_) + " along the way while " +
                       in_mm(since_furthest_) + " more went in, and is at " + place_text(push.tip) +

@@ -272,7 +272,7 @@ void Trial::check_advance(std::size_t goal, double distance) {
   Pursuit& pursuit = pursuits_[goal];
   const Push& push = record_.pushes.back();
   const Centerline& path = own.way->path();
-  const double progress = preprocess::find_progress(tip_at_rest(), path);
+  const double progress = own.way->find_progress(tip_at_rest());
   if (distance <= 0.0 || progress > pursuit.furthest) {
     pursuit.furthest = progress;
     pursuit.since_furthest = 0.0;

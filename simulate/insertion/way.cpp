@@ -15,7 +15,7 @@ using preprocess::find_place;
 using preprocess::is_on_path;
 using preprocess::PathPlace;
 
-constexpr double kSectionReach = 2.5;   // of a cross-section from its middle, in inscribed radii
+constexpr double kSectionReach = 4.0;   // of a flat cross-section from its middle, in radii
 constexpr double kThinWall = 0.75;      // less is no wall between two places              [mm]
 constexpr double kWalk = 0.5;           // between looks for a wall                        [mm]
 constexpr double kLookedAt = 20.0;      // of a wire, from the tip, for an arrival         [mm]
@@ -125,7 +125,8 @@ std::optional<std::string> Way::find_detour(const Eigen::Ref<const Eigen::Matrix
   Vec3 off_at = Vec3::Zero();
   for (Eigen::Index i = 0; i < wire.cols(); ++i) {
     const PathPlace place = find_place(wire.col(i), path_);
-    if (place.from_lumen > std::max({off, kOffLumen, place.radius})) {
+    const bool beside = place.from_lumen > std::max({off, kOffLumen, place.radius});
+    if (beside && (tree_.empty() || find_astray(wire.col(i)))) {
       off = place.from_lumen;
       off_at = wire.col(i);
     }
@@ -223,6 +224,11 @@ std::optional<Astray> Way::find_astray(const Vec3& tip) const {
                         (in_targets
                              ? "the target"
                              : "the way turns into " + name_of_start(next_branch(on_way.branch)))};
+}
+
+double Way::find_progress(const Vec3& tip) const {
+  const PathPlace place = find_place(tip, path_);
+  return is_on_path(place) || (!tree_.empty() && !find_astray(tip)) ? place.arc : 0.0;
 }
 
 std::optional<int> Way::find_image_end(const Vec3& tip, const Lumen& lumen) const {

@@ -53,13 +53,17 @@ class Way {
                                            const Lumen& lumen) const;
 
   /// Why a wire, as far as it is to lie on the way, did not come along it, if so: part of it lies
-  /// outside of the way's lumen by more than the way's radius there (5 mm at least), or runs back
-  /// along it by more than four radii (20 mm at least).
+  /// outside of the way's lumen, by more than the way's radius there (5 mm at least) off its balls,
+  /// or runs back along it by more than four radii (20 mm at least).
   std::optional<std::string> find_detour(const Eigen::Ref<const Eigen::Matrix3Xd>& wire) const;
 
   /// Where a tip is that is not on the way; empty for one that is. Half a radius beside the way's
   /// balls counts as on it, unless it is inside another vessel's.
   std::optional<Astray> find_astray(const Vec3& tip) const;
+
+  /// How far along the way a tip is; 0 where it is not on it. In a flat lumen that may be far
+  /// beside the balls: a tree then tells whether the tip is in a vessel of the way [mm].
+  double find_progress(const Vec3& tip) const;
 
   /// The end of the image that a tip has come to: within half a radius of where a branch ends with
   /// nothing but wall ahead. An artery goes on there in the patient, whether the model ends flat or

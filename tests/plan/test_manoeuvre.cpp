@@ -81,7 +81,7 @@ StraightPushes push_straight(const Study& study) {
   for (const Candidate& candidate : candidates) {
     const simulate::TrialResult trial = run_candidate(study, candidate, side_branches());
     pushes.outcomes.push_back(trial.outcome);
-    pushes.progress.push_back(find_progress(trial, path_into_the_branch()));
+    pushes.progress.push_back(find_progress(trial, study, path_into_the_branch()));
   }
   for (const int k : choose_starts(study, candidates, pushes.progress, pushes.outcomes, 2)) {
     pushes.starts.push_back(candidates[static_cast<std::size_t>(k)]);

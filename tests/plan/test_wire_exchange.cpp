@@ -89,7 +89,7 @@ TEST(WireExchange, FiguresAreOfEachWireByItself) {
   trial.nodes = Eigen::Matrix3Xd::Zero(3, 2);
   trial.nodes.col(1) = Vec3(0.0, 0.0, 9.0);
   const Centerline path = line_through({{0.0, 0.0, 0.0}, {0.0, 0.0, 50.0}});
-  const std::vector<ToolMetrics> all = compute_tool_metrics(trial, path);
+  const std::vector<ToolMetrics> all = compute_tool_metrics(trial, {}, path);
   ASSERT_EQ(all.size(), 3U);
   EXPECT_EQ(all[0].name + " " + all[1].name + " " + all[2].name, "hook soft stiff");
   EXPECT_EQ(all[1].peak_tip_force, 3.0);

@@ -93,6 +93,25 @@ TEST(Way, EveryWireThatPassesTheSectionOfATubeReachesWhereverItRuns) {
   }
 }
 
+/// As the true lumen of a dissection: 3 mm from its middle to the near wall, 12 mm to its edges.
+TEST(Way, InAFlatLumenAWireAlongItsEdgeAdvancesAndReaches) {
+  Surface flat = shapes::straight_tube(3.0, 150.0, 1.5);
+  flat.vertices.row(0) *= 4.0;
+  const VesselModel tube(flat, LumenOptions{.grid_spacing = 0.6});
+  const Centerline line = line_through({{0.0, 0.0, 5.0}, {0.0, 0.0, 145.0}}, 3.0);
+  const Goal goal =
+      goal_of(line_through({{0.0, 0.0, 5.0}, {0.0, 0.0, 130.0}}, 3.0), {{line, -1, 0.0}});
+  for (const double shift : {0.0, 5.0, 8.0, -9.0}) {
+    EXPECT_EQ(goal.way->find_progress(Vec3(shift, 1.0, 100.0)), 95.0) << shift;
+    const Introducer introducer{.point = Vec3(shift, 0.0, 5.0), .direction = Vec3::UnitZ()};
+    const TrialResult trial = run_trial(wire_of(60.0), introducer, goal, tube, options(2.0));
+    EXPECT_EQ(trial.outcome, Outcome::kReached)
+        << shift << ": " << outcome_name(trial.outcome) << " " << trial.reason;
+  }
+  const Way fork_way(into_branch(kSecond, 25.0), tree_of_fork());
+  EXPECT_EQ(fork_way.find_progress(Vec3(15.0, 0.0, kFirst)), 0.0) << "in another branch";
+}
+
 TEST(Way, APushFarPastTheSectionReaches) {
   const VesselModel tube(shapes::straight_tube(6.0, 80.0, 2.0));
   const Goal goal = goal_of(line_through({{0.0, 0.0, 5.0}, {0.0, 0.0, 60.0}}, 6.0));
