@@ -366,6 +366,23 @@ std::optional<Junction> junction_at(const simulate::Way& of, double arc, int chi
   return junction;
 }
 
+/// Makes one turn of two at one level: of the way into a stem without length, and out of that.
+void join_turns(std::vector<Junction>& junctions) {
+  for (std::size_t k = 1; k < junctions.size();) {
+    const Junction& stem = junctions[k - 1];
+    Junction& own = junctions[k];
+    const bool turns = stem.taken && own.taken && !stem.entered && !own.entered &&
+                       !stem.bifurcation && !own.bifurcation && stem.trunk != stem.branch;
+    if (!turns || own.trunk != stem.branch || own.level != stem.level) {
+      ++k;
+      continue;
+    }
+    own.trunk = stem.trunk;
+    own.trunk_direction = stem.trunk_direction;
+    junctions.erase(junctions.begin() + static_cast<std::ptrdiff_t>(k) - 1);
+  }
+}
+
 }  // namespace
 
 LinePart find_part(const Centerline& line, double arc) {
@@ -387,7 +404,11 @@ std::string leaving_name(const std::vector<preprocess::Branch>& tree, const Junc
                             : simulate::own_start(tree[static_cast<std::size_t>(junction.branch)]);
   const std::string name = branch_name(tree, junction.branch, begins);
   const std::string number = "branch " + std::to_string(junction.branch + 1);
-  return junction.entered && name == number ? "the wider vessel (" + number + ")" : name;
+  if (junction.entered && name == number) return "the wider vessel (" + number + ")";
+  // The trunk parts, and the way's own part has no other name than the trunk.
+  if (junction.trunk != junction.branch || name != trunk_name(tree, junction)) return name;
+  const double other = simulate::own_start(tree[static_cast<std::size_t>(junction.fork)]);
+  return name + ", past " + branch_name(tree, junction.fork, other);
 }
 
 std::string trunk_name(const std::vector<preprocess::Branch>& tree, const Junction& junction) {
@@ -513,6 +534,7 @@ std::vector<Junction> find_junctions(const simulate::Way& of) {
   std::stable_sort(junctions.begin(), junctions.end(), [](const Junction& a, const Junction& b) {
     return std::tie(a.level, a.taken) < std::tie(b.level, b.taken);
   });
+  join_turns(junctions);
   return junctions;
 }
 

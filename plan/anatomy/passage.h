@@ -54,7 +54,8 @@ struct Junction {
 /// By how much the branch turns from the trunk [rad].
 double turn_of(const Junction& junction);
 
-/// The vessel that leaves, by the name of its part there.
+/// The vessel that leaves, by the name of its part there; where a vessel parts and the way's part
+/// is called as before, by the other too: "branch 1, past branch 11".
 std::string leaving_name(const std::vector<preprocess::Branch>& tree, const Junction& junction);
 
 /// The vessel that it leaves, by the name of its part there.
@@ -74,7 +75,8 @@ std::string trunk_name(const std::vector<preprocess::Branch>& tree, const Juncti
 /// crosses the trunk at right angles, and settles in an oblique branch only beyond the ostium.
 /// Where the trunk parts into arteries of like width (simulate::parts), and where the way goes from
 /// one leg into the other of two that meet in a wider vessel, the trunk's direction is that before
-/// the fork. A way out of a branch into a wider vessel turns into that; the ostium is then where it
+/// the fork. A turn into a stem and one out of it at the same level are one, out of the trunk. A
+/// way out of a branch into a wider vessel turns into that; the ostium is then where it
 /// comes into the vessel's spheres, and the level where it comes to its axis. Expects a tree that
 /// starts where the way does, as find_tree() makes it.
 std::vector<Junction> find_junctions(const simulate::Way& of);

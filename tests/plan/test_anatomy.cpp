@@ -138,6 +138,42 @@ TEST(Junctions, TreeWhoseFirstBranchEndsInTheSmallArteryTellsTheSame) {
   EXPECT_NEAR(found[0].branch_direction.dot(Vec3::UnitX()), 1.0, 1e-9);
 }
 
+TEST(Junctions, AStemWithoutLengthIsOneTurnOutOfTheTrunk) {
+  // As where carotid and brachiocephalic artery leave the arch by one mouth.
+  Branch first{.line = line_through({Vec3::Zero(), Vec3(0, 0, 100), Vec3(60, 0, 100)}, 3.5)};
+  first.line.radius.head(200).setConstant(10.0);
+  const Branch upper{.line = line_through({Vec3(0, 0, 100), Vec3(0, 0, 200)}, 10.0),
+                     .parent = 0,
+                     .parent_arc = 100.0};
+  const Branch own{.line = line_through({Vec3(3, 0, 100), Vec3(60, 50, 100)}, 3.0),
+                   .parent = 0,
+                   .parent_arc = 103.0};
+  Centerline way =
+      line_through({Vec3::Zero(), Vec3(0, 0, 100), Vec3(3, 0, 100), Vec3(50, 41, 100)}, 3.0);
+  for (Eigen::Index k = 0; way.arc_length(k) < 100.0; ++k) way.radius(k) = 10.0;
+  const auto found = find_junctions(simulate::Way(way, {first, upper, own}));
+  ASSERT_EQ(found.size(), 1u);
+  EXPECT_TRUE(found[0].taken);
+  EXPECT_EQ(found[0].trunk, 1);
+  EXPECT_EQ(found[0].branch, 2);
+  EXPECT_NEAR(found[0].trunk_direction.dot(Vec3::UnitZ()), 1.0, 1e-6);
+}
+
+TEST(Junctions, WhereAVesselPartsTheWaysPartIsToldByTheOther) {
+  Centerline leg = line_through({Vec3::Zero(), Vec3(0, 0, 100), Vec3(-60, 0, 180)}, 5.0);
+  leg.radius.head(200).setConstant(8.0);
+  const std::vector<Branch> tree = {{.line = leg},
+                                    {.line = line_through({Vec3(0, 0, 100), Vec3(60, 0, 180)}, 5.0),
+                                     .parent = 0,
+                                     .parent_arc = 100.0}};
+  Centerline way = line_through({Vec3::Zero(), Vec3(0, 0, 100), Vec3(-50, 0, 167)}, 5.0);
+  way.radius.head(200).setConstant(8.0);
+  const auto found = find_junctions(simulate::Way(way, tree));
+  ASSERT_EQ(found.size(), 1u);
+  EXPECT_TRUE(found[0].taken);
+  EXPECT_EQ(leaving_name(tree, found[0]), "branch 1, past branch 2");
+}
+
 TEST(Junctions, OppositeRenalsFourMillimetresApartAreOneOstiumOnTheWay) {
   // The left one is the wider, and lower: the way into the right one passes it.
   const Branch left = side_branch(96.0, 60.0, 3.0, 96.0);
