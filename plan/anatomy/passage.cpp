@@ -45,7 +45,7 @@ Centerline joined(const Centerline& way, double arc, const Centerline& after) {
 }
 
 /// Where a line, from an arc length on, leaves the trunk's spheres; `arc` where it never does.
-double find_ostium(const Centerline& line, double arc, const Centerline& trunk) {
+double find_ostium_arc(const Centerline& line, double arc, const Centerline& trunk) {
   for (Eigen::Index k = segment_at(line, arc); k < line.points.cols(); ++k) {
     const preprocess::PathPlace place = preprocess::find_place(line.points.col(k), trunk);
     if (place.from_axis > place.radius) return line.arc_length(k);
@@ -100,7 +100,7 @@ Junction junction_of(const Centerline& way, double arc, const Trunk& of, const C
                      double from) {
   const Centerline& trunk = of.line;
   const preprocess::PathPlace place = preprocess::find_place(point_at(side, from), trunk);
-  const double reach = 2.0 * place.radius, ostium = find_ostium(side, from, trunk);
+  const double reach = 2.0 * place.radius, ostium = find_ostium_arc(side, from, trunk);
   Junction junction{.taken = &side == &way};
   junction.level = find_level(way, arc, of, point_at(side, ostium));
   junction.arc = junction.taken ? ostium : junction.level;
@@ -402,7 +402,7 @@ std::string leaving_name(const std::vector<preprocess::Branch>& tree, const Junc
   const double begins = goes_on
                             ? simulate::begins_behind(tree, junction.fork)
                             : simulate::own_start(tree[static_cast<std::size_t>(junction.branch)]);
-  const std::string name = branch_name(tree, junction.branch, begins);
+  std::string name = branch_name(tree, junction.branch, begins);
   const std::string number = "branch " + std::to_string(junction.branch + 1);
   if (junction.entered && name == number) return "the wider vessel (" + number + ")";
   // The trunk parts, and the way's own part has no other name than the trunk.

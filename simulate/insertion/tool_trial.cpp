@@ -194,13 +194,12 @@ bool ToolTrial::advance(const ToolStep& step, bool last, bool looks) {
     // Within another tool it brings no tip on.
     const bool leads = foremost_of(step.tool) > foremost() - 1e-9;
     if (!leads || step.push <= 0.0) continue;
+    const bool at_end = step.steers > 0 && is_near_end(step.tool, kSteerBeforeEnd);
     if (step.steers > 0 && may_lose_way()) {
       if (loses_way(by)) return true;
-    } else if (step.steers > 0 && is_near_end(step.tool, kSteerBeforeEnd)) {
-      break;
-    } else if (looks && goal_.way) {
+    } else if (looks && goal_.way && !at_end) {
       if (!comes_further(by) && since_furthest_ > kToolPatience) return true;
-    } else if (last && !check_advance(by)) {
+    } else if (at_end || (last && !check_advance(by))) {
       break;
     }
   }
