@@ -25,10 +25,6 @@ double angle_off(CurveKind kind, double take_off) {
   return std::max({0.0, kHookedFrom - angle, angle - kHookedTo});
 }
 
-double take_off_of(const Ostium& ostium) {
-  return std::acos(std::clamp(ostium.trunk.dot(ostium.branch), -1.0, 1.0));
-}
-
 }  // namespace
 
 const char* kind_name(CurveKind kind) {
@@ -89,6 +85,10 @@ double curved_length(const simulate::Wire& tube, bool first) {
     if (first) break;
   }
   return end;
+}
+
+double take_off_of(const Ostium& ostium) {
+  return std::acos(std::clamp(ostium.trunk.dot(ostium.branch), -1.0, 1.0));
 }
 
 CurveKind asked_for(double take_off) {

@@ -26,6 +26,9 @@ CurveShape find_shape(const simulate::Wire& tube);
 /// Length from the tip to the end of a catheter's first or last curve [mm].
 double curved_length(const simulate::Wire& tube, bool first);
 
+/// How far the branch turns from its trunk [rad].
+double take_off_of(const Ostium& ostium);
+
 /// The kind that a branch asks for which turns so far from its trunk: simple below 60 degrees,
 /// hooked to 120, reversed beyond, where it leaves back down (references-2 L; limits assumed).
 CurveKind asked_for(double take_off);

@@ -79,7 +79,7 @@ std::string tell_hooks(const Known& known) {
     (pair.nearest_hook <= kAtOstium ? at : off).push_back(pair);
   }
   if (!ostium || (at.empty() && off.empty())) return {};
-  const double take_off = std::acos(std::clamp(ostium->trunk.dot(ostium->branch), -1.0, 1.0));
+  const double take_off = take_off_of(*ostium);
   if (at.empty()) {
     return " No catheter's tip came to the ostium: " + list_words(names_with_hooks(off, known)) +
            ". The branch turns by " + one_decimal(take_off / kRadPerDeg) +

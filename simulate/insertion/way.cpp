@@ -126,7 +126,7 @@ std::optional<std::string> Way::find_detour(const Eigen::Ref<const Eigen::Matrix
   for (Eigen::Index i = 0; i < wire.cols(); ++i) {
     const PathPlace place = find_place(wire.col(i), path_);
     const bool beside = place.from_lumen > std::max({off, kOffLumen, place.radius});
-    if (beside && (tree_.empty() || find_astray(wire.col(i)))) {
+    if (beside && !is_in_own_vessel(wire.col(i))) {
       off = place.from_lumen;
       off_at = wire.col(i);
     }
@@ -226,9 +226,13 @@ std::optional<Astray> Way::find_astray(const Vec3& tip) const {
                              : "the way turns into " + name_of_start(next_branch(on_way.branch)))};
 }
 
+bool Way::is_in_own_vessel(const Vec3& place) const {
+  return !tree_.empty() && !find_astray(place);
+}
+
 double Way::find_progress(const Vec3& tip) const {
   const PathPlace place = find_place(tip, path_);
-  return is_on_path(place) || (!tree_.empty() && !find_astray(tip)) ? place.arc : 0.0;
+  return is_on_path(place) || is_in_own_vessel(tip) ? place.arc : 0.0;
 }
 
 std::optional<int> Way::find_image_end(const Vec3& tip, const Lumen& lumen) const {

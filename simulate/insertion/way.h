@@ -80,6 +80,9 @@ class Way {
  private:
   /// The branch of the way that it goes on in from another.
   int next_branch(int branch) const;
+  /// Whether a place, however far beside the way's balls, is in a vessel of the way; never without
+  /// a tree.
+  bool is_in_own_vessel(const Vec3& place) const;
   /// Whether a tip is on the other side of the bifurcation: where it is, the branch of the way that
   /// it comes from, and the branch by which it left that, -1 where it is in it.
   bool is_across(const BranchPlace& tip, const BranchPlace& on_way, int left) const;
