@@ -58,14 +58,32 @@ const armTable = ({ostia, bend}) =>
     ...(bend.best ? [["the sharpest bend", mm(bend.at_mm), "\u2013", ...[bend.best, bend.second].map((view) => viewText(view, ["far arm", "near arm"]))]] : [])]);
 
 const kFromTheFront = {view: "LAO 0, CRA 0", lao_deg: 0, cranial_deg: 0};
+const kAxes = ["first", "second", "third"];
 
 /** The ostium to work at: that of the target's branch, where the way turns into it. */
 export const workingOstium = ({ostia}) => ostia.findLast((row) => row.leads_to_target ?? row === ostia.at(-1));
 
-/** The view to work in at an ostium: the best that the arm reaches; from the front without one, and where the axes are not the patient's. */
-export const workingView = (ostium) => {
+/** Where the input's axes are not the patient's: along the one in which the vessel reaches least; the one in which it reaches furthest stands upright, the access below. */
+const alongAnAxis = ({tree, way}) => {
+  const points = [...tree, way].flatMap((line) => line.points);
+  const reach = kAxes.map((_, k) => points.reduce((most, p) => Math.max(most, p[k]), -Infinity) - points.reduce((least, p) => Math.min(least, p[k]), Infinity));
+  const [least, middle, most] = [0, 1, 2].sort((j, k) => reach[j] - reach[k]);
+  const unit = (axis, length) => kAxes.map((_, k) => (k === axis ? length : 0));
+  return {view: `along the ${kAxes[least]} axis of the input`, right: unit(middle, 1), up: unit(most, way.points.at(-1)[most] < way.points[0][most] ? -1 : 1)};
+};
+
+/** The view to work in at an ostium: the best that the arm reaches; from the front without one; along an axis where the axes are not the patient's. */
+export const workingView = (arm, ostium, panel) => {
+  if (arm.no_views) return alongAnAxis(panel);
   if (!ostium?.best) return kFromTheFront;
   return ostium.best.reachable || !ostium.second ? ostium.best : ostium.second;
+};
+
+/** The picture's axes in space, as unit vectors: of a C-arm's view, or as the view has them. */
+const axesOf = (view) => {
+  if (view.up) return view;
+  const a = (view.lao_deg * Math.PI) / 180, b = (view.cranial_deg * Math.PI) / 180;
+  return {right: [Math.cos(a), Math.sin(a), 0], up: [-Math.sin(a) * Math.sin(b), Math.cos(a) * Math.sin(b), Math.cos(b)]};
 };
 
 /**
@@ -73,9 +91,7 @@ export const workingView = (ostium) => {
  * whose place the middle of the way is drawn without; an ostium; access and target.
  */
 export const drawView = ({tree, way}, view, marks) => {
-  const a = (view.lao_deg * Math.PI) / 180, b = (view.cranial_deg * Math.PI) / 180;
-  const right = [Math.cos(a), Math.sin(a), 0];
-  const up = [-Math.sin(a) * Math.sin(b), Math.cos(a) * Math.sin(b), Math.cos(b)];
+  const {right, up} = axesOf(view);
   const dot = (u, p) => u[0] * p[0] + u[1] * p[1] + u[2] * p[2];
   const seen = (p) => [dot(right, p), -dot(up, p)];
   const round = (x) => x.toFixed(1);
@@ -111,11 +127,11 @@ export const drawView = ({tree, way}, view, marks) => {
     lumen, middle, names, ends, marks.ostium ? circle(marks.ostium) : null);
 };
 
-const pictureOf = (panel, ostium) => {
-  const view = workingView(ostium);
+const pictureOf = (arm, panel, ostium) => {
+  const view = workingView(arm, ostium, panel);
   return el("figure", {},
     drawView(panel, view, {ostium: ostium.place_mm}),
-    el("figcaption", {}, `${ostium.best ? view.view : "Against the second axis of the input"}: as the detector sees the way (blue) and the vessels beside it (grey), as wide as their lumen, each branch with its number at its end; the ostium of ${ostium.branch} is circled.`));
+    el("figcaption", {}, `${arm.no_views ? `Seen ${view.view}` : `${view.view}, as the detector sees it`}: the way blue, the vessels beside it grey, as wide as their lumen, each branch with its number at its end; the ostium of ${ostium.branch} circled.`));
 };
 
 // ---- Lengths.
@@ -146,7 +162,7 @@ export const anatomySection = (page) => {
     ostia.length
       ? [arm.no_views ? el("p", {}, `No C-arm angles: ${shown(arm.no_views)}.`) : el("p", {}, `Views that show a vessel and the branch that the way takes in their length, for a patient who lies straight on the back. LAO turns the detector to the patient's left, RAO to the right, CRA to the head, CAU to the feet. Within reach is ${degrees(arm.max_rotation_deg)} to either side and ${degrees(arm.max_tilt_deg)} up or down (${shown(arm.source)}).`),
          armTable(arm),
-         page.panels.anatomy ? ostia.map((ostium) => pictureOf(page.panels.anatomy, ostium)) : null].flat()
+         page.panels.anatomy ? ostia.map((ostium) => pictureOf(arm, page.panels.anatomy, ostium)) : null].flat()
       : el("p", {}, "The way leaves no vessel for a branch, so no ostium asks for a view of its own."),
     el("h3", {}, "Lengths and wires"), lengthTable(lengths), lengthFacts(lengths));
 };

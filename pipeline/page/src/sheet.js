@@ -207,14 +207,14 @@ const pictureBlock = (page) => {
     return block("picture", "The vessel", el("p", {}, "A picture of the vessel stands below."));
   }
   const ostium = workingOstium(anatomy.c_arm), known = !anatomy.c_arm.no_views;
-  const view = known ? workingView(ostium) : {...workingView(null), view: "along the second axis of the input"};
+  const view = workingView(anatomy.c_arm, ostium, panel);
   const nodes = ranking.length ? page.trials[ranking[0].trial].nodes() : new Float32Array();
   const wire = Array.from({length: nodes.length / 3}, (_, k) => [...nodes.subarray(3 * k, 3 * k + 3)]);
   const drawing = drawView(panel, view, {wire, ostium: ostium?.place_mm, access: page.access, target: page.target});
   const second = ostium?.second && view !== ostium.second ? `Second best: ${ostium.second.view}. ` : "";
   const turn = !ostium ? "Antero-posterior: the way turns into no branch. " : `Shows the turn into ${shown(ostium.branch)} (circled) in its length. `;
   return block("picture", known ? `Working view: ${view.view}` : "The vessel, no C-arm view", drawing,
-    el("p", {class: "note"}, `${known ? `${turn}${second}` : `No C-arm angles: ${shown(anatomy.c_arm.no_views)}. `}` +
+    el("p", {class: "note"}, `${known ? `${turn}${second}` : `Seen ${view.view}. No C-arm angles: ${shown(anatomy.c_arm.no_views)}. `}` +
       `Way blue, other vessels grey, ${wire.length ? "wire of plan 1 red, " : ""}A access, T target.`));
 };
 
