@@ -385,7 +385,7 @@ class Weighing {
       return;
     }
     find(Answer::kUnsure, "The end of the plan hangs on how it is computed: " + *first.sensitive +
-                              ". Where the wire goes is as good as chance.");
+                              ". The real wire may end elsewhere than shown, too.");
     doubts_.push_back("where its tip ends hangs on how it is computed");
     change("Another wire, angle or roll whose end does not hang on how it is computed.");
   }
