@@ -47,19 +47,24 @@ Json wire_row(const char* what, const simulate::Wire& wire, double needed) {
 
 Json sheath_row(const Json& sheath, double inside) {
   constexpr double kRounding = 0.005;  // 5 F are 1.667 mm, and written 1.67                [mm]
+  const bool weighed = !sheath.at("assumed_longer_than_way").get<bool>();
   const double most =
       sheath.at("max_ratio").get<double>() * sheath.at("lumen_diameter_mm").get<double>();
   std::vector<std::string> names;
   for (const Sheath& known : catalogue().sheaths) {
     const bool takes_it = known.inner_diameter >= inside - kRounding;
-    if (known.outer_diameter < most && takes_it) names.push_back(known.name);
+    if ((known.outer_diameter < most || !weighed) && takes_it) names.push_back(known.name);
   }
-  const double taken = sheath.at("device_diameter_mm");
-  return fetch_row(
-      "Sheath", names,
-      format("outer diameter below %.3g mm, takes a catheter of %.3g mm; ", most, inside) +
-          of_catalogue(names) + format("; checked here with one of %.3g mm", taken),
-      sheath.at("assumed"));
+  const std::string takes = format("takes a catheter of %.3g mm", inside);
+  const std::string text =
+      weighed
+          ? format("outer diameter below %.3g mm, ", most) + takes + "; " + of_catalogue(names) +
+                format("; checked here with one of %.3g mm",
+                       sheath.at("device_diameter_mm").get<double>())
+          : takes + "; " + of_catalogue(names) +
+                format("; not held against the lumen, for one of %.0f mm is longer than the way",
+                       sheath.at("length_mm").get<double>());
+  return fetch_row("Sheath", names, text, sheath.at("assumed"));
 }
 
 /// For a plan of a wire alone: what passes the way over that wire.

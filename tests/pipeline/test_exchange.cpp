@@ -45,6 +45,7 @@ TEST(Exchange, NamesBothWires) {
   const Json sheath = {{"max_ratio", 1.05},
                        {"lumen_diameter_mm", 8},
                        {"device_diameter_mm", 2.7},
+                       {"assumed_longer_than_way", false},
                        {"assumed", true}};
   const Json anatomy = {
       {"access", {{"device", {{"device_diameter_mm", 1.67}}}, {"sheath", sheath}}},

@@ -174,6 +174,10 @@ TEST(Report, ListsWhatToFetchWithTheCatalogues) {
   };
   EXPECT_FALSE(has(sheath.at("items"), "sheath-4f"));
   EXPECT_TRUE(has(sheath.at("items"), "sheath-6f"));
+  // The assumed one is longer than the way and so is not weighed.
+  const std::string text = sheath.at("text");
+  EXPECT_NE(text.find("one of 110 mm is longer than the way"), std::string::npos) << text;
+  EXPECT_EQ(text.find("checked here"), std::string::npos) << text;
   EXPECT_NE(row("Wire length").at("text").get<std::string>().find("from the access point"),
             std::string::npos);
   expect_valid(report, folder.path());
