@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "plan/anatomy/passage.h"
+#include "plan/catheters.h"
 #include "plan/number_text.h"
 #include "plan/search.h"
 #include "plan/statistics.h"
@@ -344,6 +345,16 @@ class Weighing {
     }
   }
 
+  /// For a plan whose end hangs on how it is computed.
+  void change_for_a_steadier() {
+    const bool bare = known_.study.catheters.empty();
+    std::string sentence = bare && find_ostium(known_.study.goal)
+                               ? std::string(kShapedCatheter) + ", or another "
+                               : "Another ";
+    sentence.append(bare ? "wire, angle or roll" : "wire, catheter, angle or roll");
+    change(sentence + " whose end does not hang on how it is computed.");
+  }
+
   void weigh_tip_error(const RankedPlan& first) {
     const simulate::Goal& goal = known_.study.goal;
     if (!first.tip_error && first.tip_unsure) {
@@ -351,8 +362,7 @@ class Weighing {
            "The error of the tip's place could not be told: runs with other elements or shorter "
            "pushes do not end there.");
       doubts_.push_back("runs with other elements or shorter pushes do not end there");
-      change(
-          "Another wire, catheter, angle or roll whose end does not hang on how it is computed.");
+      change_for_a_steadier();
       return;
     }
     if (!first.tip_error) {
@@ -387,7 +397,7 @@ class Weighing {
     find(Answer::kUnsure, "The end of the plan hangs on how it is computed: " + *first.sensitive +
                               ". The real wire may end elsewhere than shown, too.");
     doubts_.push_back("where its tip ends hangs on how it is computed");
-    change("Another wire, angle or roll whose end does not hang on how it is computed.");
+    change_for_a_steadier();
   }
 
   /// The best other plan that `merit` has something to say of, if any: one that was repeated, and

@@ -176,9 +176,8 @@ std::string change_at_branch(const Endings& endings, const Known& known, const s
   if (!tried_moves(known.plan)) {
     return "Turning the wire at the branch: " + went + "; the wire was not turned.";
   }
-  return R"(A shaped catheter that leads the wire into the branch ("catheters": "suggest" tries )"
-         "some): " +
-         went + ", though wires with an angled tip and turns of the wire were tried.";
+  return std::string(kShapedCatheter) + ": " + went +
+         ", though wires with an angled tip and turns of the wire were tried.";
 }
 
 std::string change_of_wire_length(const Endings& endings, const Known& known,

@@ -7,6 +7,10 @@
 
 namespace wireplan::plan {
 
+/// What a case whose target is in a branch may try where its wires alone do not do.
+inline constexpr const char* kShapedCatheter =
+    R"(A shaped catheter that leads the wire into the branch ("catheters": "suggest" tries some))";
+
 /// "a", "a and b", "a, b and c"
 std::string list_words(const std::vector<std::string>& parts);
 /// Of all that there are: "3 of 9 trials", "all 9 trials", "both trials", "the one trial"

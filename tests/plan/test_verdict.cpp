@@ -7,6 +7,7 @@
 #include "plan/number_text.h"
 #include "plan/verdict.h"
 #include "tests/plan/known_plans.h"
+#include "tests/plan/two_renals.h"
 
 namespace wireplan::plan {
 namespace {
@@ -157,6 +158,12 @@ TEST(Verdict, AnEndThatHangsOnHowItIsComputedIsUnsure) {
     const Verdict verdict = bench.verdict();
     EXPECT_EQ(verdict.answer, apart < 1.0 ? Answer::kFeasible : Answer::kUnsure);
     EXPECT_EQ(tells(verdict.reasons, "with pushes half as long its tip ends 1.0 mm away"),
+              apart > 1.0);
+    EXPECT_EQ(tells(verdict.changes, "Another wire, angle or roll whose end"), apart > 1.0);
+    bench.study.goal.way = toward(1.0).goal.way;
+    EXPECT_EQ(tells(bench.verdict().changes, "A shaped catheter that leads the wire"), apart > 1.0);
+    bench.study.catheters = toward(1.0).catheters;
+    EXPECT_EQ(tells(bench.verdict().changes, "Another wire, catheter, angle or roll whose end"),
               apart > 1.0);
   }
 }
