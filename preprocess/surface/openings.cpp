@@ -256,15 +256,28 @@ std::vector<Opening> find_openings(const Surface& surface) {
   return CapFinder(surface).find();
 }
 
+namespace {
+
+constexpr double kOval = 1.5;  // reach of a cap in its radii
+
+bool is_near(const Opening& opening, const Vec3& tip) {
+  return (tip - opening.center).norm() <= kLookedAt + kOval * opening.radius;
+}
+
+}  // namespace
+
+bool may_have_left(const std::vector<Opening>& openings, const Vec3& tip) {
+  return std::any_of(openings.begin(), openings.end(),
+                     [&](const Opening& opening) { return is_near(opening, tip); });
+}
+
 std::optional<int> left_through(const std::vector<Opening>& openings,
                                 const Eigen::Ref<const Eigen::Matrix3Xd>& wire) {
-  constexpr double kBeyond = 1.0;     // a cap                                             [mm]
-  constexpr double kLookedAt = 40.0;  // of the wire, from the tip                         [mm]
-  constexpr double kOval = 1.5;       // reach of a cap in its radii
+  constexpr double kBeyond = 1.0;  // a cap                                                [mm]
   const int tip = static_cast<int>(wire.cols()) - 1;
   for (std::size_t k = 0; k < openings.size(); ++k) {
     const Opening& opening = openings[k];
-    if ((wire.col(tip) - opening.center).norm() > kLookedAt + kOval * opening.radius) continue;
+    if (!is_near(opening, wire.col(tip))) continue;
     double beyond = 0.0;
     for (int i = tip; i > 0 && beyond < kLookedAt; --i) {
       const double from = opening.normal.dot(wire.col(i - 1) - opening.center);

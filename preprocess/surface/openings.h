@@ -25,11 +25,17 @@ struct Opening {
 /// manifold surface with outward triangles.
 std::vector<Opening> find_openings(const Surface& surface);
 
+/// Length of wire, from its tip, that left_through() looks at [mm].
+inline constexpr double kLookedAt = 40.0;
+
 /// The opening through which a wire has left, if any. It has left if it crosses the cap's plane
 /// outward within 1.5 radii of the cap's centre (which covers oval caps), and 1 mm or more of wire
-/// lies beyond that crossing. The wire's nodes (3, n) end with the tip [mm]; its last 40 mm are
-/// looked at.
+/// lies beyond that crossing. The wire's nodes (3, n) end with the tip [mm]; the last `kLookedAt`
+/// of it are looked at.
 std::optional<int> left_through(const std::vector<Opening>& openings,
                                 const Eigen::Ref<const Eigen::Matrix3Xd>& wire);
+
+/// Whether the tip is near enough to an opening for that; else the wire has left through none.
+bool may_have_left(const std::vector<Opening>& openings, const Vec3& tip);
 
 }  // namespace wireplan::preprocess

@@ -99,4 +99,17 @@ Eigen::Matrix3Xd places_at_rest(const SectionChain* chain, const Eigen::Matrix3X
   return points;
 }
 
+Eigen::Matrix3Xd end_at_rest(const SectionChain& chain, const Eigen::Matrix3Xd& u,
+                             const Eigen::Ref<const Eigen::Matrix3Xd>& nodes, double length) {
+  Eigen::Matrix3Xd places(3, nodes.cols());
+  MovingFrame frame;
+  Eigen::Index first = nodes.cols();
+  for (double passed = 0.0; first > 0 && passed < length;) {
+    frame.find(chain, u, nodes.col(--first));
+    places.col(first) = frame.rest();
+    if (first + 1 < nodes.cols()) passed += (places.col(first + 1) - places.col(first)).norm();
+  }
+  return places.rightCols(nodes.cols() - first);
+}
+
 }  // namespace wireplan::simulate

@@ -42,4 +42,8 @@ class MovingFrame {
 Eigen::Matrix3Xd places_at_rest(const SectionChain* chain, const Eigen::Matrix3Xd& u,
                                 Eigen::Matrix3Xd points);
 
+/// The same of a wire's last nodes alone, so many that they are `length` long at rest, or all [mm].
+Eigen::Matrix3Xd end_at_rest(const SectionChain& chain, const Eigen::Matrix3Xd& u,
+                             const Eigen::Ref<const Eigen::Matrix3Xd>& nodes, double length);
+
 }  // namespace wireplan::simulate

@@ -37,15 +37,10 @@ std::optional<Vec3> Insertion::find_fold() const {
 std::optional<int> Insertion::left_through() const {
   const std::vector<preprocess::Opening>& openings = vessel_.lumen.openings();
   if (vessel_.sections == nullptr) return preprocess::left_through(openings, free_wire());
-  // Places at rest are looked for only where the wire is near an opening.
-  const double moved = std::sqrt(state_.sections.colwise().squaredNorm().maxCoeff());
-  const bool near = std::any_of(openings.begin(), openings.end(), [&](const auto& opening) {
-    const double reach = opening.radius + 2.0 * Lumen::kFreeLength + moved;
-    return ((free_wire().colwise() - opening.center).colwise().squaredNorm().minCoeff() <
-            reach * reach);
-  });
-  if (!near) return {};
-  return preprocess::left_through(openings, free_nodes_at_rest());
+  // Places at rest are looked for only where the wire may have left.
+  if (!preprocess::may_have_left(openings, at_rest(tip()))) return {};
+  return preprocess::left_through(openings, end_at_rest(*vessel_.sections, state_.sections,
+                                                        free_wire(), preprocess::kLookedAt));
 }
 
 Vec3 Insertion::most_bent() const {

@@ -500,8 +500,10 @@ void ToolTrial::check_place() {
     return end(Outcome::kReached, "tip " + in_mm(best_distance_) + " from the target" + after);
   }
   best_distance_ = to_goal;
-  const Eigen::Matrix3Xd nodes = bench_.at_rest(bench_.state().x);
   const bool near = counts && goal_.at_section && goal_.way->may_have_arrived(here);
+  const std::vector<preprocess::Opening>& openings = vessel_.lumen.openings();
+  if (!near && !preprocess::may_have_left(openings, here)) return;
+  const Eigen::Matrix3Xd nodes = bench_.at_rest(bench_.state().x);
   if (const auto before = near ? goal_.way->find_arrival(nodes, vessel_.lumen) : std::nullopt) {
     const std::optional<std::string> detour = goal_.way->find_detour(nodes.leftCols(*before + 1));
     if (detour) {
@@ -513,9 +515,8 @@ void ToolTrial::check_place() {
     return end(Outcome::kReached, "tip past the target's cross-section, " + in_mm(from_axis) +
                                       " from the vessel's axis," + after);
   }
-  if (const std::optional<int> opening =
-          preprocess::left_through(vessel_.lumen.openings(), nodes)) {
-    const Vec3& center = vessel_.lumen.openings()[static_cast<std::size_t>(*opening)].center;
+  if (const std::optional<int> opening = preprocess::left_through(openings, nodes)) {
+    const Vec3& center = openings[static_cast<std::size_t>(*opening)].center;
     const std::string name = goal_.way ? goal_.way->name_at(center) : std::string();
     return end_where_it_is(Outcome::kLeftImage, "a tool left the imaged vessel through its end" +
                                                     (name.empty() ? "" : " in " + name) + " at " +

@@ -173,5 +173,22 @@ TEST(LeftThrough, NamesTheCapThatTheWireComesOutOf) {
   EXPECT_EQ(left_through({}, wire_through({inside, Vec3(0.0, 0.0, 25.0)})), std::nullopt);
 }
 
+TEST(LeftThrough, IsRuledOutByTheTipAlone) {
+  const std::vector<Opening> openings = find_openings(shapes::straight_tube(2.0, 20.0, 0.5));
+  ASSERT_EQ(openings.size(), 2u);
+  int came_out = 0, ruled_out = 0;
+  for (double z = 25.0; z < 120.0; z += 1.0) {  // ever further out of the upper end
+    const Vec3 tip(0.0, 0.0, z);
+    const bool left = left_through(openings, wire_through({Vec3(0.0, 0.0, 10.0), tip})).has_value();
+    const bool may = may_have_left(openings, tip);
+    EXPECT_TRUE(may || !left) << z;
+    came_out += left;
+    ruled_out += !may;
+  }
+  EXPECT_GT(came_out, 20);
+  EXPECT_GT(ruled_out, 50);  // from 63 mm on
+  EXPECT_FALSE(may_have_left({}, Vec3::Zero()));
+}
+
 }  // namespace
 }  // namespace wireplan::preprocess
