@@ -22,6 +22,9 @@ constexpr double kSamePlace = 5e-4;
 /// Of a point that is looked at in every state, see ContactPoints::asleep_until_.
 constexpr double kAwake = -1.0;
 
+/// What a point knows is of use to one that comes this near to where it was, along the wire [mm].
+constexpr double kCarried = 0.1;
+
 /// How deep into the wall a step may lead a point, or one of its parts [mm].
 constexpr double kInto = 0.25;
 
@@ -100,6 +103,8 @@ ContactPoints::ContactPoints(const Rod& rod, const VesselModel& vessel, double s
   u_.setZero(3, chain_->nodes());
   frames_.resize(points_.size());
   framed_in_.assign(points_.size(), -1);
+  position_before_.resize(3, size());
+  before_in_.assign(points_.size(), -1);
   gathered_.resize(points_.size());
 }
 
@@ -162,6 +167,7 @@ void ContactPoints::take(const Rod& rod) {
   const int before = size();
   build_points(rod, spacing_, points_);
   expects(size() == before && rod.nodes() == x_.cols() && rod.thinner.size() > 0);
+  forget_before();
   for (int k = 0; k < size(); ++k) {
     const double thinner = at_point(rod.thinner, (*this)[k]), more = thinner - thinner_[k];
     if (more == 0.0) continue;
@@ -182,13 +188,16 @@ const MovingFrame& ContactPoints::frame(int k) const {
   return frames_[at];
 }
 
-Vec3 ContactPoints::position_in(int k, const Eigen::Matrix3Xd& x,
-                                const Eigen::Matrix3Xd& sections) const {
-  Vec3 p = (*this)[k].at(x);
-  if (chain_ == nullptr) return p;
-  MovingFrame frame;
-  frame.find(*chain_, sections, p);
-  return frame.rest();
+Vec3 ContactPoints::position_before(int k, const ContactMemory& memory) const {
+  if (chain_ == nullptr) return (*this)[k].at(memory.x);
+  const auto at = static_cast<std::size_t>(k);
+  if (before_in_[at] != before_) {
+    before_in_[at] = before_;
+    MovingFrame then = frames_[at];  // near there
+    then.find(*chain_, memory.sections, (*this)[k].at(memory.x));
+    position_before_.col(k) = then.rest();
+  }
+  return position_before_.col(k);
 }
 
 Vec3 ContactPoints::motion_of(int k, const WireMotion& motion) const {
@@ -237,6 +246,43 @@ void ContactPoints::carry_back(const Eigen::VectorXd& from, double distance, Eig
     if (part > 0.0) to[target - 1] += part * from[k];
     asleep_until_.segment(std::max(0, target - 1), target > 0 ? 2 : 1).setConstant(kAwake);
   }
+  if (chain_ != nullptr) carry_knowledge(distance);
+}
+
+/// Each point takes over what the point knew that was where it will be.
+void ContactPoints::carry_knowledge(double distance) {
+  const int step = distance > 0.0 ? 1 : -1, end = step > 0 ? size() : -1;
+  const auto off = [&](int from, int k) {
+    return std::abs((*this)[k].tip_distance - distance - (*this)[from].tip_distance);
+  };
+  int from = step > 0 ? 0 : size() - 1;
+  for (int k = from; k != end; k += step) {
+    while (from + step != end && off(from + step, k) <= off(from, k)) from += step;
+    if (from == k || off(from, k) > kCarried) continue;
+    const auto to = static_cast<std::size_t>(k), of = static_cast<std::size_t>(from);
+    const double more = thinner(k) - thinner(from);
+    std::swap(frames_[to], frames_[of]);
+    known_position_.col(k) = known_position_.col(from);
+    known_distance_[k] = known_distance_[from] + more;
+    touched_[to] = touched_[of];
+    if (touched_[of] == 0) continue;
+    known_[to] = known_[of];
+    known_[to].distance += more;
+  }
+  std::fill(framed_in_.begin(), framed_in_.end(), -1);
+}
+
+/// Whether a point is further from the wall than `near`, by what was known of it before: where it
+/// is at rest to first order, and as much again for what that leaves. If so, it sleeps.
+bool ContactPoints::is_away(int k, double near) {
+  const auto at = static_cast<std::size_t>(k);
+  if (touched_[at] != 0 || framed_in_[at] == state_ || !frames_[at].is_known()) return false;
+  const Vec3 step = frames_[at].step_to(u_, place(k));
+  const Vec3 moved = frames_[at].rest() + step - known_position_.col(k);
+  const double least = known_distance_[k] - kLipschitz * (moved.norm() + step.norm());
+  if (!(least >= near)) return false;
+  asleep_until_[k] = travelled_ + (least - near) / kLipschitz;
+  return true;
 }
 
 void ContactPoints::find_active(const Eigen::Matrix3Xd& x, const Eigen::Matrix3Xd& sections,
@@ -256,8 +302,9 @@ void ContactPoints::find_active(const Eigen::Matrix3Xd& x, const Eigen::Matrix3X
   // One that was far enough for its motion since is not looked at.
   for (int k = first_free_; k < size(); ++k) {
     if (asleep_until_[k] >= travelled_) continue;
-    const Vec3 p = position(k);
     const double near = reach_ + (expected[k] > 0.0 ? kInSight : 0.0);
+    if (chain_ != nullptr && is_away(k, near)) continue;
+    const Vec3 p = position(k);
     const double least = least_distance(k, p);
     if (least >= near) {
       asleep_until_[k] = travelled_ + (least - near) / kLipschitz;

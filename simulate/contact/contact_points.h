@@ -97,8 +97,9 @@ class ContactPoints {
   const Eigen::Matrix3Xd& nodes() const { return x_; }
   const Eigen::Matrix3Xd& sections() const { return u_; }
   Vec3 position(int k) const { return chain_ == nullptr ? (*this)[k].at(x_) : frame(k).rest(); }
-  /// The same in another state.
-  Vec3 position_in(int k, const Eigen::Matrix3Xd& x, const Eigen::Matrix3Xd& sections) const;
+  /// The same in the equilibrium before, which is kept until that is another one.
+  Vec3 position_before(int k, const ContactMemory& memory) const;
+  void forget_before() { ++before_; }
   /// On the wire.
   Vec3 place(int k) const { return (*this)[k].at(x_); }
   /// A force over a point's position, on the wire.
@@ -156,6 +157,8 @@ class ContactPoints {
   void finish_hessian(Sink& sink, int k, Gathered& point) const;
 
   const MovingFrame& frame(int k) const;
+  void carry_knowledge(double distance);
+  bool is_away(int k, double near);
   WallSample look_at(int k, const Vec3& position, double near);
   double least_distance(int k, const Vec3& position) const;
   double way_inside(int k, const Vec3& from, const Vec3& toward, double length, double distance,
@@ -185,6 +188,9 @@ class ContactPoints {
   mutable std::vector<MovingFrame> frames_;
   mutable std::vector<long long> framed_in_;
   long long state_ = 0;
+  mutable Eigen::Matrix3Xd position_before_;  // and of which equilibrium
+  mutable std::vector<long long> before_in_;
+  long long before_ = 0;
   mutable std::vector<Gathered> gathered_;
   mutable std::vector<int> gathered_points_;
   mutable std::vector<Vec3> turned_slopes_;  // scratch

@@ -22,7 +22,7 @@ Rub rub(double u, double slip) {
 /// Where friction holds a point, or where it was in the last equilibrium.
 Vec3 anchor_of(int k, const ContactPoints& points, const ContactMemory& memory) {
   if (memory.normal_force[k] > 0.0) return memory.anchor.col(k);
-  return points.position_in(k, memory.x, memory.sections);
+  return points.position_before(k, memory);
 }
 
 }  // namespace
@@ -120,7 +120,7 @@ void Friction::find_rubbed(const ContactPoints& points, const ContactMemory& mem
   const auto add = [&](int k, double limit_now) {
     const Vec3 normal = lag_.normal.col(k), anchor = anchor_of(k, points, memory);
     const auto along = [&](const Vec3& off) { return Vec3(off - off.dot(normal) * normal); };
-    const Vec3 before = along(points.position_in(k, memory.x, memory.sections) - anchor);
+    const Vec3 before = along(points.position_before(k, memory) - anchor);
     const Vec3 now = along(points.position(k) - anchor), way = now - before;
     const double limit = 0.5 * (coefficient(k) * memory.normal_force[k] + limit_now);
     const double work = limit * (rub(now.norm(), slip_).energy - rub(before.norm(), slip_).energy);

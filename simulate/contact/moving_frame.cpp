@@ -18,6 +18,10 @@ constexpr double kLongest = 4.0;
 /// leaves, by third derivatives of some 0.02/mm^3, is 4e-10 of them [mm].
 constexpr double kSeries = 5e-3;
 
+/// For steps no longer than this the inverse of G of before does: where sections moved by as much
+/// since, it is some 1e-4 off [mm].
+constexpr double kTurned = 2e-3;
+
 /// Within this they lead on to where the chain is asked next, as long as steps are longer than
 /// that, so often at most [mm].
 constexpr double kGuessed = 2.0, kGuessing = 0.1;
@@ -42,29 +46,49 @@ void MovingFrame::carry_weights() {
   }
 }
 
+/// What is left of a point without its place at rest and how far that has moved.
+Vec3 MovingFrame::missing(const Eigen::Matrix3Xd& u, const Vec3& point) const {
+  Vec3 left = point - rest_;
+  for (const SectionChain::Weight& weight : weights_) {
+    left -= weight.value * u.col(weight.node);
+  }
+  return left;
+}
+
+void MovingFrame::find_inverse(const Eigen::Matrix3Xd& u) {
+  Mat3 G = Mat3::Identity();
+  for (const SectionChain::Weight& weight : weights_) {
+    const double* const moved = u.data() + 3 * weight.node;
+    for (int c = 0; c < 3; ++c) {
+      for (int r = 0; r < 3; ++r) G(r, c) += moved[r] * weight.slope[c];
+    }
+  }
+  inverse_ = G.inverse();
+}
+
 void MovingFrame::find(const SectionChain& chain, const Eigen::Matrix3Xd& u, const Vec3& point) {
   if (known_.empty()) {
     rest_ = point;
     look(chain);
+    find_inverse(u);
   }
   for (int round = 0; round < kMostCarries; ++round) {
-    Vec3 moved = Vec3::Zero();
-    Mat3 G = Mat3::Identity();
-    for (const SectionChain::Weight& weight : weights_) {
-      moved += weight.value * u.col(weight.node);
-      G += u.col(weight.node) * weight.slope.transpose();
+    // The inverse of before does for short steps.
+    Vec3 left = missing(u, point), step = inverse_ * left;
+    if (step.squaredNorm() > kTurned * kTurned) {
+      find_inverse(u);
+      step = inverse_ * left;
     }
-    inverse_ = G.inverse();
-    const Vec3 missing = point - rest_ - moved;
-    Vec3 step = inverse_ * missing;
     const double length = step.norm(), away = (rest_ - known_place_).norm();
     if (length <= kNear && away <= kSeries) {
+      find_inverse(u);
+      step = inverse_ * left;
       rest_ += step;
       for (SectionChain::Weight& weight : weights_) weight.value += weight.slope.dot(step);
       return;
     }
     if (!(length <= kLongest)) {
-      step = length < 1e300 ? Vec3((kLongest / length) * step) : Vec3(missing.normalized());
+      step = length < 1e300 ? Vec3((kLongest / length) * step) : Vec3(left.normalized());
     }
     rest_ += step;
     // Where the series alone leads, the chain is asked once it is there.

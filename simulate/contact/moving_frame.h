@@ -15,6 +15,12 @@ class MovingFrame {
   /// Finds the place for a point, by Newton's method from where it was.
   void find(const SectionChain& chain, const Eigen::Matrix3Xd& u, const Vec3& point);
 
+  /// Whether a place was found yet; how far a point is from it, to first order [mm].
+  bool is_known() const { return !known_.empty(); }
+  Vec3 step_to(const Eigen::Matrix3Xd& u, const Vec3& point) const {
+    return inverse_ * missing(u, point);
+  }
+
   const Vec3& rest() const { return rest_; }        // X                                    [mm]
   const Mat3& inverse() const { return inverse_; }  // G^-1
   /// At X.
@@ -28,6 +34,8 @@ class MovingFrame {
  private:
   void look(const SectionChain& chain);
   void carry_weights();
+  Vec3 missing(const Eigen::Matrix3Xd& u, const Vec3& point) const;
+  void find_inverse(const Eigen::Matrix3Xd& u);
 
   Vec3 rest_ = Vec3::Zero();
   Mat3 inverse_ = Mat3::Identity();

@@ -72,6 +72,7 @@ void WallContact::start_at(const RodState& state) {
   memory_.x = state.x;
   memory_.sections = state.sections;
   memory_.normal_force.setZero();
+  points_.forget_before();
   friction_.predict_nothing();
   forces_.expect_nothing();
 }
@@ -84,7 +85,9 @@ void WallContact::predict(double distance) {
 
 double WallContact::settle() {
   forces_.remember_feet(memory_.triangle);
-  return friction_.settle(points_, memory_);
+  const double heat = friction_.settle(points_, memory_);
+  points_.forget_before();
+  return heat;
 }
 
 const std::vector<Touch>& WallContact::touches() {

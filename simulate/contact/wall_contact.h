@@ -78,7 +78,10 @@ class WallContact {
   void find_slopes(std::vector<Slope>& slopes) const;
 
   const Memory& memory() const { return memory_; }
-  void restore(const Memory& memory) { memory_ = memory; }
+  void restore(const Memory& memory) {
+    memory_ = memory;
+    points_.forget_before();
+  }
 
   // ---- the solver's part: samples
 

@@ -177,6 +177,32 @@ const std::vector<int>& SectionChain::candidates(const Vec3& rest) const {
   return near_[at];
 }
 
+namespace {
+
+/// A symmetric matrix by its columns from the diagonal down: entry by entry, since as Eigen's outer
+/// products they take twice the time.
+struct Symmetric {
+  double of[6] = {};
+
+  void add_square(double scale, const Vec3& a) {
+    const double x = scale * a[0], y = scale * a[1], z = scale * a[2];
+    of[0] += x * a[0], of[1] += x * a[1], of[2] += x * a[2];
+    of[3] += y * a[1], of[4] += y * a[2], of[5] += z * a[2];
+  }
+  /// scale (a b' + b a')
+  void add_products(double scale, const Vec3& a, const Vec3& b) {
+    const double x = scale * a[0], y = scale * a[1], z = scale * a[2];
+    of[0] += 2.0 * x * b[0], of[1] += x * b[1] + y * b[0], of[2] += x * b[2] + z * b[0];
+    of[3] += 2.0 * y * b[1], of[4] += y * b[2] + z * b[1], of[5] += 2.0 * z * b[2];
+  }
+  void add(double scale, const Symmetric& other) {
+    for (int k = 0; k < 6; ++k) of[k] += scale * other.of[k];
+  }
+  void put(Mat3& to) const { to << of[0], of[1], of[2], of[1], of[3], of[4], of[2], of[4], of[5]; }
+};
+
+}  // namespace
+
 void SectionChain::find_weights(const Vec3& rest, bool with_bend,
                                 std::vector<Weight>& weights) const {
   const std::vector<int>& nodes = candidates(rest);
@@ -187,7 +213,7 @@ void SectionChain::find_weights(const Vec3& rest, bool with_bend,
   weights.clear();
   double sum = 0.0;
   Vec3 mean = Vec3::Zero();  // of the nodes' places from here, over the square of the width
-  Mat3 spread = Mat3::Zero();
+  Symmetric squares;
   for (const int k : nodes) {
     const Vec3 away = places_.col(k) - rest;
     const double power = 0.5 * per_square * (nearest - away.squaredNorm());
@@ -196,43 +222,50 @@ void SectionChain::find_weights(const Vec3& rest, bool with_bend,
     const Vec3 a = per_square * away;
     sum += e;
     mean += e * a;
-    if (with_bend) spread += (e * a) * a.transpose();
+    if (with_bend) squares.add_square(e, a);
     if (e > 0.5 * kDropped) weights.push_back({k, e, a, Mat3::Zero()});
   }
   mean /= sum;
-  spread /= sum;
-  spread -= mean * mean.transpose();
+  Symmetric spread;
+  spread.add(1.0 / sum, squares);
+  spread.add_square(-1.0, mean);
   // 2. Without those that are next to nothing. With a node's a from the mean: q' = q a, and
   //    q'' = q (a a' - spread).
   double total = 0.0;
   Vec3 total_slope = Vec3::Zero();
-  Mat3 total_bend = Mat3::Zero();
+  Symmetric total_bend;
   std::size_t count = 0;
   for (const Weight& part : weights) {
     const double q = part.value / sum;
     const Kept kept = keep(q);
     if (kept.value == 0.0) continue;
-    const Vec3 a = part.slope - mean, slope = q * a;
+    const Vec3 a = part.slope - mean;
     Weight& weight = weights[count++];
     weight.node = part.node;
     weight.value = kept.value;
-    weight.slope = kept.slope * slope;
+    weight.slope = (kept.slope * q) * a;
     total += weight.value;
     total_slope += weight.slope;
     if (!with_bend) continue;
-    weight.bend = kept.curvature * slope * slope.transpose() +
-                  (kept.slope * q) * (a * a.transpose() - spread);
-    total_bend += weight.bend;
+    Symmetric bend;
+    bend.add_square((kept.curvature * q + kept.slope) * q, a);
+    bend.add(-kept.slope * q, spread);
+    total_bend.add(1.0, bend);
+    bend.put(weight.bend);
   }
   weights.resize(count);
   // 3. Of sum 1.
+  const double per_total = 1.0 / total;
   for (Weight& weight : weights) {
-    weight.value /= total;
-    weight.slope = (weight.slope - weight.value * total_slope) / total;
+    weight.value *= per_total;
+    weight.slope = per_total * (weight.slope - weight.value * total_slope);
     if (!with_bend) continue;
-    weight.bend = (weight.bend - weight.slope * total_slope.transpose() -
-                   total_slope * weight.slope.transpose() - weight.value * total_bend) /
-                  total;
+    Symmetric change;
+    change.add_products(per_total, weight.slope, total_slope);
+    change.add(per_total * weight.value, total_bend);
+    Mat3 less;
+    change.put(less);
+    weight.bend = per_total * weight.bend - less;
   }
 }
 

@@ -258,6 +258,67 @@ TEST(MovingVessel, FactorsOfWireAndSectionsSolveAsADenseMatrix) {
   }
 }
 
+// ---------------------------------------------------------------- what points know
+
+/// Pushed and pulled along the vessel while sections wander: points that take over what others knew
+/// and sleep by it feel what points feel that know nothing.
+TEST(MovingVessel, WhatPointsRememberDoesNotChangeWhatTheyFeel) {
+  Pushed pushed(true, 0.2);
+  WallContact forgetful(pushed.bench.rod, pushed.vessel, contact_every(1.0, 0.2));
+  forgetful.start_at(pushed.bench.state);
+  std::mt19937_64 random(5);
+  RodState state = pushed.bench.state;
+  const auto lay = [&](double from) {
+    for (int i = 0; i < pushed.bench.rod.nodes(); ++i) {
+      const double s = from + 39.0 * i / (pushed.bench.rod.nodes() - 1), x = 5.0 + s;
+      const Vec3 rest(x, 6.0 * std::sin(0.06 * x) + 1.5 * std::sin(0.3 * s), 0.2);
+      state.x.col(i) = rest + pushed.vessel.sections->displacement(rest, state.sections);
+    }
+  };
+  int touched = 0;
+  double from = 3.0;
+  for (const double distance : {1.0, 1.0, 1.0, 0.7, -1.0, -1.0, 2.0, 1.0, -0.5, 1.0}) {
+    from += distance;
+    for (double& value : state.sections.reshaped()) value += 0.3 * uniform(random);
+    lay(from);
+    for (WallContact* contact : {&pushed.bench.contact, &forgetful}) {
+      contact->predict(distance);
+      if (contact == &forgetful) contact->forget();
+      contact->begin(state);
+    }
+    const ContactSample &found = pushed.bench.contact.latest(), &expected = forgetful.latest();
+    ASSERT_EQ(found.active.size(), expected.active.size()) << from;
+    for (std::size_t k = 0; k < found.active.size(); ++k) {
+      ASSERT_EQ(found.active[k].point, expected.active[k].point) << from;
+      EXPECT_LT((found.active[k].position - expected.active[k].position).norm(), 1e-8);
+      EXPECT_NEAR(found.active[k].force, expected.active[k].force, 1e-7);
+      touched += found.active[k].force > 0.0;
+    }
+    for (WallContact* contact : {&pushed.bench.contact, &forgetful}) contact->settle();
+  }
+  EXPECT_GT(touched, 30);
+}
+
+TEST(MovingVessel, TheEndOfAWireIsWhereAllOfItIsAtRest) {
+  const Pushed pushed(false, 0.0);
+  const RodState& state = pushed.bench.state;
+  const SectionChain& chain = *pushed.vessel.sections;
+  const Eigen::Matrix3Xd all = places_at_rest(&chain, state.sections, state.x);
+  for (const double length : {0.5, 10.0, 20.0, 1e3}) {
+    const Eigen::Matrix3Xd end = end_at_rest(chain, state.sections, state.x, length);
+    // Weights by their series, from another place: 4e-10 of 1.5 mm for each of five.
+    EXPECT_LT((end - all.rightCols(end.cols())).colwise().norm().maxCoeff(), 4e-9);
+    double passed = 0.0;
+    for (Eigen::Index k = 1; k < end.cols(); ++k) passed += (end.col(k) - end.col(k - 1)).norm();
+    if (end.cols() < all.cols()) {
+      EXPECT_GE(passed, length);
+      EXPECT_LT(passed - (end.col(1) - end.col(0)).norm(), length);
+    } else {
+      EXPECT_EQ(length, 1e3);
+    }
+  }
+}
+
 // ---------------------------------------------------------------- V18: straightening
 
 /// The wave of references M drawn out fivefold along its axis, so that slopes are small (the closed
