@@ -175,67 +175,101 @@ void MovingBand::find_order(int nodes, int per_node, const SectionBlocks& blocks
   ordered_.resize(numbers);
 }
 
+// ---------------------------------------------------------------- numbers
+
+// What is WIDE is compiled for registers of four numbers too, and taken where the processor has
+// them; what it calls is compiled into it.
+#if defined(__GNUC__) && defined(__x86_64__)
+#define WIREPLAN_WIDE __attribute__((target("avx2")))
+#define WIREPLAN_INLINE __attribute__((always_inline)) inline
+#else
+#define WIREPLAN_WIDE
+#define WIREPLAN_INLINE inline
+#endif
+
 namespace {
 
-/// A block of D columns, each filled up to P numbers, with which the processor calculates at once.
+/// Four numbers at once, in one register where the processor has such, else in two: the same bits.
+using Lane = double __attribute__((vector_size(32)));
+using StoredLane = double __attribute__((vector_size(32), aligned(8), may_alias));
+
+bool has_wide_registers() {
+#if defined(__GNUC__) && defined(__x86_64__)
+  static const bool has = __builtin_cpu_supports("avx2");
+  return has;
+#else
+  return false;
+#endif
+}
+
+/// A block of D columns, each filled up to P numbers.
 template <int D, int P>
 struct Tile {
-  using Column = Eigen::Array<double, P, 1>;
-  Column of[D];
+  static constexpr int kLanes = P / 4;
+  Lane of[D][kLanes];
 
-  static Eigen::Map<const Column> column(const double* block, int c) {
-    return Eigen::Map<const Column>(block + c * P);
+  WIREPLAN_INLINE void take(const double* from) {
+    for (int c = 0; c < D; ++c) {
+      for (int q = 0; q < kLanes; ++q) {
+        of[c][q] = *reinterpret_cast<const StoredLane*>(from + c * P + 4 * q);
+      }
+    }
   }
-  void take(const double* from) {
-    for (int c = 0; c < D; ++c) of[c] = column(from, c);
+  WIREPLAN_INLINE void put(double* to) const {
+    for (int c = 0; c < D; ++c) {
+      for (int q = 0; q < kLanes; ++q) {
+        *reinterpret_cast<StoredLane*>(to + c * P + 4 * q) = of[c][q];
+      }
+    }
   }
-  void put(double* to) const {
-    for (int c = 0; c < D; ++c) Eigen::Map<Column>(to + c * P) = of[c];
-  }
+  WIREPLAN_INLINE double at(int r, int c) const { return of[c][r / 4][r % 4]; }
+  WIREPLAN_INLINE void set(int r, int c, double value) { of[c][r / 4][r % 4] = value; }
   /// Less W L'.
-  void subtract(const double* w, const double* l) {
+  WIREPLAN_INLINE void subtract(const double* w, const double* l) {
     for (int m = 0; m < D; ++m) {
-      const Column here = column(w, m);
-      for (int c = 0; c < D; ++c) of[c] -= here * l[m * P + c];
+      for (int q = 0; q < kLanes; ++q) {
+        const Lane here = *reinterpret_cast<const StoredLane*>(w + m * P + 4 * q);
+        for (int c = 0; c < D; ++c) of[c][q] -= here * l[m * P + c];
+      }
     }
   }
   /// Becomes itself times the inverse of L', L with ones on its diagonal.
-  void solve_right(const double* l) {
+  WIREPLAN_INLINE void solve_right(const double* l) {
     for (int c = 1; c < D; ++c) {
-      for (int m = 0; m < c; ++m) of[c] -= of[m] * l[m * P + c];
+      for (int m = 0; m < c; ++m) {
+        for (int q = 0; q < kLanes; ++q) of[c][q] -= of[m][q] * l[m * P + c];
+      }
     }
   }
   /// Becomes L below its diagonal, of L D L'. False at a pivot that is not positive.
-  bool factor(double* inverse) {
+  WIREPLAN_INLINE bool factor(double* inverse) {
     for (int c = 0; c < D; ++c) {
-      if (!(of[c][c] > 0.0)) return false;
-      inverse[c] = 1.0 / of[c][c];
+      if (!(at(c, c) > 0.0)) return false;
+      inverse[c] = 1.0 / at(c, c);
       for (int r = c + 1; r < D; ++r) {
-        const double part = of[c][r] * inverse[c];
-        for (int k = c + 1; k <= r; ++k) of[k][r] -= part * of[c][k];
+        const double part = at(r, c) * inverse[c];
+        for (int k = c + 1; k <= r; ++k) set(r, k, at(r, k) - part * at(k, c));
       }
-      for (int r = c + 1; r < D; ++r) of[c][r] *= inverse[c];
+      for (int r = c + 1; r < D; ++r) set(r, c, at(r, c) * inverse[c]);
     }
     return true;
   }
 };
 
-}  // namespace
-
 /// Blocks hold L times pivots until the row is done.
-template <int D>
-bool MovingBand::factor_row(std::size_t at) {
+template <int D, class Row>
+WIREPLAN_INLINE bool factor_row(const Row* rows, std::size_t at, double* values, double* inverse) {
   constexpr int P = padded(D), kSize = D * P;
-  const Row& here = rows_[at];
-  double* const own = values_.data() + here.offset;  // of block here.first
+  const Row& here = rows[at];
+  double* const own = values + here.offset;  // of block here.first
   const int last = static_cast<int>(at);
   Tile<D, P> tile;
   // 1. Blocks before the diagonal.
   for (int c = here.first; c < last; ++c) {
-    const Row& other = rows_[static_cast<std::size_t>(c)];
+    const Row& other = rows[c];
     const int from = std::max(here.first, other.first);
     const double* l =
-        values_.data() + other.offset + static_cast<std::ptrdiff_t>(from - other.first) * kSize;
+        values + other.offset + static_cast<std::ptrdiff_t>(from - other.first) * kSize;
     const double* w = own + static_cast<std::ptrdiff_t>(from - here.first) * kSize;
     double* const target = own + static_cast<std::ptrdiff_t>(c - here.first) * kSize;
     tile.take(target);
@@ -248,21 +282,91 @@ bool MovingBand::factor_row(std::size_t at) {
   tile.take(diagonal);
   double* w = own;
   for (int k = here.first; k < last; ++k, w += kSize) {
-    const double* const inverse = inverse_.data() + static_cast<std::ptrdiff_t>(k) * D;
-    Tile<D, P> l;
-    l.take(w);
-    for (int m = 0; m < D; ++m) l.of[m] *= inverse[m];
+    const double* const pivots = inverse + static_cast<std::ptrdiff_t>(k) * D;
+    Tile<D, P> times_pivots, l;
+    times_pivots.take(w);
     for (int m = 0; m < D; ++m) {
-      const auto times_pivot = Tile<D, P>::column(w, m);
-      for (int c = 0; c < D; ++c) tile.of[c] -= times_pivot * l.of[m][c];
+      for (int q = 0; q < P / 4; ++q) l.of[m][q] = times_pivots.of[m][q] * pivots[m];
     }
     l.put(w);
+    for (int m = 0; m < D; ++m) {
+      for (int q = 0; q < P / 4; ++q) {
+        for (int c = 0; c < D; ++c) tile.of[c][q] -= times_pivots.of[m][q] * w[m * P + c];
+      }
+    }
   }
   // 3. Its own factors.
-  if (!tile.factor(inverse_.data() + at * D)) return false;
+  if (!tile.factor(inverse + at * D)) return false;
   tile.put(diagonal);
   return true;
 }
+
+template <int D, class Row>
+WIREPLAN_INLINE bool factor_rows(const std::vector<Row>& rows, double* values, double* inverse) {
+  for (std::size_t at = 0; at < rows.size(); ++at) {
+    if (!factor_row<D>(rows.data(), at, values, inverse)) return false;
+  }
+  return true;
+}
+
+template <int D, class Row>
+WIREPLAN_WIDE bool factor_rows_wide(const std::vector<Row>& rows, double* values, double* inverse) {
+  return factor_rows<D>(rows, values, inverse);
+}
+
+/// All rows forward, the pivots, and all rows back, in the order.
+template <int D, class Row>
+WIREPLAN_INLINE void solve_rows(const std::vector<Row>& rows, const double* values,
+                                const std::vector<double>& inverse, double* x) {
+  constexpr int P = padded(D), kSize = D * P, kLanes = P / 4;
+  for (std::size_t at = 0; at < rows.size(); ++at) {
+    const double* l = values + rows[at].offset;
+    const double* known = x + static_cast<std::ptrdiff_t>(rows[at].first) * D;
+    double* const own = x + at * D;
+    Lane sums[D][kLanes] = {};  // one for each column, so that none waits for another
+    for (; known < own; known += D, l += kSize) {
+      for (int c = 0; c < D; ++c) {
+        for (int q = 0; q < kLanes; ++q) {
+          sums[c][q] += *reinterpret_cast<const StoredLane*>(l + c * P + 4 * q) * known[c];
+        }
+      }
+    }
+    for (int c = 1; c < D; ++c) {
+      for (int q = 0; q < kLanes; ++q) sums[0][q] += sums[c][q];
+    }
+    for (int r = 0; r < D; ++r) {
+      own[r] -= sums[0][r / 4][r % 4];
+      for (int c = 0; c < r; ++c) own[r] -= l[c * P + r] * own[c];
+    }
+  }
+  for (std::size_t k = 0; k < inverse.size(); ++k) x[k] *= inverse[k];
+  for (std::size_t at = rows.size(); at-- > 0;) {
+    const double* l = values + rows[at].offset;
+    double* known = x + static_cast<std::ptrdiff_t>(rows[at].first) * D;
+    double* const own = x + at * D;
+    const double* const diagonal = l + (own - known) * P;
+    for (int r = D - 1; r > 0; --r) {
+      for (int c = 0; c < r; ++c) own[c] -= diagonal[c * P + r] * own[r];
+    }
+    double found[D];
+    std::copy(own, own + D, found);
+    for (; known < own; known += D, l += kSize) {
+      for (int c = 0; c < D; ++c) {
+        double sum = l[c * P] * found[0];
+        for (int r = 1; r < D; ++r) sum += l[c * P + r] * found[r];
+        known[c] -= sum;
+      }
+    }
+  }
+}
+
+template <int D, class Row>
+WIREPLAN_WIDE void solve_rows_wide(const std::vector<Row>& rows, const double* values,
+                                   const std::vector<double>& inverse, double* x) {
+  solve_rows<D>(rows, values, inverse, x);
+}
+
+}  // namespace
 
 template <int D>
 bool MovingBand::factor(BlockBand<D>& wire, const SectionBlocks& blocks, double shift) {
@@ -314,50 +418,16 @@ bool MovingBand::factor(BlockBand<D>& wire, const SectionBlocks& blocks, double 
     double* const own = block_at(i, i);
     for (int c = 0; c < 3; ++c) own[c * P + c] += shift;
   }
-  for (std::size_t at = 0; at < rows_.size(); ++at) {
-    if (!factor_row<D>(at)) return false;
-  }
-  return true;
+  return has_wide_registers() ? factor_rows_wide<D>(rows_, values_.data(), inverse_.data())
+                              : factor_rows<D>(rows_, values_.data(), inverse_.data());
 }
 
-/// All rows forward, the pivots, and all rows back, in the order.
 template <int D>
-void MovingBand::solve_rows() {
-  constexpr int P = padded(D), kSize = D * P;
-  double* const x = ordered_.data();
-  for (std::size_t at = 0; at < rows_.size(); ++at) {
-    const double* l = values_.data() + rows_[at].offset;
-    const double* known = x + static_cast<std::ptrdiff_t>(rows_[at].first) * D;
-    double* const own = x + at * D;
-    double sum[P] = {};
-    for (; known < own; known += D, l += kSize) {
-      for (int c = 0; c < D; ++c) {
-        for (int r = 0; r < P; ++r) sum[r] += l[c * P + r] * known[c];
-      }
-    }
-    for (int r = 0; r < D; ++r) {
-      own[r] -= sum[r];
-      for (int c = 0; c < r; ++c) own[r] -= l[c * P + r] * own[c];
-    }
-  }
-  for (std::size_t k = 0; k < inverse_.size(); ++k) x[k] *= inverse_[k];
-  for (std::size_t at = rows_.size(); at-- > 0;) {
-    const double* l = values_.data() + rows_[at].offset;
-    double* known = x + static_cast<std::ptrdiff_t>(rows_[at].first) * D;
-    double* const own = x + at * D;
-    const double* const diagonal = l + (own - known) * P;
-    for (int r = D - 1; r > 0; --r) {
-      for (int c = 0; c < r; ++c) own[c] -= diagonal[c * P + r] * own[r];
-    }
-    double found[P] = {};
-    std::copy(own, own + D, found);
-    for (; known < own; known += D, l += kSize) {
-      for (int c = 0; c < D; ++c) {
-        double sum = 0.0;
-        for (int r = 0; r < P; ++r) sum += l[c * P + r] * found[r];
-        known[c] -= sum;
-      }
-    }
+void MovingBand::solve_ordered() {
+  if (has_wide_registers()) {
+    solve_rows_wide<D>(rows_, values_.data(), inverse_, ordered_.data());
+  } else {
+    solve_rows<D>(rows_, values_.data(), inverse_, ordered_.data());
   }
 }
 
@@ -369,16 +439,16 @@ void MovingBand::solve(Eigen::VectorXd& v) {
   }
   switch (per_node_) {
     case 3:
-      solve_rows<3>();
+      solve_ordered<3>();
       break;
     case 4:
-      solve_rows<4>();
+      solve_ordered<4>();
       break;
     case 5:
-      solve_rows<5>();
+      solve_ordered<5>();
       break;
     default:
-      solve_rows<6>();
+      solve_ordered<6>();
   }
   x = ordered_.data();
   for (const Row& row : rows_) {

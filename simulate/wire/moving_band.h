@@ -64,9 +64,7 @@ class MovingBand {
   void find_order(int nodes, int per_node, const SectionBlocks& blocks);
   void find_sequence(const SectionBlocks& blocks);
   template <int D>
-  bool factor_row(std::size_t at);
-  template <int D>
-  void solve_rows();
+  void solve_ordered();
 
   int per_node_ = 0;             // D
   std::vector<Row> rows_;        // in the order
