@@ -15,10 +15,14 @@ using simulate::TrialResult;
 
 constexpr double kSupport = 1e-3;  // [N/mm^3]
 
+double pushes_of(const TrialResult& trial) {
+  return static_cast<double>(std::max<std::size_t>(1, trial.pushes.size()));
+}
+
 double iterations_per_push(const TrialResult& trial) {
   double sum = 0.0;
   for (const Push& push : trial.pushes) sum += push.iterations;
-  return sum / static_cast<double>(std::max<std::size_t>(1, trial.pushes.size()));
+  return sum / pushes_of(trial);
 }
 
 }  // namespace
@@ -42,7 +46,9 @@ std::vector<Json> time_moving_vessel(const Vessel& vessel, const std::vector<dou
     for (std::size_t k = 0; k < EI.size(); ++k) {
       fixed_ms[k].push_back(held.cpu_ms[k]);
       moving_ms[k].push_back(moved.cpu_ms[k]);
-      ratio[k].push_back(moved.cpu_ms[k] / held.cpu_ms[k]);
+      // A wire that leaves the lumen where the vessel stays may go on where it moves.
+      ratio[k].push_back((moved.cpu_ms[k] / pushes_of(moved.trials[k])) /
+                         (held.cpu_ms[k] / pushes_of(held.trials[k])));
     }
   }
   std::vector<Json> rows;

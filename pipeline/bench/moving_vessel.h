@@ -8,7 +8,7 @@
 namespace wireplan::pipeline {
 
 /// Straight wires of these EI [N mm^2] pushed in by `length` [mm] along the path of a vessel that
-/// yields, with cross-sections that move and without, in turns.
+/// yields, with cross-sections that move and without, in turns; times are compared per push.
 std::vector<Json> time_moving_vessel(const Vessel& vessel, const std::vector<double>& EI,
                                      double length, int repeats);
 
