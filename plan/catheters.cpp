@@ -288,14 +288,18 @@ std::string turned_by(double angle) {
 std::string tell_tries(const ToolStep& step) {
   if (step.tries == 0) return {};
   const std::string length = whole_number(step.try_pull) + " mm ";
+  const std::string more = whole_number(std::abs(step.try_turn) / kRadPerDeg) + " degrees";
   return "If it passes by the branch or comes no further, withdraw it and try again, " +
          count_of_times(step.tries) + " at most. First try with both tools " + length +
-         "back from where they were, then " + length + "on. Then try with the catheter turned " +
-         turned_by(step.try_turn) +
-         ", then turned to the other side. Then do the same again, each time by twice the length "
-         "and " +
-         whole_number(std::abs(step.try_turn) / kRadPerDeg) +
-         " degrees more, but no further on than " + whole_number(simulate::kTryBeyond) +
+         "back from where they were, then " + length +
+         "on. Then hook anew, as also where the catheter's tip has come out of the ostium: "
+         "with the wire ahead, advance both until the catheter's tip is " +
+         whole_number(simulate::kTryAbove) +
+         " mm beyond the ostium, no further than it has been, turn it " + more +
+         " toward the branch (" + (step.try_turn > 0.0 ? "clockwise" : "counterclockwise") +
+         " where it looks along that) and pull both back to its level; then turned to the other "
+         "side. Then do the same again, each time by twice the length and " +
+         more + " more, but no further on than " + whole_number(simulate::kTryBeyond) +
          " mm beyond the ostium or where they were.";
 }
 

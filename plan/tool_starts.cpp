@@ -43,7 +43,7 @@ struct Template {
   double turn_slack = 30.0 * kRadPerDeg;  // ... and of turns
   int rounds = 4;  // of tries of a wire that passes the ostium by, at most, from so far beside
   double again_pull = 3.0, again_turn = 15.0 * kRadPerDeg;  //                          [mm, rad]
-  int steers = 8;                                           // of a wire on its way up, at most
+  int steers = 16;                                          // of a wire on its way up, at most
   std::size_t weighed = 5;  // scripts of a start whose neighbours are tried
 };
 constexpr Template kTemplate;

@@ -26,11 +26,10 @@ constexpr double kLongestEdge = 1.45;      // ... of it: ToolBench::divide()
 constexpr double kDivideShorter = 0.67;    // ... or shorter: the centreline is divided anew
 constexpr double kAtEnd = 0.02;            // of a part: so near, a step is at what ends it; chosen
 constexpr double kShortestToEnd = 0.1;     // of a part, near what ends it; chosen
-// Of a tool that passes a branch by: ToolStep; the last from where the image ends            [mm]
-constexpr double kTryOut = 20.0, kTryIn = 5.0, kTryBeforeEnd = 2.0;
-constexpr double kEndReach = 1.5;      // of such an end, in its radii
+constexpr double kTryAside = 10.0 * kRadPerDeg;  // of a tip: it is turned to the branch first
 constexpr double kSteerAstray = 10.0;  // pushed on in another vessel: less may pass its mouth [mm]
 constexpr int kSteerPlaces = 4;        // each so much further back; near the access ...
+constexpr int kSteersOfRound = 8, kSteerShift = 2;          // the next time round from other places
 constexpr double kSteerShare = 0.6, kSteerShareLess = 0.1;  // ... so much of the insertion
 constexpr double kLooksAside = 0.1;  // sine, of a tip against the trunk: less looks nowhere
 
@@ -155,8 +154,11 @@ bool ToolTrial::make(const ToolStep& step, bool last) {
   } else if (step.steers > 0) {
     make_steered(step, last);
   } else {
+    ToolStep again = step;
+    const double looks = step.tries > 0 ? measure(Until::kFacing, step.tool - 1) : 0.0;
+    if (std::abs(looks) > kTryAside) again.try_turn = -std::copysign(step.try_turn, looks);
     for (int tried = 0; advance(step, last, tried < step.tries); ++tried) {
-      try_again(step, from, tried + 1);
+      try_again(again, from, tried + 1);
     }
   }
   keep_end_of_step();
@@ -206,69 +208,11 @@ bool ToolTrial::advance(const ToolStep& step, bool last, bool looks) {
   return false;
 }
 
-/// Whether the tool has come out of the one outside it, and not into the branch.
-bool ToolTrial::passes_by(const ToolStep& step) const {
-  const double out = insertion(step.tool) - insertion(step.tool - 1);
-  const bool comes_out = out >= kTryOut || (out > 0.0 && is_near_end(step.tool, kTryBeforeEnd));
-  return comes_out && measure(Until::kInBranch, step.tool) < kTryIn;
-}
-
-/// Whether the tool's tip is so near to where the image ends: a hand that leads it on does so
-/// unseen.
-bool ToolTrial::is_near_end(int tool, double within) const {
-  const Vec3 here = tip(tool);
-  const auto ends = [&](const preprocess::Opening& opening) {
-    const Vec3 off = here - opening.center;
-    const double height = opening.normal.dot(off);
-    return std::abs(height) < within &&
-           (off - height * opening.normal).norm() < kEndReach * opening.radius;
-  };
-  const auto& openings = vessel_.lumen.openings();
-  return std::any_of(openings.begin(), openings.end(), ends);
-}
-
-ToolTrial::TryPlace ToolTrial::place_of_try(int tool) const {
-  return {insertion(tool - 1), insertion(tool) - insertion(tool - 1),
-          measure(Until::kLevel, tool - 1)};
-}
-
-/// Takes the tool of a push back to where the push began, and brings all to where the next try
-/// begins. The outer one's tip is not pushed on past the ostium, where it only gets further off.
-void ToolTrial::try_again(const ToolStep& step, const TryPlace& from, int tried) {
-  const int outer = step.tool - 1;
-  struct Place {
-    double push = 0.0, turn = 0.0;
-  };
-  const auto place = [&](int k) -> Place {
-    if (k == 0) return {};
-    const int round = (k - 1) / kTriesOfRound;
-    const double side = k % 2 == 1 ? 1.0 : -1.0;
-    return (k - 1) % kTriesOfRound < 2 ? Place{.push = -side * std::ldexp(step.try_pull, round)}
-                                       : Place{.turn = side * (1 + round) * step.try_turn};
-  };
-  ++tries_;
-  const Place before = place(tried - 1), next = place(tried);
-  advance({.tool = step.tool, .push = insertion(outer) + from.ahead - insertion(step.tool)}, false,
-          false);
-  const double push = from.outer + next.push - insertion(outer);
-  const ToolStep moves[] = {{.tool = outer, .turn = next.turn - before.turn},
-                            {.tool = kBothTools,
-                             .push = push,
-                             .until = push > 0.0 ? Until::kLevel : Until::kMade,
-                             .at = std::max(from.level, 0.0) + kTryBeyond}};
-  for (const ToolStep& move : moves) {
-    if (!ended() && (move.push != 0.0 || move.turn != 0.0)) advance(move, false, false);
-  }
-}
-
 /// Up to the take-off, past the vessels that the tip goes into.
 void ToolTrial::make_steered(const ToolStep& step, bool last) {
   const int outer = step.tool - 1;
   const double to = insertion(step.tool) + step.push, outer_was = insertion(outer);
   double lost_at = 0.0, came = 0.0, turned = 0.0;
-  const auto move = [&](const ToolStep& next) {
-    if (!ended() && (next.push != 0.0 || next.turn != 0.0)) advance(next, false, false);
-  };
   ToolStep rest = step;
   for (int tried = 0; advance(rest, last, false); ++tried, rest.push = to - insertion(step.tool)) {
     lost_at = std::max(lost_at, insertion(step.tool) - since_furthest_);
@@ -282,19 +226,19 @@ void ToolTrial::make_steered(const ToolStep& step, bool last) {
       continue;
     }
     ++tries_;
-    const int place = tried % kSteerPlaces;
+    const int place = (tried + kSteerShift * (tried / kSteersOfRound)) % kSteerPlaces;
     const double start = std::max(lost_at - kSteerBack - place * kSteerFurther,
                                   lost_at * (kSteerShare - place * kSteerShareLess));
     const double behind = std::min(kSteerBehind, 0.5 * start);
-    move({.tool = step.tool, .push = start - insertion(step.tool)});
-    move({.tool = outer, .push = std::max(outer_was, start - behind) - insertion(outer)});
+    move_by({.tool = step.tool, .push = start - insertion(step.tool)});
+    move_by({.tool = outer, .push = std::max(outer_was, start - behind) - insertion(outer)});
     if (tried > 0) {
-      move({.tool = outer, .turn = kSteerTurn});
+      move_by({.tool = outer, .turn = kSteerTurn});
       turned += kSteerTurn;
     }
   }
-  move({.tool = outer, .push = outer_was - insertion(outer)});
-  move({.tool = outer, .turn = -turned});
+  move_by({.tool = outer, .push = outer_was - insertion(outer)});
+  move_by({.tool = outer, .turn = -turned});
 }
 
 /// Whether the tip is still on its way up to the take-off, where it may be steered.

@@ -27,7 +27,7 @@ inline constexpr double kSteerTurn = 45.0 * kRadPerDeg;
 inline constexpr double kSteerBeforeEnd = 5.0;  //                                          [mm]
 /// Of a tool that passes a branch by: see ToolStep. Chosen.
 inline constexpr int kTriesOfRound = 4;
-inline constexpr double kTryBeyond = 6.0;  //                                               [mm]
+inline constexpr double kTryBeyond = 6.0, kTryAbove = 15.0;  //                             [mm]
 /// No catheter is pressed harder for its support: more than a hand pushes on a wire; chosen.
 inline constexpr double kMostSupport = 5.0;  //                                             [N]
 
@@ -64,7 +64,8 @@ struct ToolStep {
   /// take-off, goes into another vessel or comes no further, it is steered. It is withdrawn to
   /// kSteerBack before where that began, the tool outside it is brought up to kSteerBehind its tip,
   /// and it is led on. The next times the outer one is turned on by kSteerTurn, and both are
-  /// kSteerFurther back, three times as much at most, then again as at first. Near the access all
+  /// kSteerFurther back, three times as much at most, then again as at first; after a whole turn
+  /// each turn has another of these places. Near the access all
   /// lengths are shorter. Once the tool is up, the outer one is taken back as it was. Where all is
   /// in vain and the tip in another vessel, the trial ends. Past the take-off it is stopped
   /// kSteerBeforeEnd short of where the image ends.
@@ -75,7 +76,11 @@ struct ToolStep {
   /// `try_pull` from where they were, then pushed on by it, then the outer one turned by
   /// `try_turn`, then to the other side; then all that with the pull doubled and `try_turn` more,
   /// ...; so often. The outer one's tip goes no further on than kTryBeyond past the ostium, or past
-  /// where it was if that is beyond.
+  /// where it was if that is beyond. To be turned, and where its tip has come out of the ostium, it
+  /// hooks anew, since bends hold the twist of a hub that is turned in place: both are advanced to
+  /// kTryAbove past there, no further than they have been, the tool that leads ahead as long as it
+  /// is on the way, and pulled back to its level. A tip that looks aside is turned to the branch
+  /// first.
   int tries = 0;
   double try_pull = 0.0, try_turn = 0.0;  //                                        [mm, rad]
   /// Of the innermost, in the place of a push or turn: it is withdrawn whole out of the body, the
@@ -164,6 +169,8 @@ class ToolTrial {
   };
   TryPlace place_of_try(int tool) const;
   void try_again(const ToolStep& step, const TryPlace& from, int tried);
+  void hook_anew(const ToolStep& step, double turn, const TryPlace& from);
+  void move_by(const ToolStep& step);
   void make_steered(const ToolStep& step, bool last);
   void exchange(const ToolStep& step);
   void keep_end_of_step();

@@ -234,9 +234,12 @@ TEST(ToolSteps, SayWhatEndsThemAndWhatElseToDo) {
       told[5].otherwise,
       "If it passes by the branch or comes no further, withdraw it and try again, 8 times at most. "
       "First try with "
-      "both tools 3 mm back from where they were, then 3 mm on. Then try with the catheter "
-      "turned 15 degrees counterclockwise, then turned to the other side. Then do the same again, "
-      "each time by twice the length and 15 degrees more, but no further on than 6 mm beyond the "
+      "both tools 3 mm back from where they were, then 3 mm on. Then hook anew, as also where the "
+      "catheter's tip has come out of the ostium: with the wire ahead, advance both until the "
+      "catheter's tip is 15 mm beyond the ostium, no further than it has been, turn it 15 degrees "
+      "toward the branch (counterclockwise where it looks along that) and pull both back to its "
+      "level; then turned to the other side. Then do the same again, each time by twice the length "
+      "and 15 degrees more, but no further on than 6 mm beyond the "
       "ostium or where they were.");
   const std::string script = describe_script(steps, 247.4);
   EXPECT_EQ(

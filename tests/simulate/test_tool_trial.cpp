@@ -8,6 +8,7 @@
 #include "preprocess/surface/openings.h"
 #include "simulate/insertion/tool_script.h"
 #include "tests/shapes.h"
+#include "tests/simulate/hooked_tools.h"
 
 namespace wireplan::simulate {
 namespace {
@@ -43,50 +44,11 @@ const VesselModel& open_aorta() {
   return vessel;
 }
 
-Tool hooked_catheter() {
-  Tool tool;
-  tool.wire = {.name = "hook",
-               .radius = 0.83,
-               .sections = {{.length = 18.0, .bending_stiffness = 99.0, .rest_curvature = 0.08},
-                            {.length = 900.0, .bending_stiffness = 332.0}},
-               .friction = 0.1};
-  tool.inner_radius = 0.5;
-  return tool;
-}
-
-Tool straight_wire(double EI) {
-  Tool tool;
-  tool.wire = {.name = "wire",
-               .radius = 0.44,
-               .sections = {{.length = 1400.0, .bending_stiffness = EI}},
-               .friction = 0.04};
-  return tool;
-}
-
-ToolTrialOptions coarse() {
-  ToolTrialOptions options;
-  options.insertion.element_length = 3.0;
-  options.insertion.friction = 0.04;
-  options.insertion.length = 400.0;
-  return options;
-}
-
 const Introducer kUpward{.point = Vec3(0.0, 0.0, 5.0), .direction = Vec3::UnitZ()};
 const Goal kNowhere{.point = Vec3(0.0, 0.0, 500.0), .radius = 1.0};
 
 ToolTrial hooked_trial() {
   return {{hooked_catheter(), straight_wire(20.0)}, kUpward, kNowhere, aorta(), coarse()};
-}
-
-Centerline line_from(const Vec3& from, const Vec3& to, double radius) {
-  const double length = (to - from).norm();
-  const auto n = static_cast<Eigen::Index>(std::lround(length)) + 1;
-  Centerline line{Eigen::Matrix3Xd(3, n), Eigen::VectorXd::Constant(n, radius),
-                  Eigen::VectorXd::LinSpaced(n, 0.0, length)};
-  for (Eigen::Index k = 0; k < n; ++k) {
-    line.points.col(k) = from + line.arc_length[k] / length * (to - from);
-  }
-  return line;
 }
 
 TEST(ToolTrial, TheWireOfACatheterThatStaysOutsideGoesAsTheWireAlone) {
@@ -441,6 +403,33 @@ TEST(ToolTrial, TriesGoFurtherBackEachRoundAndNotOnPastTheOstium) {
   EXPECT_GT(trial.insertion(1) - trial.insertion(0), ahead + 20.0) << "led out from there";
 }
 
+TEST(ToolTrial, TriesTurnTheCatheterAboveTheOstiumAndFirstTowardTheBranch) {
+  ToolTrial trial = watched_trial();
+  ASSERT_TRUE(hooks(trial, 0.5 * kPi, -12.0)) << "it looks aside of both branches";
+  const double begun = trial.insertion(0), roll = trial.bench().places()[0].roll;
+  const std::size_t before = trial.pushes().size();
+  trial.make({.tool = 1, .push = 80.0, .tries = 4, .try_pull = 3.0, .try_turn = 15.0 * kRadPerDeg});
+  ASSERT_FALSE(trial.reached());
+  EXPECT_NEAR(trial.measure(Until::kLevel, 0), -12.0, 4.0) << "the wire that comes out moves it";
+  const ToolTrack catheter = trial.finish().tools.at(0);
+  double deepest = 0.0;
+  std::vector<double> turned;  // to these places, one after the other
+  for (std::size_t k = before; k < catheter.roll.size(); ++k) {
+    deepest = std::max(deepest, catheter.insertion[k]);
+    const double by = catheter.roll[k] - catheter.roll[k - 1];
+    if (std::abs(by) < 1e-9) continue;
+    EXPECT_EQ(catheter.insertion[k], catheter.insertion[k - 1]);
+    EXPECT_GT(catheter.insertion[k], begun + 10.0);
+    turned.push_back(catheter.roll[k]);
+  }
+  EXPECT_LT(deepest, 110.0 + 1e-9) << "no further than it has been";
+  ASSERT_EQ(turned.size(), 3U) << "15 degrees to one side, then 30 to the other in two parts";
+  const double start = catheter.roll[before - 1];
+  EXPECT_NEAR(turned[0] - start, -15.0 * kRadPerDeg, 1e-9) << "from where it looks to the branch";
+  EXPECT_NEAR(turned[2] - start, 15.0 * kRadPerDeg, 1e-9);
+  EXPECT_NEAR(trial.bench().places()[0].roll - roll, 15.0 * kRadPerDeg, 1e-9);
+}
+
 TEST(ToolTrial, AWireOnItsWayUpIsStoppedShortOfTheEndOfTheImage) {
   ToolTrial trial = watched_trial(1.0, open_aorta());  // whose aorta ends at 170 mm
   ASSERT_TRUE(trial.make({.tool = 1, .push = 300.0, .steers = 8})) << trial.reason();
@@ -469,100 +458,6 @@ TEST(ToolTrial, AWireThatComesNoFurtherIsLedOutAnew) {
   EXPECT_GT(trial.tip(1).x(), 25.0);
   const TrialResult record = trial.finish();
   EXPECT_NE(record.reason.find("tried again 2 times"), std::string::npos) << record.reason;
-}
-
-// A trunk of 6 mm radius along z from 0 to 200 mm with a branch of 4 mm that leaves it at 70 mm, by
-// 30 degrees toward +x, so that what comes along that side goes into it; all ends are closed.
-Vec3 along_branch(double s) { return {0.5 * s, 0.0, 70.0 + std::sqrt(0.75) * s}; }
-
-const VesselModel& side_branch() {
-  static const VesselModel vessel(
-      shapes::level_set(
-          [](const Vec3& p) {
-            const double trunk =
-                shapes::depth_in_tube(p, Vec3(0.0, 0.0, 0.0), Vec3(0.0, 0.0, 200.0), 6.0);
-            const double branch =
-                shapes::depth_in_tube(p, along_branch(0.0), along_branch(80.0), 4.0);
-            return 0.5 * std::log(std::exp(trunk / 0.5) + std::exp(branch / 0.5));
-          },
-          Vec3(-7.0, -7.0, -1.5), Vec3(46.0, 7.0, 201.5), 1.0),
-      LumenOptions{.grid_spacing = 0.6});
-  return vessel;
-}
-
-/// Up that trunk to 190 mm, past a take-off at that arc length of the way.
-ToolTrial branched_trial(double EI = 20.0, double arc = 155.0) {
-  const Centerline path = line_from(Vec3(0.0, 0.0, 5.0), Vec3(0.0, 0.0, 190.0), 6.0);
-  const std::vector<preprocess::Branch> tree = {
-      {path, -1, 0.0}, {line_from(along_branch(0.0), along_branch(79.0), 4.0), 0, 65.0}};
-  const auto way = std::make_shared<Way>(path, tree);
-  const Goal goal{.point = way->section().center, .radius = 6.0, .at_section = true, .way = way};
-  ToolTrialOptions options = coarse();
-  options.insertion.length = 600.0;
-  options.take_off = TakeOff{.arc = arc, .point = Vec3(0.0, 6.0, 5.0 + arc)};
-  const Introducer introducer{.point = Vec3(-4.0, 0.0, 5.0),
-                              .direction = Vec3(std::sin(0.15), 0.0, std::cos(0.15))};
-  return {{hooked_catheter(), straight_wire(EI)}, introducer, goal, side_branch(), options};
-}
-
-TEST(ToolTrial, AWireIsLedPastAVesselThatItGoesInto) {
-  ToolTrial astray = branched_trial();
-  ASSERT_TRUE(astray.make({.tool = 1, .push = 100.0}));
-  EXPECT_GT(astray.tip(1).x(), 8.0) << "it goes into the branch by itself";
-
-  ToolTrial led = branched_trial();
-  ASSERT_TRUE(led.make({.tool = 1, .push = 140.0, .steers = 8})) << led.reason();
-  EXPECT_LT(std::abs(led.tip(1).x()), 6.0);
-  EXPECT_GT(led.tip(1).z(), 130.0);
-  EXPECT_NEAR(led.insertion(1), 144.0, 1e-9) << "as far in as was asked for";
-  EXPECT_NEAR(led.insertion(0), 0.0, 1e-9) << "the catheter is taken back ...";
-  EXPECT_NEAR(led.bench().places()[0].roll, 0.0, 1e-9) << "... as it was";
-  const TrialResult record = led.finish();
-  EXPECT_NE(record.reason.find("tried again"), std::string::npos) << record.reason;
-}
-
-/// Insertions of the wire and the catheter, and the hub's angle, as the wire is led on each time.
-struct Led {
-  double wire, catheter, roll;
-};
-std::vector<Led> led_on(const TrialResult& record) {
-  std::vector<Led> all;
-  const ToolTrack &catheter = record.tools[0], &wire = record.tools[1];
-  for (std::size_t k = 1; k + 1 < record.pushes.size(); ++k) {
-    const bool waits = wire.insertion[k] <= wire.insertion[k - 1] + 1e-9;
-    if (waits && wire.insertion[k + 1] > wire.insertion[k] + 1e-9) {
-      all.push_back({wire.insertion[k], catheter.insertion[k], catheter.roll[k]});
-    }
-  }
-  return all;
-}
-
-TEST(ToolTrial, AWireThatCannotBeLedOnIsNotPushedForEver) {
-  // 40 mm of catheter do not matter to a wire as stiff as this.
-  ToolTrial trial = branched_trial(5000.0);
-  EXPECT_FALSE(trial.make({.tool = 1, .push = 140.0, .steers = 5}));
-  EXPECT_FALSE(trial.reached());
-  const TrialResult record = trial.finish();
-  EXPECT_NE(record.reason.find("the tip is not on the way: it is in branch 2"), std::string::npos)
-      << record.reason;
-  EXPECT_NE(record.reason.find("tried again 5 times"), std::string::npos) << record.reason;
-  const std::vector<Led> tries = led_on(record);
-  ASSERT_EQ(tries.size(), 5U);
-  for (std::size_t k = 0; k < 5; ++k) {
-    SCOPED_TRACE(k);
-    const double further = kSteerFurther * static_cast<double>(k % 4);
-    EXPECT_NEAR(tries[k].wire, tries[0].wire - further, 1e-9);
-    EXPECT_NEAR(tries[k].wire - tries[k].catheter, std::min(kSteerBehind, 0.5 * tries[k].wire),
-                1e-9);
-    EXPECT_NEAR(tries[k].roll, kSteerTurn * static_cast<double>(k), 1e-9);
-  }
-}
-
-TEST(ToolTrial, AWireNearTheTakeOffIsNotSteered) {
-  ToolTrial trial = branched_trial(20.0, 75.0 + kSteerNear - 20.0);
-  ASSERT_TRUE(trial.make({.tool = 1, .push = 100.0, .steers = 8}));
-  EXPECT_GT(trial.tip(1).x(), 8.0);
-  EXPECT_EQ(trial.finish().reason.find("tried again"), std::string::npos);
 }
 
 TEST(ToolTrial, StepsWithoutATakeOffAreMadeWhole) {
