@@ -161,6 +161,7 @@ long weigh_scripts(ToolTrial& trial, std::size_t begun,
   for (std::size_t k = 0; k < scripts.size(); ++k) {
     for (ToolScript& script : list_neighbours(scripts[k].steps)) {
       rests.emplace_back(script.begin() + static_cast<std::ptrdiff_t>(begun), script.end());
+      for (ToolStep& step : rests.back()) step.tries = 0;
       all.push_back(std::move(script));
       owners.push_back(k);
     }

@@ -36,9 +36,9 @@ struct FoundScript {
   std::vector<ToolScript> spares = {};  // neighbours that do
 };
 
-/// Of each script how many of it and its neighbours reach, and which of these are allowed to stand
-/// in for it. All begin with the same `begun` steps, which the trial has made. Returns how many
-/// were tried.
+/// Of each script how many of it and its neighbours reach at once, without ToolStep::tries, and
+/// which of these are allowed to stand in for it. All begin with the same `begun` steps, which the
+/// trial has made. Returns how many were tried.
 long weigh_scripts(simulate::ToolTrial& trial, std::size_t begun,
                    const std::function<bool(const ToolScript&)>& allowed,
                    const std::function<bool()>& cancelled, std::vector<FoundScript>& scripts);

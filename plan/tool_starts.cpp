@@ -206,8 +206,8 @@ class ToolSearch {
     if (broken_.empty()) findings_.found.push_back(std::move(found));
   }
 
-  /// A wire that passes the ostium by is withdrawn and led out again with the catheter turned a
-  /// little, first the way that it was turned before.
+  /// A wire that passes the ostium by is withdrawn and led out again: at each push out of the hook,
+  /// since a catheter that holds at the first may be pushed out of the ostium by a later one.
   void let_try_again(std::vector<ToolStep>& steps) const {
     const ToolRules& rules = study_.tool_rules;  // the last round turns from one side to the other
     const double most = std::min(rules.most_turn, rules.turn_per_length * kTemplate.again_pull);
@@ -215,17 +215,18 @@ class ToolSearch {
     const int rounds = static_cast<int>(std::min<double>(kTemplate.rounds, allowed));
     if (rounds == 0) return;
     double side = 1.0;
-    ToolStep* out = nullptr;
+    std::vector<ToolStep*> outs;
     for (std::size_t k = begin_.steps.size(); k < steps.size(); ++k) {
       ToolStep& step = steps[k];
       if (step.turn != 0.0) side = step.turn > 0.0 ? 1.0 : -1.0;
-      if (step.tool == kBothTools || step.turn != 0.0) out = nullptr;
-      if (step.tool == kWire && step.push > 0.0 && out == nullptr) out = &step;
+      if (step.tool == kBothTools || step.turn != 0.0) outs.clear();
+      if (step.tool == kWire && step.push > 0.0) outs.push_back(&step);
     }
-    if (out == nullptr) return;
-    out->tries = rounds * simulate::kTriesOfRound;
-    out->try_pull = kTemplate.again_pull;
-    out->try_turn = side * kTemplate.again_turn;
+    for (ToolStep* out : outs) {
+      out->tries = rounds * simulate::kTriesOfRound;
+      out->try_pull = kTemplate.again_pull;
+      out->try_turn = side * kTemplate.again_turn;
+    }
   }
 
   /// Of the scripts that stand first without it, how often they and their neighbours reach.

@@ -464,6 +464,25 @@ TEST(ToolSearch, AWireThatPassesTheBranchByIsLedOutAnew) {
                               std::abs(again.tools[0].insertion[k] - (catheter - 3.0)) < 1e-9);
   }
   EXPECT_TRUE(both_back);
+  // Whether it holds is asked without tries: of scripts that only these save others come first.
+  std::vector<FoundScript> weighed = {{.steps = script.steps}};
+  simulate::ToolTrial trial(tools_of(study, script), make_introducer(study, script), study.goal,
+                            aorta(), tool_options(study, script));
+  weigh_scripts(
+      trial, 0, [](const ToolScript&) { return true; }, nullptr, weighed);
+  EXPECT_FALSE(weighed[0].holds);
+  EXPECT_LT(weighed[0].share, 1.0);
+  const ToolScript first_steps = found.found[0].steps;
+  weighed = {{.steps = first_steps}};
+  weigh_scripts(
+      trial, 0, [](const ToolScript&) { return true; }, nullptr, weighed);
+  EXPECT_TRUE(weighed[0].holds);
+  ASSERT_FALSE(weighed[0].spares.empty());
+  for (const ToolScript& spare : weighed[0].spares) {
+    EXPECT_TRUE(std::any_of(spare.begin(), spare.end(), [&](const ToolStep& one) {
+      return one.tries == tries;
+    })) << "what stands in for it makes them";
+  }
 }
 
 TEST(CatheterChoice, LeavesTheStudyWhatTheWayAsksFor) {
