@@ -23,6 +23,9 @@ constexpr int kTurnsOfScouts = 3, kTurns = 1;
 // Of 8 that are 7: one with 6 was safe in 11 of 16.
 constexpr std::size_t kScriptsRefined = 4, kScriptsTried = 2;
 constexpr double kMostOfTries = 0.85;
+// Of scripts of tools at least so many are repeated so often, before the best gets the rest;
+// chosen.
+constexpr int kScriptsRepeated = 3;
 // Neighbours of a script of tools that are run in full in its place.
 constexpr std::size_t kSparesTried = 2;
 // Which plans are the best is found from so many repeats of each that may be. Plans that fall
@@ -445,7 +448,8 @@ class Planner {
   void repeat() {
     plan_.robustness = unknowns(options_.robustness.repeats);
     plan_.disturbances = draw_disturbances(plan_.robustness, study_.wires);
-    const int asked = plan_.robustness.repeats, few = std::min(kFirstRepeats, asked);
+    const int asked = plan_.robustness.repeats;
+    const int few = std::min(has_tool_plans() ? kTries : kFirstRepeats, asked);
     repeat_best(few, kRepeatRounds);
     if (asked > few) {
       repeat_best(asked, 1);
@@ -457,13 +461,45 @@ class Planner {
   void repeat_best(int count, int rounds) {
     for (int round = 0; count > 0; ++round) {
       // In the end the first, and the best of each wire and catheter, alone.
-      const Judgement now = judged();
       const std::vector<int> chosen =
-          choose_plans_to_repeat(now.ranking, plan_.candidates, now.repeated,
-                                 round < rounds ? plan_.robustness.plans : 1, count);
+          choose_to_repeat(round < rounds ? plans_to_repeat(count) : 1, count);
       if (chosen.empty()) return;
       add_repeats(chosen, static_cast<std::size_t>(count));
     }
+  }
+
+  // The best of each catheter is repeated as often as tells it from the first, and no further.
+  std::vector<int> choose_to_repeat(int plans, int count) const {
+    const Judgement now = judged();
+    const Ranking& ranking = now.ranking;
+    std::vector<int> chosen =
+        choose_plans_to_repeat(ranking, plan_.candidates, now.repeated, plans, count);
+    if (!has_tool_plans() || count <= kTries) return chosen;
+    const auto first =
+        ranking.plans.begin() + std::min<std::ptrdiff_t>(plans, std::ssize(ranking.plans));
+    std::erase_if(chosen, [&](int id) {
+      return std::none_of(ranking.plans.begin(), first,
+                          [&](const RankedPlan& plan) { return plan.trial == id; }) &&
+             std::none_of(ranking.wires.begin(), ranking.wires.end(),
+                          [&](const WireSummary& wire) { return wire.best_trial == id; });
+    });
+    return chosen;
+  }
+
+  // As the case asks for; of scripts of catheter and wire no fewer than these, as long as that
+  // takes a part of the repeats alone: by their scores alone the steadiest is not known.
+  int plans_to_repeat(int count) const {
+    const int asked = plan_.robustness.plans;
+    const bool part = count < plan_.robustness.repeats;
+    return part && has_tool_plans() && asked > 0 ? std::max(asked, kScriptsRepeated) : asked;
+  }
+
+  bool has_tool_plans() const {
+    for (std::size_t k = 0; k < plan_.trials.size(); ++k) {
+      const bool reached = plan_.trials[k].outcome == simulate::Outcome::kReached;
+      if (reached && plan_.candidates[k].catheter >= 0) return true;
+    }
+    return false;
   }
 
   // Until each has `count`. Repeat by repeat, so that plans under one disturbance run at about the

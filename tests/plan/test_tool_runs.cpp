@@ -3,6 +3,7 @@
 
 #include <vector>
 
+#include "plan/judge.h"
 #include "plan/make_plan.h"
 #include "plan/trial_log.h"
 #include "tests/plan/memory_log.h"
@@ -88,6 +89,44 @@ class LogOfRepeats : public MemoryLog {
  private:
   int failures_;
 };
+
+/// In which every other repeat of the script that is repeated first passes the branch by.
+class LogOfAWeakFirst : public LogOfRepeats {
+ public:
+  LogOfAWeakFirst() : LogOfRepeats(0) {}
+  std::optional<Measured> find(const Run& run) override {
+    std::optional<Measured> end = LogOfRepeats::find(run);
+    if (!end || !run.disturbance) return end;
+    if (first.empty()) first = run.candidate.steps;
+    if (run.candidate.steps == first && ++tried % 2 == 0) {
+      end->outcome = simulate::Outcome::kPassedBy;
+      end->metrics.reached = false;
+    }
+    return end;
+  }
+  std::vector<simulate::ToolStep> first;
+  int tried = 0;
+};
+
+TEST(ToolRuns, MakePlanRepeatsOtherScriptsThanTheFirstByScore) {
+  const auto model = []() -> const simulate::VesselModel& { return aorta(); };
+  const Study study = toward(1.0);
+  const PlanVessel vessel{
+      .path = study.goal.way->path(), .yields = false, .model = model, .rigid_model = model};
+  PlanOptions options;
+  options.robustness.plans = 1;
+  options.robustness.repeats = 16;
+  LogOfAWeakFirst log;
+  const Plan plan = make_plan(study, vessel, options, log);
+  const Ranking ranking = judge(study, plan, {}, {}).ranking;
+  ASSERT_FALSE(ranking.plans.empty());
+  const int best = ranking.plans.front().trial;
+  EXPECT_NE(plan.candidates.at(static_cast<std::size_t>(best)).steps, log.first);
+  ASSERT_GE(plan.repeated.size(), 3U);
+  for (const RepeatedTrials& repeated : plan.repeated) {
+    EXPECT_EQ(repeated.trials.size(), repeated.trial == best ? 16U : 8U) << repeated.trial;
+  }
+}
 
 TEST(ToolRuns, MakePlanTriesTheNextCathetersWhereNoScriptHoldsInMostRepeats) {
   const auto model = []() -> const simulate::VesselModel& { return aorta(); };
