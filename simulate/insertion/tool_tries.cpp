@@ -9,6 +9,7 @@ namespace {
 
 // ToolStep; the last from where the image ends; chosen                                       [mm]
 constexpr double kTryOut = 20.0, kTryIn = 5.0, kTryBeforeEnd = 2.0;
+constexpr double kTryPart = 2.0;      // of a push that is looked at, of the options' steps
 constexpr double kEndReach = 1.5;     // of such an end, in its radii
 constexpr double kTryFallen = 8.0;    // below where it was: the outer one's tip has come out   [mm]
 constexpr double kTryLeads = 12.0;    // of the tool that leads, ahead of the other            [mm]
@@ -97,9 +98,27 @@ void ToolTrial::hook_anew(const ToolStep& step, double turn, const TryPlace& fro
            .at = from.level});
 }
 
-/// Of a step that is under way.
+/// Of a step that is under way. Both tools are pushed no nearer to where the image ends than a tool
+/// that is led up, so that no try leaves the image.
 void ToolTrial::move_by(const ToolStep& step) {
-  if (!ended() && (step.push != 0.0 || step.turn != 0.0)) advance(step, false, false);
+  if (ended() || (step.push == 0.0 && step.turn == 0.0)) return;
+  if (step.tool != kBothTools || step.push < 0.0) {
+    advance(step, false, false);
+    return;
+  }
+  const auto near_end = [&] {
+    for (int tool = 0; tool < std::ssize(record_.tools); ++tool) {
+      if (is_near_end(tool, kSteerBeforeEnd)) return true;
+    }
+    return false;
+  };
+  ToolStep part = step;
+  for (double left = step.push; left > 1e-9 && !ended() && !near_end(); left -= part.push) {
+    part.push = std::min(left, kTryPart * options_.insertion.step);
+    const double before = foremost();
+    advance(part, false, false);
+    if (foremost() - before < 1e-9) return;  // it is where the step ends
+  }
 }
 
 }  // namespace wireplan::simulate

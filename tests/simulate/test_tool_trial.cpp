@@ -450,6 +450,16 @@ TEST(ToolTrial, AWireThatComesToTheEndOfTheImageHasPassedTheBranchBy) {
   EXPECT_NE(record.reason.find("tried again 4 times"), std::string::npos) << record.reason;
 }
 
+TEST(ToolTrial, NoTryLeadsTheToolsOutOfTheImage) {
+  ToolTrial trial = watched_trial(1.0, open_aorta());
+  ASSERT_TRUE(trial.make({.tool = 1, .push = 150.0}) && trial.make({.tool = 0, .push = 164.0}));
+  ASSERT_LT(170.0 - trial.tip(0).z(), kTryBeyond) << "so far on it would be outside";
+  trial.make({.tool = 1, .push = 80.0, .tries = 4, .try_pull = 8.0});
+  const TrialResult record = trial.finish();
+  EXPECT_EQ(record.outcome, Outcome::kLeftImage) << "at last, by the wire";
+  EXPECT_NE(record.reason.find("tried again 4 times"), std::string::npos) << record.reason;
+}
+
 TEST(ToolTrial, AWireThatComesNoFurtherIsLedOutAnew) {
   // In a branch that ends 10 mm behind a cross-section too small to be passed.
   ToolTrial trial = watched_trial(1.0, aorta(), 1e-3);
