@@ -160,10 +160,7 @@ class ToolSearch {
     ++findings_.branches;
     const std::size_t pushes = trial_.pushes().size();
     trial_.make(step);
-    double furthest = 0.0;
-    for (std::size_t k = pushes; k < trial_.pushes().size(); ++k) {
-      furthest = std::max(furthest, study_.goal.way->find_progress(trial_.pushes()[k].tip));
-    }
+    const double furthest = furthest_since(pushes, trial_, *study_.goal.way);
     if (furthest > findings_.furthest) {
       findings_.furthest = furthest;
       findings_.closest = with(steps_, step);
@@ -558,6 +555,15 @@ class ToolSearch {
 }  // namespace
 
 double room_beyond() { return kTemplate.above[0] + kTemplate.leads + kTemplate.before_end; }
+
+double furthest_since(std::size_t push, const simulate::ToolTrial& trial,
+                      const simulate::Way& way) {
+  double furthest = 0.0;
+  for (std::size_t k = push; k < trial.pushes().size(); ++k) {
+    furthest = std::max(furthest, way.find_progress(trial.pushes()[k].tip));
+  }
+  return furthest;
+}
 
 WayUp go_up(const Study& study, const ToolPair& pair, const Ostium& ostium,
             const simulate::VesselModel& vessel, const std::function<bool()>& cancelled) {

@@ -37,6 +37,9 @@ struct WayUp {
 /// into the branch [mm].
 double room_beyond();
 
+/// How far along the way the tip came in the pushes from this one on [mm].
+double furthest_since(std::size_t push, const simulate::ToolTrial& trial, const simulate::Way& way);
+
 /// The wire beyond the ostium, and the catheter over it.
 WayUp go_up(const Study& study, const ToolPair& pair, const Ostium& ostium,
             const simulate::VesselModel& vessel, const std::function<bool()>& cancelled);

@@ -176,10 +176,7 @@ class SeatedSearch {
     const double left = ostium_.end - ostium_.arc - depth;
     const double push = std::ceil(kExchange.behind + left + kExchange.spare);
     const bool goes_on = go({.tool = kBroughtIn, .push = push}, /*last=*/true);
-    double progress = 0.0;
-    for (std::size_t k = pushes; k < trial_.pushes().size(); ++k) {
-      progress = std::max(progress, study_.goal.way->find_progress(trial_.pushes()[k].tip));
-    }
+    const double progress = furthest_since(pushes, trial_, *study_.goal.way);
     if (trial_.reached()) return keep(depth, progress);
     tell_stop(goes_on ? "its last push ends before the target" : trial_.reason(), progress);
   }
