@@ -202,7 +202,7 @@ std::vector<Stage> stages_from_labels(const Case& given) {
   if (!given.labels->choice.names.empty()) read_too(stages.back(), {"/labels/names"});
   read_points(stages.back(), given);
   stages.push_back({.name = "surface",
-                    .version = 10,
+                    .version = 11,
                     .reads_input = in_volume,
                     .after = {"segment"},
                     .parameters = {"/surface/edge_length_mm"},
@@ -230,7 +230,7 @@ std::vector<Stage> stages_to_surface(const Case& given) {
                     .make = make_segment});
   read_points(stages.back(), given);
   stages.push_back({.name = "surface",
-                    .version = 9,
+                    .version = 10,
                     .reads_input = true,
                     .after = {"segment"},
                     .parameters = {"/surface/edge_length_mm"},

@@ -37,6 +37,8 @@ constexpr double kHold = 0.15;
 constexpr int kRounds = 3;        // the first finds the unit
 constexpr double kDeep = 0.8413;  // part of a blurred step one sigma inside of it
 constexpr double kThick = 1.2;    // slices so much thicker than pixels are thick
+// Smoothing rounds the rim of a cap about so deep, however thick the slices are [mm]; chosen.
+constexpr double kRim = 1.7;
 // Blur moves the half level of a disc by sigma^2/(2 r), but not by more than this part of sigma: in
 // one thinner than 3 sigma it lowers the lumen's value, and so the level, as well.
 constexpr double kMostMoved = 0.15;
@@ -90,11 +92,13 @@ class Interpolated {
   /// Unit vector across the slices.
   Vec3 across_slices() const { return image_.grid.direction.col(thick_); }
 
-  /// Within a voxel of the outermost centres, where a cut vessel is capped.
+  /// Where a cut vessel is capped: within a voxel of the outermost centres, but no further than the
+  /// rim of a cap is round.
   bool at_border(const Vec3& point) const {
     const Vec3 p = image_.grid.ijk_from_lps(point);
     for (int a = 0; a < 3; ++a) {
-      if (p[a] < 1.0 || p[a] > image_.grid.size[a] - 2.0) return true;
+      const double depth = std::min(1.0, kRim / image_.grid.spacing[a]);
+      if (p[a] < depth || p[a] > image_.grid.size[a] - 1.0 - depth) return true;
     }
     return false;
   }

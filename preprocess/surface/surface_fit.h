@@ -39,9 +39,10 @@ struct FitStatistics {
 ///      the given surface. Where fewer than a quarter show an edge, they are not moved back; nor
 ///      where the median is more than half a voxel: then the edge is sought up to two voxels away.
 /// A vertex where the image shows no edge (a vein in contact, the end of what was segmented)
-/// follows its neighbours but is held back. Within a voxel of the volume's border, where the vessel
-/// is capped, vertices stay. Connectivity is kept, but the mesh may cut itself afterwards where
-/// walls are close: check it. Expects a closed surface with outward normals.
+/// follows its neighbours but is held back. Within a voxel of the volume's border and at most
+/// 1.7 mm, where the vessel is capped, vertices stay. Connectivity is kept, but the mesh may cut
+/// itself afterwards where walls are close: check it. Expects a closed surface with outward
+/// normals.
 Surface fit_to_image(const Surface& surface, const Image& image, FitStatistics* statistics,
                      FitWidth width = FitWidth::kOfImage);
 
