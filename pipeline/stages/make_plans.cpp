@@ -1,5 +1,6 @@
 // The stages that simulate. Each asks for the whole plan as far as it is responsible for; what the
 // stages before it simulated is found in the log.
+#include <chrono>
 #include <cmath>
 #include <utility>
 
@@ -45,8 +46,10 @@ std::string first_answer_text(const plan::Study& study, const plan::FirstAnswer&
          "; not known yet: the wall as it yields, errors, disturbances";
 }
 
-std::string first_script_text(const plan::Study& study, const plan::Candidate& script) {
-  return "first script, of the search's coarse steps: " + plan::describe(study, script) + ": " +
+std::string first_script_text(const plan::Study& study, const plan::Candidate& script,
+                              double seconds) {
+  return format("first script, after %.0f s of the search, of its coarse steps: ", seconds) +
+         plan::describe(study, script) + ": " +
          plan::describe_script(study, script, study.insertion.length) +
          "; not known yet: whether it holds in full and under disturbances";
 }
@@ -63,7 +66,10 @@ plan::Early early_answers(Workspace& work, Until until) {
     };
   }
   if (until == Until::kManoeuvres) {
-    early.script = [&](const plan::Candidate& script) { told(first_script_text(study, script)); };
+    early.script = [&, start = std::chrono::steady_clock::now()](const plan::Candidate& script) {
+      const std::chrono::duration<double> since = std::chrono::steady_clock::now() - start;
+      told(first_script_text(study, script, since.count()));
+    };
   }
   return early;
 }
