@@ -161,11 +161,20 @@ class Weighing {
 
   /// Why trials against a rigid wall are enough for that answer.
   void tell_rigid(Answer answer, const Endings& all) {
-    find(answer,
-         "The wall was taken for rigid, which is enough here: " +
-             part_of(all.trials - all.held_by_wall(), all.trials, "trial") +
-             " ended in another vessel or before the target for want of wire, which a wall that "
-             "gives way by tenths of a millimetre does not change.");
+    std::vector<std::string> ends;
+    int ended = 0;
+    const auto add = [&](int trials, const char* how) {
+      if (trials > 0) ends.emplace_back(how);
+      ended += trials;
+    };
+    add(all.passed_by + all.wrong_branch + all.another_way, "in another vessel");
+    add(all.left_image, "at an end of the imaged vessel");
+    add(all.whole_wire_in + all.all_wire_in, "before the target for want of wire");
+    add(all.missed, "with a tip that went no further along the way");
+    if (ended == 0) return;
+    find(answer, "The wall was taken for rigid, which is enough here: " +
+                     part_of(ended, all.trials, "trial") + " ended " + list_words(ends, "or") +
+                     ", which a wall that gives way by tenths of a millimetre does not change.");
   }
 
   static std::string how_trials_ended(const Endings& all, const Endings& fine) {

@@ -203,10 +203,10 @@ std::string change_of_aim(const Endings& endings, const Known& known, const std:
 
 }  // namespace
 
-std::string list_words(const std::vector<std::string>& parts) {
+std::string list_words(const std::vector<std::string>& parts, const std::string& last) {
   std::string text;
   for (std::size_t k = 0; k < parts.size(); ++k) {
-    if (k > 0) text += k + 1 == parts.size() ? " and " : ", ";
+    if (k > 0) text += k + 1 == parts.size() ? " " + last + " " : ", ";
     text += parts[k];
   }
   return text;

@@ -11,8 +11,8 @@ namespace wireplan::plan {
 inline constexpr const char* kShapedCatheter =
     R"(A shaped catheter that leads the wire into the branch ("catheters": "suggest" tries some))";
 
-/// "a", "a and b", "a, b and c"
-std::string list_words(const std::vector<std::string>& parts);
+/// "a", "a and b", "a, b and c", or with another word before the last.
+std::string list_words(const std::vector<std::string>& parts, const std::string& last = "and");
 /// Of all that there are: "3 of 9 trials", "all 9 trials", "both trials", "the one trial"
 std::string part_of(int count, int all, const std::string& noun);
 /// With a capital letter in front.

@@ -551,11 +551,16 @@ TEST(Verdict, OfARigidWallAloneSaysWhyThatIsEnoughOrIsUnsure) {
   WhatIsKnown bench;
   bench.add_many(8, Outcome::kPassedBy, Level::kProbe);
   EXPECT_TRUE(tells(bench.verdict().reasons, "rigid, which is enough here: all 8 trials ended in"));
+  EXPECT_FALSE(tells(bench.verdict().reasons, "want of wire")) << "none ended so";
   EXPECT_FALSE(tells(bench.verdict().changes, "full detail")) << "it would change nothing";
   bench.add_many(2, Outcome::kStuck, Level::kProbe);
   const Verdict clear = bench.verdict();
   EXPECT_EQ(clear.answer, Answer::kNotFeasible);
   EXPECT_TRUE(tells(clear.reasons, "rigid, which is enough here: 8 of 10 trials ended in"));
+  WhatIsKnown coils = bench;
+  coils.add_many(4, Outcome::kMissed, Level::kProbe);
+  EXPECT_TRUE(tells(coils.verdict().reasons,
+                    "12 of 14 trials ended in another vessel or with a tip that went no further"));
   EXPECT_TRUE(tells(clear.changes, "Running all trials in full detail"));
   bench.add_many(7, Outcome::kStuck, Level::kProbe);
   const Verdict held = bench.verdict();
