@@ -295,29 +295,36 @@ TEST(SurfaceFromImage, HoldsATubesRadiusAtVoxelsFinerThanTheBlur) {
   EXPECT_NEAR(sum / count, 0.0, 0.08);
 }
 
+/// Of a straight tube of 300 HU along that unit vector through the origin, in fat, with 5 HU of
+/// noise.
+Surface surface_of_tube(const Grid& grid, const Vec3& along, double radius) {
+  PhantomSpec spec;
+  spec.grid = grid;
+  spec.body_semi_axes = {90.0, 90.0, 1.0};
+  spec.fat_mm = 85.0;
+  spec.skin_mm = 1.0;
+  spec.noise_hu = 5.0;
+  PhantomTube tube{.name = "tube", .hu = 300.0, .wall_mm = 1.0, .points = {}, .radius = {}};
+  tube.points.resize(3, 2);
+  tube.points << -100.0 * along, 100.0 * along;
+  tube.radius = Eigen::Vector2d::Constant(radius);
+  spec.tubes = {tube};
+  const Phantom phantom = make_phantom(spec);
+  return surface_from_image(phantom.image, phantom.lumen, {.edge_length_mm = 1.0});
+}
+
 TEST(SurfaceFromImage, HoldsAnObliqueTubesRadiusAcrossThickSlices) {
   // Blur is wider across the slices, so walls that run along them come out too far in: by 0.25 mm
   // at 4 mm, and 0.13 mm at 3 mm, where blur was taken to be the same in all directions.
   constexpr double kRadius = 4.0, kPixel = 0.75;
   for (const auto& [thickness, most] : {std::pair(3.0, 0.08), std::pair(4.0, 0.16)}) {
     SCOPED_TRACE(thickness);
-    PhantomSpec spec;
-    spec.grid.size = {100, 60, static_cast<int>(60.0 / thickness)};
-    spec.grid.spacing = Vec3(kPixel, kPixel, thickness);
-    spec.grid.origin = Vec3(-50.0 * kPixel, -30.0 * kPixel, -30.0);
-    spec.body_semi_axes = {90.0, 90.0, 1.0};
-    spec.fat_mm = 85.0;
-    spec.skin_mm = 1.0;
-    spec.noise_hu = 5.0;
-    PhantomTube tube{.name = "tube", .hu = 300.0, .wall_mm = 1.0, .points = {}, .radius = {}};
+    Grid grid;
+    grid.size = {100, 60, static_cast<int>(60.0 / thickness)};
+    grid.spacing = Vec3(kPixel, kPixel, thickness);
+    grid.origin = Vec3(-50.0 * kPixel, -30.0 * kPixel, -30.0);
     const Vec3 along = Vec3(0.766, 0.1, 0.643).normalized();
-    tube.points.resize(3, 2);
-    tube.points << -100.0 * along, 100.0 * along;
-    tube.radius = Eigen::Vector2d::Constant(kRadius);
-    spec.tubes = {tube};
-    const Phantom phantom = make_phantom(spec);
-    const Surface surface =
-        surface_from_image(phantom.image, phantom.lumen, {.edge_length_mm = 1.0});
+    const Surface surface = surface_of_tube(grid, along, kRadius);
     double sum = 0.0, count = 0.0;
     for (const auto& vertex : surface.vertices.colwise()) {
       const Vec3 p = vertex, outward = p - p.dot(along) * along;
@@ -333,21 +340,12 @@ TEST(SurfaceFromImage, HoldsAnObliqueTubesRadiusAcrossThickSlices) {
 TEST(SurfaceFromImage, FitsATubeUpToTheRoundedRimOfItsCapInThickSlices) {
   // Of slices of 5 mm a whole one stayed as the mask had it: 3.3 to 4.7 mm from the axis.
   constexpr double kRadius = 4.0, kThickness = 5.0, kLast = 10.0;
-  PhantomSpec spec;
-  spec.grid.size = {48, 40, 9};
-  spec.grid.spacing = Vec3(1.0, 1.0, kThickness);
-  spec.grid.origin = Vec3(-24.0, -20.0, kLast - 8.0 * kThickness);
-  spec.body_semi_axes = {90.0, 90.0, 1.0};
-  spec.fat_mm = 85.0;
-  spec.skin_mm = 1.0;
-  PhantomTube tube{.name = "tube", .hu = 300.0, .wall_mm = 1.0, .points = {}, .radius = {}};
+  Grid grid;
+  grid.size = {48, 40, 9};
+  grid.spacing = Vec3(1.0, 1.0, kThickness);
+  grid.origin = Vec3(-24.0, -20.0, kLast - 8.0 * kThickness);
   const Vec3 along = Vec3(0.4, 0.1, 1.0).normalized();
-  tube.points.resize(3, 2);
-  tube.points << -100.0 * along, 100.0 * along;
-  tube.radius = Eigen::Vector2d::Constant(kRadius);
-  spec.tubes = {tube};
-  const Phantom phantom = make_phantom(spec);
-  const Surface surface = surface_from_image(phantom.image, phantom.lumen, {.edge_length_mm = 1.0});
+  const Surface surface = surface_of_tube(grid, along, kRadius);
   for (double depth = kThickness; depth > 3.4; depth -= 0.5) {
     const Vec3 on_axis = (kLast - depth) / along.z() * along;
     const double nearest = (surface.vertices.colwise() - on_axis).colwise().norm().minCoeff();
