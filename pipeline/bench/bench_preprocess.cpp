@@ -16,6 +16,7 @@
 #include <vector>
 
 #include "pipeline/bench/bench_report.h"
+#include "pipeline/files/clock.h"
 #include "pipeline/files/text.h"
 #include "pipeline/report/plot.h"
 #include "preprocess/centerline/centerline.h"
@@ -229,8 +230,7 @@ Preprocessed run_steps(const preprocess::PhantomSpec& spec, bool quick) {
     const double cpu = cpu_seconds();
     const auto start = std::chrono::steady_clock::now();
     step();
-    const double wall_s =
-        std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+    const double wall_s = seconds_since(start);
     const double cpu_s = cpu_seconds() - cpu;
     const Json peak = memory.megabytes();
     if (!error && all.surface.triangles.cols() > 0) error = compare(all.surface, truth, spec.grid);

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "pipeline/bench/bench_report.h"
+#include "pipeline/files/clock.h"
 #include "preprocess/centerline/centerline.h"
 
 namespace wireplan::pipeline {
@@ -29,10 +30,6 @@ Vec3 tip_at(const TrialResult& trial, double insertion) {
   const Push& before = *(next - 1);
   const double part = (insertion - before.insertion) / (next->insertion - before.insertion);
   return before.tip + std::min(1.0, part) * (next->tip - before.tip);
-}
-
-double seconds_since(std::chrono::steady_clock::time_point start) {
-  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 }
 
 bool same_bits(const TrialResult& a, const TrialResult& b) {

@@ -23,6 +23,7 @@
 
 #include "pipeline/commands/commands.h"
 #include "pipeline/files/case_file.h"
+#include "pipeline/files/clock.h"
 #include "pipeline/files/text.h"
 #include "pipeline/report/overview.h"
 #include "pipeline/report/report.h"
@@ -41,10 +42,6 @@ using Clock = std::chrono::steady_clock;
 constexpr double kMemoryOfAnyGb = 0.3, kMemoryPerInputByte = 8.0;
 constexpr double kBytesPerGb = 1e9;
 constexpr auto kPollInterval = std::chrono::milliseconds(20);
-
-double seconds_since(Clock::time_point start) {
-  return std::chrono::duration<double>(Clock::now() - start).count();
-}
 
 // ---- which cases -----------------------------------------------------------------------------
 

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <utility>
 
+#include "pipeline/files/clock.h"
 #include "pipeline/files/plan_file.h"
 #include "pipeline/files/text.h"
 #include "pipeline/files/trial_file.h"
@@ -67,8 +68,7 @@ plan::Early early_answers(Workspace& work, Until until) {
   }
   if (until == Until::kManoeuvres) {
     early.script = [&, start = std::chrono::steady_clock::now()](const plan::Candidate& script) {
-      const std::chrono::duration<double> since = std::chrono::steady_clock::now() - start;
-      told(first_script_text(study, script, since.count()));
+      told(first_script_text(study, script, seconds_since(start)));
     };
   }
   return early;

@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "pipeline/files/catalogue.h"
+#include "pipeline/files/clock.h"
 #include "pipeline/files/trial_file.h"
 #include "pipeline/files/viewer_files.h"
 #include "pipeline/report/anatomy_json.h"
@@ -530,8 +531,7 @@ void make_report(Workspace& work, const fs::path& folder) {
   }
 
   report.timing = timing_json(work);
-  report.timing["report_s"] =
-      std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  report.timing["report_s"] = seconds_since(start);
   const Json result = build_report(report);
   if (page_missing().empty()) write_whole(build_page(result, page), folder / "report.html");
   write_whole(sheet_csv(result), folder / "sheet.csv");

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "pipeline/files/access_limits_file.h"
+#include "pipeline/files/clock.h"
 #include "pipeline/report/report.h"
 #include "pipeline/store/hash.h"
 #include "plan/search.h"
@@ -16,10 +17,6 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr const char* kNotMade = "to be made";  // in the place of contents not yet known
-
-double seconds_since(std::chrono::steady_clock::time_point start) {
-  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-}
 
 // Of the files and of the names that a table gives.
 std::string hash_labels(const LabelsInput& labels) {

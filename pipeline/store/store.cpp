@@ -17,6 +17,7 @@
 #include <utility>
 #include <vector>
 
+#include "pipeline/files/clock.h"
 #include "pipeline/files/json_reader.h"
 #include "pipeline/store/hash.h"
 
@@ -293,8 +294,7 @@ Artifact Store::commit(const std::string& stage, const std::string& key_text,
     // The files, with their time.
     const auto start = std::chrono::steady_clock::now();
     make(temporary);
-    artifact.seconds =
-        std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+    artifact.seconds = seconds_since(start);
     write_whole(key_text, temporary / kKeyFile, Durability::kChecked);
     artifact.files = list_files(temporary);
     std::erase_if(artifact.files, [](const ArtifactFile& f) { return f.name == kKeyFile; });
