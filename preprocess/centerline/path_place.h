@@ -11,7 +11,7 @@ struct PathPlace {
   double from_lumen = 0.0;  // from the balls inscribed along it; 0 inside one              [mm]
 };
 
-/// Expects a path of at least one point.
+/// Expects a path of at least one point, with the lengths along its points.
 PathPlace find_place(const Vec3& p, const Centerline& path);
 
 /// Whether a place is in the path's lumen, which the balls fill but for what is oval: at most half

@@ -91,6 +91,7 @@ double begins_behind(const std::vector<Branch>& tree, int child) {
 
 BranchPlace find_branch(const std::vector<Branch>& tree, const Vec3& point) {
   constexpr double kClearlyNearer = 0.98;  // at a fork the branch that was found first counts
+  constexpr double kSurely = 1.0 + 1e-9;   // of a squared part, for rounding
   BranchPlace best{.part = std::numeric_limits<double>::infinity()};
   for (std::size_t k = 0; k < tree.size(); ++k) {
     const Centerline& line = tree[k].line;
@@ -98,7 +99,11 @@ BranchPlace find_branch(const std::vector<Branch>& tree, const Vec3& point) {
     BranchPlace own{.branch = static_cast<int>(k), .part = std::numeric_limits<double>::infinity()};
     for (Eigen::Index i = 0; i < line.points.cols(); ++i) {
       if (line.arc_length(i) < start) continue;
-      const double part = (point - line.points.col(i)).norm() / std::max(line.radius(i), 1e-3);
+      const double squared = (point - line.points.col(i)).squaredNorm();
+      const double radius = std::max(line.radius(i), 1e-3);
+      const double most = std::min(own.part, best.part) * radius;
+      if (squared > kSurely * most * most) continue;
+      const double part = std::sqrt(squared) / radius;
       if (part < own.part) {
         own.part = part;
         own.arc = line.arc_length(i);

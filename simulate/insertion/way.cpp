@@ -5,8 +5,6 @@
 #include <cstdio>
 #include <utility>
 
-#include "preprocess/centerline/path_place.h"
-
 namespace wireplan::simulate {
 namespace {
 
@@ -126,7 +124,7 @@ std::optional<std::string> Way::find_detour(const Eigen::Ref<const Eigen::Matrix
   for (Eigen::Index i = 0; i < wire.cols(); ++i) {
     const PathPlace place = find_place(wire.col(i), path_);
     const bool beside = place.from_lumen > std::max({off, kOffLumen, place.radius});
-    if (beside && !is_in_own_vessel(wire.col(i))) {
+    if (beside && !is_in_own_vessel(wire.col(i), place)) {
       off = place.from_lumen;
       off_at = wire.col(i);
     }
@@ -143,12 +141,12 @@ std::optional<std::string> Way::find_detour(const Eigen::Ref<const Eigen::Matrix
          " mm" + (name.empty() ? "" : ", in " + name);
 }
 
-bool Way::is_across(const BranchPlace& tip, const BranchPlace& on_way, int left) const {
-  if (!bifurcation_ || on_way.branch != bifurcation_->parent) return false;
-  if (!bifurcation_->takes_child) return left == bifurcation_->child;
+bool Way::is_across(const OffWay& place) const {
+  if (!bifurcation_ || place.on_way.branch != bifurcation_->parent) return false;
+  if (!bifurcation_->takes_child) return place.left == bifurcation_->child;
   // The parent itself goes on across it, and what leaves it there.
-  return on_way.arc > tree_[static_cast<std::size_t>(bifurcation_->child)].parent_arc &&
-         tip.branch != bifurcation_->child;
+  return place.on_way.arc > tree_[static_cast<std::size_t>(bifurcation_->child)].parent_arc &&
+         place.tip.branch != bifurcation_->child;
 }
 
 int Way::next_branch(int branch) const {
@@ -158,9 +156,7 @@ int Way::next_branch(int branch) const {
   return *(found + 1);
 }
 
-std::optional<Astray> Way::find_astray(const Vec3& tip) const {
-  if (tree_.empty()) return std::nullopt;
-  const PathPlace on_path = find_place(tip, path_);
+std::optional<Way::OffWay> Way::find_off_way(const Vec3& tip, const PathPlace& on_path) const {
   const BranchPlace here = find_branch(tree_, tip);
   // Beside the way's balls the lumen may be oval, unless the tip is in another vessel's there.
   const double here_leaves = leaves_[static_cast<std::size_t>(here.branch)];
@@ -168,13 +164,22 @@ std::optional<Astray> Way::find_astray(const Vec3& tip) const {
   const bool in_other = off_way && here.part <= 1.0 && on_path.from_lumen > 0.0;
   if (is_on_path(on_path) && !in_other) return std::nullopt;
   // Up from the tip's branch to one that the way uses.
-  BranchPlace on_way = here;
-  int left = -1;  // the branch by which the tip left the way
-  while (leaves_[static_cast<std::size_t>(on_way.branch)] < 0.0) {
-    left = on_way.branch;
-    const Branch& branch = tree_[static_cast<std::size_t>(on_way.branch)];
-    on_way = {.branch = branch.parent, .arc = branch.parent_arc};
+  OffWay place{.tip = here, .on_way = here};
+  while (leaves_[static_cast<std::size_t>(place.on_way.branch)] < 0.0) {
+    place.left = place.on_way.branch;
+    const Branch& branch = tree_[static_cast<std::size_t>(place.left)];
+    place.on_way = {.branch = branch.parent, .arc = branch.parent_arc};
   }
+  const bool behind = place.on_way.arc > leaves_[static_cast<std::size_t>(place.on_way.branch)];
+  if (place.left < 0 && !behind && !is_across(place)) return std::nullopt;
+  return place;
+}
+
+std::optional<Astray> Way::find_astray(const Vec3& tip) const {
+  if (tree_.empty()) return std::nullopt;
+  const std::optional<OffWay> place = find_off_way(tip, find_place(tip, path_));
+  if (!place) return std::nullopt;
+  const auto& [here, on_way, left] = *place;
   const double leaves = leaves_[static_cast<std::size_t>(on_way.branch)];
   const bool in_branch_of_way = on_way.branch == here.branch;
   const bool in_targets = on_way.branch == target_branch_;
@@ -183,7 +188,7 @@ std::optional<Astray> Way::find_astray(const Vec3& tip) const {
     return branch_name(tree_, k, own_start(tree_[static_cast<std::size_t>(k)]));
   };
   const std::string other_way = ", beyond the place where the way turns the other way, into ";
-  if (is_across(here, on_way, left)) {
+  if (is_across(*place)) {
     return Astray{.text = "it is in " + name + ", across the bifurcation"};
   }
   if (on_way.arc > leaves && in_targets) {
@@ -209,7 +214,6 @@ std::optional<Astray> Way::find_astray(const Vec3& tip) const {
                   .text = "it " + where + whole_millimetres(on_way.arc - leaves) +
                           " beyond the place where the way turns into " + next};
   }
-  if (in_branch_of_way) return std::nullopt;
   if (is_entered(tree_, left)) {
     return Astray{.text = "it is in " + name + other_way +
                           branch_name(tree_, on_way.branch, begins_behind(tree_, left))};
@@ -226,13 +230,13 @@ std::optional<Astray> Way::find_astray(const Vec3& tip) const {
                              : "the way turns into " + name_of_start(next_branch(on_way.branch)))};
 }
 
-bool Way::is_in_own_vessel(const Vec3& place) const {
-  return !tree_.empty() && !find_astray(place);
+bool Way::is_in_own_vessel(const Vec3& point, const PathPlace& on_path) const {
+  return !tree_.empty() && !find_off_way(point, on_path);
 }
 
 double Way::find_progress(const Vec3& tip) const {
   const PathPlace place = find_place(tip, path_);
-  return is_on_path(place) || is_in_own_vessel(tip) ? place.arc : 0.0;
+  return is_on_path(place) || is_in_own_vessel(tip, place) ? place.arc : 0.0;
 }
 
 std::optional<int> Way::find_image_end(const Vec3& tip, const Lumen& lumen) const {

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "preprocess/centerline/centerline.h"
+#include "preprocess/centerline/path_place.h"
 #include "simulate/insertion/vessel_tree.h"
 #include "simulate/wall/lumen.h"
 
@@ -80,12 +81,19 @@ class Way {
  private:
   /// The branch of the way that it goes on in from another.
   int next_branch(int branch) const;
-  /// Whether a place, however far beside the way's balls, is in a vessel of the way; never without
+  /// Where a tip is that is not on the way.
+  struct OffWay {
+    BranchPlace tip;
+    BranchPlace on_way;  // of the branch of the way that it comes from
+    int left = -1;       // the branch by which it left that; -1: it is in it
+  };
+  /// Empty for a tip that is on the way. Expects a tree, and the tip's place on the path.
+  std::optional<OffWay> find_off_way(const Vec3& tip, const preprocess::PathPlace& on_path) const;
+  /// Whether a point, however far beside the way's balls, is in a vessel of the way; never without
   /// a tree.
-  bool is_in_own_vessel(const Vec3& place) const;
-  /// Whether a tip is on the other side of the bifurcation: where it is, the branch of the way that
-  /// it comes from, and the branch by which it left that, -1 where it is in it.
-  bool is_across(const BranchPlace& tip, const BranchPlace& on_way, int left) const;
+  bool is_in_own_vessel(const Vec3& point, const preprocess::PathPlace& on_path) const;
+  /// Whether it is on the other side of the bifurcation.
+  bool is_across(const OffWay& place) const;
 
   Centerline path_;
   CrossSection section_;

@@ -37,6 +37,7 @@ Centerline path_along(const Eigen::Matrix3Xd& axis, double radius) {
   Centerline path;
   path.points = axis;
   path.radius = Eigen::VectorXd::Constant(axis.cols(), radius);
+  path.arc_length = arc_length_of(axis);
   return path;
 }
 

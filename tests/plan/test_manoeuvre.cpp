@@ -41,6 +41,7 @@ Centerline path_into_the_branch() {
     path.points.col(k) = k <= 45 ? Vec3(0.0, 0.0, 5.0 + k) : Vec3(k - 45.0, 0.0, kOstium);
     path.radius[k] = k <= 50 ? 5.0 : 2.5;
   }
+  path.arc_length = arc_length_of(path.points);
   return path;
 }
 

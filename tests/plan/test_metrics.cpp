@@ -21,6 +21,7 @@ Centerline straight_path() {
   path.points.col(0) = Vec3::Zero();
   path.points.col(1) = Vec3(0.0, 0.0, 100.0);
   path.radius = Eigen::Vector2d(3.0, 5.0);
+  path.arc_length = Eigen::Vector2d(0.0, 100.0);
   return path;
 }
 
@@ -130,6 +131,7 @@ TEST(Metrics, DeviationAllowsForRepeatedPathPoints) {
   path.points.conservativeResize(3, 3);
   path.points.col(2) = path.points.col(1);
   path.radius = Eigen::Vector3d(3.0, 5.0, 5.0);
+  path.arc_length = Eigen::Vector3d(0.0, 100.0, 100.0);
   TrialResult trial;
   trial.nodes = Vec3(3.0, 0.0, 104.0);
   const Metrics metrics = compute_metrics(trial, study_with_goal_at(Vec3::Zero()), path);
