@@ -478,10 +478,11 @@ void make_surface(Workspace& work, const fs::path& folder) {
   figures["openings"] = openings_json(preprocess::find_openings(surface));
   if (check.euler_number != 2) {
     const auto handles = (2 - check.euler_number) / 2;
-    figures["warnings"].push_back("surface: it has " + std::to_string(handles) +
-                                  (handles == 1 ? " handle" : " handles") + " (Euler number " +
-                                  std::to_string(check.euler_number) +
-                                  "): arteries that touch or loop; look whether the loop is real");
+    figures["warnings"].push_back(
+        "surface: it has " + std::to_string(handles) +
+        (handles == 1 ? " handle, a closed loop" : " handles, closed loops") +
+        " of arteries that touch or run in a ring; look whether " +
+        (handles == 1 ? "it is" : "they are") + " real");
   }
   write_figures(figures, folder);
 }

@@ -110,12 +110,17 @@ export const drawView = ({tree, way}, view, marks) => {
   const line = (points, color, width) =>
     svg("polyline", {points: points.map((p) => seen(p).map(round).join(",")).join(" "), fill: "none", stroke: color, "stroke-width": width * unit});
   const middle = marks.wire?.length ? line(marks.wire, "#a3262a", 1.4) : line(way.points, "#1b1b1b", 0.8);
+  const taken = [];  // by letters: middle, width and height
   const label = (p, text, size) => {
-    const [x, y] = seen(p);
+    const [x, foot] = seen(p), width = 0.7 * size * unit * text.length, height = size * unit;
+    const meets = (y) => taken.some((other) => Math.abs(x - other.x) < (width + other.width) / 2 && Math.abs(y - other.y) < (height + other.height) / 2);
+    let y = foot;
+    while (meets(y)) y += height / 4;
+    taken.push({x, y, width, height});
     return svg("text", {x: round(x), y: round(y), "font-size": size * unit, "text-anchor": "middle", fill: "#1b1b1b", stroke: "#ffffff", "stroke-width": (size * unit) / 5, "paint-order": "stroke"}, text);
   };
-  const names = tree.map((branch, k) => label(branch.points.at(-1), String(k + 1), 10));
   const ends = [["A", marks.access], ["T", marks.target]].filter(([, p]) => p).map(([text, p]) => label(p, text, 15));
+  const names = tree.map((branch, k) => label(branch.points.at(-1), String(k + 1), 10));
   const circle = (p) => {
     const [x, y] = seen(p);
     return svg("circle", {cx: round(x), cy: round(y), r: 6 * unit, fill: "none", stroke: "#a3262a", "stroke-width": 1.4 * unit});

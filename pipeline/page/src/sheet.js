@@ -154,7 +154,7 @@ const lengthBlock = ({anatomy}) => {
   const last = places.slice(-kPlaces);
   return block("lengths", "Lengths from the access",
     el("dl", {class: "pairs"}, last.map(told).flatMap(([place, at]) => [el("dt", {}, place), el("dd", {}, at)])),
-    last.length < places.length ? el("p", {class: "note"}, `${places.length - last.length} before these below.`) : null);
+    last.length < places.length ? el("p", {class: "note"}, `${places.length - last.length} nearer to the access: in the table below.`) : null);
 };
 
 // ---- What is uncertain.
