@@ -433,8 +433,9 @@ std::vector<TrialResult> Trial::finish_all() {
 void Trial::save(Mark& mark) const {
   expects(!ended());
   insertion_.save(mark.insertion);
-  mark.pushes = record_.pushes.size();
-  mark.shapes = record_.shapes.size();
+  mark.pushes = record_.pushes;
+  mark.push_terms = record_.push_terms;
+  mark.shapes = record_.shapes;
   mark.pushing_since = pushing_since_;
   mark.since_shape = since_shape_;
   mark.crossing = record_.crossing;
@@ -443,9 +444,9 @@ void Trial::save(Mark& mark) const {
 
 void Trial::restore(const Mark& mark) {
   insertion_.restore(mark.insertion);
-  record_.pushes.resize(mark.pushes);
-  if (options_.record_terms) record_.push_terms.resize(mark.pushes);
-  record_.shapes.resize(mark.shapes);
+  record_.pushes = mark.pushes;
+  record_.push_terms = mark.push_terms;
+  record_.shapes = mark.shapes;
   pushing_since_ = mark.pushing_since;
   since_shape_ = mark.since_shape;
   record_.crossing = mark.crossing;

@@ -168,10 +168,14 @@ class Trial {
     TrialResult end = {};
   };
 
-  /// save() marks where an unfinished trial is, restore() takes it back there; peak forces stay.
+  /// save() marks where an unfinished trial is, restore() takes it there from wherever it is, also
+  /// after another mark; peak forces stay.
   struct Mark {
     Insertion::Snapshot insertion;
-    std::size_t pushes = 0, shapes = 0, pushing_since = 0;
+    std::vector<Push> pushes;
+    std::vector<PushTerms> push_terms;
+    std::vector<Shape> shapes;
+    std::size_t pushing_since = 0;
     double since_shape = 0.0;
     std::optional<SelfCrossing> crossing;
     std::vector<Pursuit> pursuits;

@@ -323,6 +323,40 @@ TEST(Moves, AMarkTakesATrialBack) {
   EXPECT_NEAR(detour.pushes.back().push_work, direct.pushes.back().push_work, 1e-4);
 }
 
+TEST(Moves, AMarkIsGoneOnToFromOneThatLiesBeforeIt) {
+  // From the first mark the wire goes elsewhere, then it is taken to the second: all that was
+  // recorded up to there is that of the way there, and none of the other.
+  const Wire wire = curved_wire();
+  InsertionOptions with = options(0.1);
+  with.record_terms = true;
+  Trial trial(wire, along_z(), kNowhere, bend(), with);
+  Trial::Mark first, second;
+  trial.make({.push = 40.0});
+  trial.save(first);
+  trial.make({.push = 20.0});
+  trial.save(second);
+  const std::vector<Push> way = trial.pushes();
+  for (const double elsewhere : {30.0, 5.0}) {  // further than the second mark, and less far
+    SCOPED_TRACE(elsewhere);
+    trial.restore(first);
+    trial.make({.turn = kPi});
+    trial.make({.push = elsewhere});
+    trial.restore(second);
+    ASSERT_EQ(trial.pushes().size(), way.size());
+    for (std::size_t k = 0; k < way.size(); ++k) {
+      EXPECT_EQ(trial.pushes()[k].tip, way[k].tip) << k;
+      EXPECT_EQ(trial.pushes()[k].peak_contact_force, way[k].peak_contact_force) << k;
+    }
+  }
+  const TrialResult ended = trial.finish();
+  EXPECT_EQ(ended.push_terms.size(), way.size());
+  ASSERT_EQ(ended.shapes.size(), 12u);  // every 5 mm
+  for (std::size_t k = 0; k < ended.shapes.size(); ++k) {
+    EXPECT_NEAR(ended.shapes[k].insertion, 5.0 * static_cast<double>(k + 1), 1e-9);
+    EXPECT_EQ(ended.shapes[k].hub_angle, 0.0);
+  }
+}
+
 TEST(Moves, ShapesAreKeptOnTheWayBackToo) {
   const TrialResult trial =
       make_moves(curved_wire(), straight(), {{.push = 20.0}, {.push = -10.0}, {.turn = kPi}});
