@@ -381,18 +381,24 @@ class Planner {
     if (start_ids.empty()) return;
     std::vector<Candidate> starts;
     for (const int id : start_ids) starts.push_back(candidate(id));
-    keep_what_reaches(find_manoeuvres(study_at(study_, Level::kScout), starts, vessel_.path,
-                                      vessel_.scout_model(), kTurnsOfScouts, options_.batch),
-                      start_ids);
-    if (!plan_.scripts.found.empty()) return;
-    keep_what_reaches(
-        find_manoeuvres(study_, starts, vessel_.path, vessel_.model(), kTurns, options_.batch),
-        start_ids);
+    search_at(Level::kScout, starts, start_ids);
+    if (plan_.scripts.found.empty()) search_at(Level::kFull, starts, start_ids);
+  }
+
+  void search_at(Level level, const std::vector<Candidate>& starts,
+                 const std::vector<int>& start_ids) {
+    const bool full = level == Level::kFull;
+    const Manoeuvres search =
+        find_manoeuvres(study_at(study_, level), starts, vessel_.path,
+                        full ? vessel_.model() : vessel_.scout_model(),
+                        {.most_turns = full ? kTurns : kTurnsOfScouts}, options_.batch);
+    if (options_.batch.cancelled && options_.batch.cancelled()) throw Interrupted();
+    plan_.scripts.branches += search.effort.branches;
+    plan_.scripts.searches.push_back({level, search.effort});
+    keep_what_reaches(search, start_ids);
   }
 
   void keep_what_reaches(const Manoeuvres& search, const std::vector<int>& start_ids) {
-    if (options_.batch.cancelled && options_.batch.cancelled()) throw Interrupted();
-    plan_.scripts.branches += search.branches;
     std::vector<Run> runs;
     for (const Candidate& found : search.found) {
       runs.push_back({.candidate = found});

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "plan/batch.h"
+#include "plan/manoeuvre.h"
 #include "plan/robustness.h"
 #include "plan/settings.h"
 #include "plan/tool_search.h"
@@ -42,12 +43,19 @@ struct Run {
   bool is_plain() const { return !disturbance && !elements; }
 };
 
+/// A search for scripts of a wire alone, at one level.
+struct MoveSearch {
+  Level level = Level::kScout;
+  SearchEffort effort = {};
+};
+
 /// Scripts of moves that reach, and what finding them took.
 struct Scripts {
   std::vector<Candidate> found = {};
   std::vector<int> starts = {};  // of each, the straight candidate that it went on from
   int starts_tried = 0;
-  long branches = 0;  // pushes that were tried
+  long branches = 0;                      // pushes that were tried
+  std::vector<MoveSearch> searches = {};  // of wires alone, in their order
   /// Of catheter and wire: their scripts stand in `found` too, with the start -1, and those of a
   /// pair without one that reaches as what came closest.
   std::vector<PairFindings> pairs = {};

@@ -148,7 +148,8 @@ class Weighing {
                                     : std::to_string(scripts.found.size()) + " came up to be tried";
       find(answer, "Turns and pulls of the wire on the way were searched too: " +
                        std::to_string(scripts.branches) + " pushes from " +
-                       count_of(scripts.starts_tried, "start") + ", " + found + ".");
+                       count_of(scripts.starts_tried, "start") + ", " + found + "." +
+                       describe_searches(scripts));
     }
     const auto tried = std::count_if(scripts.pairs.begin(), scripts.pairs.end(),
                                      [](const PairFindings& pair) { return pair.tried(); });
@@ -157,6 +158,33 @@ class Weighing {
                        count_of(static_cast<int>(tried), "pair") + ".");
     }
     for (std::string& text : describe_pairs(known_)) find(answer, std::move(text));
+  }
+
+  /// Why the searches for turns and pulls ended.
+  static std::string describe_searches(const Scripts& scripts) {
+    std::string text;
+    bool cut_off = false;
+    for (const auto& [level, effort] : scripts.searches) {
+      std::vector<std::string> ends;
+      if (effort.no_further > 0) {
+        ends.push_back("more turns brought the tip no further from " +
+                       count_of(effort.no_further, "start"));
+      }
+      if (effort.cut_off > 0) {
+        ends.push_back("the search was cut off at its limit of work from " +
+                       count_of(effort.cut_off, "start"));
+      }
+      if (ends.empty()) continue;
+      text += std::string(level == Level::kFull ? " In full detail " : " In coarse trials ") +
+              list_words(ends, "and") + ".";
+      cut_off = cut_off || effort.cut_off > 0;
+    }
+    if (cut_off) {
+      text +=
+          " Where it was cut off, scripts may have been missed: with fewer wires in the case it "
+          "goes further for each.";
+    }
+    return text;
   }
 
   /// Why trials against a rigid wall are enough for that answer.

@@ -412,13 +412,16 @@ Json numerics_json(const ReportInput& input) {
     plans.push_back(row.finish());
   }
   const Json& trials = input.figures.at("trials");
-  return {{"lumen_grid_mm", trials.at("lumen_grid_mm")},
-          {"lumen_max_deviation_mm", trials.at("lumen_max_deviation_mm")},
-          {"lumen_mean_deviation_mm", trials.at("lumen_mean_deviation_mm")},
-          {"scout", trials.at("scout")},
-          {"plans", std::move(plans)},
-          {"rows", std::move(rows)},
-          {"rows_time", "cpu_s of each row stands in timing.numerics"}};
+  Json numerics = {{"lumen_grid_mm", trials.at("lumen_grid_mm")},
+                   {"lumen_max_deviation_mm", trials.at("lumen_max_deviation_mm")},
+                   {"lumen_mean_deviation_mm", trials.at("lumen_mean_deviation_mm")},
+                   {"scout", trials.at("scout")},
+                   {"plans", std::move(plans)},
+                   {"rows", std::move(rows)},
+                   {"rows_time", "cpu_s of each row stands in timing.numerics"}};
+  const Json& searches = input.figures.at("manoeuvres").at("searches");
+  if (!searches.empty()) numerics["script_searches"] = searches;
+  return numerics;
 }
 
 // The files beside report.json that people look at.

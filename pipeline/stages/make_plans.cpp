@@ -194,6 +194,7 @@ void make_manoeuvres(Workspace& work, const fs::path& folder) {
   Json figures = figures_of("manoeuvres");
   figures["starts"] = scripts.starts_tried;
   figures["branches"] = scripts.branches;
+  figures["searches"] = searches_json(scripts);
   figures["scripts"] = scripts_json(scripts);
   if (work.given().suggest_catheters && work.study().catheters.empty()) {
     figures["warnings"].push_back(

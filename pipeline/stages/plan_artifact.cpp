@@ -51,6 +51,19 @@ Json scripts_json(const plan::Scripts& scripts) {
   return list;
 }
 
+Json searches_json(const plan::Scripts& scripts) {
+  Json list = Json::array();
+  for (const plan::MoveSearch& search : scripts.searches) {
+    list.push_back({{"level", plan::level_name(search.level)},
+                    {"branches", search.effort.branches},
+                    {"iterations", search.effort.iterations},
+                    {"most_iterations", search.effort.most_iterations},
+                    {"no_further", search.effort.no_further},
+                    {"cut_off", search.effort.cut_off}});
+  }
+  return list;
+}
+
 Json pairs_json(const plan::Scripts& scripts) {
   Json list = Json::array();
   for (const plan::PairFindings& pair : scripts.pairs) {
@@ -74,6 +87,15 @@ Json pairs_json(const plan::Scripts& scripts) {
 plan::Scripts read_scripts(const Json& figures, const plan::Study& study) {
   const std::vector<plan::Candidate> straight = plan::list_candidates(study);
   plan::Scripts scripts{.starts_tried = figures.at("starts"), .branches = figures.at("branches")};
+  for (const Json& search : figures.at("searches")) {
+    const bool full = search.at("level") == plan::level_name(plan::Level::kFull);
+    scripts.searches.push_back({.level = full ? plan::Level::kFull : plan::Level::kScout,
+                                .effort = {.branches = search.at("branches"),
+                                           .iterations = search.at("iterations"),
+                                           .most_iterations = search.at("most_iterations"),
+                                           .no_further = search.at("no_further"),
+                                           .cut_off = search.at("cut_off")}});
+  }
   for (const Json& script : figures.at("scripts")) {
     scripts.starts.push_back(script.value("start", -1));
     if (scripts.starts.back() >= 0) {

@@ -17,8 +17,10 @@ plan::Plan read_plan(Workspace& work);
 /// The same before stage plans is made: without errors and repeats.
 plan::Plan known_before_plans(Workspace& work);
 
-/// Scripts, and pairs of catheter and wire, as the artifact `manoeuvres` tells them; and back.
+/// Scripts, searches for those of wires alone, and pairs of catheter and wire, as the artifact
+/// `manoeuvres` tells them; and back.
 Json scripts_json(const plan::Scripts& scripts);
+Json searches_json(const plan::Scripts& scripts);
 Json pairs_json(const plan::Scripts& scripts);
 plan::Scripts read_scripts(const Json& figures, const plan::Study& study);
 

@@ -128,6 +128,7 @@ Json figures(const Surface& surface) {
             {"inverted_tetrahedra", 0},
             {"limited_tetrahedra", 0},
             {"min_height_mm", 1.0}}},
+          {"manoeuvres", {{"warnings", none}, {"searches", none}}},
           {"trials",
            {{"warnings", none},
             {"scout", nullptr},

@@ -102,7 +102,7 @@ TEST(Manoeuvres, FindTheWayPastADecoyIntoABranchAtARightAngle) {
 
   const Centerline path = path_into_the_branch();
   const Manoeuvres search =
-      find_manoeuvres(study, pushes.starts, path, side_branches(), /*most_turns=*/3, {});
+      find_manoeuvres(study, pushes.starts, path, side_branches(), /*limits=*/{}, {});
   ASSERT_FALSE(search.found.empty());
   for (const Candidate& candidate : search.found) {
     SCOPED_TRACE(describe_moves(candidate.moves, 0.0));
@@ -111,18 +111,19 @@ TEST(Manoeuvres, FindTheWayPastADecoyIntoABranchAtARightAngle) {
     EXPECT_EQ(trial.outcome, Outcome::kReached) << trial.reason;
     EXPECT_GE(candidate.moves.size(), 2u);
   }
-  EXPECT_GT(search.branches, 100);
+  EXPECT_GT(search.effort.branches, 100);
+  EXPECT_EQ(search.effort.cut_off, 0);
 
   // The same on any number of threads, and whatever else is searched.
   const Manoeuvres alone =
-      find_manoeuvres(study, {pushes.starts[0]}, path, side_branches(), 3, {.threads = 1});
+      find_manoeuvres(study, {pushes.starts[0]}, path, side_branches(), {}, {.threads = 1});
   ASSERT_LE(alone.found.size(), search.found.size());
-  EXPECT_LT(alone.branches, search.branches);
+  EXPECT_LT(alone.effort.branches, search.effort.branches);
   for (std::size_t k = 0; k < alone.found.size(); ++k) {
     EXPECT_EQ(describe_moves(alone.found[k].moves, 0.0),
               describe_moves(search.found[k].moves, 0.0));
   }
-  EXPECT_TRUE(find_manoeuvres(study, pushes.starts, path, side_branches(), /*most_turns=*/0, {})
+  EXPECT_TRUE(find_manoeuvres(study, pushes.starts, path, side_branches(), {.most_turns = 0}, {})
                   .found.empty());
 }
 
@@ -131,9 +132,130 @@ TEST(Manoeuvres, StopWhenCancelled) {
   Candidate start;
   start.wire = 1;
   const Manoeuvres search = find_manoeuvres(study, {start}, path_into_the_branch(), side_branches(),
-                                            3, {.cancelled = [] { return true; }});
+                                            {}, {.cancelled = [] { return true; }});
   EXPECT_TRUE(search.found.empty());
-  EXPECT_LT(search.branches, 10);
+  EXPECT_LT(search.effort.branches, 10);
+}
+
+/// Up the trunk to a height, and from there into a branch toward -x, which the vessel has not got.
+Centerline path_into_no_branch(int height) {
+  Centerline path;
+  path.points.resize(3, height + 26);
+  path.radius.setConstant(height + 26, 5.0);
+  for (int k = 0; k < height + 26; ++k) {
+    path.points.col(k) =
+        k <= height ? Vec3(0.0, 0.0, 5.0 + k) : Vec3(height - k, 0.0, 5.0 + height);
+  }
+  path.arc_length = arc_length_of(path.points);
+  return path;
+}
+
+Study into_no_branch(int height) {
+  Study study = into_the_branch();
+  study.goal = {.point = Vec3(-25.0, 0.0, 5.0 + height), .radius = 3.0};
+  return study;
+}
+std::vector<Candidate> angled_starts() {
+  std::vector<Candidate> starts(2);
+  for (std::size_t k = 0; k < starts.size(); ++k) {
+    starts[k].wire = 1;
+    starts[k].roll = static_cast<double>(k) * kPi;
+  }
+  return starts;
+}
+
+TEST(Manoeuvres, EndWhereTurnsBringTheTipNoFurther) {
+  const Study study = into_no_branch(45);
+  const Centerline path = path_into_no_branch(45);
+  const auto search = [&](const SearchLimits& limits, int threads) {
+    return find_manoeuvres(study, angled_starts(), path, side_branches(), limits,
+                           {.threads = threads});
+  };
+  // A round that gives nobody up tries seven turns at each of the depths, every 3 mm.
+  const Manoeuvres all = search({.patience = 1000000, .most_seconds = 1e6}, 1);
+  const Manoeuvres some = search({.patience = 20}, 1);
+  for (const Manoeuvres* each : {&all, &some}) {
+    EXPECT_TRUE(each->found.empty());
+    EXPECT_EQ(each->effort.no_further, 2);
+    EXPECT_EQ(each->effort.cut_off, 0);
+  }
+  // Per start a push, and in two rounds at most: up to three pushes again, and until 20 in a row
+  // are in vain, of which a try after pulls makes four at once. A gain or two come before.
+  EXPECT_GT(all.effort.branches, 2 * 80);
+  EXPECT_GE(some.effort.branches, 2 * 21);
+  EXPECT_LE(some.effort.branches, 2 * 80);
+  EXPECT_LT(3 * some.effort.iterations, 2 * all.effort.iterations);
+
+  const Manoeuvres again = search({.patience = 20}, 2);
+  EXPECT_EQ(again.effort.branches, some.effort.branches);
+  EXPECT_EQ(again.effort.iterations, some.effort.iterations);
+}
+
+TEST(Manoeuvres, CountTheIterationsOfTheirPushes) {
+  // Without a turn a search is one straight push, until that has brought the tip no further for 15
+  // mm: a part of the candidate's own trial.
+  const Study study = into_no_branch(45);
+  const Centerline path = path_into_no_branch(45);
+  const Candidate start = angled_starts().front();
+  const SearchEffort effort =
+      find_manoeuvres(study, {start}, path, side_branches(), {.most_turns = 0}, {}).effort;
+  EXPECT_EQ(effort.branches, 1);
+  double furthest = 0.0, depth = 0.0;
+  long iterations = 0;
+  for (const simulate::Push& push : run_candidate(study, start, side_branches()).pushes) {
+    iterations += push.iterations;
+    const double progress = find_progress(push.tip, study, path);
+    if (progress > furthest) {
+      furthest = progress;
+      depth = push.insertion;
+    }
+    if (push.insertion - depth >= 15.0) break;
+  }
+  EXPECT_GT(iterations, 100);
+  EXPECT_EQ(effort.iterations, iterations);
+}
+
+TEST(Manoeuvres, EndAtTheirShareOfTheWork) {
+  const Study study = into_no_branch(45);
+  const auto search = [&](double seconds) {
+    return find_manoeuvres(study, angled_starts(), path_into_no_branch(45), side_branches(),
+                           {.patience = 1000000, .most_seconds = seconds}, {})
+        .effort;
+  };
+  const SearchEffort whole = search(1e6);
+  EXPECT_EQ(whole.cut_off, 0);
+  // A third of what it takes, by its own count. What is under way at the limit is finished.
+  const double seconds = 1e6 * static_cast<double>(whole.iterations) /
+                         static_cast<double>(whole.most_iterations) / 3.0;
+  const SearchEffort part = search(seconds);
+  EXPECT_EQ(part.cut_off, 2);
+  EXPECT_EQ(part.no_further, 0);
+  EXPECT_NEAR(static_cast<double>(part.most_iterations),
+              static_cast<double>(whole.iterations) / 3.0, 2.0);
+  EXPECT_GE(part.iterations, part.most_iterations);
+  EXPECT_LT(part.iterations, 1.2 * static_cast<double>(part.most_iterations));
+}
+
+TEST(Manoeuvres, GoOnFromWhereTheWireHasPassedWhatHeldIt) {
+  // Straight, the tip goes into the side branch at 25 mm. Turned it goes up the trunk, 55 mm on, as
+  // most turns bring it: the round of turns ends with the third such try.
+  const Study study = into_no_branch(80);
+  Candidate start = angled_starts().front();
+  const auto branches = [&](int turns) {
+    return find_manoeuvres(study, {start}, path_into_no_branch(80), side_branches(),
+                           {.most_turns = turns, .patience = 1000000}, {})
+        .effort.branches;
+  };
+  long fewest = 1000;
+  for (const double roll : {0.0, 0.5 * kPi, kPi, 1.5 * kPi}) {
+    start.roll = roll;
+    const double progress =
+        find_progress(run_candidate(study, start, side_branches()), study, path_into_no_branch(80));
+    if (progress > 30.0) continue;  // it went up the trunk
+    fewest = std::min(fewest, branches(1));
+  }
+  EXPECT_GE(fewest, 1 + 1 + 3);
+  EXPECT_LE(fewest, 40);
 }
 
 TEST(Manoeuvres, GoOnFromThePushesThatCameFurthest) {

@@ -1,4 +1,5 @@
-// What stops scripts of catheter and wire, and which tool or length that asks for.
+// What is told of scripts: what stops those of catheter and wire, and which tool or length that
+// asks for; and why searches for those of a wire alone ended.
 #include <gtest/gtest.h>
 
 #include <memory>
@@ -82,6 +83,35 @@ TEST(ToolVerdict, TellsACatheterThatDoesNotComeToTheOstiumFromAWireThatDoesNotTu
   WhatIsKnown found = tried(128.0, Outcome::kPassedBy, 0.4);
   found.plan.scripts.pairs[0].found = 2;
   EXPECT_FALSE(changes_by_words(found, "came to the ostium"));
+}
+
+TEST(Verdict, TellsTheScriptsThatWereSearched) {
+  WhatIsKnown bench;
+  bench.add_many(10, Outcome::kPassedBy);
+  EXPECT_FALSE(tells(bench.verdict().reasons, "were searched"));
+  bench.plan.scripts.starts_tried = 2;
+  bench.plan.scripts.branches = 345;
+  EXPECT_TRUE(tells(bench.verdict().reasons,
+                    "searched too: 345 pushes from 2 starts, none of them reached."));
+  bench.plan.scripts.searches = {
+      {.level = Level::kScout,
+       .effort = {.branches = 300, .iterations = 800, .most_iterations = 900, .no_further = 2}},
+      {.level = Level::kFull,
+       .effort = {.branches = 45,
+                  .iterations = 95,
+                  .most_iterations = 90,
+                  .no_further = 1,
+                  .cut_off = 1}}};
+  EXPECT_TRUE(tells(bench.verdict().reasons,
+                    "none of them reached. In coarse trials more turns brought the tip no further "
+                    "from 2 starts. In full detail more turns brought the tip no further from 1 "
+                    "start and the search was cut off at its limit of work from 1 start. Where it "
+                    "was cut off, scripts may have been missed: with fewer wires in the case it "
+                    "goes further for each."));
+  bench.plan.scripts.searches.pop_back();
+  EXPECT_FALSE(tells(bench.verdict().reasons, "may have been missed"));
+  bench.add_many(5, Outcome::kLeftImage);  // leaves it open, and so it stays
+  EXPECT_EQ(bench.verdict().answer, Answer::kUnsure);
 }
 
 }  // namespace

@@ -571,18 +571,6 @@ TEST(Verdict, OfARigidWallAloneSaysWhyThatIsEnoughOrIsUnsure) {
   EXPECT_EQ(bench.verdict().answer, Answer::kNotFeasible);
 }
 
-TEST(Verdict, TellsTheScriptsThatWereSearched) {
-  WhatIsKnown bench;
-  bench.add_many(10, Outcome::kPassedBy);
-  EXPECT_FALSE(tells(bench.verdict().reasons, "were searched"));
-  bench.plan.scripts.starts_tried = 2;
-  bench.plan.scripts.branches = 345;
-  EXPECT_TRUE(tells(bench.verdict().reasons,
-                    "searched too: 345 pushes from 2 starts, none of them reached."));
-  bench.add_many(5, Outcome::kLeftImage);  // leaves it open, and so it stays
-  EXPECT_EQ(bench.verdict().answer, Answer::kUnsure);
-}
-
 TEST(Verdict, CameAnotherWayIsNotFoldedBack) {
   WhatIsKnown bench;
   bench.add_many(6, Outcome::kAnotherWay);
