@@ -141,16 +141,21 @@ void resolve(const Panel& panel, Picture& picture, int left, int bottom) {
   }
 }
 
-/// The side of the patient that a direction along an axis points to, as a word or its letter.
-std::string side_name(const Vec3& direction) {
+/// The side of the patient that a direction along an axis points to, as a word or its letter; of
+/// axes that are not the patient's the axis, "+x".
+std::string side_name(const Vec3& direction, bool patient_axes) {
   static const std::array<std::array<const char*, 2>, 3> kNames{
       {{"right", "left"}, {"anterior", "posterior"}, {"inferior", "superior"}}};
+  static const std::array<std::array<const char*, 2>, 3> kAxes{
+      {{"-x", "+x"}, {"-y", "+y"}, {"-z", "+z"}}};
   Eigen::Index axis = 0;
   direction.cwiseAbs().maxCoeff(&axis);
-  return kNames[axis][direction[axis] > 0.0 ? 1 : 0];
+  return (patient_axes ? kNames : kAxes)[axis][direction[axis] > 0.0 ? 1 : 0];
 }
-std::string side_letter(const Vec3& direction) {
-  return std::string(1, static_cast<char>(std::toupper(side_name(direction).front())));
+std::string side_letter(const Vec3& direction, bool patient_axes) {
+  const std::string name = side_name(direction, patient_axes);
+  if (!patient_axes) return name;
+  return std::string(1, static_cast<char>(std::toupper(name.front())));
 }
 
 struct Box {
@@ -325,16 +330,17 @@ void draw_legend(Picture& picture, const std::vector<PictureWire>& wires, const 
 }
 
 /// Names of the view and of its four sides, round the panel.
-void draw_sides(Picture& picture, const Mat3& view, int left, int bottom, int width, int height,
-                int line) {
+void draw_sides(Picture& picture, const Mat3& view, bool patient_axes, int left, int bottom,
+                int width, int height, int line) {
   const int size = line * 6 / 10, x = left + width / 2, y = bottom + height / 2;
   const Vec3 right = view.row(0), up = view.row(1), toward = view.row(2);
-  draw_text(picture, "seen from " + side_name(toward), x, bottom + height + line / 2, size,
-            Align::kCenter);
-  draw_text(picture, side_letter(-right), left + line / 2, y, size, Align::kCenter, kGrey);
-  draw_text(picture, side_letter(right), left + width - line / 2, y, size, Align::kCenter, kGrey);
-  draw_text(picture, side_letter(up), x, bottom + height - line / 2, size, Align::kCenter, kGrey);
-  draw_text(picture, side_letter(-up), x, bottom + line / 2, size, Align::kCenter, kGrey);
+  draw_text(picture, "seen from " + side_name(toward, patient_axes), x, bottom + height + line / 2,
+            size, Align::kCenter);
+  const auto letter = [&](const Vec3& side) { return side_letter(side, patient_axes); };
+  draw_text(picture, letter(-right), left + line / 2, y, size, Align::kCenter, kGrey);
+  draw_text(picture, letter(right), left + width - line / 2, y, size, Align::kCenter, kGrey);
+  draw_text(picture, letter(up), x, bottom + height - line / 2, size, Align::kCenter, kGrey);
+  draw_text(picture, letter(-up), x, bottom + line / 2, size, Align::kCenter, kGrey);
 }
 
 }  // namespace
@@ -383,7 +389,7 @@ Picture draw_picture(const Surface& vessel, const std::vector<PictureWire>& wire
     draw_marks(panel, project, marks);
     draw_vessel(panel, project, vessel, marks);
     resolve(panel, picture, k * width, bottom);
-    draw_sides(picture, views[k], k * width, bottom, width, height, line);
+    draw_sides(picture, views[k], marks.patient_axes, k * width, bottom, width, height, line);
   }
   draw_legend(picture, wires, marks, pixels_per_mm, line);
   return picture;

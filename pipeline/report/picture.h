@@ -1,7 +1,8 @@
 #pragma once
 /// A picture of wires in a vessel, as a PNG: the vessel translucent, the wires solid, two
 /// orthographic views side by side. Up is the axis along which the scene is longest (z, toward the
-/// head, for an upright patient); letters at the edges name the sides (R L A P S I).
+/// head, for an upright patient); letters at the edges name the sides (R L A P S I)
+/// where the axes are the patient's.
 ///
 /// Drawn by a small depth-buffer rasteriser of our own, not through VTK's renderer: Debian's VTK
 /// has X11 OpenGL windows alone (no EGL, no OSMesa), and without a display these end the process.
@@ -33,6 +34,7 @@ struct PictureMarks {
   std::optional<Vec3> access = {};  // blue ball                                         [mm]
   std::optional<Vec3> target = {};  // green ball in a ring of the target's radius       [mm]
   double target_radius = 4.0;       //                                                        [mm]
+  bool patient_axes = true;         // else sides are named by the input's axes: +x, -y
   /// Painted on the vessel by force_color up to the largest, which the legend tells; one value per
   /// triangle, or empty.                                                                     [N]
   std::vector<double> wall_force = {};

@@ -44,7 +44,8 @@ PictureMarks marks_of(const Json& report, const std::string& title) {
   return {.title = report.at("name").get<std::string>() + ": " + title,
           .access = point_of(asked.at("access").at("point_mm")),
           .target = point_of(asked.at("target").at("point_mm")),
-          .target_radius = target_radius(report, asked.at("target"))};
+          .target_radius = target_radius(report, asked.at("target")),
+          .patient_axes = asked.value("axes", "patient") == "patient"};
 }
 
 /// Of a device among the "wires" or "catheters" of the case, or of those that are suggested.

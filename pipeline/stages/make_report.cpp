@@ -225,12 +225,14 @@ std::string draw_overview(Workspace& work, const ReportInput& report, const Page
   const PictureMarks marks{.title = report.name,
                            .access = report.study.access,
                            .target = report.study.goal.point,
-                           .target_radius = report.study.goal.radius};
-  std::vector<KeyLine> key = {{"piece", "overview " + std::to_string(kReportVersion)},
-                              {"surface", work.artifact("surface").contents()},
-                              {"marks", Json({marks.title, to_json(*marks.access),
-                                              to_json(*marks.target), marks.target_radius})
-                                            .dump()}};
+                           .target_radius = report.study.goal.radius,
+                           .patient_axes = work.given().axes_known};
+  std::vector<KeyLine> key = {
+      {"piece", "overview " + std::to_string(kReportVersion)},
+      {"surface", work.artifact("surface").contents()},
+      {"marks", Json({marks.title, marks.patient_axes, to_json(*marks.access),
+                      to_json(*marks.target), marks.target_radius})
+                    .dump()}};
   for (const int id :
        plan::best_of_each_wire(report.study, report.plan, report.judgement.ranking)) {
     const auto w =
@@ -239,9 +241,10 @@ std::string draw_overview(Workspace& work, const ReportInput& report, const Page
     const PageTrial& trial = page.trials[static_cast<std::size_t>(id)];
     if (trial.nodes.cols() < 2) continue;
     const simulate::Outcome outcome = report.plan.trials[static_cast<std::size_t>(id)].outcome;
+    std::string ended = outcome_name(outcome);
+    std::replace(ended.begin(), ended.end(), '_', ' ');
     wires.push_back(
-        {.name = report.study.wires[w].name + ": " +
-                 (best ? "best plan" : "no plan, " + std::string(outcome_name(outcome))),
+        {.name = report.study.wires[w].name + ": " + (best ? "best plan" : "no plan, " + ended),
          .nodes = trial.nodes.cast<double>(),
          .contact_force = {},
          .radius = report.study.wires[w].radius,

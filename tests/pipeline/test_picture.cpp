@@ -157,6 +157,25 @@ TEST(Picture, SmoothShadingLeavesNoSeamsBetweenTriangles) {
   EXPECT_GT(compared, 1000);
 }
 
+TEST(Picture, NamesNoSidesOfThePatientWhereTheAxesAreNotTheirs) {
+  // The names are all that differs, and they stand in the margins: above, below and at the sides.
+  PictureMarks marks = marks_on_axis();
+  const Picture known = draw_picture(upright_tube(), {}, marks, kSmall);
+  marks.patient_axes = false;
+  const Picture unknown = draw_picture(upright_tube(), {}, marks, kSmall);
+  int differ = 0, inside = 0;
+  for (std::size_t k = 0; k < known.rgb.size(); ++k) {
+    if (known.rgb[k] == unknown.rgb[k]) continue;
+    ++differ;
+    const int column = static_cast<int>(k / 3) % (known.width / 2),
+              row = static_cast<int>(k / 3) / known.width;
+    inside += std::abs(column - known.width / 4) > 20 && column > 30 &&
+              column < known.width / 2 - 30 && row < 500;
+  }
+  EXPECT_GT(differ, 300);
+  EXPECT_EQ(inside, 0);
+}
+
 TEST(Picture, FileIsAPngAndTheSameBytesEachTime) {
   const std::filesystem::path folder =
       std::filesystem::path(testing::TempDir()) / "wireplan_test_picture";
