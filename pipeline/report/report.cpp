@@ -46,6 +46,9 @@ Json limits_of_validity(const ReportInput& input) {
       is_rigid(input)
           ? "The wall is rigid: contact forces are those of a vessel that does not give way, upper "
             "bounds, and the wall's stiffness is reported but does not act."
+      : input.parameters.at("wall").contains("support_kpa_per_mm")
+          ? "The wall yields by linear theory on cross-sections that move as wholes, without any "
+            "layers or prestress; dents beyond 0.2 of the radius are flagged beyond_linear_theory."
           : "The wall yields by linear theory, as a layer on a fixed outside; where it moves by "
             "more than 0.2 of the vessel's radius, the trial is flagged beyond_linear_theory.";
   return {

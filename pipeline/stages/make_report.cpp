@@ -219,10 +219,26 @@ Json timing_json(const Workspace& work) {
   return timing;
 }
 
+/// What the overview's title adds where the vessel moves, since wires that move it otherwise than
+/// it is drawn seem to lie outside it; and what the legend adds of each.
+std::string title_of_motion(const ReportInput& report) {
+  if (report.motion.is_null()) return {};
+  return report.judgement.ranking.plans.empty()
+             ? ": the vessel at rest; in mm, how far each wire moves it"
+             : ": the vessel as the best plan moves it; in mm, how far each wire does";
+}
+std::string legend_of_motion(const ReportInput& report, int trial) {
+  if (report.motion.is_null()) return {};
+  for (const Json& row : report.motion.at("trials")) {
+    if (row.at("trial") == trial) return format(", %.1f mm", row.at("most_mm").get<double>());
+  }
+  return {};
+}
+
 /// The best plan of each wire in the vessel, or its closest attempt where it has none: PNG bytes.
 std::string draw_overview(Workspace& work, const ReportInput& report, const PageInput& page) {
   std::vector<PictureWire> wires;
-  const PictureMarks marks{.title = report.name,
+  const PictureMarks marks{.title = report.name + title_of_motion(report),
                            .access = report.study.access,
                            .target = report.study.goal.point,
                            .target_radius = report.study.goal.radius,
@@ -243,12 +259,13 @@ std::string draw_overview(Workspace& work, const ReportInput& report, const Page
     const simulate::Outcome outcome = report.plan.trials[static_cast<std::size_t>(id)].outcome;
     std::string ended = outcome_name(outcome);
     std::replace(ended.begin(), ended.end(), '_', ' ');
-    wires.push_back(
-        {.name = report.study.wires[w].name + ": " + (best ? "best plan" : "no plan, " + ended),
-         .nodes = trial.nodes.cast<double>(),
-         .contact_force = {},
-         .radius = report.study.wires[w].radius,
-         .color = wire_color(static_cast<int>(wires.size()))});
+    wires.push_back({.name = report.study.wires[w].name + ": " +
+                             (best ? "best plan" : "no plan, " + ended) +
+                             legend_of_motion(report, id),
+                     .nodes = trial.nodes.cast<double>(),
+                     .contact_force = {},
+                     .radius = report.study.wires[w].radius,
+                     .color = wire_color(static_cast<int>(wires.size()))});
     const int catheter = report.plan.candidates[static_cast<std::size_t>(id)].catheter;
     if (catheter < 0) continue;
     const simulate::Wire& tube =

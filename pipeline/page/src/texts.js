@@ -4,7 +4,6 @@ import {el, facts, name, section, table} from "./dom.js";
 import {degrees, number, outcomeWord, percent, planName, plural, shown, withError} from "./format.js";
 
 const list = (values, text) => values.map(text).join(", ");
-const mm = (value) => `${number(value)}\u00a0mm`;
 const point = (p) => `(${p.map((x) => number(x)).join(", ")})\u00a0mm`;
 
 /** Those that pairs were made of, each once. */
@@ -17,6 +16,11 @@ const frictionText = ({wires, friction, friction_factor: factor}) => {
     ? `coefficients: ${list(wires, (wire) => `${shown(wire.name)} ${of(wire)}`)}`
     : `coefficient ${of(wires[0])}`;
 };
+
+/** How the wall gives way, and the vessel with it. */
+const wallText = ({wall_model: model, wall_stiffness_kpa_per_mm: stiffness}, support) =>
+  (model === "rigid" ? "rigid" : `yields, ${number(stiffness)}\u00a0kPa/mm`) +
+  (support === undefined ? "" : `; the vessel moves as a whole on a support of ${number(support)}\u00a0kPa/mm`);
 
 export const askedSection = (page) => {
   const {report, trials} = page;
@@ -37,7 +41,7 @@ export const askedSection = (page) => {
       ["Entry", `inclination ${list(asked.access.inclination_deg, degrees)}; azimuth ${list(asked.access.azimuth_deg, degrees)}`],
       ["Roll of the tip", list(asked.tip_roll_deg, degrees)],
       ["Friction", frictionText(asked)],
-      ["Wall", report.vessel.wall_model === "rigid" ? "rigid" : `yields, ${number(report.vessel.wall_stiffness_kpa_per_mm)}\u00a0kPa/mm`],
+      ["Wall", wallText(report.vessel, asked.wall.support_kpa_per_mm)],
       ["Tried", plural(trials.length, "insertion")],
       ["Repeats", report.robustness?.repeats > 0
         ? `${report.robustness.repeats} of each of the best plans, disturbed in angle, friction, stiffness, wall and lumen`
@@ -55,7 +59,7 @@ export const answerSection = (page) => {
     return section("answer", "The answer",
       el("p", {class: "answer"}, `No plan reaches the target within the limits: of ${plural(trials.length, "trial")} `,
         [...counts].map(([outcome, count]) => `${count} ${outcomeWord(outcome)}`).join(", "),
-        scouted ? `. ${scouted} of them were run against a rigid wall only; --exhaustive runs all in full.` : "."));
+        scouted ? `. ${scouted} of them were run against a ${report.vessel_motion ? "wall that moves as a whole but takes no dents" : "rigid wall"} only; --exhaustive runs all in full.` : "."));
   }
   const t = trials[best.trial], errors = t.errors;
   const ties = best.tied_with.length;
@@ -179,19 +183,22 @@ export const catheterSection = ({report: {catheters}}) => {
 /** Of a vessel that moves as a whole: what the best trial of each wire moves, and by how much that differs over its repeats. */
 export const motionSection = ({report: {vessel_motion: motion}}) => {
   if (!motion?.trials.length) return null;
-  const spread = (row, unit) => (row ? `${number(row.low)} to ${number(row.high)}${unit}` : "\u2013");
+  // To a tenth of a millimetre or degree: no less is known of a support that was not measured.
+  const tenths = (value, unit) => (value < 0.05 ? `under 0.1${unit}` : `${value.toFixed(1)}${unit}`);
+  const inMm = (value) => tenths(value, "\u00a0mm"), inDegrees = (value) => tenths(value, "\u00b0");
+  const spread = (row, unit) => (row ? `${row.low.toFixed(1)} to ${row.high.toFixed(1)}${unit}` : "\u2013");
   const side = (value, plus, minus) => `${value < 0 ? minus : plus} ${Math.abs(Math.round(value))}`;
-  const view = (v) => (v ? `${side(v.rotation_deg, "LAO", "RAO")}, ${side(v.tilt_deg, "CRA", "CAU")}` : "view");
+  const view = (v) => (v ? `${side(v.rotation_deg, "LAO", "RAO")}, ${side(v.tilt_deg, "CRA", "CAU")}` : "\u2013");
   const rowsOf = (trial) => {
     const over = trial.under_disturbances;
     return [
-      [`Largest shift, at ${place(trial.most_at_mm)}`, "\u2013", mm(trial.most_mm), spread(over?.most_mm, "\u00a0mm")],
-      ["Length of the way", mm(trial.way_length_mm), mm(trial.moved_way_length_mm), spread(over?.moved_way_length_mm, "\u00a0mm")],
-      ...trial.ostia.map((row, k) => [name(`Shift of the ostium of ${shown(row.branch)}`), "\u2013", mm(row.shift_mm), spread(over?.ostia[k]?.shift_mm, "\u00a0mm")]),
+      [`Largest shift, at ${place(trial.most_at_mm)}`, "\u2013", inMm(trial.most_mm), spread(over?.most_mm, "\u00a0mm")],
+      ["Length of the way", inMm(trial.way_length_mm), inMm(trial.moved_way_length_mm), spread(over?.moved_way_length_mm, "\u00a0mm")],
+      ...trial.ostia.map((row, k) => [name(`Shift of the ostium of ${shown(row.branch)}`), "\u2013", inMm(row.shift_mm), spread(over?.ostia[k]?.shift_mm, "\u00a0mm")]),
       ...trial.turns.flatMap((row, k) => [
-        [name(`Turn into ${shown(row.branch)}`), degrees(row.at_rest_deg), degrees(row.moved_deg), spread(over?.turns[k]?.moved_deg, "\u00b0")],
-        [name(`From the access to ${shown(row.branch)}`), mm(row.from_access_mm), mm(row.moved_from_access_mm), spread(over?.turns[k]?.moved_from_access_mm, "\u00a0mm")],
-        [name(`C-arm there: the line of sight changes by ${degrees(row.view_change_deg)}`), view(row.view_at_rest), view(row.view_moved), spread(over?.turns[k]?.view_change_deg, "\u00b0 of change")],
+        [name(`Turn into ${shown(row.branch)}`), inDegrees(row.at_rest_deg), inDegrees(row.moved_deg), spread(over?.turns[k]?.moved_deg, "\u00b0")],
+        [name(`From the access to ${shown(row.branch)}`), inMm(row.from_access_mm), inMm(row.moved_from_access_mm), spread(over?.turns[k]?.moved_from_access_mm, "\u00a0mm")],
+        [name(`C-arm there: the line of sight changes by ${inDegrees(row.view_change_deg)}`), view(row.view_at_rest), view(row.view_moved), spread(over?.turns[k]?.view_change_deg, "\u00b0 of change")],
       ]),
     ];
   };
