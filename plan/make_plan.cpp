@@ -195,10 +195,11 @@ class Planner {
       }
       return;
     }
-    ToolScripts search =
-        find_tool_scripts(study_, vessel_.scout_model(), options_.batch, options_.early.script);
+    ToolScripts search = find_tool_scripts(study_, vessel_.scout_model(), options_.batch,
+                                           options_.early.script, options_.hooks);
     while (has_more_pairs(study_, search) && !has_steady_script(search)) {
-      search_on(study_, vessel_.scout_model(), options_.batch, options_.early.script, search);
+      search_on(study_, vessel_.scout_model(), options_.batch, options_.early.script, search,
+                options_.hooks);
     }
     find_exchanges(study_, vessel_.scout_model(), options_.batch, search);
     if (options_.batch.cancelled && options_.batch.cancelled()) throw Interrupted();

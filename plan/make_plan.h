@@ -37,6 +37,7 @@ struct PlanOptions {
   enum class Until { kTrials, kManoeuvres, kEnd };
 
   bool exhaustive = false;  // no scouts: all in full
+  Hooks hooks = Hooks::kBest;
   Manoeuvring manoeuvres = Manoeuvring::kWhenNeeded;
   RobustnessOptions robustness = {};  // ranges are cut to what trials can be run with
   Until until = Until::kEnd;          // the last step that is done

@@ -183,6 +183,12 @@ long weigh_scripts(ToolTrial& trial, std::size_t begun,
   return std::ssize(all);
 }
 
+void take_for_held(FoundScript& script) {
+  script.holds = true;
+  script.share = 1.0;
+  if (!script.by_length.empty()) script.spares = {script.by_length};
+}
+
 std::vector<FoundScript> choose_different(const std::vector<FoundScript>& from, std::size_t most) {
   constexpr double kNearTurn = 45.0 * kRadPerDeg, kNearDepth = 9.0;    // [rad], [mm]
   constexpr double kOtherTurn = 20.0 * kRadPerDeg, kOtherDepth = 3.0;  // [rad], [mm]

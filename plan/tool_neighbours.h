@@ -43,6 +43,9 @@ long weigh_scripts(simulate::ToolTrial& trial, std::size_t begun,
                    const std::function<bool(const ToolScript&)>& allowed,
                    const std::function<bool()>& cancelled, std::vector<FoundScript>& scripts);
 
+/// As one that holds, untried; made by its lengths where it does not reach in full.
+void take_for_held(FoundScript& script);
+
 /// At most so many that differ in turn or depth. First those whose neighbours reach, as far as that
 /// was tried, and with most others round them: a hand and a patient that are not quite as assumed
 /// end there. Then the fewest steps and the least force first.

@@ -62,9 +62,22 @@ std::vector<std::vector<std::size_t>> tried_together(const Study& study,
   return groups;
 }
 
+/// Scripts that are told alike stand once.
+std::vector<FoundScript> without_twins(std::vector<FoundScript> from) {
+  std::vector<FoundScript> kept;
+  for (FoundScript& script : from) {
+    const ToolScript told = as_written(script.steps);
+    const bool known = std::any_of(kept.begin(), kept.end(), [&](const FoundScript& other) {
+      return as_written(other.steps) == told;
+    });
+    if (!known) kept.push_back(std::move(script));
+  }
+  return kept;
+}
+
 /// What a pair's way up and its starts found: the different scripts of it that hold best.
 void gather(const Study& study, const std::vector<ToolStart>& starts, std::size_t slot,
-            const StartFindings& way_up, PairFindings& pair, ToolScripts& all) {
+            const StartFindings& way_up, Hooks hooks, PairFindings& pair, ToolScripts& all) {
   std::vector<const StartFindings*> parts;
   for (const ToolStart& start : starts) {
     if (start.pair == slot) parts.push_back(&start.findings);
@@ -87,7 +100,8 @@ void gather(const Study& study, const std::vector<ToolStart>& starts, std::size_
     }
     found.insert(found.end(), own.found.begin(), own.found.end());
   }
-  std::vector<FoundScript> kept = choose_different(found, kScriptsKept);
+  std::vector<FoundScript> kept = hooks == Hooks::kEvery ? without_twins(std::move(found))
+                                                         : choose_different(found, kScriptsKept);
   if (pair.stopped.empty()) pair.stopped = way_up.stopped;
   if (pair.found > 0) pair.stopped.clear();
   if (!kept.empty()) pair.held = kept.front().share;
@@ -151,7 +165,8 @@ bool has_more_pairs(const Study& study, const ToolScripts& all) {
 }
 
 void search_on(const Study& study, const simulate::VesselModel& vessel, const BatchOptions& options,
-               const std::function<void(const Candidate&)>& on_first, ToolScripts& all) {
+               const std::function<void(const Candidate&)>& on_first, ToolScripts& all,
+               Hooks hooks) {
   const std::optional<Ostium> ostium = find_ostium(study.goal);
   if (all.groups == 0) {
     for (const ToolPair& pair : pairs_of(study)) all.pairs.emplace_back().pair = pair;
@@ -176,7 +191,7 @@ void search_on(const Study& study, const simulate::VesselModel& vessel, const Ba
           const auto k = static_cast<std::size_t>(slot);
           const ToolPair& pair = all.pairs[slots[k]].pair;
           if (!pair.unfit.empty()) return;
-          ways[k] = go_up(scout, pair, *ostium, vessel, options.cancelled);
+          ways[k] = go_up(scout, pair, *ostium, vessel, hooks, options.cancelled);
           tell(pair, ways[k].findings);
         },
         options);
@@ -190,13 +205,13 @@ void search_on(const Study& study, const simulate::VesselModel& vessel, const Ba
           ToolStart& start = starts[static_cast<std::size_t>(slot)];
           const ToolPair& pair = all.pairs[slots[start.pair]].pair;
           start.findings = search_start(scout, pair, *ostium, ways[start.pair], *start.depth,
-                                        start.withdrawn, options.cancelled);
+                                        start.withdrawn, hooks, options.cancelled);
           tell(pair, start.findings);
         },
         options);
     for (std::size_t k = 0; k < slots.size(); ++k) {
       PairFindings& pair = all.pairs[slots[k]];
-      gather(study, starts, k, ways[k].findings, pair, all);
+      gather(study, starts, k, ways[k].findings, hooks, pair, all);
       holds = holds || pair.held >= kSteadyShare;
     }
   }
@@ -204,9 +219,9 @@ void search_on(const Study& study, const simulate::VesselModel& vessel, const Ba
 
 ToolScripts find_tool_scripts(const Study& study, const simulate::VesselModel& vessel,
                               const BatchOptions& options,
-                              const std::function<void(const Candidate&)>& on_first) {
+                              const std::function<void(const Candidate&)>& on_first, Hooks hooks) {
   ToolScripts all;
-  search_on(study, vessel, options, on_first, all);
+  search_on(study, vessel, options, on_first, all, hooks);
   return all;
 }
 

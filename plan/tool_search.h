@@ -12,7 +12,7 @@
 #include <vector>
 
 #include "plan/batch.h"
-#include "plan/tool_neighbours.h"
+#include "plan/tool_starts.h"
 
 namespace wireplan::plan {
 
@@ -74,12 +74,13 @@ Study tool_scout_study(const Study& study);
 /// holds where friction and stiffness are others. Where it does not reach so when made again, and
 /// does by the same lengths, it turns and pulls by these. The way up is made once for a pair, and
 /// not again for neighbours. Keeps up to six scripts of a pair, which differ
-/// in turn, or in depth, first those of whose neighbours (tool_neighbours.h) most reach too. The
-/// same at any thread count. The first script that is found is told to `on_first`, where given, at
-/// once and from any thread.
+/// in turn, or in depth, first those of whose neighbours (tool_neighbours.h) most reach too; of
+/// every hook all that are not told alike. The same at any thread count. The first script that is
+/// found is told to `on_first`, where given, at once and from any thread.
 ToolScripts find_tool_scripts(const Study& study, const simulate::VesselModel& vessel,
                               const BatchOptions& options,
-                              const std::function<void(const Candidate&)>& on_first = nullptr);
+                              const std::function<void(const Candidate&)>& on_first = nullptr,
+                              Hooks hooks = Hooks::kBest);
 
 /// Whether there are pairs that `all` does not tell of yet: of catheters that the anatomy suggests
 /// three are tried together, then the next, else all at once.
@@ -87,6 +88,7 @@ bool has_more_pairs(const Study& study, const ToolScripts& all);
 
 /// Goes on with these until one of them has a script that holds, and adds what it finds.
 void search_on(const Study& study, const simulate::VesselModel& vessel, const BatchOptions& options,
-               const std::function<void(const Candidate&)>& on_first, ToolScripts& all);
+               const std::function<void(const Candidate&)>& on_first, ToolScripts& all,
+               Hooks hooks = Hooks::kBest);
 
 }  // namespace wireplan::plan

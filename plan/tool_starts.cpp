@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <utility>
 
 namespace wireplan::plan {
@@ -86,9 +87,10 @@ void end_at(ToolStep& step, Until until, double at) {
 class ToolSearch {
  public:
   ToolSearch(const Study& study, const ToolPair& pair, const Ostium& ostium,
-             const std::function<bool()>& cancelled, ToolTrial& trial)
+             const std::function<bool()>& cancelled, ToolTrial& trial, Hooks hooks)
       : study_(study),
         ostium_(ostium),
+        every_hook_(hooks == Hooks::kEvery),
         cancelled_(cancelled),
         catheter_(study.catheters[static_cast<std::size_t>(pair.catheter)]),
         wire_(study.wires[static_cast<std::size_t>(pair.wire)]),
@@ -117,7 +119,7 @@ class ToolSearch {
       std::vector<State> hooks = turn_and_pull();
       std::stable_sort(hooks.begin(), hooks.end(),
                        [](const State& a, const State& b) { return a.off < b.off; });
-      if (hooks.size() > kTemplate.tries) hooks.resize(kTemplate.tries);
+      if (!every_hook_ && hooks.size() > kTemplate.tries) hooks.resize(kTemplate.tries);
       for (const State& hook : hooks) {
         if (stop()) break;
         wire_out(hook);
@@ -229,6 +231,10 @@ class ToolSearch {
   /// Of the scripts that stand first without it, how often they and their neighbours reach.
   void weigh_found() {
     findings_.count = static_cast<int>(findings_.found.size());
+    if (every_hook_) {
+      std::for_each(findings_.found.begin(), findings_.found.end(), take_for_held);
+      return;
+    }
     findings_.found = choose_different(findings_.found, kTemplate.weighed);
     weigh(findings_.found);
     // Where a tip springs round, what ends a step may be seen sooner than it was found at.
@@ -345,6 +351,7 @@ class ToolSearch {
   bool looks_away() {
     const double along = trial_.tip_direction(kCatheter).dot(ostium_.branch);
     least_aside_ = std::min(least_aside_, std::acos(std::clamp(along, -1.0, 1.0)));
+    looked_there_ = looked_there_ || along >= kTemplate.toward;
     return along < kTemplate.toward;
   }
 
@@ -361,7 +368,7 @@ class ToolSearch {
       if (side > 0.0) pull_past(hooks);
       made = turn_on(side, turns, hooks) && made;
     }
-    const bool none = hooks.empty(), turns = may_turn();
+    const bool none = !looked_there_, turns = may_turn();
     for (const double side : {1.0, -1.0}) {
       if (!none || !turns || stop()) break;
       back_to(start);
@@ -374,7 +381,7 @@ class ToolSearch {
       }
       made = turned && let_twist_through() && turn_on(side, kTemplate.turns / 2, hooks) && made;
     }
-    if (hooks.empty() && made && !stop()) {
+    if (!looked_there_ && made && !stop()) {
       findings_.stopped =
           std::string(turns ? "at all turns of its hub, by up to a whole one to either side"
                             : "with its hub as it is, since tool_rules let it not be turned") +
@@ -428,7 +435,7 @@ class ToolSearch {
   /// Adds the best states of a pull from here, and comes back here. From below the ostium, as where
   /// the image ends too near above it, of a push as well.
   void pull_past(std::vector<State>& hooks) {
-    if (looks_away()) return;
+    if (looks_away() && !every_hook_) return;
     const double level = trial_.measure(Until::kLevel, kCatheter);
     move_past(-kTemplate.pull, hooks);
     if (level < 0.0) move_past(kTemplate.pull, hooks);
@@ -447,7 +454,11 @@ class ToolSearch {
       own.push_back(here(broken_.empty() ? off() : HUGE_VAL));
       own.back().facing = turned.facing;
     }
-    keep_best(std::move(own), hooks);
+    if (every_hook_) {
+      std::move(own.begin(), own.end(), std::back_inserter(hooks));
+    } else {
+      keep_best(std::move(own), hooks);
+    }
     back_to(turned);
   }
 
@@ -535,6 +546,7 @@ class ToolSearch {
 
   const Study& study_;
   const Ostium& ostium_;
+  const bool every_hook_;
   const std::function<bool()>& cancelled_;
   const Catheter& catheter_;
   const simulate::Wire& wire_;
@@ -548,8 +560,9 @@ class ToolSearch {
   std::vector<ToolStep> steps_;
   const State* hook_ = nullptr;  // that the wire is brought out of
   StartFindings findings_;
-  std::string broken_;        // rule, by the longest pull or the last that reached
-  double least_aside_ = kPi;  // of the catheter's tip and the branch, turned              [rad]
+  std::string broken_;         // rule, by the longest pull or the last that reached
+  double least_aside_ = kPi;   // of the catheter's tip and the branch, turned              [rad]
+  bool looked_there_ = false;  // by less than a right angle
 };
 
 }  // namespace
@@ -566,20 +579,22 @@ double furthest_since(std::size_t push, const simulate::ToolTrial& trial,
 }
 
 WayUp go_up(const Study& study, const ToolPair& pair, const Ostium& ostium,
-            const simulate::VesselModel& vessel, const std::function<bool()>& cancelled) {
+            const simulate::VesselModel& vessel, Hooks hooks,
+            const std::function<bool()>& cancelled) {
   WayUp up;
   const Candidate begun = first_candidate(study, pair);
   up.trial = std::make_unique<ToolTrial>(tools_of(study, begun), make_introducer(study, begun),
                                          study.goal, vessel, tool_options(study, begun));
-  up.findings = ToolSearch(study, pair, ostium, cancelled, *up.trial).go_up(up.depths);
+  up.findings = ToolSearch(study, pair, ostium, cancelled, *up.trial, hooks).go_up(up.depths);
   return up;
 }
 
 StartFindings search_start(const Study& study, const ToolPair& pair, const Ostium& ostium,
-                           const WayUp& up, const RaisedTools& depth, double withdrawn,
+                           const WayUp& up, const RaisedTools& depth, double withdrawn, Hooks hooks,
                            const std::function<bool()>& cancelled) {
   ToolTrial trial(*up.trial);
-  return ToolSearch(study, pair, ostium, cancelled, trial).search(depth, withdrawn, up.findings);
+  return ToolSearch(study, pair, ostium, cancelled, trial, hooks)
+      .search(depth, withdrawn, up.findings);
 }
 
 }  // namespace wireplan::plan

@@ -12,6 +12,10 @@
 
 namespace wireplan::plan {
 
+/// Which states along the pulls of a start the wire is brought out of: those that lie best, or all,
+/// to hold the search against, of which each script that reaches is kept and none is weighed.
+enum class Hooks { kBest, kEvery };
+
 /// A script on its way, and where the trial that makes it is.
 struct RaisedTools {
   ToolScript steps;
@@ -42,12 +46,13 @@ double furthest_since(std::size_t push, const simulate::ToolTrial& trial, const 
 
 /// The wire beyond the ostium, and the catheter over it.
 WayUp go_up(const Study& study, const ToolPair& pair, const Ostium& ostium,
-            const simulate::VesselModel& vessel, const std::function<bool()>& cancelled);
+            const simulate::VesselModel& vessel, Hooks hooks,
+            const std::function<bool()>& cancelled);
 
 /// From one depth on, with the wire withdrawn to so far behind the catheter's tip [mm]. The way up
 /// is left as it is: starts of it may be searched at the same time.
 StartFindings search_start(const Study& study, const ToolPair& pair, const Ostium& ostium,
-                           const WayUp& up, const RaisedTools& depth, double withdrawn,
+                           const WayUp& up, const RaisedTools& depth, double withdrawn, Hooks hooks,
                            const std::function<bool()>& cancelled);
 
 }  // namespace wireplan::plan

@@ -28,6 +28,7 @@ struct OtherElements {
   double factor = 1.0;                  // of the study's length
   double insertion = 0.0;               //                                             [mm]
   std::optional<Setting> setting = {};  // that is changed; empty: none
+  bool operator==(const OtherElements&) const = default;
 };
 
 /// One simulated trial: all that tells it from the others of a case.

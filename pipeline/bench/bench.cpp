@@ -101,6 +101,12 @@ double thread_milliseconds() {
   return 1e3 * static_cast<double>(now.tv_sec) + 1e-6 * static_cast<double>(now.tv_nsec);
 }
 
+double process_seconds() {
+  timespec now{};
+  clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &now);
+  return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
+}
+
 double median(std::vector<double> values) {
   expects(!values.empty());
   const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
@@ -117,11 +123,12 @@ void run_bench(const std::string& name, const std::filesystem::path& folder,
                            : name == "segmentation" ? bench_segmentation
                            : name == "measured"     ? bench_measured
                            : name == "truth"        ? bench_truth
+                           : name == "scripts"      ? bench_scripts
                                                     : nullptr;
   if (make_report == nullptr) {
     throw Error("bench: NAME is '" + name +
-                "', expected accuracy, stability, throughput, preprocess, segmentation, measured "
-                "or truth");
+                "', expected accuracy, stability, throughput, preprocess, segmentation, measured, "
+                "truth or scripts");
   }
   if (make_report != bench_throughput && !options.case_path.empty()) {
     throw Error("bench: --case is '" + options.case_path +
@@ -139,9 +146,18 @@ void run_bench(const std::string& name, const std::filesystem::path& folder,
     throw Error("bench: " + name + " is given the folder '" + options.measured.string() +
                 "', expected none: only measured takes one");
   }
-  if (make_report != bench_truth && (!options.cases.empty() || options.trials > 0)) {
-    throw Error("bench: " + name +
-                " is given cases or --trials, expected none: only truth takes them");
+  if (make_report != bench_truth && options.trials > 0) {
+    throw Error("bench: " + name + " is given --trials, expected none: only truth takes them");
+  }
+  if (make_report != bench_truth && make_report != bench_scripts && !options.cases.empty()) {
+    throw Error("bench: " + name + " is given the case '" + options.cases.front() +
+                "', expected none: only truth and scripts take cases");
+  }
+  const bool of_case =
+      make_report == bench_throughput ? !options.case_path.empty() : make_report == bench_scripts;
+  if (!of_case && !options.overrides.empty()) {
+    throw Error("bench: " + name + " is given --set '" + options.overrides.front() +
+                "', expected none: only scripts, and throughput with --case, change a case");
   }
   std::filesystem::create_directories(folder);
   const BenchReport report = make_report(options);

@@ -125,12 +125,6 @@ SurfaceError compare(const Surface& surface, const preprocess::PhantomLumen& tru
           .p95 = errors[errors.size() * 95 / 100]};
 }
 
-double cpu_seconds() {
-  timespec now{};
-  clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &now);
-  return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
-}
-
 /// Largest resident memory of the process since the last reset. Linux tells and resets it in /proc;
 /// null where it does not.
 class PeakMemory {
@@ -227,11 +221,11 @@ Preprocessed run_steps(const preprocess::PhantomSpec& spec, bool quick) {
   double cpu_sum = 0.0;
   const auto run = [&](const std::string& name, const std::function<void()>& step) {
     const PeakMemory memory;
-    const double cpu = cpu_seconds();
+    const double cpu = process_seconds();
     const auto start = std::chrono::steady_clock::now();
     step();
     const double wall_s = seconds_since(start);
-    const double cpu_s = cpu_seconds() - cpu;
+    const double cpu_s = process_seconds() - cpu;
     const Json peak = memory.megabytes();
     if (!error && all.surface.triangles.cols() > 0) error = compare(all.surface, truth, spec.grid);
     cpu_sum += cpu_s;

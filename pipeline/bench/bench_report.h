@@ -43,6 +43,7 @@ BenchReport bench_preprocess(const BenchOptions& options);
 BenchReport bench_segmentation(const BenchOptions& options);
 BenchReport bench_measured(const BenchOptions& options);
 BenchReport bench_truth(const BenchOptions& options);
+BenchReport bench_scripts(const BenchOptions& options);
 
 /// Rows as a table for people: columns aligned, numbers with 4 digits.
 std::string table_text(const std::vector<Json>& rows);
@@ -54,8 +55,9 @@ Json aim_row(const std::string& what, const std::string& aim, const Json& found)
 Json aim_entry(const char* what, double aim, bool at_least, const Json& found);
 std::string aims_text(const Json& aims);
 
-/// CPU time of this thread [ms].
+/// CPU time of this thread [ms], and of the process, all its threads [s].
 double thread_milliseconds();
+double process_seconds();
 
 double median(std::vector<double> values);
 

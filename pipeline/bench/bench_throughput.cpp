@@ -10,9 +10,9 @@
 #include "pipeline/bench/bench_walls.h"
 #include "pipeline/bench/coaxial_manoeuvres.h"
 #include "pipeline/bench/moving_vessel.h"
+#include "pipeline/bench/opened_case.h"
 #include "pipeline/bench/throughput_results.h"
 #include "pipeline/bench/timed_batch.h"
-#include "pipeline/stages/stages.h"
 #include "preprocess/wall/wall.h"
 
 namespace wireplan::pipeline {
@@ -64,13 +64,8 @@ const Size kQuick = {.tree_edge = 4.0,
 
 /// The vessel of a case, made by its own stages and kept in the store.
 Vessel vessel_of_case(const Case& given, const std::filesystem::path& cache) {
-  RunOptions options;
-  options.cache = cache.empty() ? Store::default_root() : cache;
-  options.to = "wall";
-  Workspace work(given, options.work, Store(options.cache));
-  const RunResult result = run_stages(given, options);
-  for (const Artifact& artifact : result.artifacts) work.add(artifact);
-  return {work.surface(), work.path(), work.wall()};
+  const OpenedCase opened = open_case(given, cache);
+  return {opened.work->surface(), opened.work->path(), opened.work->wall()};
 }
 
 // ---------------------------------------------------------------- rows

@@ -6,10 +6,11 @@
 #include <set>
 
 #include "pipeline/bench/bench_walls.h"
+#include "pipeline/bench/opened_case.h"
 #include "pipeline/bench/timed_batch.h"
 #include "pipeline/bench/truth_results.h"
 #include "pipeline/files/text.h"
-#include "pipeline/stages/stages.h"
+#include "pipeline/stages/plan_artifact.h"
 #include "plan/judge.h"
 
 namespace wireplan::pipeline {
@@ -166,20 +167,9 @@ std::vector<Chosen> choose_trials(const plan::Study& study, const plan::Plan& pl
 }
 
 std::vector<TruthTrial> measure_case(const Case& given, const BenchOptions& options) {
-  RunOptions run;
-  run.cache = options.cache.empty() ? Store::default_root() : options.cache;
-  run.to = "wall";
-  Workspace work(given, run.work, Store(run.cache));
-  const RunResult made = run_stages(given, run);
-  for (const Artifact& artifact : made.artifacts) work.add(artifact);
-
-  const plan::Study& study = work.study();
-  const plan::PlanVessel vessel{
-      .path = work.path(),
-      .yields = given.wall.elastic,
-      .model = [&]() -> const simulate::VesselModel& { return work.model(); },
-      .rigid_model = [&]() -> const simulate::VesselModel& { return work.rigid_model(); },
-      .moving_model = work.moving_model()};
+  const OpenedCase opened = open_case(given, options.cache);
+  const plan::Study& study = opened.work->study();
+  const plan::PlanVessel vessel = plan_vessel(*opened.work);
   NoLog log;
   plan::PlanOptions search{.exhaustive = given.exhaustive,
                            .manoeuvres = plan::Manoeuvring::kNever,
@@ -223,15 +213,6 @@ std::vector<std::string> known_cases() {
   }
   std::sort(found.begin(), found.end());
   return found;
-}
-
-/// One section of it, its first.
-Case read_one_section(const std::string& path) {
-  Case given = read_case(path);
-  choose_section(given, 0, 0);
-  given.accesses.resize(1);
-  given.targets.resize(1);
-  return given;
 }
 
 }  // namespace

@@ -173,12 +173,8 @@ preprocess::PhantomTube artery(const std::vector<Vec3>& points, const std::vecto
   return tube;
 }
 
-}  // namespace
-
-Vessel make_arterial_tree(double edge_length) {
+preprocess::PhantomSpec empty_phantom(const Vec3& low, const Vec3& high, double spacing) {
   preprocess::PhantomSpec spec;
-  const double spacing = 0.6 * edge_length;
-  const Vec3 low(-85.0, -52.0, -145.0), high(85.0, 40.0, 165.0);
   for (int k = 0; k < 3; ++k) {
     spec.grid.size[static_cast<std::size_t>(k)] =
         static_cast<int>(std::ceil((high[k] - low[k]) / spacing)) + 1;
@@ -187,6 +183,14 @@ Vessel make_arterial_tree(double edge_length) {
   spec.grid.origin = low;
   spec.body_semi_axes = Vec3(200.0, 200.0, 1000.0);
   spec.supersampling = 1;  // nobody reads the image, its truth alone
+  return spec;
+}
+
+}  // namespace
+
+Vessel make_arterial_tree(double edge_length) {
+  preprocess::PhantomSpec spec =
+      empty_phantom(Vec3(-85.0, -52.0, -145.0), Vec3(85.0, 40.0, 165.0), 0.6 * edge_length);
   spec.tubes = {
       artery({{3, 9, 175}, {4, 7, 120}, {9, 5, 75}, {16, -1, 40}, {8, -2, 10}, {4, -1, -4}},
              {10, 10, 9, 10, 9, 8}),
@@ -216,6 +220,20 @@ Vessel make_arterial_tree(double edge_length) {
   vessel.path = preprocess::find_centerline(vessel.surface, Vec3(-71.0, -36.0, -140.0),
                                             Vec3(3.0, 9.0, 160.0));
   vessel.wall = preprocess::extrude_wall(vessel.surface, {}).wall;
+  return vessel;
+}
+
+Vessel make_branched_aorta() {
+  constexpr double kEdge = 1.2, kLevel = 60.0;  // [mm]
+  preprocess::PhantomSpec spec =
+      empty_phantom(Vec3(-11.0, -11.0, 0.0), Vec3(46.0, 11.0, 130.0), 0.6 * kEdge);
+  spec.tubes = {artery({{0, 0, -20}, {0, 0, 150}}, {9, 9}),
+                artery({{0, 0, kLevel}, {60, 0, kLevel}}, {3, 3})};
+  Vessel vessel;
+  vessel.surface = preprocess::surface_from_mask(preprocess::make_phantom(spec).lumen,
+                                                 {.edge_length_mm = kEdge});
+  vessel.path =
+      preprocess::find_centerline(vessel.surface, Vec3(0.0, 0.0, 5.0), Vec3(35.0, 0.0, kLevel));
   return vessel;
 }
 

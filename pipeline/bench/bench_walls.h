@@ -20,6 +20,10 @@ std::vector<BenchWall> make_bench_walls();
 /// length [mm]. The path leads from the right external iliac artery up the aorta.
 Vessel make_arterial_tree(double edge_length);
 
+/// Of `bench scripts`: an aorta of 9 mm radius, 130 mm up along +z from the origin, with a branch
+/// of 3 mm toward +x at 60 mm. The path leads from its foot 35 mm into that.
+Vessel make_branched_aorta();
+
 /// A tube of radius 5 mm with two bends of 90 degrees, radius 60 mm, the second square to the plane
 /// of the first. Starts at the origin along +z.
 Vessel make_s_tube();

@@ -2,8 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <ctime>
 
+#include "pipeline/bench/bench_report.h"
 #include "preprocess/centerline/centerline.h"
 #include "preprocess/centerline/path_place.h"
 #include "preprocess/centerline/section_width.h"
@@ -23,12 +23,6 @@ using preprocess::SegmentStatistics;
 constexpr double kNearWay = 3.0;  // true radii
 constexpr double kRadiusTolerance = 0.05;
 constexpr double kWideEnough = 2.0;  // voxels in radius, for a radius to be asked for
-
-double process_seconds() {
-  timespec now{};
-  clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &now);
-  return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
-}
 
 double mean_of(const std::vector<double>& values) {
   double sum = 0.0;

@@ -323,16 +323,18 @@ void add_bench(CLI::App& app, int& code) {
   const auto arguments = std::make_shared<Arguments>();
   CLI::App* bench = app.add_subcommand(
       "bench",
-      "Error against run time, stability, throughput, segmentation, measured wires, truth");
+      "Error against run time, stability, throughput, segmentation, measured wires, truth, "
+      "searches for scripts");
   bench
       ->add_option("NAME", arguments->name,
-                   "accuracy, stability, throughput, preprocess, segmentation, measured or truth")
+                   "accuracy, stability, throughput, preprocess, segmentation, measured, truth or "
+                   "scripts")
       ->required();
-  bench->add_option(
-      "N|FOLDER|CASE|ROWS", arguments->of,
-      "Segmentation: how many patients [100]; measured: folder of the frames "
-      "[guide3d]; truth: cases [all]; throughput: some of vessel, s-tube, paper, moving and "
-      "coaxial [all]");
+  bench->add_option("N|FOLDER|CASE|ROWS", arguments->of,
+                    "Segmentation: how many patients [100]; measured: folder of the frames "
+                    "[guide3d]; truth: cases [all]; scripts: cases; throughput: some of vessel, "
+                    "s-tube, paper, moving and "
+                    "coaxial [all]");
   bench->add_option("--trials", arguments->options.trials, "Truth: trials of each case [12]")
       ->check(CLI::Range(1, 100'000));
   bench->add_option("-o,--output", arguments->output, "Folder for results [wireplan-out/bench]");
@@ -343,10 +345,12 @@ void add_bench(CLI::App& app, int& code) {
                     "Segmentation: folder of real cases with labels [WIREPLAN_DATA]");
   bench->add_option("--case", arguments->options.case_path,
                     "Throughput: the case whose vessel to take");
-  bench->add_option("--set", arguments->options.overrides, "Throughput: key=value of that case")
+  bench
+      ->add_option("--set", arguments->options.overrides,
+                   "Throughput, scripts: key=value of the case")
       ->allow_extra_args(false);
   bench->add_option("--cache", arguments->options.cache,
-                    "Throughput, truth: store of the case's stages");
+                    "Throughput, truth, scripts: store of the case's stages");
   bench->footer(
       "Writes NAME.json, NAME.csv and the plot NAME.png, and prints the table.\n"
       "  accuracy   each method's error and time on scenes whose answer is known\n"
@@ -359,9 +363,11 @@ void add_bench(CLI::App& app, int& code) {
       "             an earlier frame's shape on to the next; a picture of each frame\n"
       "  truth      stated errors of trials of cases against the run with elements of a quarter,\n"
       "             and how far tips end apart where settings change that should not matter\n"
+      "  scripts    the first plan of cases with catheters against that of a search that brings\n"
+      "             the wire out of every hook, and both times\n"
       "Example: wireplan bench accuracy -o out");
   bench->callback([&code, arguments] {
-    if (arguments->name == "truth") {
+    if (arguments->name == "truth" || arguments->name == "scripts") {
       arguments->options.cases = arguments->of;
     } else if (arguments->name == "throughput") {
       arguments->options.rows = arguments->of;

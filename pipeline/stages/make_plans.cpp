@@ -74,29 +74,6 @@ plan::Early early_answers(Workspace& work, Until until) {
   return early;
 }
 
-plan::PlanOptions plan_options(Workspace& work, Until until) {
-  const Case& given = work.given();
-  plan::PlanOptions options{.exhaustive = given.exhaustive,
-                            .manoeuvres = given.manoeuvres,
-                            .robustness = given.robustness,
-                            .until = until,
-                            .batch = {.threads = work.options().threads,
-                                      .progress = work.options().progress,
-                                      .cancelled = work.options().cancelled},
-                            .early = early_answers(work, until)};
-  double& lumen = options.robustness.unknowns.lumen;
-  if (lumen == 0.0) lumen = choose_lumen_offset(work);
-  return options;
-}
-
-plan::PlanVessel plan_vessel(Workspace& work) {
-  return {.path = work.path(),
-          .yields = work.given().wall.elastic,
-          .model = [&]() -> const simulate::VesselModel& { return work.model(); },
-          .rigid_model = [&]() -> const simulate::VesselModel& { return work.rigid_model(); },
-          .moving_model = work.moving_model()};
-}
-
 plan::Plan plan_until(Workspace& work, Until until, StoredTrials& log) {
   return plan::make_plan(work.study(), plan_vessel(work), plan_options(work, until), log);
 }
@@ -137,6 +114,29 @@ std::vector<std::pair<Level, plan::Spent>> levels_of(const plan::Plan& plan, boo
 }
 
 }  // namespace
+
+plan::PlanOptions plan_options(Workspace& work, Until until) {
+  const Case& given = work.given();
+  plan::PlanOptions options{.exhaustive = given.exhaustive,
+                            .manoeuvres = given.manoeuvres,
+                            .robustness = given.robustness,
+                            .until = until,
+                            .batch = {.threads = work.options().threads,
+                                      .progress = work.options().progress,
+                                      .cancelled = work.options().cancelled},
+                            .early = early_answers(work, until)};
+  double& lumen = options.robustness.unknowns.lumen;
+  if (lumen == 0.0) lumen = choose_lumen_offset(work);
+  return options;
+}
+
+plan::PlanVessel plan_vessel(Workspace& work) {
+  return {.path = work.path(),
+          .yields = work.given().wall.elastic,
+          .model = [&]() -> const simulate::VesselModel& { return work.model(); },
+          .rigid_model = [&]() -> const simulate::VesselModel& { return work.rigid_model(); },
+          .moving_model = work.moving_model()};
+}
 
 void make_trials(Workspace& work, const fs::path& folder) {
   const plan::Study& study = work.study();

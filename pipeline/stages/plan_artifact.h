@@ -11,6 +11,11 @@ inline constexpr const char* kTimingSchema = "wireplan.timing/1";
 
 void write_plan(const plan::Plan& plan, const std::filesystem::path& folder);
 
+/// The vessel and the options with which a case is planned up to there. Expects the stages up to
+/// `wall` to be done; the vessel refers to the workspace.
+plan::PlanVessel plan_vessel(Workspace& work);
+plan::PlanOptions plan_options(Workspace& work, plan::PlanOptions::Until until);
+
 /// Expects the stages up to `plans` to be done. Without shapes, and what was spent.
 plan::Plan read_plan(Workspace& work);
 

@@ -444,6 +444,54 @@ TEST(Bench, TruthIsToldOfACaseThatIsNotThere) {
   EXPECT_THROW(run_bench("accuracy", folder.path(), {.cases = {"no-such-case"}}), Error);
 }
 
+TEST(Bench, FirstScriptOfTheBestHooksIsTiedWithThatOfEveryHook) {
+  const QuickRun scripts("scripts");
+  const Json& rows = scripts.result.at("rows");
+  ASSERT_EQ(rows.size(), 1u);
+  const Json& row = rows[0];
+  SCOPED_TRACE(row.dump());
+  EXPECT_GT(row.at("every_hook_tried").get<int>(), 2 * row.at("search_tried").get<int>());
+  EXPECT_GT(row.at("every_hook_scripts").get<int>(), row.at("search_scripts").get<int>());
+  for (const std::string name : {"search", "every_hook"}) {
+    EXPECT_EQ(row.at(name + "_repeats"), 2);
+    const std::string first = row.at(name + "_first");
+    EXPECT_EQ(first.find("soft in hook, "), 0u) << first;
+    EXPECT_NE(first.find(": advance the wire to "), std::string::npos) << first;
+    EXPECT_GT(row.at(name + "_cpu_s").get<double>(), 0.0);
+  }
+  EXPECT_EQ(row.at("tied"), true);
+  EXPECT_GE(row.at("rank").get<int>(), 1);
+  EXPECT_LE(row.at("rank").get<int>(), row.at("every_hook_scripts").get<int>() + 1);
+  EXPECT_NEAR(row.at("cpu_ratio").get<double>() * row.at("every_hook_cpu_s").get<double>(),
+              row.at("search_cpu_s").get<double>(), 1e-6);
+  const Json& results = scripts.result.at("results");
+  EXPECT_EQ(results.at("tied"), 1);
+  EXPECT_EQ(results.at("aims").at(1).at("found"), row.at("cpu_ratio"));
+  expect_written(scripts, "scripts", "cpu_ratio");
+}
+
+TEST(Bench, ScriptsAreAskedOfCasesWithCatheters) {
+  const TemporaryFolder folder;
+  const auto message = [&](const std::string& name, const BenchOptions& options) -> std::string {
+    try {
+      run_bench(name, folder / "out", options);
+    } catch (const Error& error) {
+      return error.what();
+    }
+    return "no error";
+  };
+  EXPECT_NE(message("scripts", {}).find("scripts is given no case, expected cases with catheters"),
+            std::string::npos);
+  write_tube_case(folder.path());
+  const std::string tube = (folder / "case.json").string();
+  EXPECT_NE(message("scripts", {.cases = {tube}, .cache = folder / "cache"})
+                .find("tube: no script of catheter and wire is searched for"),
+            std::string::npos);
+  EXPECT_NE(message("truth", {.cases = {tube}, .overrides = {"insertion.friction=0"}})
+                .find("truth is given --set 'insertion.friction=0', expected none"),
+            std::string::npos);
+}
+
 TEST(Bench, CaseIsForThroughputAlone) {
   const TemporaryFolder folder;
   EXPECT_THROW(run_bench("accuracy", folder.path(), {.case_path = "cases/abdomen"}), Error);
@@ -478,7 +526,7 @@ TEST(Bench, UnknownNameIsToldWithTheKnownOnes) {
   } catch (const Error& error) {
     EXPECT_EQ(std::string(error.what()),
               "bench: NAME is 'speed', expected accuracy, stability, throughput, preprocess, "
-              "segmentation, measured or truth");
+              "segmentation, measured, truth or scripts");
   }
 }
 

@@ -378,6 +378,23 @@ TEST(ToolSearch, TargetsOnEitherSideHaveMirroredScripts) {
   EXPECT_NEAR(there, -back, 31.0) << "turns are tried by 30 degrees";
 }
 
+TEST(ToolSearch, EveryHookHasWhatTheBestOnesHaveAndMore) {
+  const Study study = toward(1.0);
+  const ToolScripts best = find_tool_scripts(study, aorta(), {.threads = 2});
+  const ToolScripts every =
+      find_tool_scripts(study, aorta(), {.threads = 2}, nullptr, Hooks::kEvery);
+  std::vector<Candidate> all = every.found;
+  for (const auto& spares : every.spares) all.insert(all.end(), spares.begin(), spares.end());
+  const auto count = [](const std::vector<Candidate>& scripts, const Candidate& script) {
+    return std::count_if(scripts.begin(), scripts.end(),
+                         [&](const Candidate& other) { return other.steps == script.steps; });
+  };
+  for (const Candidate& script : best.found) EXPECT_GE(count(all, script), 1);
+  for (const Candidate& script : every.found) EXPECT_EQ(count(every.found, script), 1);
+  EXPECT_GT(every.pairs.at(0).found, best.pairs.at(0).found);
+  EXPECT_GT(every.branches, 2 * best.branches) << "though none is weighed";
+}
+
 TEST(ToolSearch, KeepsToStricterRulesFromTheFirstTurnOn) {
   Study study = toward(1.0);
   study.tool_rules.most_turn = 50.0 * kRadPerDeg;
