@@ -185,7 +185,7 @@ class Search {
 
   double progress_here() const {
     if (trial_.pushes().empty()) return 0.0;
-    return find_progress(trial_.pushes().back().tip, study_, path_);
+    return find_progress(trial_.tip_at_rest(), study_, path_);
   }
 
   /// A round: tries turns, and pulls after them, round the places where the attempts left the path.

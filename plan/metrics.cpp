@@ -10,10 +10,21 @@
 namespace wireplan::plan {
 namespace {
 
+/// Where targets and paths are: in the vessel at rest.
+const Eigen::Matrix3Xd& nodes_at_rest(const simulate::TrialResult& trial) {
+  return trial.nodes_at_rest.cols() > 0 ? trial.nodes_at_rest : trial.nodes;
+}
+std::vector<Vec3> tips_at_rest(const simulate::TrialResult& trial) {
+  if (!trial.tips_at_rest.empty()) return trial.tips_at_rest;
+  std::vector<Vec3> tips;
+  for (const simulate::Push& push : trial.pushes) tips.push_back(push.tip);
+  return tips;
+}
+
 /// Where the tip ended: of the final shape, else of the last push, else still at the access.
 Vec3 final_tip(const simulate::TrialResult& trial, const Study& study) {
-  if (trial.nodes.cols() > 0) return trial.nodes.rightCols<1>();
-  return trial.pushes.empty() ? study.access : trial.pushes.back().tip;
+  if (nodes_at_rest(trial).cols() > 0) return nodes_at_rest(trial).rightCols<1>();
+  return trial.pushes.empty() ? study.access : tips_at_rest(trial).back();
 }
 
 WallMotion find_wall_motion(const std::vector<simulate::Push>& pushes, const Centerline& path) {
@@ -99,14 +110,15 @@ Metrics compute_metrics(const simulate::TrialResult& trial, const Study& study,
   metrics.reached = trial.outcome == simulate::Outcome::kReached;
   metrics.tip_to_target = (final_tip(trial, study) - study.goal.point).norm();
   metrics.nearest_to_target = metrics.tip_to_target;
-  for (const simulate::Push& push : trial.pushes) {
+  for (const Vec3& tip : tips_at_rest(trial)) {
     metrics.nearest_to_target =
-        std::min(metrics.nearest_to_target, (push.tip - study.goal.point).norm());
+        std::min(metrics.nearest_to_target, (tip - study.goal.point).norm());
   }
   metrics.wall_motion = find_wall_motion(trial.pushes, path);
-  for (Eigen::Index k = 0; k < trial.nodes.cols(); ++k) {
-    const preprocess::PathPlace place = preprocess::find_place(trial.nodes.col(k), path);
-    metrics.centerline_deviation += place.from_axis / static_cast<double>(trial.nodes.cols());
+  const Eigen::Matrix3Xd& nodes = nodes_at_rest(trial);
+  for (Eigen::Index k = 0; k < nodes.cols(); ++k) {
+    const preprocess::PathPlace place = preprocess::find_place(nodes.col(k), path);
+    metrics.centerline_deviation += place.from_axis / static_cast<double>(nodes.cols());
     metrics.off_path = std::max(metrics.off_path, place.from_lumen);
   }
   return metrics;
@@ -120,8 +132,8 @@ double find_progress(const Vec3& tip, const Study& study, const Centerline& path
 double find_progress(const simulate::TrialResult& trial, const Study& study,
                      const Centerline& path) {
   double progress = 0.0;
-  for (const simulate::Push& push : trial.pushes) {
-    progress = std::max(progress, find_progress(push.tip, study, path));
+  for (const Vec3& tip : tips_at_rest(trial)) {
+    progress = std::max(progress, find_progress(tip, study, path));
   }
   return progress;
 }

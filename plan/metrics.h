@@ -103,7 +103,8 @@ inline constexpr std::array kMetricFields = {
     MetricField{"residual_n", &Metrics::residual},
 };
 
-/// All of the trial's numbers. Without a push the wire counts as lying at the access, free of
+/// All of the trial's numbers. Distances from target and path are those in the vessel at rest, of
+/// which both are. Without a push the wire counts as lying at the access, free of
 /// force. The deviation is the mean over the nodes of the exact distance to the path's segments.
 /// Expects a path of at least one point.
 Metrics compute_metrics(const simulate::TrialResult& trial, const Study& study,

@@ -307,6 +307,10 @@ std::string trial_text(const plan::Study& study, const plan::Candidate& candidat
   file["pushes"] = pushes_to_json(trial.pushes);
   file["nodes_mm"] = to_json(trial.nodes);
   if (trial.sections.size() > 0) file["sections_mm"] = to_json(trial.sections);
+  if (!trial.tips_at_rest.empty()) {
+    file["nodes_at_rest_mm"] = to_json(trial.nodes_at_rest);
+    for (const Vec3& tip : trial.tips_at_rest) file["tips_at_rest_mm"].push_back(to_json(tip));
+  }
   file["contacts"] = contacts_to_json(trial.contacts);
   file["peak_forces"] = peaks_to_json(trial.peak_forces);
   return to_lines(file);
@@ -403,6 +407,11 @@ std::optional<TrialResult> find_trial(const std::filesystem::path& path) {
   trial.pushes = pushes_from_json(file.at("pushes"));
   trial.nodes = points_of(file.at("nodes_mm"));
   if (file.contains("sections_mm")) trial.sections = points_of(file.at("sections_mm"));
+  if (file.contains("tips_at_rest_mm")) {
+    trial.nodes_at_rest = points_of(file.at("nodes_at_rest_mm"));
+    const Eigen::Matrix3Xd tips = points_of(file.at("tips_at_rest_mm"));
+    for (Eigen::Index k = 0; k < tips.cols(); ++k) trial.tips_at_rest.emplace_back(tips.col(k));
+  }
   trial.contacts = contacts_from_json(file.at("contacts"));
   trial.peak_forces = peaks_from_json(file.at("peak_forces"));
   if (file.contains("tools")) {

@@ -117,8 +117,7 @@ bool Trial::start(const StartLine& line) {
     return end_all(Outcome::kNotConverged,
                    "no equilibrium near the line that the wire is to start from");
   }
-  record_.pushes.push_back(*push);
-  if (options_.record_terms) record_.push_terms.push_back(insertion_.terms());
+  record(*push);
   record_.start = shape_here();
   record_.shapes.push_back(*record_.start);
   pushing_since_ = 1;
@@ -173,8 +172,7 @@ bool Trial::step(const Move& move) {
                                                place_text(insertion_.tip()) + " mm");
   }
   if (end_in_sphere()) return false;
-  record_.pushes.push_back(*push);
-  if (options_.record_terms) record_.push_terms.push_back(insertion_.terms());
+  record(*push);
   if (distance <= 0.0) pushing_since_ = record_.pushes.size();
   if (ends_by_crossing()) return false;
   since_shape_ += std::abs(distance) + std::abs(move.turn) / kTurnPerShape * options_.record_every;
@@ -189,6 +187,12 @@ bool Trial::step(const Move& move) {
     record_.shapes.push_back(shape_here());
   }
   return true;
+}
+
+void Trial::record(const Push& push) {
+  record_.pushes.push_back(push);
+  if (options_.record_terms) record_.push_terms.push_back(insertion_.terms());
+  if (vessel_.sections) record_.tips_at_rest.push_back(tip_at_rest());
 }
 
 /// Whether the last step brought the wire through itself; notes it where it is pushed on.
@@ -382,6 +386,7 @@ void Trial::end(std::size_t goal, Outcome outcome, const std::string& reason) {
   ended.crossing = record_.crossing;
   ended.nodes = insertion_.free_nodes();
   ended.sections = insertion_.sections();
+  if (vessel_.sections) ended.nodes_at_rest = insertion_.free_nodes_at_rest();
   ended.contacts = insertion_.contacts();
   ended.peak_forces = insertion_.peak_forces();
   const bool recorded = !record_.shapes.empty() &&
@@ -424,6 +429,10 @@ std::vector<TrialResult> Trial::finish_all() {
       result.push_terms.assign(record_.push_terms.data(),
                                record_.push_terms.data() + pursuit.pushes);
     }
+    if (vessel_.sections) {
+      result.tips_at_rest.assign(record_.tips_at_rest.data(),
+                                 record_.tips_at_rest.data() + pursuit.pushes);
+    }
     result.shapes.insert(result.shapes.begin(), record_.shapes.data(),
                          record_.shapes.data() + pursuit.shapes);
   }
@@ -435,6 +444,7 @@ void Trial::save(Mark& mark) const {
   insertion_.save(mark.insertion);
   mark.pushes = record_.pushes;
   mark.push_terms = record_.push_terms;
+  mark.tips_at_rest = record_.tips_at_rest;
   mark.shapes = record_.shapes;
   mark.pushing_since = pushing_since_;
   mark.since_shape = since_shape_;
@@ -446,6 +456,7 @@ void Trial::restore(const Mark& mark) {
   insertion_.restore(mark.insertion);
   record_.pushes = mark.pushes;
   record_.push_terms = mark.push_terms;
+  record_.tips_at_rest = mark.tips_at_rest;
   record_.shapes = mark.shapes;
   pushing_since_ = mark.pushing_since;
   since_shape_ = mark.since_shape;

@@ -96,6 +96,10 @@ struct TrialResult {
   std::optional<SelfCrossing> crossing;
   Eigen::Matrix3Xd nodes;          // (3, k) final shape beyond the introducer, proximal to distal
   Eigen::Matrix3Xd sections = {};  // of the final shape, as Shape has them
+  /// In the vessel at rest, in which ways and targets are: the tip after each push, and the final
+  /// shape. Empty where cross-sections do not move, and of several tools                    [mm]
+  std::vector<Vec3> tips_at_rest = {};
+  Eigen::Matrix3Xd nodes_at_rest = {};
   std::vector<WireContact> contacts;       // of the final shape
   std::vector<TriangleForce> peak_forces;  // over all pushes, ascending triangles; if mapped
   std::vector<ToolTrack> tools;            // of several tools, from the outside in; else empty
@@ -151,6 +155,8 @@ class Trial {
 
   double depth() const { return insertion_.depth(); }
   const std::vector<Push>& pushes() const { return record_.pushes; }
+  /// Where the tip is in the vessel at rest, in which ways and goals are                     [mm]
+  Vec3 tip_at_rest() const { return insertion_.at_rest(insertion_.tip()); }
   /// Ends the trial, unless it has ended: as reached if the tip is in the goal, else as missed.
   /// Hands out the results, in the order of the goals.
   std::vector<TrialResult> finish_all();
@@ -174,6 +180,7 @@ class Trial {
     Insertion::Snapshot insertion;
     std::vector<Push> pushes;
     std::vector<PushTerms> push_terms;
+    std::vector<Vec3> tips_at_rest;
     std::vector<Shape> shapes;
     std::size_t pushing_since = 0;
     double since_shape = 0.0;
@@ -188,8 +195,7 @@ class Trial {
   void end_where_it_is(std::size_t goal, Outcome outcome, const std::string& reason);
   bool end_all(Outcome outcome, const std::string& reason);
   bool end_in_sphere();
-  /// Where the tip is in the vessel at rest, in which ways and goals are.
-  Vec3 tip_at_rest() const { return insertion_.at_rest(insertion_.tip()); }
+  void record(const Push& push);
   void check_place(std::size_t goal);
   void check_advance(std::size_t goal, double distance);
   void check_motion(std::size_t goal);

@@ -38,6 +38,9 @@ TEST(TrialFile, KeepsEveryBitAndMakesNullOfWhatIsNoNumber) {
                      .penetration = 0.7,
                      .wall_displacement = 0.9}};
   trial.peak_forces = {{3, 0.1}, {17, 1.0 / 3.0}};
+  trial.sections = Eigen::Matrix3Xd::Random(3, 4);
+  trial.tips_at_rest = {Vec3(1.0 / 3.0, 0.1, -0.2), Vec3(0.7, 1.0 / 7.0, 1e-300)};
+  trial.nodes_at_rest = Eigen::Matrix3Xd::Random(3, 5);
   fs::create_directories(folder / "trials");
   const fs::path file = folder / trial_file_name(12);
   EXPECT_EQ(file.filename(), "0012.json");
@@ -60,6 +63,9 @@ TEST(TrialFile, KeepsEveryBitAndMakesNullOfWhatIsNoNumber) {
   EXPECT_EQ(read->pushes[1].stored_energy, 1.3);
   EXPECT_EQ(read->pushes[1].friction_work, 1.7);
   EXPECT_EQ(read->nodes, trial.nodes);
+  EXPECT_EQ(read->sections, trial.sections);
+  EXPECT_EQ(read->tips_at_rest, trial.tips_at_rest);
+  EXPECT_EQ(read->nodes_at_rest, trial.nodes_at_rest);
   ASSERT_EQ(read->contacts.size(), 1u);
   const simulate::WireContact &contact = read->contacts[0], &written = trial.contacts[0];
   EXPECT_EQ(contact.node, 3);

@@ -185,6 +185,35 @@ TEST(Metrics, NearestDistanceIsOverAllPushesAndTheEnd) {
   EXPECT_EQ(compute_metrics(trial, study, straight_path()).tip_to_target, 15.0);
 }
 
+TEST(Metrics, OfAVesselThatMovesAreThoseOfTheVesselAtRest) {
+  // The wire has carried the vessel 3 mm to the side and 1 mm on; at rest it lies on the path.
+  const Vec3 carried(3.0, 0.0, 1.0);
+  TrialResult moved, at_rest;
+  for (const double z : {20.0, 58.0, 75.0}) {
+    Push push = push_at(z, 0.0);
+    push.tip = Vec3(0.0, 0.0, z);
+    at_rest.pushes.push_back(push);
+    moved.tips_at_rest.push_back(push.tip);
+    push.tip += carried;
+    moved.pushes.push_back(push);
+  }
+  at_rest.nodes.resize(3, 2);
+  at_rest.nodes << 0.0, 0.0, 0.0, 0.0, 0.0, 75.0;
+  moved.nodes_at_rest = at_rest.nodes;
+  moved.nodes = at_rest.nodes.colwise() + carried;
+  const Study study = study_with_goal_at(Vec3(0.0, 0.0, 60.0));
+  const Metrics found = compute_metrics(moved, study, straight_path()),
+                expected = compute_metrics(at_rest, study, straight_path());
+  EXPECT_EQ(found.nearest_to_target, 2.0);
+  EXPECT_EQ(found.tip_to_target, 15.0);
+  EXPECT_EQ(found.centerline_deviation, expected.centerline_deviation);
+  EXPECT_EQ(find_progress(moved, study, straight_path()),
+            find_progress(at_rest, study, straight_path()));
+  moved.tips_at_rest.clear();
+  moved.nodes_at_rest.resize(3, 0);
+  EXPECT_NE(compute_metrics(moved, study, straight_path()).tip_to_target, 15.0);
+}
+
 TEST(Metrics, TipDistanceIsThatOfTheLastNode) {
   TrialResult trial;
   trial.outcome = Outcome::kReached;

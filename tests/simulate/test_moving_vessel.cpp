@@ -488,9 +488,19 @@ TrialResult push_through(double support, double EI, double young_modulus = 0.4) 
         SectionChainOptions{
             .support = support, .young_modulus = young_modulus, .pins = {{.place = Vec3::Zero()}}});
   }
-  return run_trial(
+  TrialResult result = run_trial(
       round_wire(130.0, 0.45, EI), {.point = Vec3(2.0, 0.0, 0.0), .direction = Vec3::UnitX()},
       {.point = Vec3(500.0, 0.0, 0.0), .radius = 1.0}, vessel, {.length = 90.0, .friction = 0.15});
+  // At rest the wire is where the sections carry it from.
+  EXPECT_EQ(result.tips_at_rest.size(), vessel.sections ? result.pushes.size() : 0u);
+  EXPECT_EQ(result.nodes_at_rest.cols(), vessel.sections ? result.nodes.cols() : 0);
+  if (vessel.sections && !result.tips_at_rest.empty()) {
+    const Eigen::Matrix3Xd carried =
+        vessel.sections->carried(result.nodes_at_rest, result.sections);
+    EXPECT_LT((carried - result.nodes).cwiseAbs().maxCoeff(), 1e-6);
+    EXPECT_LT((result.tips_at_rest.back() - result.nodes_at_rest.rightCols<1>()).norm(), 1e-9);
+  }
+  return result;
 }
 
 TEST(MovingVessel, AnEndlesslyStiffSupportIsTodaysWall) {
