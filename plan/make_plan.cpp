@@ -6,6 +6,7 @@
 
 #include "plan/judge.h"
 #include "plan/manoeuvre.h"
+#include "plan/repeat_choice.h"
 #include "plan/wire_exchange.h"
 
 namespace wireplan::plan {
@@ -23,9 +24,9 @@ constexpr int kTurnsOfScouts = 3, kTurns = 1;
 // Of 8 that are 7: one with 6 was safe in 11 of 16.
 constexpr std::size_t kScriptsRefined = 4, kScriptsTried = 2;
 constexpr double kMostOfTries = 0.85;
-// Of scripts of tools at least so many are repeated so often, before the best gets the rest;
-// chosen.
-constexpr int kScriptsRepeated = 3;
+// Of scripts of tools at least so many of the best are looked at for whether they may lead, in so
+// many rounds; chosen.
+constexpr int kScriptsRepeated = 3, kOtherRounds = 6;
 // Neighbours of a script of tools that are run in full in its place.
 constexpr std::size_t kSparesTried = 2;
 // Which plans are the best is found from so many repeats of each that may be. Plans that fall
@@ -456,11 +457,13 @@ class Planner {
     plan_.robustness = unknowns(options_.robustness.repeats);
     plan_.disturbances = draw_disturbances(plan_.robustness, study_.wires);
     const int asked = plan_.robustness.repeats;
-    const int few = std::min(has_tool_plans() ? kTries : kFirstRepeats, asked);
+    const int few = std::min(has_tool_plans() ? kFewRepeats : kFirstRepeats, asked);
     repeat_best(few, kRepeatRounds);
+    repeat_others();
     if (asked > few) {
       repeat_best(asked, 1);
       repeat_best(few, kRepeatRounds);
+      repeat_others();
       repeat_best(asked, 0);
     }
   }
@@ -469,19 +472,19 @@ class Planner {
     for (int round = 0; count > 0; ++round) {
       // In the end the first, and the best of each wire and catheter, alone.
       const std::vector<int> chosen =
-          choose_to_repeat(round < rounds ? plans_to_repeat(count) : 1, count);
+          choose_to_repeat(round < rounds ? plan_.robustness.plans : 1, count);
       if (chosen.empty()) return;
       add_repeats(chosen, static_cast<std::size_t>(count));
     }
   }
 
-  // The best of each catheter is repeated as often as tells it from the first, and no further.
+  // Scripts of a catheter are left to repeat_others() but for the first.
   std::vector<int> choose_to_repeat(int plans, int count) const {
     const Judgement now = judged();
     const Ranking& ranking = now.ranking;
     std::vector<int> chosen =
         choose_plans_to_repeat(ranking, plan_.candidates, now.repeated, plans, count);
-    if (!has_tool_plans() || count <= kTries) return chosen;
+    if (!has_tool_plans()) return chosen;
     const auto first =
         ranking.plans.begin() + std::min<std::ptrdiff_t>(plans, std::ssize(ranking.plans));
     std::erase_if(chosen, [&](int id) {
@@ -493,12 +496,18 @@ class Planner {
     return chosen;
   }
 
-  // As the case asks for; of scripts of catheter and wire no fewer than these, as long as that
-  // takes a part of the repeats alone: by their scores alone the steadiest is not known.
-  int plans_to_repeat(int count) const {
-    const int asked = plan_.robustness.plans;
-    const bool part = count < plan_.robustness.repeats;
-    return part && has_tool_plans() && asked > 0 ? std::max(asked, kScriptsRepeated) : asked;
+  // By their scores alone the steadiest of scripts is not known.
+  void repeat_others() {
+    for (int round = 0; has_tool_plans() && round < kOtherRounds; ++round) {
+      const Judgement now = judged();
+      const int plans = plan_.robustness.plans;
+      const NextRepeats next =
+          choose_others_to_repeat(now.ranking, plan_.candidates, now.repeated, plans,
+                                  std::max(plans, kScriptsRepeated), plan_.robustness.repeats);
+      if (next.plans.empty()) return;
+      add_repeats(next.plans, static_cast<std::size_t>(next.count));
+      repeat_best(std::min(kFewRepeats, plan_.robustness.repeats), 0);
+    }
   }
 
   bool has_tool_plans() const {

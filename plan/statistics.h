@@ -17,6 +17,10 @@ Spread find_spread(std::vector<double> values);
 /// count > 0.
 std::array<double, 2> wilson_interval(int successes, int count);
 
+/// 90 % interval of the mean of a normal variable, of which these were drawn (Student, Biometrika
+/// 1908). Expects at least two values.
+std::array<double, 2> mean_interval(const std::vector<double>& values);
+
 /// Place of each value in ascending order, from 0; equal values share the mean of their places.
 std::vector<double> find_ranks(const std::vector<double>& values);
 

@@ -373,9 +373,13 @@ class Weighing {
             four_digits(warn) + " N (limit " + four_digits(known_.limits.tip_force_fail) + " N).";
     find(risk ? Answer::kFeasibleWithRisk : Answer::kFeasible, text);
     if (!risk) return;
-    const auto merit = [&](const RankedPlan& other) {
+    const auto merit = [&](const RankedPlan& other) -> std::string {
       const double less = most_tip_force(other.trial);
-      return less <= warn ? two_digits(less) + " N" : std::string();
+      if (less > warn) return "";
+      const std::size_t own = repeats_of(other.trial)->repeats.size();
+      const bool fewer = repeats != nullptr && own < repeats->repeats.size();
+      return two_digits(less) + " N" +
+             (fewer ? ", over " + std::to_string(own) + " disturbed repeats" : "");
     };
     if (!offer_other(first, "tip force at most ", merit)) {
       change("A wire with a softer tip, which presses less on the wall.");

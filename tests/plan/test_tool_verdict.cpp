@@ -47,6 +47,19 @@ bool changes_by_words(const WhatIsKnown& known, const std::string& words) {
   return false;
 }
 
+TEST(ToolVerdict, OfAPlanWithFewerRepeatsThanTheFirstItIsToldOverHowMany) {
+  for (const int count : {4, 16}) {
+    WhatIsKnown known = WhatIsKnown::good();
+    known.plan.trials[0].metrics.peak_tip_force = 0.4;  // above the warning level
+    known.add(Outcome::kReached).peak_contact_force = 0.9;
+    known.repeat(2, count);
+    known.refine(2, 0.1);
+    EXPECT_EQ(changes_by_words(known, "): tip force at most 0.10 N, over 4 disturbed repeats."),
+              count == 4);
+    EXPECT_EQ(changes_by_words(known, "): tip force at most 0.10 N."), count == 16);
+  }
+}
+
 TEST(ToolVerdict, TheTrunkBeyondTheOstiumIsWhatIsSeenOfIt) {
   EXPECT_NEAR(find_ostium(goal_below(128.0)).value().trunk_beyond, 128.0 - kLevel, 1.0);
   EXPECT_NEAR(find_ostium(goal_below(75.0)).value().trunk_beyond, 75.0 - kLevel, 1.0);

@@ -22,6 +22,10 @@ const wallText = ({wall_model: model, wall_stiffness_kpa_per_mm: stiffness}, sup
   (model === "rigid" ? "rigid" : `yields, ${number(stiffness)}\u00a0kPa/mm`) +
   (support === undefined ? "" : `; the vessel moves as a whole on a support of ${number(support)}\u00a0kPa/mm`);
 
+/** So many of each plan, or up to so many where some have fewer. */
+const repeatsText = ({repeats, plans}, text) =>
+  `${plans?.some((plan) => plan.repeats < repeats) ? "up to " : ""}${text(repeats)}`;
+
 export const askedSection = (page) => {
   const {report, trials} = page;
   const asked = report.provenance.parameters;
@@ -44,7 +48,7 @@ export const askedSection = (page) => {
       ["Wall", wallText(report.vessel, asked.wall.support_kpa_per_mm)],
       ["Tried", plural(trials.length, "insertion")],
       ["Repeats", report.robustness?.repeats > 0
-        ? `${report.robustness.repeats} of each of the best plans, disturbed in angle, friction, stiffness, wall and lumen`
+        ? `${repeatsText(report.robustness, String)} of each of the best plans, disturbed in angle, friction, stiffness, wall and lumen`
         : "none asked: how robust a plan is, is not known"],
     ]));
 };
@@ -91,7 +95,7 @@ const sensitivity = (page, best, key, title) => {
 
 /** How far each unknown may be off, and its share in what moves the plans against each other. */
 const unknownRows = ({robustness, vessel, catheters}) => {
-  const {unknowns, sensitivity, repeats} = robustness;
+  const {unknowns, sensitivity} = robustness;
   const wires = catheters ? "wires and catheters" : "wires";
   const names = {
     friction: ["Friction", `times ${(unknowns.friction_factor ?? []).map(number).join(" to ")}, each wire by its own spread`],
@@ -103,7 +107,7 @@ const unknownRows = ({robustness, vessel, catheters}) => {
   };
   const shares = new Map((sensitivity?.shares ?? []).map(({unknown, share}) => [unknown, share]));
   return Object.entries(names).map(([key, [title, range]]) =>
-    [title, `${range}, in ${plural(repeats, "repeat")} of each of the best plans`,
+    [title, `${range}, in ${repeatsText(robustness, (count) => plural(count, "repeat"))} of each of the best plans`,
      shares.has(key) ? `${percent(shares.get(key))} of what moves these plans against each other` : "no share found"]);
 };
 
