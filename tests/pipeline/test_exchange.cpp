@@ -3,6 +3,9 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <mutex>
 
 #include "pipeline/files/case_file.h"
 #include "pipeline/files/trial_file.h"
@@ -78,6 +81,25 @@ TEST(Exchange, NamesBothWires) {
             "stiff in cobra in exchange for soft");
 }
 
+/// One line tells the script, and after how much of this time it was found.
+void expect_first_script(const std::vector<std::string>& lines, std::chrono::duration<double> all) {
+  const std::string begin = "first script, after ",
+                    then = " s of the search, of its coarse steps: ";
+  int count = 0;
+  for (const std::string& line : lines) {
+    if (line.find(begin) != 0) continue;
+    ++count;
+    std::size_t digits = 0;
+    const int seconds = std::stoi(line.substr(begin.size()), &digits);
+    EXPECT_GE(seconds, 0);
+    EXPECT_LE(seconds, std::lround(all.count())) << line;
+    EXPECT_EQ(line.find(then + "soft in hook, ", begin.size()), begin.size() + digits) << line;
+    EXPECT_NE(line.find(": advance the wire to "), std::string::npos) << line;
+    EXPECT_NE(line.find("; not known yet: whether it holds in full"), std::string::npos) << line;
+  }
+  EXPECT_EQ(count, 1);
+}
+
 TEST(Exchange, IsToldFromTheSearchToThePage) {
   const TemporaryFolder folder;
   write_stl(plan::oblique_surface(), folder / "aorta.stl");
@@ -113,9 +135,17 @@ TEST(Exchange, IsToldFromTheSearchToThePage) {
   RunOptions options;
   options.cache = folder / "cache";
   options.work.threads = 2;
+  std::mutex mutex;
+  std::vector<std::string> lines;
+  options.work.told = [&](const std::string& line) {
+    const std::scoped_lock lock(mutex);
+    lines.push_back(line);
+  };
+  const auto start = std::chrono::steady_clock::now();
   const fs::path made =
       run_stages(read_case(folder / "case.json"), options).artifacts.back().folder;
   const Json report = read_json(made / "report.json", kReportSchema);
+  expect_first_script(lines, std::chrono::steady_clock::now() - start);
   fs::create_directories(folder / "report");
   write_json(report, folder / "report/report.json");
   expect_follows_schemas(folder / "report");
