@@ -381,14 +381,14 @@ class Planner {
   void search_scripts(const std::vector<int>& start_ids) {
     plan_.scripts.starts_tried = static_cast<int>(start_ids.size());
     if (start_ids.empty()) return;
-    std::vector<Candidate> starts;
-    for (const int id : start_ids) starts.push_back(candidate(id));
-    search_at(Level::kScout, starts, start_ids);
-    if (plan_.scripts.found.empty()) search_at(Level::kFull, starts, start_ids);
+    search_at(Level::kScout, start_ids);
+    if (plan_.scripts.found.empty()) search_at(Level::kFull, start_ids);
   }
 
-  void search_at(Level level, const std::vector<Candidate>& starts,
-                 const std::vector<int>& start_ids) {
+  // Keeps what reaches in full.
+  void search_at(Level level, const std::vector<int>& start_ids) {
+    std::vector<Candidate> starts;
+    for (const int id : start_ids) starts.push_back(candidate(id));
     const bool full = level == Level::kFull;
     const Manoeuvres search =
         find_manoeuvres(study_at(study_, level), starts, vessel_.path,
@@ -397,10 +397,6 @@ class Planner {
     if (options_.batch.cancelled && options_.batch.cancelled()) throw Interrupted();
     plan_.scripts.branches += search.effort.branches;
     plan_.scripts.searches.push_back({level, search.effort});
-    keep_what_reaches(search, start_ids);
-  }
-
-  void keep_what_reaches(const Manoeuvres& search, const std::vector<int>& start_ids) {
     std::vector<Run> runs;
     for (const Candidate& found : search.found) {
       runs.push_back({.candidate = found});
