@@ -1,12 +1,15 @@
-// Which catheters an ostium asks for: their shapes, and those that are suggested.
+// Which catheters an ostium asks for: their shapes, those that are suggested, and those that reach.
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <memory>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "plan/catheter_choice.h"
+#include "plan/tool_search.h"
+#include "tests/plan/two_renals.h"
 
 namespace wireplan::plan {
 namespace {
@@ -86,6 +89,45 @@ TEST(CatheterChoice, FollowsTheTakeOffAndTheTrunk) {
   EXPECT_EQ(next[0].catheter, 1);
   EXPECT_NE(next[0].reason.find("of which none is there; a hooked curve comes next"),
             std::string::npos);
+}
+
+/// Scripts that a search finds, from below, with a catheter that curves once by so much, into a
+/// branch at that angle to the way down, 30 mm past the aorta's wall; that the first of them
+/// reaches in full is expected.
+int count_scripts(double between, double curve, double radius) {
+  const double angle = between * kRadPerDeg, out = kAorta / std::sin(angle) + 30.0;
+  const Vec3 aside(std::sin(angle), 0.0, -std::cos(angle)), from(0.0, 0.0, kHigh);
+  const simulate::VesselModel vessel(oblique_surface(aside, out),
+                                     simulate::LumenOptions{.grid_spacing = 0.6});
+  Study study = toward(1.0);
+  study.wires[0].sections[0].bending_stiffness = 5.0;
+  study.wires[0].sections[1].bending_stiffness = 60.0;
+  study.catheters = {shaped(8.0, {{curve, radius}})};
+  study.catheters[0].tool.inner_radius = 0.5;
+  const auto way = std::make_shared<simulate::Way>(
+      line_through({{0.0, 0.0, 5.0}, from, from + out * aside}),
+      std::vector<preprocess::Branch>{
+          {line_through({{0.0, 0.0, 5.0}, {0.0, 0.0, kTop - 2.0}}), -1, 0.0},
+          {line_through({from, from + (out + 14.0) * aside}), 0, kHigh - 5.0}});
+  study.goal = {.point = way->section().center,
+                .radius = way->section().radius,
+                .at_section = true,
+                .way = way};
+  study.insertion.length = 300.0;
+  const ToolScripts scripts = find_tool_scripts(study, vessel, {.threads = 2});
+  const int count = scripts.pairs.at(0).found;
+  if (count > 0) {
+    const simulate::TrialResult trial = run_candidate(study, scripts.found.at(0), vessel);
+    EXPECT_EQ(trial.outcome, simulate::Outcome::kReached) << trial.reason;
+  }
+  return count;
+}
+
+TEST(ToolSearch, ABranchThatRunsDownTakesAReversedCurve) {
+  const double cobra = 90.0, reversed = 160.0;  // degrees by which the catheter curves
+  EXPECT_GT(count_scripts(90.0, cobra, 8.0), 0);
+  EXPECT_EQ(count_scripts(30.0, cobra, 8.0), 0) << "the wire comes no further than the ostium";
+  EXPECT_GT(count_scripts(30.0, reversed, 7.0), 0);
 }
 
 }  // namespace

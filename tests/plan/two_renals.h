@@ -88,16 +88,16 @@ inline Study toward(double side) {
   return study;
 }
 
-/// An aorta as `aorta()`, 190 mm long, whose one branch leaves at 100 mm, 15 degrees down: a stiff
+/// An aorta as `aorta()`, 190 mm long, whose one branch leaves at 100 mm: 15 degrees down a stiff
 /// wire straightens the hook out of it.
 inline constexpr double kHigh = 100.0, kOut = 50.0, kTop = 190.0;
 inline const Vec3 kAside(std::cos(15.0 * kRadPerDeg), 0.0, -std::sin(15.0 * kRadPerDeg));
-inline Surface oblique_surface() {
+inline Surface oblique_surface(const Vec3& aside = kAside, double out = kOut) {
   return shapes::level_set(
-      [](const Vec3& p) {
+      [&](const Vec3& p) {
         const Vec3 from(0.0, 0.0, kHigh);
         const double trunk = shapes::depth_in_tube(p, Vec3::Zero(), Vec3(0.0, 0.0, kTop), kAorta);
-        const double branch = shapes::depth_in_tube(p, from, from + (kOut + 15.0) * kAside, kRenal);
+        const double branch = shapes::depth_in_tube(p, from, from + (out + 15.0) * aside, kRenal);
         return 0.5 * std::log(std::exp(2.0 * trunk) + std::exp(2.0 * branch));
       },
       Vec3(-10.0, -10.0, -1.5), Vec3(70.0, 10.0, kTop + 1.5), 1.1);
