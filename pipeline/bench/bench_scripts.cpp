@@ -253,7 +253,7 @@ Json compare_in_branched_aorta() {
                            .options = {.robustness = {.repeats = 2, .plans = 1}}});
 }
 
-Json results_of(const std::vector<Json>& rows) {
+Json scripts_results(const std::vector<Json>& rows) {
   Json worst = nullptr;
   int tied = 0, compared = 0;
   for (const Json& row : rows) {
@@ -276,7 +276,7 @@ Json results_of(const std::vector<Json>& rows) {
   return results;
 }
 
-std::string text_of(const std::vector<Json>& rows, const Json& results) {
+std::string scripts_text(const std::vector<Json>& rows, const Json& results) {
   std::vector<Json> shown;
   std::string scripts;
   for (const Json& row : rows) {
@@ -294,7 +294,7 @@ std::string text_of(const std::vector<Json>& rows, const Json& results) {
   return table_text(shown) + "\nFirst plans:\n" + scripts + "\n" + aims_text(results.at("aims"));
 }
 
-Picture plot_of(const std::vector<Json>& rows) {
+Picture plot_scripts(const std::vector<Json>& rows) {
   std::vector<FrontPlot> plots;
   for (const Json& row : rows) {
     FrontPlot plot{.title = row.at("case"),
@@ -339,9 +339,9 @@ BenchReport bench_scripts(const BenchOptions& options) {
         {"..._safe", "part of its repeats in which the first plan is safe"},
         {"rank", "of the search's first plan among all plans of every hook"},
         {"tied", "whether it is their first or tied with it; null: they have no plan"}}}};
-  report.results = results_of(report.rows);
-  report.text = text_of(report.rows, report.results);
-  report.plot = plot_of(report.rows);
+  report.results = scripts_results(report.rows);
+  report.text = scripts_text(report.rows, report.results);
+  report.plot = plot_scripts(report.rows);
   return report;
 }
 
