@@ -481,14 +481,7 @@ class Planner {
     std::vector<int> chosen =
         choose_plans_to_repeat(ranking, plan_.candidates, now.repeated, plans, count);
     if (!has_tool_plans()) return chosen;
-    const auto first =
-        ranking.plans.begin() + std::min<std::ptrdiff_t>(plans, std::ssize(ranking.plans));
-    std::erase_if(chosen, [&](int id) {
-      return std::none_of(ranking.plans.begin(), first,
-                          [&](const RankedPlan& plan) { return plan.trial == id; }) &&
-             std::none_of(ranking.wires.begin(), ranking.wires.end(),
-                          [&](const WireSummary& wire) { return wire.best_trial == id; });
-    });
+    std::erase_if(chosen, [&](int id) { return !gets_all_repeats(id, ranking, plans); });
     return chosen;
   }
 

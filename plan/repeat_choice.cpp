@@ -43,6 +43,15 @@ bool may_lead(const RankedPlan& plan, const RankedPlan& first,
   return own_unsafe < unsafe || (own_unsafe == unsafe && may_score_better(*own, *best));
 }
 
+bool gets_all_repeats(int trial, const Ranking& ranking, int first) {
+  const auto end =
+      ranking.plans.begin() + std::min<std::ptrdiff_t>(first, std::ssize(ranking.plans));
+  return std::any_of(ranking.plans.begin(), end,
+                     [&](const RankedPlan& plan) { return plan.trial == trial; }) ||
+         std::any_of(ranking.wires.begin(), ranking.wires.end(),
+                     [&](const WireSummary& wire) { return wire.best_trial == trial; });
+}
+
 NextRepeats choose_others_to_repeat(const Ranking& ranking,
                                     const std::vector<Candidate>& candidates,
                                     const std::vector<RepeatedPlan>& repeated, int first, int among,
@@ -62,10 +71,7 @@ NextRepeats choose_others_to_repeat(const Ranking& ranking,
     const RankedPlan& plan = ranking.plans[k];
     const int catheter = catheter_of(plan.trial), has = count_repeats(repeated, plan.trial);
     const bool best_of_catheter = catheter >= 0 && seen.insert(catheter).second;
-    const bool best_of_wire =
-        std::any_of(ranking.wires.begin(), ranking.wires.end(),
-                    [&](const WireSummary& wire) { return wire.best_trial == plan.trial; });
-    if (static_cast<int>(k) < first || best_of_wire || has >= few) continue;
+    if (gets_all_repeats(plan.trial, ranking, first) || has >= few) continue;
     const bool unknown = best_of_catheter && known.count(catheter) == 0;
     const bool considered = static_cast<int>(k) < among || best_of_catheter;
     if (!unknown && !(considered && may_lead(plan, ranking.plans.front(), repeated))) continue;

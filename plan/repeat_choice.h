@@ -19,13 +19,16 @@ inline constexpr int kFewRepeats = 8, kFewestRepeats = 4;
 bool may_lead(const RankedPlan& plan, const RankedPlan& first,
               const std::vector<RepeatedPlan>& repeated);
 
+/// Whether a plan is among the first so many of the ranking, or the best of a wire.
+bool gets_all_repeats(int trial, const Ranking& ranking, int first);
+
 /// Which plans are repeated until each has `count`.
 struct NextRepeats {
   std::vector<int> plans = {};  // trials, best first; none: nobody
   int count = 0;
 };
 
-/// Of all but the first `first` and the best of each wire: the best `among` of the ranking, and the
+/// Of all that do not get all repeats: the best `among` of the ranking, and the
 /// best of each catheter, that may lead, first so often as the fewest, then as the few; and once
 /// the best of a catheter without any repeats, so often as the fewest. None before the first of the
 /// ranking has a few. No more than `most` of each.
