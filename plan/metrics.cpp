@@ -14,17 +14,14 @@ namespace {
 const Eigen::Matrix3Xd& nodes_at_rest(const simulate::TrialResult& trial) {
   return trial.nodes_at_rest.cols() > 0 ? trial.nodes_at_rest : trial.nodes;
 }
-std::vector<Vec3> tips_at_rest(const simulate::TrialResult& trial) {
-  if (!trial.tips_at_rest.empty()) return trial.tips_at_rest;
-  std::vector<Vec3> tips;
-  for (const simulate::Push& push : trial.pushes) tips.push_back(push.tip);
-  return tips;
+const Vec3& tip_at_rest(const simulate::TrialResult& trial, std::size_t push) {
+  return trial.tips_at_rest.empty() ? trial.pushes[push].tip : trial.tips_at_rest[push];
 }
 
 /// Where the tip ended: of the final shape, else of the last push, else still at the access.
 Vec3 final_tip(const simulate::TrialResult& trial, const Study& study) {
   if (nodes_at_rest(trial).cols() > 0) return nodes_at_rest(trial).rightCols<1>();
-  return trial.pushes.empty() ? study.access : tips_at_rest(trial).back();
+  return trial.pushes.empty() ? study.access : tip_at_rest(trial, trial.pushes.size() - 1);
 }
 
 WallMotion find_wall_motion(const std::vector<simulate::Push>& pushes, const Centerline& path) {
@@ -110,9 +107,9 @@ Metrics compute_metrics(const simulate::TrialResult& trial, const Study& study,
   metrics.reached = trial.outcome == simulate::Outcome::kReached;
   metrics.tip_to_target = (final_tip(trial, study) - study.goal.point).norm();
   metrics.nearest_to_target = metrics.tip_to_target;
-  for (const Vec3& tip : tips_at_rest(trial)) {
+  for (std::size_t k = 0; k < trial.pushes.size(); ++k) {
     metrics.nearest_to_target =
-        std::min(metrics.nearest_to_target, (tip - study.goal.point).norm());
+        std::min(metrics.nearest_to_target, (tip_at_rest(trial, k) - study.goal.point).norm());
   }
   metrics.wall_motion = find_wall_motion(trial.pushes, path);
   const Eigen::Matrix3Xd& nodes = nodes_at_rest(trial);
@@ -132,8 +129,8 @@ double find_progress(const Vec3& tip, const Study& study, const Centerline& path
 double find_progress(const simulate::TrialResult& trial, const Study& study,
                      const Centerline& path) {
   double progress = 0.0;
-  for (const Vec3& tip : tips_at_rest(trial)) {
-    progress = std::max(progress, find_progress(tip, study, path));
+  for (std::size_t k = 0; k < trial.pushes.size(); ++k) {
+    progress = std::max(progress, find_progress(tip_at_rest(trial, k), study, path));
   }
   return progress;
 }
