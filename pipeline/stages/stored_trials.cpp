@@ -152,6 +152,8 @@ std::optional<plan::Measured> StoredTrials::find(const plan::Run& run) {
   const auto known = work_.measured.find(place);
   if (run.id >= 0 && known != work_.measured.end()) {
     measured = known->second;
+  } else if (const auto kept = work_.trials_for_others().extract(files->trial)) {
+    measured = plan::measure(kept.mapped(), study_of(run.level), work_.path());
   } else if (const std::optional<simulate::TrialResult> trial = find_trial(files->trial)) {
     measured = plan::measure(*trial, study_of(run.level), work_.path());
   }
@@ -183,8 +185,10 @@ void StoredTrials::keep(const plan::Run& run, const simulate::TrialResult& trial
 
 void StoredTrials::keep_other(std::size_t other, const plan::Run& run,
                               const simulate::TrialResult& trial) {
-  work_.store().keep_piece(key_of(run, other_keys_.at(other)),
-                           trial_text(study_of(run.level), run.candidate, trial));
+  fs::path piece = work_.store().keep_piece(key_of(run, other_keys_.at(other)),
+                                            trial_text(study_of(run.level), run.candidate, trial));
+  const std::scoped_lock lock(mutex_);
+  work_.trials_for_others().insert_or_assign(std::move(piece), trial);
 }
 
 std::optional<plan::Scripts> StoredTrials::find_scripts() {

@@ -49,7 +49,7 @@ class StoredTrials final : public plan::TrialLog {
   std::string shared_key_;               // what all runs of the case read
   std::vector<std::string> other_keys_;  // the same toward each of the study's others
   std::array<plan::Study, 3> studies_;
-  std::mutex mutex_;  // guards places_ and the workspace's measured
+  std::mutex mutex_;  // guards places_ and, of the workspace, `measured` and trials_for_others()
   std::map<std::pair<plan::Level, int>, Files> places_;
 };
 

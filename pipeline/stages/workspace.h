@@ -22,13 +22,15 @@ namespace wireplan::pipeline {
 
 using plan::Interrupted;
 
-/// The vessel as trials feel it, for all sections of a case: made once.
+/// What the sections of a case share: the vessel as trials feel it, made once, and trials.
 struct ModelStock {
   std::string made_from;  // key of surface and wall
   std::unique_ptr<simulate::VesselModel> model = nullptr;
   std::unique_ptr<const simulate::WallCompliance> compliance_aside = nullptr;  // while it is rigid
   std::string sections_made_from = {};  // how its cross-sections move
   std::unique_ptr<const simulate::SectionChain> sections_aside = nullptr;  // while it is rigid
+  /// That a section ran for others too, by the pieces that hold them, until those ask for them.
+  std::map<std::filesystem::path, simulate::TrialResult> trials = {};
 };
 
 /// How a stage speaks to whom started it; each may be empty.
@@ -97,6 +99,10 @@ class Workspace {
   /// goal and of the others, and the insertion length where the case leaves it open. Sections that
   /// one push can serve have tangent and length in common.
   const plan::Study& study();
+  /// Trials that a section ran for others: nobody need read their pieces (ModelStock).
+  std::map<std::filesystem::path, simulate::TrialResult>& trials_for_others() {
+    return models().trials;
+  }
 
   std::filesystem::path input;  // the volume, surface or labels that the case starts from
   std::string input_sha256;
