@@ -316,6 +316,7 @@ class Weighing {
     const bool too_low = safe_share(*repeats) < rules_.safe_share;
     const bool too_few = (low <= rules_.doubtful_share && high >= rules_.safe_share) ||
                          (!too_low && low < rules_.sure_share);
+    const bool seldom = high < rules_.doubtful_share;
     std::string text = "Safe in " + safe_of(*repeats) + " disturbed repeats, which is " +
                        percent(safe_share(*repeats)) + " % (" + percent(low) + " to " +
                        percent(high) + " % with 95 % confidence), where " +
@@ -325,10 +326,12 @@ class Weighing {
       text +=
           "; too few repeats to tell: at least " + percent(rules_.sure_share) + " % are to be sure";
     }
-    find(too_few   ? Answer::kUnsure
-         : too_low ? Answer::kFeasibleWithRisk
-                   : Answer::kFeasible,
+    if (seldom) text += "; a plan that fails more often than not is none to count on";
+    find(too_few || seldom ? Answer::kUnsure
+         : too_low         ? Answer::kFeasibleWithRisk
+                           : Answer::kFeasible,
          text + ".");
+    if (seldom) doubts_.push_back("in disturbed repeats it fails more often than not");
     if (too_few) doubts_.push_back("the repeats are too few to tell how often it stays safe");
     if (too_few) change("More than " + count_of(count, "repeat") + ", to know the share better.");
     if (!too_low) return;

@@ -49,8 +49,9 @@ struct VerdictRules {
   /// Of disturbed repeats that are safe: below, there is a risk. One attempt in ten that fails is
   /// what is borne; chosen.
   double safe_share = 0.9;
-  /// A plan that works every other time is none to count on. Where the 95 % interval of the share
-  /// holds both this and `safe_share`, the repeats do not tell the two apart: unsure.
+  /// A plan that works every other time is none to count on: unsure where the 95 % interval of the
+  /// share is below. Where it holds both this and `safe_share`, the repeats do not tell the two
+  /// apart: unsure too.
   double doubtful_share = 0.5;
   /// Feasible is said only where with 95 % confidence at least so many attempts are safe; chosen:
   /// of three failures in ten one would want to hear before. It takes 9 repeats that are all safe,
@@ -80,8 +81,9 @@ struct Known {
 ///                       `unclear_part` of all did not, or one reached that was not run in full,
 ///                       or none was and most got stuck, folded back or went through a wall that
 ///                       was taken for rigid. A plan, but: it was not repeated, its share of safe
-///                       repeats is not known well enough, its tip's error is not known or too
-///                       large, or its end hangs on how it is computed (RankedPlan::sensitive)
+///                       repeats is not known well enough, or that of a plan that mostly fails, its
+///                       tip's error is not known or too large, or its end hangs on how it is
+///                       computed (RankedPlan::sensitive)
 ///   feasible with risk  tip force, also that of 19 in 20 repeats, above the level to warn of;
 ///                       share of safe repeats too low; wall moved beyond linear theory; sheath at
 ///                       its largest ratio to the lumen, or device as wide as the lumen; way or
