@@ -5,7 +5,6 @@
 #include <tbb/parallel_for.h>
 #include <tbb/partitioner.h>
 #include <tbb/task_arena.h>
-#include <time.h>
 
 #include <algorithm>
 #include <cmath>
@@ -171,12 +170,6 @@ BatchResult run_batch(const Study& study, const std::vector<Candidate>& candidat
   };
   result.finished = for_each_slot(static_cast<int>(candidates.size()), run_slot, options);
   return result;
-}
-
-double thread_cpu_seconds() {
-  timespec now{};
-  expects(clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now) == 0);
-  return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
 }
 
 }  // namespace wireplan::plan

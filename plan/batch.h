@@ -60,7 +60,4 @@ std::vector<simulate::TrialResult> run_for_all_goals(const Study& study, const C
 std::vector<bool> for_each_slot(int count, const std::function<void(int slot)>& work,
                                 const BatchOptions& options);
 
-/// CPU time that the calling thread has used so far [s].
-double thread_cpu_seconds();
-
 }  // namespace wireplan::plan

@@ -33,6 +33,7 @@ struct Candidate {
   int catheter = -1;  // index into Study::catheters, round the wire; -1: none
   std::vector<simulate::ToolStep> steps = {};  // of a script of catheter and wire
   int first_wire = -1;  // that a script begins with and exchanges for `wire`, its spare 0; -1: none
+  bool operator==(const Candidate&) const = default;
 };
 
 /// All combinations, wires outermost, roll innermost. What cannot differ is listed once: at

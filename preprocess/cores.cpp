@@ -1,6 +1,7 @@
 #include "preprocess/cores.h"
 
 #include <sched.h>
+#include <time.h>
 
 #include <algorithm>
 #include <cmath>
@@ -8,6 +9,8 @@
 #include <sstream>
 #include <string>
 #include <thread>
+
+#include "preprocess/base.h"
 
 namespace wireplan {
 namespace {
@@ -27,6 +30,12 @@ std::optional<double> quota_of(const std::string& text) {
   double quota = 0.0, period = 0.0;
   if (!(in >> quota >> period) || quota <= 0.0 || period <= 0.0) return std::nullopt;
   return quota / period;
+}
+
+double seconds_by(clockid_t clock) {
+  timespec now{};
+  expects(clock_gettime(clock, &now) == 0);
+  return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
 }
 
 /// Whether a list such as "cpu,cpuacct" holds the controller of cores.
@@ -79,5 +88,9 @@ int core_count() {
   if (quota) cores = std::clamp(static_cast<int>(std::ceil(*quota)), 1, cores);
   return cores;
 }
+
+double thread_cpu_seconds() { return seconds_by(CLOCK_THREAD_CPUTIME_ID); }
+
+double process_cpu_seconds() { return seconds_by(CLOCK_PROCESS_CPUTIME_ID); }
 
 }  // namespace wireplan

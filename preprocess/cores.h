@@ -1,5 +1,5 @@
 #pragma once
-/// How many threads are worth starting.
+/// How many threads are worth starting, and the time that they take.
 #include <filesystem>
 #include <optional>
 #include <string_view>
@@ -10,6 +10,10 @@ namespace wireplan {
 /// system), and no more than the quota of its control groups (a container), a part of a core
 /// counting as one.
 int core_count();
+
+/// CPU time since the calling thread, or the process with all its threads, began [s].
+double thread_cpu_seconds();
+double process_cpu_seconds();
 
 /// The least quota [cores] of a process and all groups above its own; nothing where none is set.
 /// `groups` is its /proc/self/cgroup, `mounts` where the groups' files lie (/sys/fs/cgroup):

@@ -1,7 +1,6 @@
 #include "pipeline/bench/bench.h"
 
 #include <algorithm>
-#include <ctime>
 #include <iostream>
 #include <sstream>
 
@@ -93,18 +92,6 @@ std::string aims_text(const Json& aims) {
             format("%g\n", one.at("aim").get<double>());
   }
   return text;
-}
-
-double thread_milliseconds() {
-  timespec now{};
-  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
-  return 1e3 * static_cast<double>(now.tv_sec) + 1e-6 * static_cast<double>(now.tv_nsec);
-}
-
-double process_seconds() {
-  timespec now{};
-  clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &now);
-  return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
 }
 
 double median(std::vector<double> values) {

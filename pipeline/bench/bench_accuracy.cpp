@@ -7,6 +7,7 @@
 #include "pipeline/bench/bench_report.h"
 #include "pipeline/files/text.h"
 #include "pipeline/report/plot.h"
+#include "preprocess/cores.h"
 #include "simulate/equilibrium/dynamics.h"
 #include "simulate/equilibrium/solver.h"
 
@@ -296,11 +297,11 @@ constexpr int kNewtonIterations = 200;
 
 Solve solve_newton(const Model& model, Statics& statics, RodState& state, double tolerance) {
   state = model.start;
-  const double begin = thread_milliseconds();
+  const double begin = thread_cpu_seconds();
   const NewtonResult result = statics.solve(
       model.problem, state, {.residual_tolerance = tolerance, .max_iterations = kNewtonIterations});
-  return {state.x.rightCols<1>(), thread_milliseconds() - begin, result.iterations, result.residual,
-          result.converged ? "converged" : "not_converged"};
+  return {state.x.rightCols<1>(), 1e3 * (thread_cpu_seconds() - begin), result.iterations,
+          result.residual, result.converged ? "converged" : "not_converged"};
 }
 
 Contender newton(const AccuracyScene& scene, int elements, double tolerance) {
@@ -334,9 +335,9 @@ using Motion = MotionResult (*)(const Problem&, RodState&, const MotionOptions&)
 
 Solve solve_motion(Motion run, const Model& model, const MotionOptions& options) {
   RodState state = model.start;
-  const double begin = thread_milliseconds();
+  const double begin = thread_cpu_seconds();
   const MotionResult result = run(model.problem, state, options);
-  const double milliseconds = thread_milliseconds() - begin;
+  const double milliseconds = 1e3 * (thread_cpu_seconds() - begin);
   return {state.x.rightCols<1>(), milliseconds, result.steps, result.residual,
           result.outcome == MotionOutcome::kConverged  ? "converged"
           : result.outcome == MotionOutcome::kFinished ? "not_converged"

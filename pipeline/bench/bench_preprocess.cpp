@@ -20,6 +20,7 @@
 #include "pipeline/files/text.h"
 #include "pipeline/report/plot.h"
 #include "preprocess/centerline/centerline.h"
+#include "preprocess/cores.h"
 #include "preprocess/segment/segment.h"
 #include "preprocess/surface/openings.h"
 #include "preprocess/surface/surface.h"
@@ -221,11 +222,11 @@ Preprocessed run_steps(const preprocess::PhantomSpec& spec, bool quick) {
   double cpu_sum = 0.0;
   const auto run = [&](const std::string& name, const std::function<void()>& step) {
     const PeakMemory memory;
-    const double cpu = process_seconds();
+    const double cpu = process_cpu_seconds();
     const auto start = std::chrono::steady_clock::now();
     step();
     const double wall_s = seconds_since(start);
-    const double cpu_s = process_seconds() - cpu;
+    const double cpu_s = process_cpu_seconds() - cpu;
     const Json peak = memory.megabytes();
     if (!error && all.surface.triangles.cols() > 0) error = compare(all.surface, truth, spec.grid);
     cpu_sum += cpu_s;

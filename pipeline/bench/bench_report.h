@@ -55,10 +55,6 @@ Json aim_row(const std::string& what, const std::string& aim, const Json& found)
 Json aim_entry(const char* what, double aim, bool at_least, const Json& found);
 std::string aims_text(const Json& aims);
 
-/// CPU time of this thread [ms], and of the process, all its threads [s].
-double thread_milliseconds();
-double process_seconds();
-
 double median(std::vector<double> values);
 
 }  // namespace wireplan::pipeline

@@ -6,7 +6,6 @@
 #include <limits>
 #include <memory>
 #include <mutex>
-#include <tuple>
 
 #include "pipeline/bench/bench_report.h"
 #include "pipeline/bench/bench_walls.h"
@@ -18,6 +17,7 @@
 #include "pipeline/stages/plan_artifact.h"
 #include "plan/judge.h"
 #include "preprocess/centerline/centerline.h"
+#include "preprocess/cores.h"
 #include "simulate/insertion/way.h"
 
 namespace wireplan::pipeline {
@@ -32,20 +32,9 @@ using plan::Run;
 
 constexpr double kMostOfTime = 0.25;  // of the other search's, that the search may take
 
-bool same_candidate(const Candidate& a, const Candidate& b) {
-  const auto numbers = [](const Candidate& c) {
-    return std::tuple(c.wire, c.inclination, c.azimuth, c.roll, c.catheter, c.first_wire);
-  };
-  const auto same_move = [](const simulate::Move& one, const simulate::Move& other) {
-    return one.push == other.push && one.turn == other.turn;
-  };
-  return numbers(a) == numbers(b) && a.steps == b.steps &&
-         std::equal(a.moves.begin(), a.moves.end(), b.moves.begin(), b.moves.end(), same_move);
-}
-
 bool same_run(const Run& a, const Run& b) {
   return a.level == b.level && a.disturbance == b.disturbance && a.elements == b.elements &&
-         same_candidate(a.candidate, b.candidate);
+         a.candidate == b.candidate;
 }
 
 /// What a search made is known to it, as with the store; empty at its start.
@@ -92,10 +81,10 @@ Search search(const Searched& given, Hooks hooks) {
     options.robustness.plans = std::numeric_limits<int>::max();
   }
   OwnLog log;
-  const double start = process_seconds();
+  const double start = process_cpu_seconds();
   Search made;
   made.plan = plan::make_plan(given.study, given.vessel, options, log);
-  made.cpu = process_seconds() - start;
+  made.cpu = process_cpu_seconds() - start;
   made.ranking = plan::judge(given.study, made.plan, given.limits, given.weights).ranking;
   return made;
 }

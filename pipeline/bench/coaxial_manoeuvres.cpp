@@ -7,6 +7,7 @@
 #include "pipeline/bench/bench_report.h"
 #include "pipeline/bench/bench_walls.h"
 #include "pipeline/files/text.h"
+#include "preprocess/cores.h"
 #include "preprocess/wall/wall.h"
 #include "simulate/insertion/tool_bench.h"
 
@@ -49,7 +50,7 @@ simulate::ToolScene coaxial_scene(const simulate::VesselModel& vessel, double le
 }
 
 Json time_manoeuvre(const simulate::ToolScene& scene, const char* wall) {
-  const double start = thread_milliseconds();
+  const double start = thread_cpu_seconds();
   simulate::ToolBench bench(scene);
   bool good = bench.settled();
   int iterations = 0;
@@ -59,7 +60,7 @@ Json time_manoeuvre(const simulate::ToolScene& scene, const char* wall) {
     iterations += bench.record().iterations;
     residual = std::max(residual, bench.record().residual);
   }
-  const double seconds = 1e-3 * (thread_milliseconds() - start);
+  const double seconds = thread_cpu_seconds() - start;
   const simulate::ToolRecord& record = bench.record();
   Json row;
   row["wall"] = wall;

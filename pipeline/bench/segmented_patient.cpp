@@ -7,6 +7,7 @@
 #include "preprocess/centerline/centerline.h"
 #include "preprocess/centerline/path_place.h"
 #include "preprocess/centerline/section_width.h"
+#include "preprocess/cores.h"
 #include "preprocess/surface/surface.h"
 #include "preprocess/volume/phantom_lumen.h"
 #include "preprocess/volume/voxels.h"
@@ -178,14 +179,14 @@ void measure_line(const Surface& surface, const Centerline& line, const Centerli
 std::optional<Centerline> find_line(const preprocess::Image& image, const Vec3& access,
                                     const Vec3& target, preprocess::Segmentation& found,
                                     Surface& surface, PatientRow& row) {
-  const double start = process_seconds();
+  const double start = process_cpu_seconds();
   try {
     found = preprocess::segment(image, {.seeds = {access}, .target = target});
   } catch (const Error& error) {
     row.outcome = PatientOutcome::kRefused;
     row.message = error.what();
   }
-  row.segment_s = process_seconds() - start;
+  row.segment_s = process_cpu_seconds() - start;
   if (row.outcome != PatientOutcome::kDone) return std::nullopt;
   try {
     surface = preprocess::surface_from_image(image, found.mask, {});
@@ -238,12 +239,12 @@ PatientRow segment_patient(const preprocess::RandomPatient& patient) {
   const Centerline way = preprocess::true_way(patient);
   const preprocess::PhantomLumen truth(patient.spec);
 
-  const double start = process_seconds();
+  const double start = process_cpu_seconds();
   preprocess::Segmentation found;
   Surface surface;
   const std::optional<Centerline> line =
       find_line(phantom.image, patient.access.point, patient.target.point, found, surface, row);
-  row.all_s = process_seconds() - start;
+  row.all_s = process_cpu_seconds() - start;
   if (row.outcome == PatientOutcome::kRefused) return row;
 
   const Grid& grid = phantom.image.grid;
@@ -294,11 +295,11 @@ PatientRow segment_labelled(const LabelledCase& given) {
     }
     row.slice_mm = image.grid.spacing.z();
     row.spacing_mm = image.grid.spacing.x();
-    const double start = process_seconds();
+    const double start = process_cpu_seconds();
     preprocess::Segmentation found;
     Surface surface;
     find_line(image, given.access, given.target, found, surface, row);
-    row.all_s = process_seconds() - start;
+    row.all_s = process_cpu_seconds() - start;
     if (row.outcome == PatientOutcome::kRefused) return row;
     row.dice = overlap(found.mask.labels, lumen.labels, [](std::size_t) { return true; });
     measure_outside(image.grid, found.mask.labels, allowed, told_places(found.statistics), row);

@@ -7,6 +7,7 @@
 #include "pipeline/bench/bench_report.h"
 #include "pipeline/files/clock.h"
 #include "preprocess/centerline/centerline.h"
+#include "preprocess/cores.h"
 
 namespace wireplan::pipeline {
 namespace {
@@ -74,12 +75,12 @@ InsertionBatch make_batch(const std::string& surface, const Vessel& vessel, cons
 }
 
 SharedModel::SharedModel(const Vessel& vessel, const std::string& wall) {
-  const double start = thread_milliseconds();
+  const double start = thread_cpu_seconds();
   const simulate::LumenOptions options = simulate::follow(vessel.surface);
   vessel_model = wall == "elastic"
                      ? std::make_unique<VesselModel>(vessel.surface, vessel.wall, options)
                      : std::make_unique<VesselModel>(vessel.surface, options);
-  build_ms = thread_milliseconds() - start;
+  build_ms = 1e3 * (thread_cpu_seconds() - start);
 }
 
 BatchTiming time_batch(const InsertionBatch& batch, const SharedModel& model,

@@ -14,6 +14,7 @@
 #include "pipeline/stages/held_places.h"
 #include "plan/batch.h"
 #include "preprocess/centerline/centerline.h"
+#include "preprocess/cores.h"
 #include "preprocess/files/vessel_io.h"
 #include "preprocess/surface/surface.h"
 #include "preprocess/surface/surface_repair.h"
@@ -319,9 +320,9 @@ std::string tell_start(const Json& start) {
 SceneAnswer run_tools(const SceneFile& file, const LoadedVessel* vessel, const fs::path& folder) {
   simulate::ToolScene scene = file.tools->scene;
   if (vessel) scene.vessel = vessel->model.get();
-  const double start = plan::thread_cpu_seconds();
+  const double start = thread_cpu_seconds();
   const simulate::ToolSceneResult result = simulate::run_tool_scene(scene);
-  const double seconds = plan::thread_cpu_seconds() - start;
+  const double seconds = thread_cpu_seconds() - start;
   std::vector<simulate::WireContact> contacts;
   if (vessel) {
     double radius = 0.0;  // of the thickest tool, which contacts count from
@@ -367,9 +368,9 @@ SceneAnswer run_insertion_scene(const SceneFile& file, const InsertionScene& sce
                                 const LoadedVessel& vessel, const Json& support_fit,
                                 const fs::path& folder) {
   fs::create_directories(folder);
-  const double start = plan::thread_cpu_seconds();
+  const double start = thread_cpu_seconds();
   simulate::TrialResult result = run_hand(scene, *vessel.model, scene.options);
-  const double seconds = plan::thread_cpu_seconds() - start;
+  const double seconds = thread_cpu_seconds() - start;
   for (simulate::PushTerms& terms : result.push_terms) terms.tip_roll -= scene.roll_zero;
   if (!scene.has_target && result.outcome == simulate::Outcome::kMissed) {
     result.reason = (!scene.moves.empty() ? "all moves were made"

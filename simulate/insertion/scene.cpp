@@ -4,9 +4,9 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
-#include <ctime>
 #include <utility>
 
+#include "preprocess/cores.h"
 #include "simulate/equilibrium/dynamics.h"
 #include "simulate/insertion/end_path.h"
 #include "simulate/wire/writhe.h"
@@ -69,13 +69,6 @@ bool twists_the_wire(const std::vector<Support>& supports) {
 }
 
 namespace {
-
-/// CPU time of this thread [s].
-double thread_seconds() {
-  timespec now{};
-  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
-  return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
-}
 
 template <typename... Values>
 std::string format(const char* text, Values... values) {
@@ -530,13 +523,13 @@ SceneResult run_scene(const Scene& scene) {
   if (scene.vessel != nullptr) add_vessel(scene, setup);
   SceneResult result;
   result.terms = terms_of(scene, setup.rod);
-  const double begin = thread_seconds();
+  const double begin = thread_cpu_seconds();
   if (scene.solver.method == Method::kNewton) {
     run_newton(scene, setup, result);
   } else {
     run_motion(scene, setup, result);
   }
-  result.cpu_time_s = thread_seconds() - begin;
+  result.cpu_time_s = thread_cpu_seconds() - begin;
   describe(scene, setup, result);
   if (result.outcome == SceneOutcome::kConverged) {
     result.crossing = CrossingFinder().find(result.nodes, scene.wire.radius);

@@ -120,6 +120,7 @@ std::string describe_balance(const std::vector<Push>& pushes);
 struct Move {
   double push = 0.0;  // negative: pulls back                                            [mm]
   double turn = 0.0;  // of the hub, right-handed about the introducer's direction      [rad]
+  bool operator==(const Move&) const = default;
 };
 
 /// An insertion step by step, to its outcome. Never throws for what the physics does.
