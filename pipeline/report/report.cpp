@@ -192,7 +192,7 @@ Json vessel_json(const ReportInput& input) {
   }
 
   Row row;
-  for (const char* key : {"volume_mm3", "area_mm2", "triangles", "euler_number"}) {
+  for (const char* key : {"volume_mm3", "area_mm2", "triangles", "euler_number", "handles"}) {
     row.put(key, surface.at(key));
   }
   row.put("openings", surface.at("openings"));

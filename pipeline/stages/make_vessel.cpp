@@ -15,6 +15,7 @@
 #include "preprocess/segment/segment.h"
 #include "preprocess/surface/openings.h"
 #include "preprocess/surface/surface.h"
+#include "preprocess/surface/surface_handles.h"
 #include "preprocess/surface/surface_repair.h"
 #include "preprocess/wall/wall.h"
 
@@ -72,18 +73,38 @@ void add_thick_slices(const preprocess::Grid& grid, Json& figures) {
       "to 2 mm");
 }
 
-// Loops that were wide enough to be arteries.
-std::string loops_warning(const std::vector<preprocess::Loop>& loops) {
+// The first of loops or handles: "(1.0, 2.0, 3.0) mm (1.2 mm in radius), ... and in other places".
+template <typename Loops>
+std::string places_of(const Loops& loops) {
   constexpr std::size_t kLoopsTold = 5;
   std::string places;
   for (std::size_t k = 0; k < std::min(loops.size(), kLoopsTold); ++k) {
-    const Vec3& at = loops[k].place;
-    places += (k == 0 ? "" : ", ") + place_text(at) +
+    places += (k == 0 ? "" : ", ") + place_text(loops[k].place) +
               format(" mm (%.1f mm in radius)", loops[k].radius_mm);
   }
-  return "segment: the vessel closes to a loop at " + places +
-         (loops.size() > kLoopsTold ? " and in other places" : "") +
+  return places + (loops.size() > kLoopsTold ? " and in other places" : "");
+}
+
+template <typename Loops>
+Json loops_json(const Loops& loops) {
+  Json list = Json::array();
+  for (const auto& loop : loops) {
+    list.push_back({{"place_mm", to_json(loop.place)}, {"radius_mm", loop.radius_mm}});
+  }
+  return list;
+}
+
+// Loops that were wide enough to be arteries.
+std::string loops_warning(const std::vector<preprocess::Loop>& loops) {
+  return "segment: the vessel closes to a loop at " + places_of(loops) +
          ": a ring of arteries, or vessels that touch; look at the outline there";
+}
+
+std::string handles_warning(int count, const std::vector<preprocess::Handle>& handles) {
+  return "surface: it has " + std::to_string(count) + (count == 1 ? " handle" : " handles") +
+         ", of arteries that touch or run in a ring, or holes" +
+         (handles.empty() ? "" : ", thinnest at " + places_of(handles)) + "; look whether " +
+         (count == 1 ? "it is" : "they are") + " real";
 }
 
 // Side branches that the levels alone would leave out.
@@ -148,10 +169,8 @@ void add_segmentation(const preprocess::SegmentStatistics& statistics, bool chos
       figures["warnings"].push_back(leak_warning(leak));
     }
   }
-  figures["loops"] = {{"cut", statistics.loops.cut}, {"left", Json::array()}};
-  for (const preprocess::Loop& loop : statistics.loops.left) {
-    figures["loops"]["left"].push_back(
-        {{"place_mm", to_json(loop.place)}, {"radius_mm", loop.radius_mm}});
+  if (chosen) {  // else nobody looked for them: the surface tells its handles
+    figures["loops"] = {{"cut", statistics.loops.cut}, {"left", loops_json(statistics.loops.left)}};
   }
   if (!statistics.loops.left.empty()) {
     figures["warnings"].push_back(loops_warning(statistics.loops.left));
@@ -476,14 +495,12 @@ void make_surface(Workspace& work, const fs::path& folder) {
   }
   if (given.surface_input) add_mends(mends, figures);
   figures["openings"] = openings_json(preprocess::find_openings(surface));
+  std::vector<preprocess::Handle> handles;
   if (check.euler_number != 2) {
-    const auto handles = (2 - check.euler_number) / 2;
-    figures["warnings"].push_back(
-        "surface: it has " + std::to_string(handles) +
-        (handles == 1 ? " handle, a closed loop" : " handles, closed loops") +
-        " of arteries that touch or run in a ring; look whether " +
-        (handles == 1 ? "it is" : "they are") + " real");
+    handles = preprocess::find_handles(surface);
+    figures["warnings"].push_back(handles_warning((2 - check.euler_number) / 2, handles));
   }
+  figures["handles"] = loops_json(handles);
   write_figures(figures, folder);
 }
 

@@ -29,14 +29,18 @@ std::vector<MarkedPlace> places_to_look_at(const Case& given, const Json& figure
          point_of(figures["narrowest_mm"])});
   }
   const auto add = [&](const char* list, std::size_t most, const auto& name_of) {
-    if (!figures.contains(list)) return;
-    for (std::size_t k = 0; k < std::min(most, figures.at(list).size()); ++k) {
-      const Json& one = figures.at(list).at(k);
+    const Json::json_pointer key(std::string("/") + list);
+    if (!figures.contains(key)) return;
+    for (std::size_t k = 0; k < std::min(most, figures.at(key).size()); ++k) {
+      const Json& one = figures.at(key).at(k);
       places.push_back({name_of(one), point_of(one.at("place_mm"))});
     }
   };
   add("touches", kMostTouches, [](const Json& touch) -> std::string {
     return touch.at("cut").get<bool>() ? "limbs touch, parted" : "limbs touch";
+  });
+  add("loops/left", kMostTouches, [](const Json& loop) {
+    return format("a loop, %.1f mm in radius", loop.at("radius_mm").get<double>());
   });
   add("way_doubts", kMostTouches, [](const Json& doubt) -> std::string {
     return doubt.at("by") == "level" ? "the level changes" : "the way narrows";

@@ -199,7 +199,7 @@ std::vector<Stage> stages_from_labels(const Case& given) {
   if (!given.labels->choice.names.empty()) read_too(stages.back(), {"/labels/names"});
   read_points(stages.back(), given);
   stages.push_back({.name = "surface",
-                    .version = 12,
+                    .version = 13,
                     .reads_input = in_volume,
                     .after = {"segment"},
                     .parameters = {"/surface/edge_length_mm"},
@@ -213,7 +213,7 @@ std::vector<Stage> stages_to_surface(const Case& given) {
   std::vector<Stage> stages;
   if (!given.volume) {
     stages.push_back({.name = "surface",
-                      .version = 11,
+                      .version = 12,
                       .reads_input = true,
                       .parameters = {"/surface/unit", "/surface/frame", "/surface/edge_length_mm"},
                       .make = make_surface});
@@ -221,13 +221,13 @@ std::vector<Stage> stages_to_surface(const Case& given) {
   }
   stages.push_back({.name = "volume", .version = 5, .reads_input = true, .make = make_volume});
   stages.push_back({.name = "segment",
-                    .version = 16,
+                    .version = 17,
                     .reads_input = true,
                     .parameters = {"/segmentation", "/mask"},
                     .make = make_segment});
   read_points(stages.back(), given);
   stages.push_back({.name = "surface",
-                    .version = 11,
+                    .version = 12,
                     .reads_input = true,
                     .after = {"segment"},
                     .parameters = {"/surface/edge_length_mm"},

@@ -109,6 +109,7 @@ Json figures(const Surface& surface) {
             {"area_mm2", 1.0},
             {"triangles", surface.triangles.cols()},
             {"euler_number", 2},
+            {"handles", Json::array()},
             {"openings", none}}},
           {"centerline",
            {{"warnings", none},
