@@ -108,7 +108,7 @@ class Weighing {
       if (level == Level::kFull) add(full);
       reached_coarsely += level != Level::kFull && trial(id).metrics.reached;
     }
-    headline_ = headline_of_failure(all);
+    headline_ = headline_of_failure(all, full);
     const Answer answer =
         leaves_open(all, fine, full, reached_coarsely) ? Answer::kUnsure : Answer::kNotFeasible;
     if (full.reached > 0) {
@@ -127,16 +127,6 @@ class Weighing {
       change("Running all trials in full detail: the wall was taken for rigid in " +
              part_of(all.trials - full.trials, all.trials, "trial") + ".");
     }
-  }
-
-  static std::string headline_of_failure(const Endings& all) {
-    if (all.reached == 0) {
-      return all.trials == 1 ? "The one trial does not reach the target."
-                             : "None of " + count_of(all.trials, "trial") + " reaches the target.";
-    }
-    return capital(part_of(all.reached, all.trials, "trial")) +
-           (all.reached == 1 ? " reaches the target, but not within the limits."
-                             : " reach the target, none of them within the limits.");
   }
 
   /// What was searched beside straight pushes.

@@ -299,6 +299,28 @@ std::string describe_endings(const Endings& endings) {
   return list_words(parts);
 }
 
+std::string headline_of_failure(const Endings& all, const Endings& full) {
+  const bool one = all.trials == 1;
+  if (all.reached == 0) {
+    return one ? "The one trial does not reach the target."
+               : "None of " + count_of(all.trials, "trial") + " reaches the target.";
+  }
+  const int coarse = all.reached - full.reached;
+  const std::string reach = capital(part_of(all.reached, all.trials, "trial")) +
+                            (all.reached == 1 ? " reaches the target" : " reach the target");
+  if (coarse == 0) {
+    return reach + (all.reached == 1 ? ", but not within the limits."
+                                     : ", none of them within the limits.");
+  }
+  if (full.reached == 0) {
+    return reach + (coarse == 1 ? ", but was not run in full detail."
+                                : ", none of which was run in full detail.");
+  }
+  return reach + ": " + std::to_string(full.reached) + (full.reached == 1 ? " breaks" : " break") +
+         " a limit, and " + std::to_string(coarse) + (coarse == 1 ? " was" : " were") +
+         " not run in full detail.";
+}
+
 std::string describe_broken_limits(const Endings& endings, const Limits& limits) {
   std::vector<std::string> parts;
   const auto add = [&](int count, const std::string& text) {

@@ -43,6 +43,9 @@ void add_ending(Endings& endings, const Measured& trial, const simulate::Wire& w
 /// "12 passed by the branch, 3 got stuck": all that did not reach, the most frequent first.
 std::string describe_endings(const Endings& endings);
 
+/// In one sentence, of all trials and of those of them that were run in full: none is a plan.
+std::string headline_of_failure(const Endings& all, const Endings& full);
+
 /// Which limits those that reached break; expects that there are some.
 std::string describe_broken_limits(const Endings& endings, const Limits& limits);
 

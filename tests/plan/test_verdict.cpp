@@ -401,6 +401,21 @@ TEST(Verdict, WhereMuchEndsWithoutAResultIsUnsure) {
     EXPECT_EQ(bench.verdict().answer, unclear == 2 ? Answer::kNotFeasible : Answer::kUnsure);
     EXPECT_TRUE(tells(bench.verdict().changes, "A finer computation: "));
   }
+TEST(Verdict, WhatReachedCoarselyAloneIsNotSaidToBreakALimit) {
+  WhatIsKnown bench;
+  bench.add_many(8, Outcome::kStuck);
+  bench.add(Outcome::kReached, Level::kScout);
+  EXPECT_EQ(bench.verdict().headline,
+            "1 of 9 trials reaches the target, but was not run in full detail.");
+  bench.add(Outcome::kReached, Level::kScout);
+  EXPECT_EQ(bench.verdict().headline,
+            "2 of 10 trials reach the target, none of which was run in full detail.");
+  bench.add(Outcome::kReached).peak_tip_force = 2.0;
+  EXPECT_EQ(bench.verdict().headline,
+            "3 of 11 trials reach the target: 1 breaks a limit, and 2 were not run in full "
+            "detail.");
+}
+
   WhatIsKnown ends;
   ends.add_many(5, Outcome::kStuck);
   ends.add_many(5, Outcome::kLeftImage);
