@@ -422,10 +422,8 @@ class Weighing {
   void weigh_sensitivity(const RankedPlan& first) {
     if (!first.sensitive) return;  // its error is not known either, or it stands behind none
     if (!is_sensitive(first)) {
-      find(Answer::kFeasible,
-           "Changes far below what a hand can do (0.01 deg of roll, 0.1 % of "
-           "friction, shorter pushes) move the tip by no more than " +
-               one_decimal(kTipsApart) + " mm.");
+      find(Answer::kFeasible, "The end of the plan does not hang on how it is computed: " +
+                                  describe_steadiness(known_.plan.refinements, first.trial) + ".");
       return;
     }
     find(Answer::kUnsure, "The end of the plan hangs on how it is computed: " + *first.sensitive +

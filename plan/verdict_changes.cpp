@@ -369,6 +369,18 @@ std::vector<std::string> describe_pairs(const Known& known, std::size_t most) {
   return texts;
 }
 
+std::string describe_steadiness(const std::vector<Refinement>& refinements, int trial) {
+  const auto own = std::find_if(refinements.begin(), refinements.end(),
+                                [&](const Refinement& one) { return one.trial == trial; });
+  expects(own != refinements.end());
+  std::vector<std::string> ends;
+  for (const OtherEnd& other : own->others) {
+    ends.push_back(describe_setting(other.setting) + " its tip ends " +
+                   two_digits(other.change.tip) + " mm away");
+  }
+  return list_words(ends) + ", where up to " + one_decimal(kTipsApart) + " mm may be";
+}
+
 std::vector<std::string> changes_by(const Endings& endings, const Known& known,
                                     const std::string& noun) {
   std::vector<std::pair<int, std::string>> changes;

@@ -53,6 +53,10 @@ std::string describe_broken_limits(const Endings& endings, const Limits& limits)
 /// was tried, then why others were not; at most so many sentences, and one that counts the others.
 std::vector<std::string> describe_pairs(const Known& known, std::size_t most = 4);
 
+/// How far apart a plan ends with settings changed that should not matter: of one that is not
+/// sensitive.
+std::string describe_steadiness(const std::vector<Refinement>& refinements, int trial);
+
 /// What would change how these end, the most frequent first; from what at least one in ten of them
 /// ended by. `noun` is what they are: "trial", "repeat".
 std::vector<std::string> changes_by(const Endings& endings, const Known& known,

@@ -173,6 +173,11 @@ TEST(Verdict, AnEndThatHangsOnHowItIsComputedIsUnsure) {
     EXPECT_EQ(verdict.answer, apart < 1.0 ? Answer::kFeasible : Answer::kUnsure);
     EXPECT_EQ(tells(verdict.reasons, "with pushes half as long its tip ends 1.0 mm away"),
               apart > 1.0);
+    EXPECT_EQ(tells(verdict.reasons,
+                    "does not hang on how it is computed: with pushes half as long its tip ends "
+                    "0.99 mm away, where up to 1.0 mm may be."),
+              apart < 1.0)
+        << "only what was run is told";
     EXPECT_EQ(tells(verdict.changes, "Another wire, angle or roll whose end"), apart > 1.0);
     bench.study.goal.way = toward(1.0).goal.way;
     EXPECT_EQ(tells(bench.verdict().changes, "A shaped catheter that leads the wire"), apart > 1.0);
