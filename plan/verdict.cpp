@@ -432,14 +432,16 @@ class Weighing {
     change_for_a_steadier();
   }
 
-  /// The best other plan that `merit` has something to say of, if any: one that was repeated, and
-  /// whose tip is known to end in the target.
+  /// The best other plan that `merit` has something to say of, if any: one that in its repeats is
+  /// safe as often as is asked for, or as the first, and whose tip is known to end in the target.
   template <typename Merit>
   bool offer_other(const RankedPlan& first, const std::string& what, const Merit& merit) {
     for (std::size_t k = 0; k < ranking_.plans.size(); ++k) {
       const RankedPlan& other = ranking_.plans[k];
-      if (other.trial == first.trial || repeats_of(other.trial) == nullptr) continue;
+      const RepeatedPlan* repeats = repeats_of(other.trial);
+      if (other.trial == first.trial || repeats == nullptr) continue;
       if (!other.tip_error || ends_unsure(other)) continue;
+      if (safe_share(*repeats) < std::min(rules_.safe_share, first.expected_safe)) continue;
       const std::string text = merit(other);
       if (text.empty()) continue;
       const auto id = static_cast<std::size_t>(other.trial);

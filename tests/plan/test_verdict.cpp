@@ -205,14 +205,18 @@ TEST(Verdict, AWallMovedBeyondItsModelIsARisk) {
 }
 
 TEST(Verdict, OffersOnlyPlansThatAreKnownToHold) {
-  enum class Lacks { kNothing, kRepeats, kError, kRoom, kOneEnd };
-  for (const Lacks lacks :
-       {Lacks::kNothing, Lacks::kRepeats, Lacks::kError, Lacks::kRoom, Lacks::kOneEnd}) {
+  enum class Lacks { kNothing, kRepeats, kSafety, kError, kRoom, kOneEnd };
+  for (const Lacks lacks : {Lacks::kNothing, Lacks::kRepeats, Lacks::kSafety, Lacks::kError,
+                            Lacks::kRoom, Lacks::kOneEnd}) {
     SCOPED_TRACE(static_cast<int>(lacks));
     WhatIsKnown bench = WhatIsKnown::good();
     bench.plan.trials[0].metrics.peak_tip_force = 0.4;  // above the warning level
     bench.add(Outcome::kReached).peak_contact_force = 0.9;
-    if (lacks != Lacks::kRepeats) bench.repeat(2, 16);
+    if (lacks == Lacks::kSafety) {
+      bench.repeat(2, 14, 2);
+    } else if (lacks != Lacks::kRepeats) {
+      bench.repeat(2, 15, 1);
+    }
     if (lacks != Lacks::kError) bench.refine(2, lacks == Lacks::kRoom ? 104.0 : 0.1);
     if (lacks == Lacks::kOneEnd) {
       bench.plan.refinements.back().others = {
@@ -397,15 +401,6 @@ TEST(Verdict, WhereAllThatReachBreakALimitIsNotFeasible) {
   EXPECT_TRUE(tells(verdict.changes, "A softer wire: 1 of 3 trials"));
 }
 
-TEST(Verdict, WhereMuchEndsWithoutAResultIsUnsure) {
-  // A quarter may, more may not.
-  for (const int unclear : {2, 3}) {
-    WhatIsKnown bench;
-    bench.add_many(8 - unclear, Outcome::kStuck);
-    bench.add_many(unclear, Outcome::kNotConverged);
-    EXPECT_EQ(bench.verdict().answer, unclear == 2 ? Answer::kNotFeasible : Answer::kUnsure);
-    EXPECT_TRUE(tells(bench.verdict().changes, "A finer computation: "));
-  }
 TEST(Verdict, WhatReachedCoarselyAloneIsNotSaidToBreakALimit) {
   WhatIsKnown bench;
   bench.add_many(8, Outcome::kStuck);
@@ -421,6 +416,15 @@ TEST(Verdict, WhatReachedCoarselyAloneIsNotSaidToBreakALimit) {
             "detail.");
 }
 
+TEST(Verdict, WhereMuchEndsWithoutAResultIsUnsure) {
+  // A quarter may, more may not.
+  for (const int unclear : {2, 3}) {
+    WhatIsKnown bench;
+    bench.add_many(8 - unclear, Outcome::kStuck);
+    bench.add_many(unclear, Outcome::kNotConverged);
+    EXPECT_EQ(bench.verdict().answer, unclear == 2 ? Answer::kNotFeasible : Answer::kUnsure);
+    EXPECT_TRUE(tells(bench.verdict().changes, "A finer computation: "));
+  }
   WhatIsKnown ends;
   ends.add_many(5, Outcome::kStuck);
   ends.add_many(5, Outcome::kLeftImage);
