@@ -207,15 +207,16 @@ bool stays_unseated(const Candidate& script, const Measured& trial) {
 Measured measure(const simulate::TrialResult& trial, const Study& study, const Centerline& path) {
   Metrics metrics = compute_metrics(trial, study, path);
   if (!study.catheters.empty()) metrics.script = compute_script_metrics(trial, study, path);
-  return {.outcome = trial.outcome,
-          .reason = trial.reason,
-          .terms = trial.terms,
-          .metrics = std::move(metrics),
-          .progress = find_progress(trial, study, path),
-          .last_tip = trial.pushes.empty() ? study.access : trial.pushes.back().tip,
-          .nodes = trial.nodes,
-          .sections = trial.sections,
-          .tools = compute_tool_metrics(trial, study, path)};
+  return {
+      .outcome = trial.outcome,
+      .reason = trial.reason,
+      .terms = trial.terms,
+      .metrics = std::move(metrics),
+      .progress = find_progress(trial, study, path),
+      .last_tip = trial.pushes.empty() ? study.access : tip_at_rest(trial, trial.pushes.size() - 1),
+      .nodes = trial.nodes,
+      .sections = trial.sections,
+      .tools = compute_tool_metrics(trial, study, path)};
 }
 
 }  // namespace wireplan::plan

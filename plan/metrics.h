@@ -159,7 +159,8 @@ struct Measured {
   std::vector<std::string> terms = {};
   Metrics metrics = {};
   double progress = 0.0;           // furthest place of the tip along the path, in its lumen   [mm]
-  Vec3 last_tip = Vec3::Zero();    // after the last push; the access without one              [mm]
+  Vec3 last_tip = Vec3::Zero();    // after the last push, in the vessel at rest; the access
+                                   // without one                                          [mm]
   Eigen::Matrix3Xd nodes = {};     // (3, k) final shape                                       [mm]
   Eigen::Matrix3Xd sections = {};  // of it, as simulate::Shape has them                     [mm]
   double cpu_seconds = 0.0;        // that it took; timing, so never twice the same            [s]

@@ -272,14 +272,14 @@ std::vector<Stage> stages_of(const Case& given) {
        .after = {"surface"},
        .parameters = {"/wall/thickness_mm", "/wall/young_modulus_kpa", "/wall/poisson_ratio"},
        .make = make_wall});
+  const bool sections_move = given.wall.support.has_value();
   Stage trials{.name = "trials",
-               .version = 38,
+               .version = sections_move ? 39 : 38,  // each counts its own changes
                .after = {"surface", "centerline"},
                .parameters = {"/access", "/target", "/wires", "/tip_roll_deg", "/friction",
                               "/friction_factor", "/wall/model", "/insertion"},
                .names_branches = true,
                .make = make_trials};
-  const bool sections_move = given.wall.support.has_value();
   // A rigid wall does not act but in how the vessel moves as a whole.
   if (given.wall.elastic || sections_move) trials.after.push_back("wall");
   if (sections_move) read_too(trials, {"/wall/support_kpa_per_mm", "/wall/held"});

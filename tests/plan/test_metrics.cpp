@@ -209,6 +209,7 @@ TEST(Metrics, OfAVesselThatMovesAreThoseOfTheVesselAtRest) {
   EXPECT_EQ(found.centerline_deviation, expected.centerline_deviation);
   EXPECT_EQ(find_progress(moved, study, straight_path()),
             find_progress(at_rest, study, straight_path()));
+  EXPECT_EQ(measure(moved, study, straight_path()).last_tip, at_rest.pushes.back().tip);
   moved.tips_at_rest.clear();
   moved.nodes_at_rest.resize(3, 0);
   EXPECT_NE(compute_metrics(moved, study, straight_path()).tip_to_target, 15.0);
