@@ -218,7 +218,8 @@ std::string warnings_of(const RankedPlan& plan, const Metrics& m, const simulate
 std::string scouted_reason(const Score& score, const std::string& failure) {
   if (!failure.empty()) return "scouted only: " + failure;
   return "scouted only: reaches with a score of " + four_digits(score.total) +
-         ", behind the best plan by more than the scout was found to be off";
+         "; by the default limits and weights, which decide what is run in full, behind the best "
+         "plan by more than scouts were found to be off";
 }
 
 std::string safety_of(const RepeatedPlan& plan) {
