@@ -95,6 +95,10 @@ const char* level_name(Level level) {
   throw LogicError("a level without a name");
 }
 
+const char* wall_of_scouts(bool moves) {
+  return moves ? "a wall that moves as a whole but takes no dents" : "a rigid wall";
+}
+
 Study study_at(const Study& study, Level level) {
   Study own = level == Level::kScout ? scout_study(study) : study;
   if (level != Level::kFull) own.insertion.record_every = own.insertion.length;  // no shapes

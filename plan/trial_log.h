@@ -97,6 +97,10 @@ struct PlanVessel {
   }
 };
 
+/// What the wall of scouts and probes is, of a vessel that moves as a whole or does not: "a rigid
+/// wall".
+const char* wall_of_scouts(bool moves);
+
 /// The study at a level.
 Study study_at(const Study& study, Level level);
 

@@ -119,13 +119,16 @@ class Weighing {
     }
     if (all.reached < all.trials) find(answer, how_trials_ended(all, fine));
     tell_scripts(answer);
-    const bool rigid_is_enough = answer == Answer::kNotFeasible && full.trials == 0;
+    const bool rigid_is_enough =
+        known_.yields && answer == Answer::kNotFeasible && full.trials == 0;
     if (rigid_is_enough) tell_rigid(answer, all);
     for (std::string& text : changes_by(all, known_, "trial")) change(std::move(text));
     const bool nothing_to_learn = rigid_is_enough && all.held_by_wall() == 0;
     if (full.trials < all.trials && !nothing_to_learn) {
-      change("Running all trials in full detail: the wall was taken for rigid in " +
-             part_of(all.trials - full.trials, all.trials, "trial") + ".");
+      const std::string part = part_of(all.trials - full.trials, all.trials, "trial");
+      change("Running all trials in full detail: " +
+             (known_.yields ? std::string("the wall was ") + wall_taken() + " in " + part + "."
+                            : "long elements were taken in " + part + "."));
     }
   }
 
@@ -177,6 +180,11 @@ class Weighing {
     return text;
   }
 
+  /// The wall of a vessel that yields, where trials are not run in full.
+  const char* wall_taken() const {
+    return known_.moves ? "taken to move as a whole and take no dents" : "taken for rigid";
+  }
+
   /// Why trials against a rigid wall are enough for that answer.
   void tell_rigid(Answer answer, const Endings& all) {
     std::vector<std::string> ends;
@@ -190,7 +198,7 @@ class Weighing {
     add(all.whole_wire_in + all.all_wire_in, "before the target for want of wire");
     add(all.missed, "with a tip that went no further along the way");
     if (ended == 0) return;
-    find(answer, "The wall was taken for rigid, which is enough here: " +
+    find(answer, std::string("The wall was ") + wall_taken() + ", which is enough here: " +
                      part_of(ended, all.trials, "trial") + " ended " + list_words(ends, "or") +
                      ", which a wall that gives way by tenths of a millimetre does not change.");
   }
@@ -228,14 +236,13 @@ class Weighing {
     if (reached_coarsely > 0) {
       find(Answer::kUnsure,
            count_of(reached_coarsely, "trial") + (reached_coarsely == 1 ? " reaches" : " reach") +
-               " the target against a rigid wall, and " + (reached_coarsely == 1 ? "was" : "were") +
-               " not run in full detail.");
+               " the target against " + wall_of_scouts(known_.moves) + ", and " +
+               (reached_coarsely == 1 ? "was" : "were") + " not run in full detail.");
     }
-    if (full.trials == 0 && 2 * all.held_by_wall() > all.trials) {
-      find(Answer::kUnsure,
-           capital(part_of(all.held_by_wall(), all.trials, "trial")) +
-               " got stuck, folded back or went through the wall, which was taken for rigid: one "
-               "that gives way may let the wire pass.");
+    if (known_.yields && full.trials == 0 && 2 * all.held_by_wall() > all.trials) {
+      find(Answer::kUnsure, capital(part_of(all.held_by_wall(), all.trials, "trial")) +
+                                " got stuck, folded back or went through the wall, which was " +
+                                wall_taken() + ": one that gives way may let the wire pass.");
     }
     return findings_.size() > before;
   }

@@ -70,6 +70,8 @@ struct Known {
   Limits limits = {};
   std::optional<WayFindings> way = {};
   std::vector<std::string> angled_wires = {};  // of the catalogue, that the case did not try
+  bool yields = true;  // the study's wall; that of scouts and probes does not
+  bool moves = false;  // the vessel's cross-sections, also under scouts and probes
 };
 
 /// The first of these that holds:
@@ -80,10 +82,10 @@ struct Known {
 ///                       count, since what clearly fails in one is not run in full), or more than
 ///                       `unclear_part` of all did not, or one reached that was not run in full,
 ///                       or none was and most got stuck, folded back or went through a wall that
-///                       was taken for rigid. A plan, but: it was not repeated, its share of safe
-///                       repeats is not known well enough, or that of a plan that mostly fails, its
-///                       tip's error is not known or too large, or its end hangs on how it is
-///                       computed (RankedPlan::sensitive)
+///                       yields but was taken not to. A plan, but: it was not repeated, its share
+///                       of safe repeats is not known well enough, or that of a plan that mostly
+///                       fails, its tip's error is not known or too large, or its end hangs on how
+///                       it is computed (RankedPlan::sensitive)
 ///   feasible with risk  tip force, also that of 19 in 20 repeats, above the level to warn of;
 ///                       share of safe repeats too low; wall moved beyond linear theory; sheath at
 ///                       its largest ratio to the lumen, or device as wide as the lumen; way or

@@ -23,6 +23,7 @@ constexpr const char* kStatement =
 
 constexpr const char* kRigidWall = "the wall is rigid";
 constexpr const char* kRigidScout = "the wall of a scout or a probe is rigid";
+constexpr const char* kNoDents = "the wall of a scout or a probe takes no dents";
 constexpr const char* kNotRefined = "only the first plans and those tied with the best are refined";
 std::string no_repeats(const ReportInput& input) {
   const std::string text = "only the best plans are repeated, and the best of each wire";
@@ -34,6 +35,10 @@ bool is_rigid(const ReportInput& input) {
 }
 
 Json limits_of_validity(const ReportInput& input) {
+bool moves(const ReportInput& input) {
+  return input.parameters.at("wall").contains("support_kpa_per_mm");
+}
+
   const auto& wires = input.study.wires;
   const bool smooth = std::all_of(wires.begin(), wires.end(), [&](const simulate::Wire& wire) {
     return simulate::friction_of(wire, input.study.insertion) == 0.0;
@@ -43,10 +48,13 @@ Json limits_of_validity(const ReportInput& input) {
              : "One coefficient of friction stands for all of the wall; it is that of the wire's "
                "coating or of the case, not measured on either.";
   const char* wall =
-      is_rigid(input)
+      is_rigid(input) && moves(input)
+          ? "The vessel's cross-sections move as wholes, and its wall takes no dents: contact "
+            "forces are upper bounds."
+      : is_rigid(input)
           ? "The wall is rigid: contact forces are those of a vessel that does not give way, upper "
             "bounds, and the wall's stiffness is reported but does not act."
-      : input.parameters.at("wall").contains("support_kpa_per_mm")
+      : moves(input)
           ? "The wall yields by linear theory on cross-sections that move as wholes, without any "
             "layers or prestress; dents beyond 0.2 of the radius are flagged beyond_linear_theory."
           : "The wall yields by linear theory, as a layer on a fixed outside; where it moves by "
@@ -215,7 +223,7 @@ void put_wall_motion(Row& row, const ReportInput& input, const plan::Metrics& m,
                      const std::string& ended) {
   if (is_rigid(input) || scouted) {
     for (const char* key : {"peak_wall_displacement_mm", "beyond_linear_theory", "wall_motion"}) {
-      row.put_optional(key, {}, scouted ? kRigidScout : kRigidWall);
+      row.put_optional(key, {}, !scouted ? kRigidWall : moves(input) ? kNoDents : kRigidScout);
     }
     return;
   }
@@ -241,7 +249,9 @@ void put_safe(Row& row, const ReportInput& input, std::size_t k) {
   if (known) {
     row.put("safe", safe);
   } else {
-    row.put_optional("safe", {}, "reached against a rigid wall, not run in full");
+    row.put_optional(
+        "safe", {},
+        std::string("reached against ") + plan::wall_of_scouts(moves(input)) + ", not run in full");
   }
 }
 
@@ -558,43 +568,6 @@ Json read_report(const std::filesystem::path& path) {
                 "run the case again");
   }
   return report;
-}
-
-std::string describe_tools(const Json& plan) {
-  return plan.at("wire").get<std::string>() +
-         (plan.contains("catheter") ? " in " + plan.at("catheter").get<std::string>() : "") +
-         (plan.contains("first_wire")
-              ? " in exchange for " + plan.at("first_wire").get<std::string>()
-              : "");
-}
-
-std::string describe_best(const Json& report) {
-  const Json& ranking = report.at("ranking");
-  const Json& trials = report.at("trials");
-  if (ranking.empty()) {
-    const auto scouted = std::count_if(trials.begin(), trials.end(), [](const Json& trial) {
-      return trial.value("level", "full") != "full";
-    });
-    return "no plan reaches the target within the limits: " +
-           plan::count_of(static_cast<int>(trials.size()), "trial") +
-           (scouted > 0 ? ", " + std::to_string(scouted) +
-                              " of them on a rigid wall only (--exhaustive runs all in full)"
-                        : "") +
-           "; the report says why for each";
-  }
-  const Json& best = ranking.front();
-  const std::string script = best.value("script", "");
-  const auto reached = std::count_if(trials.begin(), trials.end(), [](const Json& trial) {
-    return trial.at("reached").get<bool>();
-  });
-  const bool alone = answer_of(report) == "not feasible";  // a device does not pass
-  return std::string(alone ? "the wire alone would reach the target: " : "") + "best of " +
-         std::to_string(ranking.size()) + (ranking.size() == 1 ? " safe plan" : " safe plans") +
-         " (reach, no limit broken); " + std::to_string(reached) + " of " +
-         std::to_string(trials.size()) + " tried reach: " + describe_tools(best) +
-         ", inclination " + best.at("inclination_deg").dump() + " deg, azimuth " +
-         best.at("azimuth_deg").dump() + " deg, roll " + best.at("roll_deg").dump() + " deg, " +
-         best.at("sentence").get<std::string>() + (script.empty() ? "" : "; script: " + script);
 }
 
 }  // namespace wireplan::pipeline

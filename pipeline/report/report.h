@@ -50,10 +50,4 @@ Json build_info();
 /// Reads a report and sees that it has what describe_best tells. Throws Error where it has not.
 Json read_report(const std::filesystem::path& path);
 
-/// "bentson", or "bentson in cobra-c2": of a plan of a report.
-std::string describe_tools(const Json& plan);
-
-/// The best plan of a report in one line, or why there is none.
-std::string describe_best(const Json& report);
-
 }  // namespace wireplan::pipeline

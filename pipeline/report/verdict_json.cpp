@@ -4,6 +4,8 @@
 #include <iterator>
 
 #include "pipeline/report/anatomy_json.h"
+#include "plan/number_text.h"
+#include "plan/trial_log.h"
 
 namespace wireplan::pipeline {
 namespace {
@@ -68,6 +70,44 @@ std::string describe_verdict(const Json& report) {
     text += "reason: " + reasons.front().get<std::string>() + "\n";
   }
   return text;
+}
+
+std::string describe_tools(const Json& plan) {
+  return plan.at("wire").get<std::string>() +
+         (plan.contains("catheter") ? " in " + plan.at("catheter").get<std::string>() : "") +
+         (plan.contains("first_wire")
+              ? " in exchange for " + plan.at("first_wire").get<std::string>()
+              : "");
+}
+
+std::string describe_best(const Json& report) {
+  const Json& ranking = report.at("ranking");
+  const Json& trials = report.at("trials");
+  if (ranking.empty()) {
+    const auto scouted = std::count_if(trials.begin(), trials.end(), [](const Json& trial) {
+      return trial.value("level", "full") != "full";
+    });
+    return "no plan reaches the target within the limits: " +
+           plan::count_of(static_cast<int>(trials.size()), "trial") +
+           (scouted > 0 ? ", " + std::to_string(scouted) + " of them on " +
+                              plan::wall_of_scouts(report.contains("vessel_motion")) +
+                              " only (--exhaustive runs all in full)"
+                        : "") +
+           "; the report says why for each";
+  }
+  const Json& best = ranking.front();
+  const std::string script = best.value("script", "");
+  const auto reached = std::count_if(trials.begin(), trials.end(), [](const Json& trial) {
+    return trial.at("reached").get<bool>();
+  });
+  const bool alone = answer_of(report) == "not feasible";  // a device does not pass
+  return std::string(alone ? "the wire alone would reach the target: " : "") + "best of " +
+         std::to_string(ranking.size()) + (ranking.size() == 1 ? " safe plan" : " safe plans") +
+         " (reach, no limit broken); " + std::to_string(reached) + " of " +
+         std::to_string(trials.size()) + " tried reach: " + describe_tools(best) +
+         ", inclination " + best.at("inclination_deg").dump() + " deg, azimuth " +
+         best.at("azimuth_deg").dump() + " deg, roll " + best.at("roll_deg").dump() + " deg, " +
+         best.at("sentence").get<std::string>() + (script.empty() ? "" : "; script: " + script);
 }
 
 }  // namespace wireplan::pipeline

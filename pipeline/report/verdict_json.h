@@ -20,4 +20,10 @@ std::string describe_verdict(const Json& report);
 /// "feasible with risk", of a report; "-" where it has no verdict.
 std::string answer_of(const Json& report);
 
+/// "bentson", or "bentson in cobra-c2": of a plan of a report.
+std::string describe_tools(const Json& plan);
+
+/// The best plan of a report in one line, or why there is none.
+std::string describe_best(const Json& report);
+
 }  // namespace wireplan::pipeline

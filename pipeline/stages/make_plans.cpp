@@ -35,16 +35,19 @@ double choose_lumen_offset(const Workspace& work) {
 }
 
 /// What the scouts came to, in a line for who waits.
-std::string first_answer_text(const plan::Study& study, const plan::FirstAnswer& answer) {
-  std::string text =
-      "first answer, of coarse pushes against a rigid wall: " + std::to_string(answer.reached) +
-      " of " + std::to_string(answer.trials) + " reach the target";
+std::string first_answer_text(const plan::Study& study, const plan::FirstAnswer& answer,
+                              const WallInput& wall) {
+  std::string text = std::string("first answer, of coarse pushes against ") +
+                     plan::wall_of_scouts(wall.support.has_value()) + ": " +
+                     std::to_string(answer.reached) + " of " + std::to_string(answer.trials) +
+                     " reach the target";
   if (!answer.best) return text + "; what may do so all the same is looked at next";
   const plan::Metrics& metrics = answer.trial.metrics;
   return text + ", first " + plan::describe(study, *answer.best) +
          format(" (%.2g N at the tip, %.2g N on the wall)", metrics.peak_tip_force,
                 metrics.peak_contact_force) +
-         "; not known yet: the wall as it yields, errors, disturbances";
+         "; not known yet: " + (wall.elastic ? "the wall as it yields, " : "") +
+         "errors, disturbances";
 }
 
 std::string first_script_text(const plan::Study& study, const plan::Candidate& script,
@@ -63,7 +66,7 @@ plan::Early early_answers(Workspace& work, Until until) {
   plan::Early early;
   if (until == Until::kTrials) {
     early.scouted = [&](const plan::FirstAnswer& answer) {
-      told(first_answer_text(study, answer));
+      told(first_answer_text(study, answer, work.given().wall));
     };
   }
   if (until == Until::kManoeuvres) {

@@ -9,6 +9,7 @@
 
 #include "pipeline/files/catalogue.h"
 #include "pipeline/files/clock.h"
+#include "pipeline/files/text.h"
 #include "pipeline/files/trial_file.h"
 #include "pipeline/files/viewer_files.h"
 #include "pipeline/report/anatomy_json.h"
@@ -76,7 +77,9 @@ plan::Verdict decide(const Workspace& work, const ReportInput& report) {
                     .plan = report.plan,
                     .judgement = report.judgement,
                     .limits = work.given().limits,
-                    .angled_wires = other_angled_wires(report.study)};
+                    .angled_wires = other_angled_wires(report.study),
+                    .yields = work.given().wall.elastic,
+                    .moves = work.given().wall.support.has_value()};
   if (work.has("anatomy")) known.way = way_findings(anatomy_json(report));
   return plan::find_verdict(known);
 }

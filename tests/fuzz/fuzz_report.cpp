@@ -1,5 +1,6 @@
 // Reports that a user hands in: any bytes are a report that can be told in a line, or an Error.
 #include "pipeline/report/report.h"
+#include "pipeline/report/verdict_json.h"
 #include "tests/fuzz/fuzz.h"
 
 using namespace wireplan;

@@ -12,6 +12,7 @@
 #include "pipeline/report/fetch_json.h"
 #include "pipeline/report/report.h"
 #include "pipeline/report/tools_json.h"
+#include "pipeline/report/verdict_json.h"
 #include "pipeline/stages/stages.h"
 #include "tests/pipeline/small_case.h"
 #include "tests/plan/two_renals.h"

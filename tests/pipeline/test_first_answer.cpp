@@ -28,6 +28,22 @@ TEST(FirstAnswer, IsToldWhileARunGoesOn) {
   EXPECT_EQ(answer.out.find("first answer"), std::string::npos);
   EXPECT_EQ(run_program(folder.path(), many).log.find("first answer"), std::string::npos)
       << "all is known then";
+
+  // The wall of its coarse pushes is told as it is.
+  const auto first_of = [&](const std::string& wall) {
+    const std::string log = run_program(folder.path(), many + " --to trials --set " + wall).log;
+    const std::size_t begin = log.find("first answer"), end = log.find('\n', begin);
+    return begin == std::string::npos ? log : log.substr(begin, end - begin);
+  };
+  const std::string moves = first_of("wall.support_kpa_per_mm=1");
+  EXPECT_TRUE(
+      moves.starts_with("first answer, of coarse pushes against a wall that moves as a "
+                        "whole but takes no dents: "))
+      << moves;
+  EXPECT_TRUE(moves.ends_with("not known yet: the wall as it yields, errors, disturbances"))
+      << moves;
+  const std::string rigid = first_of("wall.model=rigid");
+  EXPECT_TRUE(rigid.ends_with("not known yet: errors, disturbances")) << rigid;
 }
 
 TEST(FirstAnswer, HasAPageBeforeErrorsAndRepeatsAreKnown) {

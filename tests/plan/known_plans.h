@@ -17,6 +17,7 @@ struct WhatIsKnown {
   Limits limits;
   std::optional<WayFindings> way;
   std::vector<std::string> angled_wires;
+  bool yields = true, moves = false;
 
   WhatIsKnown() {
     study.wires.push_back(
@@ -77,7 +78,9 @@ struct WhatIsKnown {
                          .judgement = judge(study, plan, limits, {}),
                          .limits = limits,
                          .way = way,
-                         .angled_wires = angled_wires});
+                         .angled_wires = angled_wires,
+                         .yields = yields,
+                         .moves = moves});
   }
 };
 

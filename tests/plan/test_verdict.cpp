@@ -610,6 +610,34 @@ TEST(Verdict, OfARigidWallAloneSaysWhyThatIsEnoughOrIsUnsure) {
 }
 
 TEST(Verdict, CameAnotherWayIsNotFoldedBack) {
+TEST(Verdict, TellsTheWallOfCoarseTrialsAsItIs) {
+  // Of a vessel that moves as a whole it does so there too; one that is rigid is no other in full.
+  enum class Wall { kYields, kMoves, kRigid };
+  for (const Wall wall : {Wall::kYields, Wall::kMoves, Wall::kRigid}) {
+    SCOPED_TRACE(static_cast<int>(wall));
+    WhatIsKnown held, astray, reached;
+    for (WhatIsKnown* bench : {&held, &astray, &reached}) {
+      bench->moves = wall == Wall::kMoves;
+      bench->yields = wall != Wall::kRigid;
+    }
+    held.add_many(9, Outcome::kStuck, Level::kProbe);
+    astray.add_many(9, Outcome::kPassedBy, Level::kProbe);
+    reached.add(Outcome::kReached, Level::kScout);
+    const std::string taken =
+        wall == Wall::kYields ? "taken for rigid" : "taken to move as a whole and take no dents";
+    const bool yields = wall != Wall::kRigid;
+    EXPECT_EQ(tells(held.verdict().reasons, "which was " + taken + ": one that gives"), yields);
+    EXPECT_EQ(tells(astray.verdict().reasons, "The wall was " + taken + ", which is en"), yields);
+    EXPECT_EQ(tells(held.verdict().changes, "the wall was " + taken + " in all 9 trials."), yields);
+    EXPECT_EQ(tells(held.verdict().changes, "long elements were taken in all 9 trials."), !yields);
+    EXPECT_EQ(held.verdict().answer, yields ? Answer::kUnsure : Answer::kNotFeasible);
+    EXPECT_TRUE(tells(reached.verdict().reasons,
+                      wall == Wall::kMoves
+                          ? "against a wall that moves as a whole but takes no dents, and was not"
+                          : "against a rigid wall, and was not"));
+  }
+}
+
   WhatIsKnown bench;
   bench.add_many(6, Outcome::kAnotherWay);
   bench.add_many(4, Outcome::kProlapsed);

@@ -53,6 +53,9 @@ export const outcomeWord = (outcome) => kOutcomes[outcome]?.word ?? shown(outcom
 export const outcomeMark = (outcome) => kOutcomes[outcome]?.mark ?? "?";
 export const outcomes = Object.keys(kOutcomes);
 
+/** What scouts and probes meet. */
+export const wallOfScouts = (report) => (report.vessel_motion ? "a wall that moves as a whole but takes no dents" : "a rigid wall");
+
 /** "bentson", "bentson in cobra-c2", or "amplatz-stiff in cobra-c2 in exchange for bentson". */
 export const toolsName = (trial) => `${shown(trial.wire)}${trial.catheter ? ` in ${shown(trial.catheter)}` : ""}${trial.first_wire ? ` in exchange for ${shown(trial.first_wire)}` : ""}`;
 

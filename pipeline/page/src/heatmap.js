@@ -1,7 +1,7 @@
 // Wires and rolls x entry angles as one grid: force in color and number, outcome as a letter.
 import {forceColor, gradient, inkOn} from "./colors.js";
 import {el, section} from "./dom.js";
-import {degrees, number, outcomeMark, outcomeWord, outcomes, planName, shown} from "./format.js";
+import {degrees, number, outcomeMark, outcomeWord, outcomes, planName, shown, wallOfScouts} from "./format.js";
 
 const distinct = (values) => [...new Set(values)];
 
@@ -97,7 +97,7 @@ export const heatSection = (page, selection) => {
     el("ul", {class: "marks"},
       el("li", {}, el("b", {}, "!"), " reached, but not ranked"),
       trials.some((t) => t.level !== "full")
-        ? el("li", {}, el("b", {}, "\u2248"), " coarse trial: in a rigid wall, most with long elements; forces are rough") : null,
+        ? el("li", {}, el("b", {}, "\u2248"), ` coarse trial: in ${wallOfScouts(page.report)}, most with long elements; forces are rough`) : null,
       seen.map((outcome) => el("li", {}, el("b", {}, outcomeMark(outcome)), ` ${outcomeWord(outcome)}`))),
     el("div", {class: "scroll", tabindex: "0", role: "region", "aria-label": "Grid of wires and angles"}, grid),
     el("p", {class: "note"}, "Errors of these forces are in the table of plans; those marked \u00b1\u00a0? there were not estimated."));

@@ -1,6 +1,6 @@
 // The ranked plans, and on request every trial, as a table to sort and filter.
 import {el, section} from "./dom.js";
-import {degrees, number, outcomeWord, percent, plural, shown, toolsName, withError} from "./format.js";
+import {degrees, number, outcomeWord, percent, plural, shown, toolsName, wallOfScouts, withError} from "./format.js";
 
 const success = ({plan}) => {
   if (!plan || plan.success_rate === null || plan.success_rate === undefined) return "not repeated";
@@ -104,7 +104,7 @@ export const rankingSection = (page, selection) => {
         body)),
     el("p", {class: "note"},
       "\u00b1 is the estimated error of the simulation's finite elements and of the path that its solver takes; \u00b1\u00a0? where it was not estimated, as only the best plans are run again with finer elements. " +
-      (trials.some((t) => t.level !== "full") ? "\u2248 marks trials against a rigid wall, most of them with long elements. " : "") +
+      (trials.some((t) => t.level !== "full") ? `\u2248 marks trials against ${wallOfScouts(page.report)}, most of them with long elements. ` : "") +
       `The score is the mean of its components by these weights: ${weightsOf(page.report)}. ` +
       "Errors of the wire's, the wall's and the image's data are not in it. Plans that the errors cannot tell apart are ties; those whose end hangs on how they are solved are sensitive, and stand last, as do those whose tip's error may put it outside the target, or could not be told."));
 };

@@ -1,7 +1,7 @@
 // What was asked, the answer, what is uncertain, and where it all comes from.
 import {place} from "./anatomy.js";
 import {el, facts, name, section, table} from "./dom.js";
-import {degrees, number, outcomeWord, percent, planName, plural, shown, withError} from "./format.js";
+import {degrees, number, outcomeWord, percent, planName, plural, shown, wallOfScouts, withError} from "./format.js";
 
 const list = (values, text) => values.map(text).join(", ");
 const point = (p) => `(${p.map((x) => number(x)).join(", ")})\u00a0mm`;
@@ -63,7 +63,7 @@ export const answerSection = (page) => {
     return section("answer", "The answer",
       el("p", {class: "answer"}, `No plan reaches the target within the limits: of ${plural(trials.length, "trial")} `,
         [...counts].map(([outcome, count]) => `${count} ${outcomeWord(outcome)}`).join(", "),
-        scouted ? `. ${scouted} of them were run against a ${report.vessel_motion ? "wall that moves as a whole but takes no dents" : "rigid wall"} only; --exhaustive runs all in full.` : "."));
+        scouted ? `. ${scouted} of them were run against ${wallOfScouts(report)} only; --exhaustive runs all in full.` : "."));
   }
   const t = trials[best.trial], errors = t.errors;
   const ties = best.tied_with.length;
@@ -122,8 +122,8 @@ const spreadRow = (robustness, trial, first) => {
       (row.failures.length ? `; fails because: ${[...new Set(row.failures.map((f) => shown(f.reason)))].slice(0, 3).join("; ")}` : "")];
 };
 
-const scoutRow = (scout) => ["Coarse trials that sorted out the rest",
-  `${plural(scout.trials, "trial")} with elements of ${number(scout.element_length_mm)}\u00a0mm in a ${scout.moves_as_a_whole ? "rigid wall that moves as a whole" : "rigid wall"}; of them ${scout.probed} run there with fine elements, ${scout.compared} in full`,
+const scoutRow = (scout, report) => ["Coarse trials that sorted out the rest",
+  `${plural(scout.trials, "trial")} with elements of ${number(scout.element_length_mm)}\u00a0mm in ${wallOfScouts(report)}; of them ${scout.probed} run there with fine elements, ${scout.compared} in full`,
   `of those that were run again: ${plural(scout.missed, "plan")} that the coarse trial took for failing reach, and ${scout.false_reached} that it took for reaching fail`];
 
 export const uncertainSection = (page) => {
@@ -152,7 +152,7 @@ export const uncertainSection = (page) => {
   }
   rows.push(["Shape of the lumen in the simulation", `smooth field on a grid of ${number(report.numerics.lumen_grid_mm)}\u00a0mm`,
     `off the surface by ${number(report.numerics.lumen_mean_deviation_mm)}\u00a0mm on average, ${number(report.numerics.lumen_max_deviation_mm)}\u00a0mm at most`]);
-  if (report.numerics.scout) rows.push(scoutRow(report.numerics.scout));
+  if (report.numerics.scout) rows.push(scoutRow(report.numerics.scout, report));
   const beyond = trials.filter((t) => t.beyond_linear_theory === true).length;
   if (report.vessel.wall_model !== "rigid") {
     const bestBeyond = first && trials[first.trial].beyond_linear_theory;
