@@ -493,7 +493,7 @@ class Weighing {
   }
 
   void weigh_device(const Passage& passage) {
-    const double off = 2.0 * known_.plan.robustness.unknowns.lumen;
+    const double off = 2.0 * known_.wall_offset;
     const bool too_wide = passage.device >= passage.max_ratio * passage.lumen;
     const bool surely = passage.device > passage.max_ratio * (passage.lumen + off);
     std::string text = "The narrowest place of the way is " + three_digits(passage.lumen) +

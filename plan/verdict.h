@@ -72,11 +72,13 @@ struct Known {
   std::vector<std::string> angled_wires = {};  // of the catalogue, that the case did not try
   bool yields = true;  // the study's wall; that of scouts and probes does not
   bool moves = false;  // the vessel's cross-sections, also under scouts and probes
+  /// How far the wall may be off, in or out; repeats may move it less (largest_lumen_offset) [mm].
+  double wall_offset = Unknowns{}.lumen;
 };
 
 /// The first of these that holds:
 ///   not feasible        the narrowest place is narrower than a device that was asked for by more
-///                       than the wall's place is unknown (Unknowns::lumen, at both sides); or no
+///                       than the wall's place is unknown (wall_offset, at both sides); or no
 ///                       trial is a plan, and nothing of what follows leaves that open
 ///   unsure              no plan, and: none computed with fine elements came to a clear end (probes
 ///                       count, since what clearly fails in one is not run in full), or more than

@@ -72,14 +72,16 @@ std::vector<std::string> other_angled_wires(const plan::Study& study) {
   return names;
 }
 
-plan::Verdict decide(const Workspace& work, const ReportInput& report) {
-  plan::Known known{.study = report.study,
-                    .plan = report.plan,
-                    .judgement = report.judgement,
-                    .limits = work.given().limits,
-                    .angled_wires = other_angled_wires(report.study),
-                    .yields = work.given().wall.elastic,
-                    .moves = work.given().wall.support.has_value()};
+plan::Verdict decide(Workspace& work, const ReportInput& report) {
+  plan::Known known{
+      .study = report.study,
+      .plan = report.plan,
+      .judgement = report.judgement,
+      .limits = work.given().limits,
+      .angled_wires = other_angled_wires(report.study),
+      .yields = work.given().wall.elastic,
+      .moves = work.given().wall.support.has_value(),
+      .wall_offset = plan_options(work, plan::PlanOptions::Until::kEnd).robustness.unknowns.lumen};
   if (work.has("anatomy")) known.way = way_findings(anatomy_json(report));
   return plan::find_verdict(known);
 }
