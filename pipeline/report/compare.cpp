@@ -52,11 +52,18 @@ std::string name_of(const Json& report) {
   return name;
 }
 
+/// Whether its end hangs on how it is computed, or may not be in the target: such plans stand
+/// behind all others of a report. Reports from before did not tell it.
+bool is_unsure(const Json& plan) {
+  return plan.value("sensitive", Json()) == true || plan.value("tip_unsure", Json()) == true;
+}
+
 std::string describe_way(const Json& plan) {
   return describe_tools(plan) +
          format(", %g/%g/%g deg", plan.at("inclination_deg").get<double>(),
                 plan.at("azimuth_deg").get<double>(), plan.at("roll_deg").get<double>()) +
-         (plan.value("script", "").empty() ? "" : ", with moves");
+         (plan.value("script", "").empty() ? "" : ", with moves") +
+         (is_unsure(plan) ? ", end unsure" : "");
 }
 
 std::vector<std::string> plan_cells(const Json& report, const Json& plan) {
@@ -82,7 +89,12 @@ std::string list_reports(const std::vector<Json>& reports) {
         format("%zu", k + 1), name_of(reports[k]), answer_of(reports[k]),
         format("%zu/%zu", ranking.size(), reports[k].at("trials").size())};
     if (ranking.empty()) {
-      row.insert(row.end(), {"none reaches", "-", "-", "-", "-", "-"});
+      const Json& trials = reports[k].at("trials");
+      const bool reached = std::any_of(trials.begin(), trials.end(), [](const Json& trial) {
+        return trial.value("reached", false);
+      });
+      row.insert(row.end(),
+                 {reached ? "none within limits" : "none reaches", "-", "-", "-", "-", "-"});
     } else {
       const std::vector<std::string> cells = plan_cells(reports[k], ranking.front());
       row.insert(row.end(), cells.begin(), cells.end());
@@ -139,19 +151,20 @@ double expected_success_rate(const Json& plan) {
 
 std::string list_best_plans(const std::vector<Json>& reports) {
   struct Place {
-    double failed, score;  // that order plans within a report
+    bool unsure;  // these three order plans within a report
+    double failed, score;
     std::size_t report, rank;
   };
   std::vector<Place> places;
   for (std::size_t k = 0; k < reports.size(); ++k) {
     const Json& ranking = reports[k].at("ranking");
     for (std::size_t r = 0; r < ranking.size(); ++r)
-      places.push_back(
-          {1.0 - expected_success_rate(ranking[r]), ranking[r].at("expected_score"), k, r});
+      places.push_back({is_unsure(ranking[r]), 1.0 - expected_success_rate(ranking[r]),
+                        ranking[r].at("expected_score"), k, r});
   }
   std::sort(places.begin(), places.end(), [](const Place& a, const Place& b) {
-    return std::tie(a.failed, a.score, a.report, a.rank) <
-           std::tie(b.failed, b.score, b.report, b.rank);
+    return std::tie(a.unsure, a.failed, a.score, a.report, a.rank) <
+           std::tie(b.unsure, b.failed, b.score, b.report, b.rank);
   });
   if (places.size() > kPlansListed) places.resize(kPlansListed);
 
@@ -197,6 +210,11 @@ std::string compare_reports(const std::vector<std::filesystem::path>& files) {
        {"/limits", "/ranking/weights", "/ranking/script_weights", "/target/radius_mm"}) {
     if (agree(reports, pointer)) continue;
     text += std::string("Scores are not comparable: ") + (pointer + 1) + " differs.\n";
+  }
+  const auto has_catheters = [](const Json& report) { return report.contains("catheters"); };
+  const auto with = std::count_if(reports.begin(), reports.end(), has_catheters);
+  if (with > 0 && with < std::ssize(reports)) {
+    text += "Scores are not comparable: of cases with catheters they have more components.\n";
   }
   for (const char* pointer : {"/robustness", "/friction", "/friction_factor", "/wall"}) {
     if (agree(reports, pointer)) continue;

@@ -98,6 +98,21 @@ TEST_F(Compare, PutsPlansFirstThatAreSafeMoreOften) {
   EXPECT_LT(text.find("soft, 10/90/0 deg", list), text.find("stiff, 10/90/0 deg", list)) << text;
 }
 
+TEST_F(Compare, PutsPlansLastWhoseEndIsUnsureAsAReportDoes) {
+  for (const char* key : {"sensitive", "tip_unsure"}) {
+    Json unsure = report_of("soft", 0.2);
+    unsure["ranking"][0][key] = true;
+    Json sure = report_of("stiff", 0.3);
+    for (const char* each : {"sensitive", "tip_unsure"}) sure["ranking"][0][each] = false;
+    const std::string text = compared({unsure, sure});
+    const std::size_t list = text.find("Their best plans");
+    ASSERT_NE(list, std::string::npos);
+    EXPECT_LT(text.find("stiff, 10/90/0 deg", list), text.find("soft, 10/90/0 deg", list)) << text;
+    EXPECT_TRUE(has(text, "soft, 10/90/0 deg, end unsure  ")) << text;
+    EXPECT_TRUE(has(text, "stiff, 10/90/0 deg  ")) << text;
+  }
+}
+
 TEST_F(Compare, PutsAWireOfManyPatientsInOneRow) {
   const std::string text =
       compared({report_of("soft", 0.4), report_of("soft", 0.6, "b"), report_of("soft", 0.5, "c")});
@@ -113,6 +128,12 @@ TEST_F(Compare, SaysWhereScoresCannotBeCompared) {
   const std::string text = compared({report_of("soft", 0.4), other});
   EXPECT_TRUE(has(text, "Scores are not comparable: ranking/weights differs.")) << text;
   EXPECT_TRUE(has(text, "Mind that friction differs.")) << text;
+
+  Json with_catheters = report_of("stiff", 0.3);
+  with_catheters["catheters"] = Json::object();
+  const std::string of_scripts = "Scores are not comparable: of cases with catheters";
+  EXPECT_TRUE(has(compared({report_of("soft", 0.4), with_catheters}), of_scripts));
+  EXPECT_FALSE(has(compared({with_catheters, with_catheters}), of_scripts));
 }
 
 TEST_F(Compare, TellsOfAReportWithoutPlansAndRefusesWhatIsNone) {
@@ -121,6 +142,8 @@ TEST_F(Compare, TellsOfAReportWithoutPlansAndRefusesWhatIsNone) {
   none["wires"][0]["best_trial"] = nullptr;
   none["wires"][0]["median_peak_contact_force_n"] = nullptr;
   EXPECT_TRUE(has(compared({report_of("soft", 0.4), none}), "none reaches"));
+  none["trials"][1]["reached"] = true;
+  EXPECT_TRUE(has(compared({report_of("soft", 0.4), none}), "none within limits"));
   write_text("{\"schema\": \"wireplan.case/1\"}", folder_ / "case.json");
   EXPECT_THROW(compare_reports({folder_ / "0.json", folder_ / "case.json"}), Error);
 }
