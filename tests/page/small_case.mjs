@@ -58,7 +58,7 @@ export const runSmallMoving = (program, folder) => run(program, folder, smallCas
   target: {point_mm: [0, 0, 45]},
   wall: {support_kpa_per_mm: 0.05},
   wires: [wire("stiff", 400)],
-  robustness: {repeats: 0},
+  robustness: {repeats: 2},
 }));
 
 /** From both ends of the tube to two places between. */

@@ -351,6 +351,8 @@ if (!given.length) {
     assert.match(await state.textContent(), /the vessel moved by 0/);
     const told = await page.locator("#motion tbody tr").allTextContents();
     assert.ok(told.some((row) => row.startsWith("Length of the way")), told.join("; "));
+    const unknowns = await page.locator("#uncertain tbody tr").allTextContents();
+    assert.ok(unknowns.some((row) => /^Support of the vesseltimes 0\.1 to 10, in 2 repeats/.test(row)), unknowns.join("; "));
     assert.deepEqual(faults, []);
     await close();
   });

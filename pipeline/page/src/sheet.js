@@ -25,6 +25,7 @@ const kUnknowns = {
   angle: "angle of the introducer",
   entry: "place of entry",
   lumen: "width of the lumen",
+  support: "support of the vessel",
 };
 
 const two = (value) => number(Number(value.toPrecision(2)));

@@ -104,6 +104,7 @@ const unknownRows = ({robustness, vessel, catheters}) => {
     angle: ["Angle of the introducer", `\u00b1\u00a0${degrees(unknowns.angle_deg)}`],
     entry: ["Place of entry", `\u00b1\u00a0${number(unknowns.entry_mm)}\u00a0mm`],
     lumen: ["Width of the lumen", `wall moved by \u00b1\u00a0${number(unknowns.lumen_mm)}\u00a0mm`],
+    ...(unknowns.support_factor ? {support: ["Support of the vessel", `times ${unknowns.support_factor.map(number).join(" to ")}`]} : {}),
   };
   const shares = new Map((sensitivity?.shares ?? []).map(({unknown, share}) => [unknown, share]));
   return Object.entries(names).map(([key, [title, range]]) =>
