@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "plan/anatomy/passage.h"
@@ -53,16 +54,22 @@ Json low_median_high(std::vector<double> values) {
 /// Of one number of each branch's row under a key, over the repeats that have the row.
 void put_spreads(const std::vector<Json>& repeats, const char* key,
                  const std::vector<const char*>& numbers, Json& into) {
+  std::vector<std::pair<Json, std::vector<Json>>> branches;  // name and rows, as first told
+  for (const Json& repeat : repeats) {
+    for (const Json& row : repeat.at(key)) {
+      const Json& name = row.at("branch");
+      auto own = std::find_if(branches.begin(), branches.end(),
+                              [&](const auto& other) { return other.first == name; });
+      if (own == branches.end()) own = branches.emplace(own, name, std::vector<Json>());
+      own->second.push_back(row);
+    }
+  }
   into[key] = Json::array();
-  for (const Json& row : repeats.front().at(key)) {
-    Json spreads = {{"branch", row.at("branch")}};
+  for (const auto& branch : branches) {
+    Json spreads = {{"branch", branch.first}};
     for (const char* number : numbers) {
       std::vector<double> values;
-      for (const Json& repeat : repeats) {
-        for (const Json& same : repeat.at(key)) {
-          if (same.at("branch") == row.at("branch")) values.push_back(same.at(number));
-        }
-      }
+      for (const Json& row : branch.second) values.push_back(row.at(number));
       spreads[number] = low_median_high(std::move(values));
     }
     into[key].push_back(std::move(spreads));

@@ -18,7 +18,8 @@ Json motion_json(const simulate::Way& way, const simulate::SectionChain& chain,
                  const Eigen::Matrix3Xd& u, const plan::ArmLimits& arm, bool axes_known);
 
 /// Of a plan's repeats under disturbances, each as motion_json() tells it, at least one: medians
-/// and the bounds of the central 90 %.
+/// and the bounds of the central 90 %. Of a turn that some repeats undo it is that of the others;
+/// rows are those of any, so they are found by their branch and not by their place.
 Json motion_spread_json(const std::vector<Json>& repeats);
 
 }  // namespace wireplan::pipeline

@@ -147,6 +147,12 @@ TEST(VesselMotion, SpreadIsThatOfTheRepeats) {
   EXPECT_NEAR(shift.at("high"), 2.9, 1e-12);
   EXPECT_EQ(spread.at("ostia")[0].at("branch"), repeats[0].at("ostia")[0].at("branch"));
   EXPECT_NEAR(spread.at("turns").at(0).at("moved_deg").at("median"), 90.0, 0.1);
+
+  // A turn that the first repeat undoes is that of the others.
+  repeats[0].at("turns") = Json::array();
+  const Json fewer = motion_spread_json(repeats);
+  ASSERT_EQ(fewer.at("turns").size(), 1u);
+  EXPECT_EQ(fewer.at("turns")[0].at("branch"), spread.at("turns")[0].at("branch"));
 }
 
 }  // namespace

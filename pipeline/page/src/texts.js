@@ -196,14 +196,15 @@ export const motionSection = ({report: {vessel_motion: motion}}) => {
   const view = (v) => (v ? `${side(v.rotation_deg, "LAO", "RAO")}, ${side(v.tilt_deg, "CRA", "CAU")}` : "\u2013");
   const rowsOf = (trial) => {
     const over = trial.under_disturbances;
+    const overTurn = ({branch}) => over?.turns.find((row) => row.branch === branch);
     return [
       [`Largest shift, at ${place(trial.most_at_mm)}`, "\u2013", inMm(trial.most_mm), spread(over?.most_mm, "\u00a0mm")],
       ["Length of the way", inMm(trial.way_length_mm), inMm(trial.moved_way_length_mm), spread(over?.moved_way_length_mm, "\u00a0mm")],
       ...trial.ostia.map((row, k) => [name(`Shift of the ostium of ${shown(row.branch)}`), "\u2013", inMm(row.shift_mm), spread(over?.ostia[k]?.shift_mm, "\u00a0mm")]),
-      ...trial.turns.flatMap((row, k) => [
-        [name(`Turn into ${shown(row.branch)}`), inDegrees(row.at_rest_deg), inDegrees(row.moved_deg), spread(over?.turns[k]?.moved_deg, "\u00b0")],
-        [name(`From the access to ${shown(row.branch)}`), inMm(row.from_access_mm), inMm(row.moved_from_access_mm), spread(over?.turns[k]?.moved_from_access_mm, "\u00a0mm")],
-        [name(`C-arm there: the line of sight changes by ${inDegrees(row.view_change_deg)}`), view(row.view_at_rest), view(row.view_moved), spread(over?.turns[k]?.view_change_deg, "\u00b0 of change")],
+      ...trial.turns.flatMap((row) => [
+        [name(`Turn into ${shown(row.branch)}`), inDegrees(row.at_rest_deg), inDegrees(row.moved_deg), spread(overTurn(row)?.moved_deg, "\u00b0")],
+        [name(`From the access to ${shown(row.branch)}`), inMm(row.from_access_mm), inMm(row.moved_from_access_mm), spread(overTurn(row)?.moved_from_access_mm, "\u00a0mm")],
+        [name(`C-arm there: the line of sight changes by ${inDegrees(row.view_change_deg)}`), view(row.view_at_rest), view(row.view_moved), spread(overTurn(row)?.view_change_deg, "\u00b0 of change")],
       ]),
     ];
   };
