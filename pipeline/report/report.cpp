@@ -26,6 +26,7 @@ constexpr const char* kRigidScout = "the wall of a scout or a probe is rigid";
 constexpr const char* kNoDents = "the wall of a scout or a probe takes no dents";
 constexpr const char* kNotRefined = "only the first plans and those tied with the best are refined";
 std::string no_repeats(const ReportInput& input) {
+  if (input.plan.robustness.repeats == 0) return "no plan is repeated";
   const std::string text = "only the best plans are repeated, and the best of each wire";
   return input.study.catheters.empty() ? text : text + " and of each catheter";
 }
@@ -34,11 +35,11 @@ bool is_rigid(const ReportInput& input) {
   return input.parameters.at("wall").at("model") == "rigid";
 }
 
-Json limits_of_validity(const ReportInput& input) {
 bool moves(const ReportInput& input) {
   return input.parameters.at("wall").contains("support_kpa_per_mm");
 }
 
+Json limits_of_validity(const ReportInput& input) {
   const auto& wires = input.study.wires;
   const bool smooth = std::all_of(wires.begin(), wires.end(), [&](const simulate::Wire& wire) {
     return simulate::friction_of(wire, input.study.insertion) == 0.0;

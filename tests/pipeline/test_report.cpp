@@ -486,6 +486,7 @@ TEST(Report, RanksWithoutRepeatsWhereTheCaseAsksForNone) {
       run_to_report(folder / "case.json", folder / "cache", 0, {"robustness.repeats=0"});
   ASSERT_FALSE(report.at("ranking").empty());
   EXPECT_TRUE(report.at("ranking")[0].at("success_rate").is_null());
+  EXPECT_EQ(report.at("ranking")[0].at("null_reasons").at("success_rate"), "no plan is repeated");
   EXPECT_TRUE(report.at("robustness").at("plans").empty());
   expect_valid(report, folder.path());
 }
