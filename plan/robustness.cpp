@@ -3,6 +3,7 @@
 #include <Eigen/Geometry>
 #include <Eigen/QR>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <map>
 #include <numeric>
@@ -83,9 +84,14 @@ struct Predictor {
   std::vector<std::vector<double>> columns;
 };
 
-/// Those that act on plans of the wire.
+/// A plan's tools: those of two plans with the same are the same unknowns.
+std::array<int, 3> tools_in(const Candidate& candidate) {
+  return {candidate.wire, candidate.catheter, candidate.first_wire};
+}
+
+/// Those that act on the plan of a candidate.
 std::vector<Predictor> list_predictors(const std::vector<Disturbance>& disturbances,
-                                       const Study& study, int wire) {
+                                       const Study& study, const Candidate& candidate) {
   std::vector<Predictor> predictors = {{"friction", {}}, {"stiffness", {}}, {"wall", {}},
                                        {"angle", {}},    {"entry", {}},     {"lumen", {}},
                                        {"support", {}}};
@@ -95,17 +101,22 @@ std::vector<Predictor> list_predictors(const std::vector<Disturbance>& disturban
     const auto [low, high] = std::minmax_element(column.begin(), column.end());
     if (low != column.end() && *low < *high) predictors[k].columns.push_back(find_ranks(column));
   };
-  const auto k = static_cast<std::size_t>(wire);
-  if (!study.spreads.empty()) {
-    const WireSpread& spread = study.spreads[k];
-    const bool rubs = simulate::friction_of(study.wires[k], study.insertion) > 0.0;
-    if (rubs && !spread.friction.known()) {
-      add(0, [](const Disturbance& d) { return d.friction; });
-    }
-    if (!spread.stiffness_known()) {
-      add(1, [k](const Disturbance& d) { return d.stiffness.empty() ? 0.5 : d.stiffness[k]; });
-    }
+  bool rubs = false;
+  const auto add_tool = [&](const simulate::Wire& tool, const WireSpread& spread, auto part) {
+    rubs = rubs || (simulate::friction_of(tool, study.insertion) > 0.0 && !spread.friction.known());
+    if (!spread.stiffness_known()) add(1, part);
+  };
+  for (const int wire : wires_of(candidate)) {
+    const auto k = static_cast<std::size_t>(wire);
+    if (study.spreads.empty()) break;
+    add_tool(study.wires[k], study.spreads[k],
+             [k](const Disturbance& d) { return d.stiffness.empty() ? 0.5 : d.stiffness[k]; });
   }
+  if (candidate.catheter >= 0) {
+    const Catheter& round = study.catheters[static_cast<std::size_t>(candidate.catheter)];
+    add_tool(round.tool.wire, round.spread, [](const Disturbance& d) { return d.tube; });
+  }
+  if (rubs) add(0, [](const Disturbance& d) { return d.friction; });
   add(2, [](const Disturbance& d) { return d.wall_factor; });
   for (const int axis : {0, 1}) {
     add(3, [axis](const Disturbance& d) { return d.tilt[axis]; });
@@ -417,16 +428,15 @@ Sensitivity find_sensitivity(const std::vector<Disturbance>& disturbances,
                              const std::vector<RepeatedPlan>& plans, const Study& study,
                              const std::vector<Candidate>& candidates) {
   std::vector<RepeatedPlan> repeated;
-  std::map<int, std::vector<Predictor>> predictors;  // by wire
+  std::map<std::array<int, 3>, std::vector<Predictor>> predictors;  // by tools
   Eigen::Index columns = 0;
   for (const RepeatedPlan& plan : plans) {
     if (plan.repeats.size() != disturbances.size()) continue;
     repeated.push_back(plan);
-    const int wire = candidates.at(static_cast<std::size_t>(plan.trial)).wire;
-    if (predictors.count(wire) == 0) {
-      predictors[wire] = list_predictors(disturbances, study, wire);
-    }
-    columns = std::max(columns, count_columns(predictors[wire]));
+    const Candidate& candidate = candidates.at(static_cast<std::size_t>(plan.trial));
+    std::vector<Predictor>& own = predictors[tools_in(candidate)];
+    if (own.empty()) own = list_predictors(disturbances, study, candidate);
+    columns = std::max(columns, count_columns(own));
   }
   Sensitivity result;
   const auto count = static_cast<Eigen::Index>(disturbances.size());
@@ -439,9 +449,9 @@ Sensitivity find_sensitivity(const std::vector<Disturbance>& disturbances,
     result.reason = "at least " + std::to_string(columns + 3) + " repeats are needed";
   }
   if (!result.reason.empty()) return result;
-  std::map<int, Regression> regressions;
-  for (auto& [wire, own] : predictors) {
-    if (count_columns(own) > 0) regressions.emplace(wire, Regression(std::move(own)));
+  std::map<std::array<int, 3>, Regression> regressions;
+  for (auto& [tools, own] : predictors) {
+    if (count_columns(own) > 0) regressions.emplace(tools, Regression(std::move(own)));
   }
 
   // Each plan's score over the mean of all in the same repeat, on the unknowns.
@@ -461,7 +471,8 @@ Sensitivity find_sensitivity(const std::vector<Disturbance>& disturbances,
     const double variance = (values.array() - values.mean()).square().sum();
     const Eigen::VectorXd y = standardised(find_ranks(differences));
     if (y.norm() == 0.0 || variance == 0.0) continue;
-    const auto own = regressions.find(candidates.at(static_cast<std::size_t>(plan.trial)).wire);
+    const auto own =
+        regressions.find(tools_in(candidates.at(static_cast<std::size_t>(plan.trial))));
     moved += variance;
     unexplained += variance * (own == regressions.end() ? y.squaredNorm()
                                                         : own->second.add(y, variance, squares));

@@ -132,9 +132,11 @@ struct Sensitivity {
 ///   1. What moves the order is how far each plan's score is from the mean of all plans in the same
 ///      repeat.
 ///   2. For each plan the ranks of these differences over the repeats are regressed on the
-///      unknowns' ranks. Of friction and EI it is its own wire's, where they have a spread.
-///   3. An unknown's share is the sum of its squared coefficients (of both directions, where it has
-///      two) over all plans, each weighted by how much its differences vary.
+///      unknowns' ranks. Of friction and EI it is that of its own wires and catheter, where they
+///      have a spread.
+///   3. An unknown's share is the sum of its squared coefficients (of both directions, or of each
+///      tool's EI, where it has several) over all plans, each weighted by how much its differences
+///      vary.
 /// Plans with fewer repeats than there are disturbances are left out.
 Sensitivity find_sensitivity(const std::vector<Disturbance>& disturbances,
                              const std::vector<RepeatedPlan>& plans, const Study& study,

@@ -65,22 +65,26 @@ std::array<double, 2> bounds_of(const plan::FactorSpread& spread) {
   return {spread.at(cut), spread.at(1.0 - cut)};
 }
 
-// Of friction and of EI: those of each wire, and the widest of all.
+// Of friction and of EI: those of each wire, and the widest of all, catheters too.
 void put_wire_unknowns(const plan::Study& study, Json& unknowns) {
   std::array<double, 2> friction = {1.0, 1.0}, stiffness = {1.0, 1.0};
   const auto widen = [](std::array<double, 2>& all, const std::array<double, 2>& own) {
     all = {std::min(all[0], own[0]), std::max(all[1], own[1])};
   };
+  const auto widen_by = [&](const plan::WireSpread& spread) {
+    widen(friction, bounds_of(spread.friction));
+    for (const auto& ends : spread.stiffness) {
+      for (const plan::FactorSpread& end : ends) widen(stiffness, bounds_of(end));
+    }
+  };
+  for (const plan::Catheter& catheter : study.catheters) widen_by(catheter.spread);
   Json wires = Json::array();
   for (std::size_t k = 0; k < study.spreads.size(); ++k) {
     const plan::WireSpread& spread = study.spreads[k];
     const std::array<double, 2> own = bounds_of(spread.friction);
     std::array<double, 2> shaft = {1.0, 1.0};
     if (!spread.stiffness.empty()) shaft = bounds_of(spread.stiffness.back()[1]);
-    widen(friction, own);
-    for (const auto& ends : spread.stiffness) {
-      for (const plan::FactorSpread& end : ends) widen(stiffness, bounds_of(end));
-    }
+    widen_by(spread);
     wires.push_back({{"wire", study.wires[k].name},
                      {"friction", simulate::friction_of(study.wires[k], study.insertion)},
                      {"friction_factor", own},
