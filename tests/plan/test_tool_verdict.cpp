@@ -125,6 +125,69 @@ TEST(Verdict, TellsTheScriptsThatWereSearched) {
   EXPECT_FALSE(tells(bench.verdict().reasons, "may have been missed"));
   bench.add_many(5, Outcome::kLeftImage);  // leaves it open, and so it stays
   EXPECT_EQ(bench.verdict().answer, Answer::kUnsure);
+Catheter curved(const std::string& name, double angle) {
+  Catheter catheter;
+  catheter.tool.wire = {
+      .name = name,
+      .radius = 0.83,
+      .sections = {{.length = 10.0 * angle, .bending_stiffness = 99.0, .rest_curvature = 0.1},
+                   {.length = 600.0, .bending_stiffness = 332.0}}};
+  return catheter;
+}
+
+TEST(Verdict, OfCathetersThatDoNotReachSaysWhatStopsThemAndWhichAreLeft) {
+  WhatIsKnown bench;
+  bench.add_many(9, Outcome::kPassedBy);
+  bench.study.catheters = {curved("cobra", 1.5), curved("short", 1.5)};
+  std::vector<PairFindings>& pairs = bench.plan.scripts.pairs;
+  pairs.resize(2);
+  pairs[0].pair = {.catheter = 0, .wire = 0};
+  pairs[0].nearest_hook = 9.66;
+  pairs[0].stopped = "it turns aside";
+  pairs[1].pair = {.catheter = 1, .wire = 0, .unfit = "catheter too short"};
+  const Verdict verdict = bench.verdict();
+  EXPECT_TRUE(tells(verdict.reasons,
+                    "No script of cobra with straight reaches: it turns aside; the catheter's tip "
+                    "came no nearer to the ostium than 9.7 mm."));
+  bench.study.wires.emplace_back().name = "soft";
+  pairs[0].exchange = {.first_wire = 1, .found = 0, .held = 0.0, .stopped = "it falls out"};
+  EXPECT_TRUE(tells(bench.verdict().reasons,
+                    "came no nearer to the ostium than 9.7 mm; nor does it in exchange for soft "
+                    "through the placed catheter: it falls out."));
+  pairs[0].exchange.stopped.clear();
+  EXPECT_FALSE(tells(bench.verdict().reasons, "No script of cobra")) << "brought in so, it reaches";
+  EXPECT_TRUE(tells(verdict.reasons, "Not tried was short with straight: catheter too short."));
+  EXPECT_TRUE(
+      tells(verdict.changes,
+            "A catheter of another shape: all 9 trials went past the branch, though cobra was "
+            "tried; a simple curve and a reversed curve were not."));
+  pairs.erase(pairs.begin());
+  EXPECT_TRUE(tells(bench.verdict().changes, "short could not be tried (catheter too short)."));
+  bench.study.catheters = {curved("cobra", 1.5), curved("vertebral", 0.8), curved("sos", 4.0)};
+  pairs.clear();
+  for (int k = 0; k < 3; ++k) {
+    pairs.emplace_back().pair = {.catheter = k, .wire = 0};
+    pairs.back().furthest = 9.0;
+  }
+  EXPECT_TRUE(tells(bench.verdict().changes,
+                    "Another access, or a catheter of another width: all 9 trials went past the "
+                    "branch, though cobra, vertebral and sos were tried."));
+}
+
+TEST(Verdict, CountsThePairsThatItDoesNotName) {
+  WhatIsKnown bench;
+  bench.add_many(2, Outcome::kPassedBy);
+  bench.study.catheters.assign(6, curved("short", 1.5));
+  for (int k = 0; k < 6; ++k) {
+    PairFindings& pair = bench.plan.scripts.pairs.emplace_back();
+    pair.pair = {.catheter = k, .wire = 0, .unfit = "catheter too short"};
+    const Verdict verdict = bench.verdict();
+    EXPECT_EQ(tells(verdict.reasons, "1 other pair of catheter and wire was not tried"), k == 4);
+    EXPECT_EQ(tells(verdict.reasons, "2 other pairs of catheter and wire were not tried"), k == 5);
+  }
+  EXPECT_TRUE(tells(bench.verdict().reasons, "Both trials passed by the branch."));
+}
+
 }
 
 }  // namespace
