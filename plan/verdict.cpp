@@ -283,16 +283,20 @@ class Weighing {
     }
     if (m.wall_motion.beyond_linear_theory()) {
       find(Answer::kFeasibleWithRisk,
-           "The wall moves " + two_digits(m.wall_motion.displacement) +
-               " mm where the vessel's radius is " + two_digits(m.wall_motion.radius) +
-               " mm, more than the " + two_digits(kLinearWallPart) +
+           (known_.moves ? "The wall is dented by " : "The wall moves ") +
+               two_digits(m.wall_motion.displacement) + " mm where the vessel's radius is " +
+               two_digits(m.wall_motion.radius) + " mm, more than the " +
+               two_digits(kLinearWallPart) +
                " of the radius that its model holds for: forces there are rough.");
       const auto merit = [&](const RankedPlan& other) {
         const WallMotion& motion = trial(other.trial).metrics.wall_motion;
         return motion.beyond_linear_theory() ? "" : two_digits(motion.displacement) + " mm";
       };
-      if (!offer_other(first, "the wall moves at most ", merit)) {
-        change("A softer wire, which moves the wall less.");
+      const std::string dents = known_.moves ? "dents" : "moves";
+      if (!offer_other(first,
+                       known_.moves ? "dents of the wall at most " : "the wall moves at most ",
+                       merit)) {
+        change("A softer wire, which " + dents + " the wall less.");
       }
     }
     weigh_length(first);

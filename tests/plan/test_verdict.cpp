@@ -194,6 +194,10 @@ TEST(Verdict, AWallMovedBeyondItsModelIsARisk) {
   EXPECT_TRUE(tells(bench.verdict().reasons, "The wall moves 1.2 mm where"));
   EXPECT_EQ(bench.verdict().changes,
             std::vector<std::string>{"A softer wire, which moves the wall less."});
+  bench.moves = true;  // as a whole too, by more
+  EXPECT_TRUE(tells(bench.verdict().reasons, "The wall is dented by 1.2 mm where"));
+  EXPECT_TRUE(tells(bench.verdict().changes, "A softer wire, which dents the wall less."));
+  bench.moves = false;
 
   // Rather another plan, where it is known to hold.
   bench.add(Outcome::kReached).peak_contact_force = 0.3;  // behind the first
