@@ -14,11 +14,22 @@ namespace {
 
 using simulate::kBothTools;
 
+/// The aorta with its renal arteries, whose wall does not yield.
+PlanVessel rigid_aorta(const Study& study) {
+  const auto model = []() -> const simulate::VesselModel& { return aorta(); };
+  return {.path = study.goal.way->path(), .yields = false, .model = model, .rigid_model = model};
+}
+
+PlanOptions all_repeats_for_the_first() {
+  PlanOptions options;
+  options.robustness.plans = 1;
+  options.robustness.repeats = 16;
+  return options;
+}
+
 TEST(ToolRuns, ThatBeginAlikeComeToTheSameTogetherAndAlone) {
   const Study study = toward(1.0);
-  const auto model = []() -> const simulate::VesselModel& { return aorta(); };
-  const PlanVessel vessel{
-      .path = study.goal.way->path(), .yields = false, .model = model, .rigid_model = model};
+  const PlanVessel vessel = rigid_aorta(study);
   RobustnessOptions robustness;
   robustness.repeats = 2;
   const std::vector<Disturbance> disturbances = draw_disturbances(robustness, study.wires);
@@ -109,13 +120,9 @@ class LogOfAWeakFirst : public LogOfRepeats {
 };
 
 TEST(ToolRuns, MakePlanRepeatsOtherScriptsThanTheFirstByScore) {
-  const auto model = []() -> const simulate::VesselModel& { return aorta(); };
   const Study study = toward(1.0);
-  const PlanVessel vessel{
-      .path = study.goal.way->path(), .yields = false, .model = model, .rigid_model = model};
-  PlanOptions options;
-  options.robustness.plans = 1;
-  options.robustness.repeats = 16;
+  const PlanVessel vessel = rigid_aorta(study);
+  const PlanOptions options = all_repeats_for_the_first();
   LogOfAWeakFirst log;
   const Plan plan = make_plan(study, vessel, options, log);
   const Ranking ranking = judge(study, plan, {}, {}).ranking;
@@ -132,13 +139,9 @@ TEST(ToolRuns, MakePlanRepeatsOtherScriptsThanTheFirstByScore) {
 }
 
 TEST(ToolRuns, MakePlanRepeatsOthersNoFurtherThanTellsThemFromASteadyFirst) {
-  const auto model = []() -> const simulate::VesselModel& { return aorta(); };
   const Study study = toward(1.0);
-  const PlanVessel vessel{
-      .path = study.goal.way->path(), .yields = false, .model = model, .rigid_model = model};
-  PlanOptions options;
-  options.robustness.plans = 1;
-  options.robustness.repeats = 16;
+  const PlanVessel vessel = rigid_aorta(study);
+  const PlanOptions options = all_repeats_for_the_first();
   LogOfRepeats log(0);
   const Plan plan = make_plan(study, vessel, options, log);
   const Judgement judgement = judge(study, plan, {}, {});
@@ -156,13 +159,11 @@ TEST(ToolRuns, MakePlanRepeatsOthersNoFurtherThanTellsThemFromASteadyFirst) {
 }
 
 TEST(ToolRuns, MakePlanTriesTheNextCathetersWhereNoScriptHoldsInMostRepeats) {
-  const auto model = []() -> const simulate::VesselModel& { return aorta(); };
   Study study = toward(1.0);
   const Catheter hook = study.catheters.front(), wide = catheter_of(650.0, 1.0, 21.0);
   study.catheters = {hook, wide, wide, hook};
   study.suggested.assign(4, "suggested");
-  const PlanVessel vessel{
-      .path = study.goal.way->path(), .yields = false, .model = model, .rigid_model = model};
+  const PlanVessel vessel = rigid_aorta(study);
   PlanOptions options{.until = PlanOptions::Until::kManoeuvres};
   options.robustness.repeats = 4;
   for (const int failures : {0, 1}) {
