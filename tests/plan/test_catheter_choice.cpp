@@ -9,6 +9,7 @@
 
 #include "plan/catheter_choice.h"
 #include "plan/tool_search.h"
+#include "tests/goal.h"
 #include "tests/plan/two_renals.h"
 
 namespace wireplan::plan {
@@ -109,10 +110,7 @@ int count_scripts(double between, double curve, double radius) {
       std::vector<preprocess::Branch>{
           {line_through({{0.0, 0.0, 5.0}, {0.0, 0.0, kTop - 2.0}}), -1, 0.0},
           {line_through({from, from + (out + 14.0) * aside}), 0, kHigh - 5.0}});
-  study.goal = {.point = way->section().center,
-                .radius = way->section().radius,
-                .at_section = true,
-                .way = way};
+  study.goal = simulate::goal_at_end(way);
   study.insertion.length = 300.0;
   const ToolScripts scripts = find_tool_scripts(study, vessel, {.threads = 2});
   const int count = scripts.pairs.at(0).found;

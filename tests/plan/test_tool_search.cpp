@@ -13,6 +13,7 @@
 #include "plan/refine.h"
 #include "plan/tool_neighbours.h"
 #include "plan/tool_search.h"
+#include "tests/goal.h"
 #include "tests/plan/memory_log.h"
 #include "tests/plan/two_renals.h"
 
@@ -319,8 +320,7 @@ TEST(ToolNeighbours, ComeToTheSameAsWhenMadeOneByOne) {
   const Study study = tool_scout_study(toward(1.0));
   const auto way =
       std::make_shared<simulate::Way>(line_through({{0.0, 0.0, 5.0}, {0.0, 0.0, 100.0}}));
-  const simulate::Goal goal{
-      .point = way->section().center, .radius = kAorta, .at_section = true, .way = way};
+  const simulate::Goal goal = simulate::goal_at_end(way);
   const Candidate candidate = first_candidate(study, {});
   const auto trial = [&] {
     return simulate::ToolTrial(tools_of(study, candidate), make_introducer(study, candidate), goal,

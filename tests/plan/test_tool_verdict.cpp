@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "plan/tool_starts.h"
+#include "tests/goal.h"
 #include "tests/plan/known_plans.h"
 #include "tests/plan/two_renals.h"
 
@@ -20,10 +21,7 @@ simulate::Goal goal_below(double top) {
       std::vector<preprocess::Branch>{
           {line_through({{0.0, 0.0, 5.0}, {0.0, 0.0, top}}), -1, 0.0},
           {line_through({{0.0, 0.0, kLevel}, {44.0, 0.0, kLevel}}), 0, kLevel - 5.0}});
-  return {.point = way->section().center,
-          .radius = way->section().radius,
-          .at_section = true,
-          .way = way};
+  return simulate::goal_at_end(way);
 }
 
 /// Ten trials that end so, and a pair whose catheter's tip came so near to the ostium.
@@ -125,6 +123,8 @@ TEST(Verdict, TellsTheScriptsThatWereSearched) {
   EXPECT_FALSE(tells(bench.verdict().reasons, "may have been missed"));
   bench.add_many(5, Outcome::kLeftImage);  // leaves it open, and so it stays
   EXPECT_EQ(bench.verdict().answer, Answer::kUnsure);
+}
+
 Catheter curved(const std::string& name, double angle) {
   Catheter catheter;
   catheter.tool.wire = {
@@ -186,8 +186,6 @@ TEST(Verdict, CountsThePairsThatItDoesNotName) {
     EXPECT_EQ(tells(verdict.reasons, "2 other pairs of catheter and wire were not tried"), k == 5);
   }
   EXPECT_TRUE(tells(bench.verdict().reasons, "Both trials passed by the branch."));
-}
-
 }
 
 }  // namespace

@@ -13,6 +13,7 @@
 #include "plan/robustness.h"
 #include "plan/settings.h"
 #include "plan/wire_exchange.h"
+#include "tests/goal.h"
 #include "tests/plan/two_renals.h"
 
 namespace wireplan::plan {
@@ -131,10 +132,7 @@ Study into_the_oblique_branch() {
       std::vector<preprocess::Branch>{
           {line_through({low, {0.0, 0.0, kTop - 2.0}}), -1, 0.0},
           {line_through({from, from + (kOut + 14.0) * kAside}), 0, kHigh - 5.0}});
-  study.goal = {.point = way->section().center,
-                .radius = way->section().radius,
-                .at_section = true,
-                .way = way};
+  study.goal = simulate::goal_at_end(way);
   study.insertion.length = 300.0;
   return study;
 }

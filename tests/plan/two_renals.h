@@ -6,6 +6,7 @@
 
 #include "plan/candidates.h"
 #include "simulate/insertion/way.h"
+#include "tests/goal.h"
 #include "tests/shapes.h"
 
 namespace wireplan::plan {
@@ -78,10 +79,7 @@ inline Study toward(double side) {
       std::vector<preprocess::Branch>{{line_through({{0.0, 0.0, 5.0}, {0.0, 0.0, 128.0}}), -1, 0.0},
                                       branch(44.0),
                                       branch(-44.0)});
-  study.goal = {.point = way->section().center,
-                .radius = way->section().radius,
-                .at_section = true,
-                .way = way};
+  study.goal = simulate::goal_at_end(way);
   study.insertion.length = 200.0;
   study.insertion.element_length = 1.5;
   study.insertion.friction = 0.04;

@@ -6,6 +6,7 @@
 #include <memory>
 #include <vector>
 
+#include "tests/goal.h"
 #include "tests/shapes.h"
 #include "tests/simulate/hooked_tools.h"
 
@@ -37,7 +38,7 @@ ToolTrial branched_trial(double EI = 20.0, double arc = 155.0) {
   const std::vector<preprocess::Branch> tree = {
       {path, -1, 0.0}, {line_from(along_branch(0.0), along_branch(79.0), 4.0), 0, 65.0}};
   const auto way = std::make_shared<Way>(path, tree);
-  const Goal goal{.point = way->section().center, .radius = 6.0, .at_section = true, .way = way};
+  const Goal goal = goal_at_end(way);
   ToolTrialOptions options = coarse();
   options.insertion.length = 600.0;
   options.take_off = TakeOff{.arc = arc, .point = Vec3(0.0, 6.0, 5.0 + arc)};

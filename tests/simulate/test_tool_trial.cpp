@@ -7,6 +7,7 @@
 
 #include "preprocess/surface/openings.h"
 #include "simulate/insertion/tool_script.h"
+#include "tests/goal.h"
 #include "tests/shapes.h"
 #include "tests/simulate/hooked_tools.h"
 
@@ -65,7 +66,7 @@ TEST(ToolTrial, TheWireOfACatheterThatStaysOutsideGoesAsTheWireAlone) {
   path.radius = path.radius.head(last).eval();
   path.arc_length = path.arc_length.head(last).eval();
   const auto way = std::make_shared<Way>(path);
-  const Goal goal{.point = way->section().center, .radius = 4.0, .at_section = true, .way = way};
+  const Goal goal = goal_at_end(way);
   ToolTrialOptions options = coarse();
   options.insertion.element_length = 1.0;
   options.insertion.length = 200.0;
@@ -220,7 +221,7 @@ TEST(ToolTrial, AWireThatComesUpInsideTheCatheterIsNotTakenForStuck) {
   // The catheter leads by 90 mm, which is more than the last push is given without progress.
   const auto way =
       std::make_shared<Way>(line_from(Vec3(0.0, 0.0, 5.0), Vec3(0.0, 0.0, 154.0), kAorta));
-  const Goal goal{.point = way->section().center, .radius = kAorta, .at_section = true, .way = way};
+  const Goal goal = goal_at_end(way);
   const TrialResult result =
       run_tool_trial({hooked_catheter(), straight_wire(20.0)}, kUpward, goal, aorta(), coarse(),
                      {{.tool = 1, .push = 116.0},

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "simulate/insertion/trial.h"
+#include "tests/goal.h"
 #include "tests/shapes.h"
 
 namespace wireplan::simulate {
@@ -18,11 +19,7 @@ using preprocess::Branch;
 using shapes::line_through;
 
 Goal goal_of(Centerline path, std::vector<Branch> tree = {}) {
-  const auto way = std::make_shared<Way>(std::move(path), std::move(tree));
-  return {.point = way->section().center,
-          .radius = way->section().radius,
-          .at_section = true,
-          .way = way};
+  return goal_at_end(std::make_shared<Way>(std::move(path), std::move(tree)));
 }
 
 Wire wire_of(double EI) {
