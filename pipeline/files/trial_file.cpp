@@ -297,6 +297,7 @@ std::string trial_text(const plan::Study& study, const plan::Candidate& candidat
     file["steps"] = steps_json(candidate.steps);
     file["tools"] = tracks_to_json(trial.tools);
     file["step"] = trial.steps;
+    if (trial.reshaped) file["reshaped"] = true;
     if (trial.support) {
       file["support"] = {{"push_n", trial.support->push}, {"more", trial.support->more}};
     }
@@ -358,6 +359,7 @@ Json steps_json(const std::vector<simulate::ToolStep>& steps) {
                       {"turn_deg", clean(step.try_turn / kRadPerDeg)}};
     }
     if (step.steers > 0) row["steers"] = step.steers;
+    if (step.side >= 0) row["side_branch"] = step.side + 1;
     if (step.seats) row["seats"] = true;
     list.push_back(std::move(row));
   }
@@ -377,6 +379,7 @@ std::vector<simulate::ToolStep> steps_of(const Json& list) {
                      .at = 0.0});
     simulate::ToolStep& step = steps.back();
     step.steers = row.value("steers", 0);
+    step.side = row.value("side_branch", 0) - 1;
     step.seats = row.value("seats", false);
     if (row.contains("exchange")) {
       step.spare = row.at("exchange").at("wire");
@@ -417,6 +420,7 @@ std::optional<TrialResult> find_trial(const std::filesystem::path& path) {
   if (file.contains("tools")) {
     trial.tools = tracks_from_json(file.at("tools"));
     trial.steps = file.at("step").get<std::vector<int>>();
+    trial.reshaped = file.value("reshaped", false);
     if (file.contains("support")) {
       const Json& support = file.at("support");
       trial.support = {.push = support.at("push_n"), .more = support.at("more")};

@@ -139,6 +139,7 @@ ToolTrial::Mark ToolTrial::save() const {
           .shapes = record_.shapes.size(),
           .step = step_,
           .tries = tries_,
+          .reshaped = record_.reshaped,
           .since_shape = since_shape_,
           .best_distance = best_distance_,
           .start_energy = start_energy_,
@@ -151,6 +152,7 @@ void ToolTrial::restore(const Mark& mark) {
   record_.steps.resize(mark.pushes);
   step_ = mark.step;
   tries_ = mark.tries;
+  record_.reshaped = mark.reshaped;
   record_.shapes.resize(mark.shapes);
   for (ToolTrack& track : record_.tools) {
     for (auto* column : {&track.insertion, &track.roll, &track.push_force, &track.hub_torque,

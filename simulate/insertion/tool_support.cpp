@@ -22,7 +22,7 @@ constexpr double kBitByBit = 2.0;     // that a tip comes back from one press to
 }  // namespace
 
 void ToolTrial::seat(const ToolStep& step) {
-  expects(step.seats && step.tool == 0 && step.push > 0.0);
+  expects(step.seats && step.tool == 0 && step.push != 0.0);
   const bool there = reached();
   if (ended() && !there) return;
   outcome_.reset();

@@ -113,26 +113,39 @@ Vec3 ToolTrial::tip_direction(int tool) const {
   return (nodes.rightCols<1>() - nodes.leftCols<1>()).normalized();
 }
 
-double ToolTrial::measure(Until until, int tool) const {
+/// How far a tip is in that vessel or what leaves it.
+double ToolTrial::depth_in(const SideVessel& side, const Vec3& tip) const {
+  const std::optional<double> arc = find_arc_on(goal_.way->tree(), side.branch, tip);
+  const double depth = arc ? *arc - side.from : -1.0;
+  return depth > 0.0 ? depth : -(tip - side.take_off.point).norm();
+}
+
+double ToolTrial::measure(Until until, int tool, int side) const {
   const double unknown = std::numeric_limits<double>::quiet_NaN();
   if (!options_.take_off || !goal_.way) return unknown;
-  const TakeOff& branch = *options_.take_off;
+  const auto& sides = options_.sides;
+  const auto own = std::find_if(sides.begin(), sides.end(),
+                                [&](const SideVessel& one) { return one.branch == side; });
+  if (side >= 0 && own == sides.end()) return unknown;
+  const TakeOff& branch = side >= 0 ? own->take_off : *options_.take_off;
   const int watched = tool == kBothTools ? 0 : tool;
   if (until == Until::kInBranch) {
+    if (side >= 0) return depth_in(*own, tip(watched));
     return goal_.way->find_progress(tip(watched)) - branch.arc;
   }
   if (until == Until::kLevel) return (tip(watched) - branch.point).dot(branch.trunk);
   const Vec3 looks = tip_direction(watched);
-  const Vec3 side = looks - looks.dot(branch.trunk) * branch.trunk;
+  const Vec3 aside = looks - looks.dot(branch.trunk) * branch.trunk;
   const Vec3 to = branch.branch - branch.branch.dot(branch.trunk) * branch.trunk;
-  if (until == Until::kMade || side.norm() < kLooksAside || to.norm() < kLooksAside) return unknown;
-  return std::atan2(branch.trunk.dot(to.cross(side)), to.dot(side));
+  if (until == Until::kMade || aside.norm() < kLooksAside || to.norm() < kLooksAside)
+    return unknown;
+  return std::atan2(branch.trunk.dot(to.cross(aside)), to.dot(aside));
 }
 
 /// How much of the step is left until what ends it [mm of push, rad of turn]; at most 0 where that
 /// has come. Empty where nothing ends it.
 std::optional<double> ToolTrial::missing(const ToolStep& step) const {
-  const double now = step.until == Until::kMade ? NAN : measure(step.until, step.tool);
+  const double now = step.until == Until::kMade ? NAN : measure(step.until, step.tool, step.side);
   if (!std::isfinite(now)) return {};
   if (step.until == Until::kInBranch) return step.at - now;
   if (step.until == Until::kLevel) return step.push > 0.0 ? step.at - now : now - step.at;
@@ -148,6 +161,7 @@ bool ToolTrial::make(const ToolStep& step, bool last) {
   expects(std::min(step.tries, step.steers) == 0);
   expects(std::max(step.tries, step.steers) == 0 || (step.tool > 0 && step.push > 0.0));
   ++step_;
+  record_.reshaped = record_.reshaped || (step.side >= 0 && step.tool <= 0);
   const TryPlace from = step.tries > 0 ? place_of_try(step.tool) : TryPlace{};
   if (step.spare >= 0) {
     exchange(step);
@@ -449,7 +463,8 @@ void ToolTrial::check_place() {
   if (!near && !preprocess::may_have_left(openings, here)) return;
   const Eigen::Matrix3Xd nodes = bench_.at_rest(bench_.state().x);
   if (const auto before = near ? goal_.way->find_arrival(nodes, vessel_.lumen) : std::nullopt) {
-    const std::optional<std::string> detour = goal_.way->find_detour(nodes.leftCols(*before + 1));
+    const std::optional<std::string> detour =
+        goal_.way->find_detour(nodes.leftCols(*before + 1), record_.reshaped);
     if (detour) {
       return end(Outcome::kAnotherWay,
                  "the tip passes the target" + after +

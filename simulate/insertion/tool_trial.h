@@ -42,6 +42,14 @@ struct TakeOff {
   Vec3 branch = Vec3::UnitX();  // unit, where the branch goes
 };
 
+/// A vessel off the way that tools are led into on purpose, as one in which a reversed curve is
+/// reshaped: a branch of the way's tree, from its own ostium on.
+struct SideVessel {
+  int branch = -1;
+  TakeOff take_off;   // `arc` along the way
+  double from = 0.0;  // of its ostium, along the branch's line                            [mm]
+};
+
 /// What ends a step before the whole of it is made, of the tip of its tool, of several together of
 /// the outermost.
 enum class Until {
@@ -90,6 +98,9 @@ struct ToolStep {
   /// The last of a script, of the outermost tool: made once the others have brought the goal, or
   /// all have been made; it brings none.
   bool seats = false;
+  /// A branch of the way's tree that the options have as a side vessel: what ends the step is seen
+  /// of that one's take-off, in the place of the target's. -1: none.
+  int side = -1;
   bool operator==(const ToolStep&) const = default;
 };
 
@@ -103,6 +114,9 @@ struct ToolTrialOptions {
   /// That take the innermost's place: ToolStep. The goal is theirs: before the first exchange a tip
   /// may pass it.
   std::vector<Wire> spares = {};
+  /// That steps may be seen at. Once the outermost tool has been in one, its knee may lie in the
+  /// trunk beyond the take-off when the target is reached, with its tip below.
+  std::vector<SideVessel> sides = {};
 };
 
 /// Copies go on by themselves from where they were copied.
@@ -127,8 +141,9 @@ class ToolTrial {
   Vec3 foremost_tip() const;
   Vec3 tip_direction(int tool) const;  // unit, onward
   /// What `until` measures of the tip: less in magnitude than `at` comes first. NaN where it cannot
-  /// be told, as without a take-off.
-  double measure(Until until, int tool) const;
+  /// be told, as without a take-off. Of a side vessel where one is given; of a tip that is not in
+  /// it kInBranch is the distance from its ostium, negative.
+  double measure(Until until, int tool, int side = -1) const;
   const std::vector<Push>& pushes() const { return record_.pushes; }
 
   /// So far the last step may bring the foremost tip, in the place of what the options say [mm].
@@ -152,6 +167,7 @@ class ToolTrial {
     ToolBench::Mark bench;
     std::size_t pushes = 0, shapes = 0;
     int step = -1, tries = 0;
+    bool reshaped = false;
     double since_shape = 0.0, best_distance = 0.0, start_energy = 0.0;
     std::vector<ToolTrack::Change> changes;  // of the innermost
   };
@@ -180,6 +196,7 @@ class ToolTrial {
   bool comes_further(double pushed);
   bool part(const ToolStep& step);
   std::optional<double> missing(const ToolStep& step) const;
+  double depth_in(const SideVessel& side, const Vec3& tip) const;
   bool divide_for(const ToolMove& move);
   bool move_or_divide(const ToolMove& move);
   void note(const ToolStep& step);

@@ -81,6 +81,16 @@ bool keeps_its_width(const Branch& branch) {
 
 }  // namespace
 
+std::optional<double> find_arc_on(const std::vector<Branch>& tree, int branch, const Vec3& point) {
+  BranchPlace place = find_branch(tree, point);
+  while (place.branch >= 0 && place.branch != branch) {
+    const Branch& own = branch_of(tree, place.branch);
+    place = {.branch = own.parent, .arc = own.parent_arc};
+  }
+  if (place.branch < 0) return {};
+  return place.arc;
+}
+
 double own_start(const Branch& branch) { return branch.parent < 0 ? 0.0 : branch.line.radius(0); }
 
 double begins_behind(const std::vector<Branch>& tree, int child) {

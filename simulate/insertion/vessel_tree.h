@@ -17,6 +17,11 @@ struct BranchPlace {
 /// The branch in whose own vessel a point is deepest. Expects a tree.
 BranchPlace find_branch(const std::vector<preprocess::Branch>& tree, const Vec3& point);
 
+/// Along a branch's line the place that a point is at, or that the branch is left at by what leads
+/// to the point's vessel; empty where it is in no branch of these [mm]. Expects a tree.
+std::optional<double> find_arc_on(const std::vector<preprocess::Branch>& tree, int branch,
+                                  const Vec3& point);
+
 /// Where a branch's own vessel begins: beyond the ball in its parent that its line starts in [mm].
 double own_start(const preprocess::Branch& branch);
 

@@ -118,13 +118,18 @@ std::optional<Eigen::Index> Way::find_arrival(const Eigen::Ref<const Eigen::Matr
   return std::nullopt;
 }
 
-std::optional<std::string> Way::find_detour(const Eigen::Ref<const Eigen::Matrix3Xd>& wire) const {
+std::optional<std::string> Way::find_detour(const Eigen::Ref<const Eigen::Matrix3Xd>& wire,
+                                            bool knee) const {
+  const auto passes_by = [&](const Vec3& point) {
+    const std::optional<Astray> astray = find_astray(point);
+    return astray && astray->passed_by;
+  };
   double furthest = 0.0, off = 0.0;
   Vec3 off_at = Vec3::Zero();
   for (Eigen::Index i = 0; i < wire.cols(); ++i) {
     const PathPlace place = find_place(wire.col(i), path_);
     const bool beside = place.from_lumen > std::max({off, kOffLumen, place.radius});
-    if (beside && !is_in_own_vessel(wire.col(i), place)) {
+    if (beside && !is_in_own_vessel(wire.col(i), place) && !(knee && passes_by(wire.col(i)))) {
       off = place.from_lumen;
       off_at = wire.col(i);
     }

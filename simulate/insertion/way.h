@@ -55,8 +55,10 @@ class Way {
 
   /// Why a wire, as far as it is to lie on the way, did not come along it, if so: part of it lies
   /// outside of the way's lumen, by more than the way's radius there (5 mm at least) off its balls,
-  /// or runs back along it by more than four radii (20 mm at least).
-  std::optional<std::string> find_detour(const Eigen::Ref<const Eigen::Matrix3Xd>& wire) const;
+  /// or runs back along it by more than four radii (20 mm at least). With a `knee` it may lie in a
+  /// vessel that the way leaves, as far beyond that as it likes.
+  std::optional<std::string> find_detour(const Eigen::Ref<const Eigen::Matrix3Xd>& wire,
+                                         bool knee = false) const;
 
   /// Where a tip is that is not on the way; empty for one that is. Half a radius beside the way's
   /// balls counts as on it, unless it is inside another vessel's.

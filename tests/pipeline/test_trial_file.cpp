@@ -94,9 +94,11 @@ TEST(TrialFile, KeepsWhatASeatedCatheterBears) {
   for (const bool seated : {true, false}) {
     trial.support.reset();
     if (seated) trial.support = {.push = 1.0 / 3.0, .more = true};
+    trial.reshaped = seated;
     write_text(trial_text(study, {.catheter = 0}, trial), folder / "trial.json");
     const std::optional<simulate::TrialResult> read = find_trial(folder / "trial.json");
     ASSERT_TRUE(read);
+    EXPECT_EQ(read->reshaped, seated) << "its knee may lie off the way";
     ASSERT_EQ(read->support.has_value(), seated);
     if (!seated) continue;
     EXPECT_EQ(read->support->push, 1.0 / 3.0);
@@ -119,7 +121,11 @@ TEST(TrialFile, StepsOfAScriptAreReadAsTheyAreWritten) {
        .try_pull = 3.0,
        .try_turn = -15.0 * kRadPerDeg},
       {.tool = 1, .at = 10.0, .spare = 0},
-      {.tool = 0, .push = 60.0, .until = Until::kInBranch, .at = 10.0, .seats = true}};
+      {.tool = 0, .push = 120.0, .until = Until::kLevel, .at = 2.0, .side = 0},
+      {.tool = 1, .push = 90.0, .until = Until::kInBranch, .at = 70.0, .side = 3},
+      {.tool = 0, .push = -60.0, .until = Until::kInBranch, .at = 10.0, .seats = true}};
+  EXPECT_EQ(steps_json(steps)[7].at("side_branch"), 4) << "as it is called: branch 4";
+  EXPECT_FALSE(steps_json(steps)[0].contains("side_branch"));
   EXPECT_EQ(steps_of(steps_json(steps)), steps);
 }
 

@@ -31,7 +31,7 @@ inline std::string text_of(const Run& run) {
     text += " until " + std::to_string(static_cast<int>(step.until));
     add(step.at);
     text += " tries " + std::to_string(step.tries) + " steers " + std::to_string(step.steers);
-    text += " spare " + std::to_string(step.spare);
+    text += " spare " + std::to_string(step.spare) + " side " + std::to_string(step.side);
   }
   text += " in " + std::to_string(c.catheter) + " after " + std::to_string(c.first_wire);
   if (run.elements) {

@@ -33,7 +33,8 @@ const VesselModel& side_branch() {
 }
 
 /// Up that trunk to 190 mm, past a take-off at that arc length of the way.
-ToolTrial branched_trial(double EI = 20.0, double arc = 155.0) {
+ToolTrial branched_trial(double EI = 20.0, double arc = 155.0,
+                         const std::vector<SideVessel>& sides = {}) {
   const Centerline path = line_from(Vec3(0.0, 0.0, 5.0), Vec3(0.0, 0.0, 190.0), 6.0);
   const std::vector<preprocess::Branch> tree = {
       {path, -1, 0.0}, {line_from(along_branch(0.0), along_branch(79.0), 4.0), 0, 65.0}};
@@ -41,6 +42,7 @@ ToolTrial branched_trial(double EI = 20.0, double arc = 155.0) {
   const Goal goal = goal_at_end(way);
   ToolTrialOptions options = coarse();
   options.insertion.length = 600.0;
+  options.sides = sides;
   options.take_off = TakeOff{.arc = arc, .point = Vec3(0.0, 6.0, 5.0 + arc)};
   const Introducer introducer{.point = Vec3(-4.0, 0.0, 5.0),
                               .direction = Vec3(std::sin(0.15), 0.0, std::cos(0.15))};
@@ -77,6 +79,30 @@ std::vector<Led> led_on(const TrialResult& record) {
     }
   }
   return all;
+}
+
+TEST(ToolTrial, AStepEndsInAVesselOffTheWayThatItIsLedInto) {
+  // The branch's own ostium, some way out of the trunk's middle.
+  const double out = 12.0;
+  ToolTrial trial = branched_trial(
+      20.0, 155.0,
+      {{.branch = 1,
+        .take_off = {.arc = 75.0, .point = along_branch(out), .trunk = Vec3::UnitZ()},
+        .from = out}});
+  ASSERT_TRUE(trial.make({.tool = 1, .push = 30.0}));
+  EXPECT_NEAR(trial.measure(Until::kInBranch, 1, 1), -(trial.tip(1) - along_branch(out)).norm(),
+              1e-9)
+      << "before it";
+  ASSERT_TRUE(
+      trial.make({.tool = 1, .push = 120.0, .until = Until::kInBranch, .at = 30.0, .side = 1}));
+  EXPECT_LT(trial.insertion(1), 140.0) << "the whole of it is not made";
+  const Vec3 along = (along_branch(1.0) - along_branch(0.0)).normalized();
+  EXPECT_NEAR(along.dot(trial.tip(1) - along_branch(out)), 30.0, 1.0);
+  EXPECT_NEAR(trial.measure(Until::kInBranch, 1, 1), 30.0, 0.6);
+  EXPECT_NEAR(trial.measure(Until::kLevel, 1, 1), (trial.tip(1) - along_branch(out)).z(), 1e-9);
+  EXPECT_LT(trial.measure(Until::kInBranch, 1), 0.0) << "at the target's take-off it is not";
+  EXPECT_TRUE(std::isnan(trial.measure(Until::kInBranch, 1, 0))) << "of no vessel that is known";
+  EXPECT_FALSE(trial.ended()) << "it is there on purpose";
 }
 
 TEST(ToolTrial, AWireThatCannotBeLedOnIsNotPushedForEver) {

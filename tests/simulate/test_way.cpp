@@ -382,6 +382,17 @@ TEST(Way, AWireThatCameAnotherWayIsTold) {
   ASSERT_TRUE(bow);
   EXPECT_NE(bow->find("30 mm outside of the way"), std::string::npos) << *bow;
   EXPECT_NE(bow->find("in branch 1"), std::string::npos) << *bow;
+  // A catheter's knee may lie in the trunk beyond the ostium, but in no vessel before that.
+  EXPECT_FALSE(way.find_detour(
+      nodes_along({{0.0, 0.0, 5.0}, {0.0, 0.0, 85.0}, {2.0, 0.0, 50.0}, {25.0, 0.0, 50.0}}), true));
+  const auto first = way.find_detour(nodes_along({{0.0, 0.0, 5.0},
+                                                  {0.0, 0.0, kFirst},
+                                                  {30.0, 0.0, kFirst},
+                                                  {2.0, 0.0, kFirst + 1.0},
+                                                  {25.0, 0.0, 50.0}}),
+                                     true);
+  ASSERT_TRUE(first);
+  EXPECT_NE(first->find("outside of the way"), std::string::npos) << *first;
   const auto fold = way.find_detour(nodes_along(
       {{0.0, 0.0, 5.0}, {0.0, 0.0, 48.0}, {3.0, 0.0, 20.0}, {2.0, 0.0, 48.0}, {25.0, 0.0, 50.0}}));
   ASSERT_TRUE(fold);
