@@ -200,7 +200,7 @@ bool ToolTrial::advance(const ToolStep& step, bool last, bool looks) {
       by = std::min(by, std::max(kShortestToEnd * most, *left / unit));
     }
     if (last && step.push > 0.0) {
-      by = std::min(by, options_.insertion.length - foremost_of(step.tool));
+      by = std::min(by, longest() - foremost_of(step.tool));
       if (by < 1e-9) break;
     }
     if (!part({.tool = step.tool, .push = by / whole * step.push, .turn = by / whole * step.turn}))
@@ -220,6 +220,16 @@ bool ToolTrial::advance(const ToolStep& step, bool last, bool looks) {
     }
   }
   return false;
+}
+
+/// So far the last step may bring the foremost tip: more by the way up to a reshaped catheter's
+/// knee and back.
+double ToolTrial::longest() const {
+  if (!record_.reshaped || !options_.take_off) return options_.insertion.length;
+  const TakeOff& branch = *options_.take_off;
+  const Eigen::Matrix3Xd nodes = bench_.at_rest(bench_.nodes_of(0));
+  const double knee = (branch.trunk.transpose() * (nodes.colwise() - branch.point)).maxCoeff();
+  return options_.insertion.length + 2.0 * std::max(0.0, knee);
 }
 
 /// Up to the take-off, past the vessels that the tip goes into.

@@ -108,7 +108,8 @@ struct ToolStep {
 struct ToolTrialOptions {
   double friction_between = 0.05;  // Coulomb's coefficient of one tool in the other
   /// Elements, steps, tolerance, friction of the wall. `length` bounds the foremost tip in the last
-  /// step of a script alone, since a wire may be further in before.
+  /// step of a script alone, since a wire may be further in before; past a reshaped catheter's knee
+  /// by twice as much more as that lies beyond the take-off.
   InsertionOptions insertion;
   std::optional<TakeOff> take_off;  // that steps may end at; without one they are made whole
   /// That take the innermost's place: ToolStep. The goal is theirs: before the first exchange a tip
@@ -191,6 +192,7 @@ class ToolTrial {
   void exchange(const ToolStep& step);
   void keep_end_of_step();
   bool awaits_spare() const;
+  double longest() const;
   bool may_lose_way() const;
   bool loses_way(double pushed);
   bool comes_further(double pushed);
