@@ -5,6 +5,10 @@
 #include <cmath>
 #include <cstdio>
 
+#include "plan/catheter_choice.h"
+#include "plan/side_vessels.h"
+#include "plan/tool_neighbours.h"
+
 namespace wireplan::plan {
 namespace {
 
@@ -97,15 +101,22 @@ int count_exchanges(const Candidate& candidate) {
                     [](const simulate::ToolStep& step) { return step.spare >= 0; }));
 }
 
+StepNames step_names(const Study& study, const Candidate& candidate) {
+  StepNames names{.spare = study.wires.at(static_cast<std::size_t>(candidate.wire)).name};
+  if (!is_reshaped(candidate.steps)) return names;
+  for (const simulate::SideVessel& side : tool_options(study, candidate).sides) {
+    names.sides[side.branch] = branch_name(study.goal.way->tree(), side.branch, side.from);
+  }
+  return names;
+}
+
 std::vector<ToldStep> describe_steps(const Study& study, const Candidate& candidate,
                                      double insertion) {
-  return describe_steps(candidate.steps, insertion,
-                        study.wires.at(static_cast<std::size_t>(candidate.wire)).name);
+  return describe_steps(candidate.steps, insertion, step_names(study, candidate));
 }
 
 std::string describe_script(const Study& study, const Candidate& candidate, double insertion) {
-  return describe_script(candidate.steps, insertion,
-                         study.wires.at(static_cast<std::size_t>(candidate.wire)).name);
+  return describe_script(candidate.steps, insertion, step_names(study, candidate));
 }
 
 simulate::ToolTrialOptions tool_options(const Study& study, const Candidate& candidate) {
@@ -114,6 +125,11 @@ simulate::ToolTrialOptions tool_options(const Study& study, const Candidate& can
                                      .take_off = find_ostium(study.goal)};
   if (candidate.first_wire >= 0) {
     options.spares = {study.wires.at(static_cast<std::size_t>(candidate.wire))};
+  }
+  const simulate::Wire& tube =
+      study.catheters.at(static_cast<std::size_t>(candidate.catheter)).tool.wire;
+  if (options.take_off && find_shape(tube).kind == CurveKind::kReversed) {
+    options.sides = find_side_vessels(*study.goal.way, options.take_off->arc);
   }
   options.insertion.element_length *= kToolElements;
   return options;

@@ -60,7 +60,8 @@ std::vector<simulate::Tool> tools_of(const Study& study, const Candidate& candid
 std::vector<int> wires_of(const Candidate& candidate);
 int count_exchanges(const Candidate& candidate);
 
-/// Its steps in words, and in one line (catheters.h).
+/// Its steps in words, and in one line (catheters.h), with what they call by name.
+StepNames step_names(const Study& study, const Candidate& candidate);
 std::vector<ToldStep> describe_steps(const Study& study, const Candidate& candidate,
                                      double insertion);
 std::string describe_script(const Study& study, const Candidate& candidate, double insertion);

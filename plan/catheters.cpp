@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "plan/anatomy/passage.h"
+#include "plan/tool_neighbours.h"
 
 namespace wireplan::plan {
 namespace {
@@ -227,8 +228,8 @@ std::vector<ToolStep> with_seat(std::vector<ToolStep> steps, const Ostium& ostiu
   constexpr double kMostFollowed = 60.0;  // that hooks lie before the ostium, and curves take up
   const double at = std::min(rules.seat, ostium.end - ostium.arc - kBehindTarget);
   if (at <= 0.0) return steps;
-  steps.push_back(
-      {.tool = 0, .push = kMostFollowed, .until = Until::kInBranch, .at = at, .seats = true});
+  const double push = is_reshaped(steps) ? -kMostFollowed : kMostFollowed;
+  steps.push_back({.tool = 0, .push = push, .until = Until::kInBranch, .at = at, .seats = true});
   return steps;
 }
 
@@ -252,10 +253,33 @@ std::string count_of_times(int count) {
   return std::to_string(count) + (count == 1 ? " time" : " times");
 }
 
+/// See below.
+std::string tell_end_at_side(const ToolStep& step, const std::string& side) {
+  const std::string at = whole_number(std::abs(step.at)) + " mm ";
+  switch (step.until) {
+    case Until::kInBranch:
+      return " into " + side + " until its tip is " + at + "past the ostium there";
+    case Until::kLevel:
+      if (step.push > 0.0) {
+        return " until its knee has opened in the trunk and its tip is " + at +
+               "beyond the level of the ostium of " + side;
+      }
+      return " until the catheter's tip is " + at + (step.at < 0.0 ? "short of" : "beyond") +
+             " the level of the ostium of " + side;
+    case Until::kFacing:
+    case Until::kMade:
+      break;
+  }
+  expects(false);  // no step is watched so
+  return {};
+}
+
 /// " until its tip is 20 mm past the ostium", of several tools "the catheter's tip"; empty of steps
-/// that are made whole.
-std::string tell_end(const ToolStep& step) {
+/// that are made whole. Of one that is seen at a side vessel " into the left iliac artery until its
+/// tip is 20 mm past the ostium there".
+std::string tell_end(const ToolStep& step, const std::string& side) {
   if (step.until == Until::kMade) return {};
+  if (!side.empty()) return tell_end_at_side(step, side);
   const std::string tip =
       step.tool == simulate::kBothTools ? " until the catheter's tip " : " until its tip ";
   switch (step.until) {
@@ -282,6 +306,13 @@ std::string tell_end(const ToolStep& step) {
 std::string turned_by(double angle) {
   return whole_number(std::abs(angle) / kRadPerDeg) + " degrees " +
          (angle > 0.0 ? "clockwise" : "counterclockwise");
+}
+
+/// Of the vessel that a step is seen at; empty of those that are at the target's ostium.
+std::string name_of_side(const ToolStep& step, const StepNames& names) {
+  if (step.side < 0) return {};
+  const auto known = names.sides.find(step.side);
+  return known != names.sides.end() ? known->second : "branch " + std::to_string(step.side + 1);
 }
 
 /// "If it passes by the branch ...": what a hand does then; empty of steps without tries.
@@ -325,7 +356,7 @@ std::string tell_steers(const ToolStep& step) {
 }  // namespace
 
 std::vector<ToldStep> describe_steps(const std::vector<ToolStep>& steps, double insertion,
-                                     const std::string& spare) {
+                                     const StepNames& names) {
   std::vector<ToldStep> told;
   double tube_in = 0.0, wire_in = kWireStart;
   bool tube_known = true, wire_known = true;
@@ -336,7 +367,8 @@ std::vector<ToldStep> describe_steps(const std::vector<ToolStep>& steps, double 
     const std::string name = both      ? "catheter and wire together"
                              : of_wire ? "the wire"
                                        : "the catheter";
-    const std::string end = tell_end(step);
+    const std::string vessel = name_of_side(step, names);
+    const std::string end = tell_end(step, vessel);
     if (of_wire || both) wire_in += step.push;
     if (!of_wire) tube_in += step.push;
     if (!end.empty() && (of_wire || both)) wire_known = false;
@@ -345,7 +377,7 @@ std::vector<ToldStep> describe_steps(const std::vector<ToolStep>& steps, double 
     if (step.spare >= 0) {
       wire_in = tube_in - step.at;
       wire_known = tube_known;
-      text = "hold the catheter, withdraw the wire whole and bring in " + spare +
+      text = "hold the catheter, withdraw the wire whole and bring in " + names.spare +
              " through it, to " +
              (wire_known ? whole_number(wire_in) + " mm"
                          : whole_number(step.at) + " mm behind the catheter's tip");
@@ -359,7 +391,8 @@ std::vector<ToldStep> describe_steps(const std::vector<ToolStep>& steps, double 
       text = "advance " + name + " until its tip is at the target, " + whole_number(insertion) +
              " mm in";
     } else if (step.push > 0.0) {
-      const bool over = !of_wire && !both && (wire_in >= tube_in || !wire_known);
+      const bool opens = !vessel.empty() && step.until == Until::kLevel;
+      const bool over = !of_wire && !both && !opens && (wire_in >= tube_in || !wire_known);
       const bool known = !both && (of_wire ? wire_known : tube_known);
       text = "advance " + name;
       text += over ? " over the wire" : "";
@@ -379,9 +412,9 @@ std::vector<ToldStep> describe_steps(const std::vector<ToolStep>& steps, double 
 }
 
 std::string describe_script(const std::vector<ToolStep>& steps, double insertion,
-                            const std::string& spare) {
+                            const StepNames& names) {
   std::string text;
-  for (const ToldStep& step : describe_steps(steps, insertion, spare)) {
+  for (const ToldStep& step : describe_steps(steps, insertion, names)) {
     text += (text.empty() ? "" : "; ") + step.text;
   }
   return text;

@@ -1,6 +1,7 @@
 #pragma once
 /// Catheters of a case: which wires go through them, and what a hand does not do with the two.
 #include <cmath>
+#include <map>
 #include <optional>
 #include <string>
 #include <vector>
@@ -72,7 +73,7 @@ std::string find_broken_rule(const std::vector<simulate::ToolStep>& steps, const
                              const simulate::Wire* spare = nullptr);
 
 /// A script, and after it the step that seats the catheter, where the branch up to the target is
-/// long enough for it.
+/// long enough for it: a push, or a pull of one that hangs from its reshaped knee.
 std::vector<simulate::ToolStep> with_seat(std::vector<simulate::ToolStep> steps,
                                           const Ostium& ostium, const ToolRules& rules);
 
@@ -85,16 +86,21 @@ struct ToldStep {
   std::string otherwise;  // sentences on what to do where the wire goes elsewhere; may be empty
 };
 
+/// What steps call by name.
+struct StepNames {
+  std::string spare = {};                 // the wire that an exchange brings in
+  std::map<int, std::string> sides = {};  // vessels that a curve is reshaped in, by branch
+};
+
 /// "advance the wire to 250 mm", "advance the catheter over the wire to 230 mm", "withdraw the wire
 /// by 60 mm", "turn the catheter 60 degrees clockwise", ...: as the hand makes them, turns as seen
 /// from the hub toward the patient. "to" is said as long as no step before ended by what was seen.
-/// The last step goes on to where the trial ended. `spare` is the name of the wire that an exchange
-/// brings in.
+/// The last step goes on to where the trial ended.
 std::vector<ToldStep> describe_steps(const std::vector<simulate::ToolStep>& steps, double insertion,
-                                     const std::string& spare = {});
+                                     const StepNames& names = {});
 
 /// The texts in one line, without what else to do: "advance the wire to 250 mm; advance ...".
 std::string describe_script(const std::vector<simulate::ToolStep>& steps, double insertion,
-                            const std::string& spare = {});
+                            const StepNames& names = {});
 
 }  // namespace wireplan::plan

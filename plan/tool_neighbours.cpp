@@ -29,8 +29,9 @@ bool begin_alike(const ToolScript& a, const ToolScript& b) {
   const ToolStep &one = a.front(), &other = b.front();
   if (one == other && (a.size() == 1) == (b.size() == 1)) return true;
   return a.size() > 1 && b.size() > 1 && std::max(one.spare, other.spare) < 0 &&
-         one.tool == other.tool && one.until == other.until && one.until != Until::kInBranch &&
-         sign_of(one.push) == sign_of(other.push) && sign_of(one.turn) == sign_of(other.turn);
+         one.tool == other.tool && one.side == other.side && one.until == other.until &&
+         one.until != Until::kInBranch && sign_of(one.push) == sign_of(other.push) &&
+         sign_of(one.turn) == sign_of(other.turn);
 }
 
 /// Whether what ends step `a` comes before what ends `b`.
@@ -116,11 +117,18 @@ bool alike(const FoundScript& a, const FoundScript& b, double turn, double depth
 
 }  // namespace
 
-std::vector<ToolScript> list_neighbours(const ToolScript& script) {
+bool is_reshaped(const ToolScript& script) {
+  return std::any_of(script.begin(), script.end(),
+                     [](const ToolStep& step) { return step.side >= 0; });
+}
+
+std::vector<ToolScript> list_neighbours(const ToolScript& script, std::size_t begun) {
   std::vector<ToolScript> all = {script};
+  const std::size_t first = is_reshaped(script) ? begun : 0;
   const auto add = [&](ToolScript::const_iterator found, double by) {
     if (found == script.end() || found + 1 == script.end()) return;
     const auto step = static_cast<std::size_t>(found - script.begin());
+    if (step < first) return;
     const double size = std::abs(found->push) + std::abs(found->turn);
     for (const double change : {-by, by}) {
       if (size + change > kSamePart) all.push_back(with_change(script, step, change));
@@ -159,7 +167,7 @@ long weigh_scripts(ToolTrial& trial, std::size_t begun,
   std::vector<ToolScript> all, rests;  // they begin alike, and are tried from there
   std::vector<std::size_t> owners;
   for (std::size_t k = 0; k < scripts.size(); ++k) {
-    for (ToolScript& script : list_neighbours(scripts[k].steps)) {
+    for (ToolScript& script : list_neighbours(scripts[k].steps, begun)) {
       rests.emplace_back(script.begin() + static_cast<std::ptrdiff_t>(begun), script.end());
       for (ToolStep& step : rests.back()) step.tries = 0;
       all.push_back(std::move(script));

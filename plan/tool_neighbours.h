@@ -15,10 +15,15 @@ using ToolScript = std::vector<simulate::ToolStep>;
 inline constexpr double kNeighbourDepth = 2.0;               // of the pull, of the advance    [mm]
 inline constexpr double kNeighbourTurn = 15.0 * kRadPerDeg;  // of the hub, or where it looks [rad]
 
+/// Whether a catheter's curve was reshaped in a side vessel: it hangs from its knee then, and goes
+/// deeper into a branch by a pull.
+bool is_reshaped(const ToolScript& script);
+
 /// The script itself, then with the last move of both tools ended earlier and later, the last
 /// turn less and more, and the catheter advanced less and further where it follows the wire into
-/// the branch: five to seven in all, fewer where the script has no such steps.
-std::vector<ToolScript> list_neighbours(const ToolScript& script);
+/// the branch: five to seven in all, fewer where the script has no such steps. Of a script whose
+/// curve is reshaped the first `begun` steps are made alike.
+std::vector<ToolScript> list_neighbours(const ToolScript& script, std::size_t begun = 0);
 
 /// Of each script whether it reaches. The trial is where all begin, and is brought back there.
 std::vector<bool> try_scripts(simulate::ToolTrial& trial, const std::vector<ToolScript>& scripts,

@@ -5,6 +5,8 @@
 #include <utility>
 
 #include "plan/catheter_choice.h"
+#include "plan/reshaping.h"
+#include "plan/side_vessels.h"
 #include "plan/tool_starts.h"
 
 namespace wireplan::plan {
@@ -30,7 +32,8 @@ ToolScript seated_steps(const Study& study, const Ostium& ostium, const Candidat
 
 /// One depth of the catheter and one withdrawal of the wire.
 struct ToolStart {
-  std::size_t pair = 0;  // among those that are tried together
+  std::size_t pair = 0;       // among those that are tried together
+  const WayUp* up = nullptr;  // of that pair
   const RaisedTools* depth = nullptr;
   double withdrawn = 0.0;  //                                                                 [mm]
   StartFindings findings;
@@ -41,9 +44,40 @@ void add_starts(const Study& study, const ToolPair& pair, std::size_t slot, cons
   const simulate::Wire& tube = study.catheters[static_cast<std::size_t>(pair.catheter)].tool.wire;
   const double all = curved_length(tube, false), first = curved_length(tube, true);
   for (const RaisedTools& depth : way.depths) {
-    starts.push_back({slot, &depth, all + kCover, {}});
-    if (first != all) starts.push_back({slot, &depth, first + kCover, {}});
+    starts.push_back({slot, &way, &depth, all + kCover, {}});
+    if (first != all) starts.push_back({slot, &way, &depth, first + kCover, {}});
   }
+}
+
+/// A way up on which the curve of a pair's catheter is reshaped in a side vessel.
+struct ReshapedWay {
+  std::size_t pair = 0;  // as above
+  simulate::SideVessel side;
+  WayUp up;
+};
+
+/// Of each pair without a script that holds those that its catheter's curve can be reshaped in.
+std::vector<ReshapedWay> list_reshaped_ways(const Study& study, const Ostium& ostium,
+                                            const std::vector<ToolPair>& pairs,
+                                            const std::vector<ToolStart>& starts) {
+  const std::vector<simulate::SideVessel> sides = find_side_vessels(*study.goal.way, ostium.arc);
+  std::vector<ReshapedWay> ways;
+  for (std::size_t k = 0; k < pairs.size(); ++k) {
+    const bool holds = std::any_of(starts.begin(), starts.end(), [&](const ToolStart& start) {
+      const auto& found = start.findings.found;
+      return start.pair == k && std::any_of(found.begin(), found.end(), [](const auto& script) {
+               return script.share >= kSteadyShare;
+             });
+    });
+    if (holds || !pairs[k].unfit.empty()) continue;
+    const Catheter& catheter = study.catheters[static_cast<std::size_t>(pairs[k].catheter)];
+    for (const simulate::SideVessel& side :
+         list_reshaping_vessels(*study.goal.way, sides, catheter.tool.wire)) {
+      ways.emplace_back().pair = k;
+      ways.back().side = side;
+    }
+  }
+  return ways;
 }
 
 /// Indices of pairs, in the order in which they are tried, while none before has a script that
@@ -77,7 +111,8 @@ std::vector<FoundScript> without_twins(std::vector<FoundScript> from) {
 
 /// What a pair's way up and its starts found: the different scripts of it that hold best.
 void gather(const Study& study, const std::vector<ToolStart>& starts, std::size_t slot,
-            const StartFindings& way_up, Hooks hooks, PairFindings& pair, ToolScripts& all) {
+            const StartFindings& way_up, const std::vector<ReshapedWay>& reshaped, Hooks hooks,
+            PairFindings& pair, ToolScripts& all) {
   std::vector<const StartFindings*> parts;
   for (const ToolStart& start : starts) {
     if (start.pair == slot) parts.push_back(&start.findings);
@@ -103,6 +138,14 @@ void gather(const Study& study, const std::vector<ToolStart>& starts, std::size_
   std::vector<FoundScript> kept = hooks == Hooks::kEvery ? without_twins(std::move(found))
                                                          : choose_different(found, kScriptsKept);
   if (pair.stopped.empty()) pair.stopped = way_up.stopped;
+  for (const ReshapedWay& way : reshaped) {
+    if (way.pair != slot) continue;
+    all.branches += way.up.findings.branches;
+    if (!way.up.depths.empty()) continue;
+    pair.stopped += "; its curve is not reshaped in " +
+                    branch_name(study.goal.way->tree(), way.side.branch, way.side.from) + ": " +
+                    way.up.findings.stopped;
+  }
   if (pair.found > 0) pair.stopped.clear();
   if (!kept.empty()) pair.held = kept.front().share;
   if (kept.empty() && !closest.empty()) kept.push_back({.steps = closest});
@@ -184,34 +227,53 @@ void search_on(const Study& study, const simulate::VesselModel& vessel, const Ba
   const std::vector<std::vector<std::size_t>> groups = tried_together(study, all.pairs);
   for (bool holds = false; !holds && all.groups < groups.size(); ++all.groups) {
     const std::vector<std::size_t>& slots = groups[all.groups];
+    std::vector<ToolPair> pairs;
+    for (const std::size_t slot : slots) pairs.push_back(all.pairs[slot].pair);
     std::vector<WayUp> ways(slots.size());
     for_each_slot(
         static_cast<int>(slots.size()),
         [&](int slot) {
           const auto k = static_cast<std::size_t>(slot);
-          const ToolPair& pair = all.pairs[slots[k]].pair;
-          if (!pair.unfit.empty()) return;
-          ways[k] = go_up(scout, pair, *ostium, vessel, hooks, options.cancelled);
-          tell(pair, ways[k].findings);
+          if (!pairs[k].unfit.empty()) return;
+          ways[k] = go_up(scout, pairs[k], *ostium, vessel, hooks, options.cancelled);
+          tell(pairs[k], ways[k].findings);
         },
         options);
     std::vector<ToolStart> starts;
     for (std::size_t k = 0; k < slots.size(); ++k) {
-      add_starts(study, all.pairs[slots[k]].pair, k, ways[k], starts);
+      add_starts(study, pairs[k], k, ways[k], starts);
     }
+    const auto search_from = [&](std::size_t first) {
+      for_each_slot(
+          static_cast<int>(starts.size() - first),
+          [&](int slot) {
+            ToolStart& start = starts[first + static_cast<std::size_t>(slot)];
+            start.findings = search_start(scout, pairs[start.pair], *ostium, *start.up,
+                                          *start.depth, start.withdrawn, hooks, options.cancelled);
+            tell(pairs[start.pair], start.findings);
+          },
+          options);
+    };
+    search_from(0);
+    std::vector<ReshapedWay> reshaped;
+    if (ostium) reshaped = list_reshaped_ways(study, *ostium, pairs, starts);
     for_each_slot(
-        static_cast<int>(starts.size()),
+        static_cast<int>(reshaped.size()),
         [&](int slot) {
-          ToolStart& start = starts[static_cast<std::size_t>(slot)];
-          const ToolPair& pair = all.pairs[slots[start.pair]].pair;
-          start.findings = search_start(scout, pair, *ostium, ways[start.pair], *start.depth,
-                                        start.withdrawn, hooks, options.cancelled);
-          tell(pair, start.findings);
+          ReshapedWay& way = reshaped[static_cast<std::size_t>(slot)];
+          way.up = go_up_reshaped(scout, pairs[way.pair], way.side, vessel, options.cancelled);
         },
         options);
+    const std::size_t plain = starts.size();
+    for (const ReshapedWay& way : reshaped) {
+      for (const RaisedTools& depth : way.up.depths) {
+        starts.push_back({way.pair, &way.up, &depth, 0.0, {}});
+      }
+    }
+    search_from(plain);
     for (std::size_t k = 0; k < slots.size(); ++k) {
       PairFindings& pair = all.pairs[slots[k]];
-      gather(study, starts, k, ways[k].findings, hooks, pair, all);
+      gather(study, starts, k, ways[k].findings, reshaped, hooks, pair, all);
       holds = holds || pair.held >= kSteadyShare;
     }
   }

@@ -7,29 +7,9 @@
 #include <string>
 #include <vector>
 
-#include "plan/candidates.h"
-#include "plan/tool_neighbours.h"
+#include "plan/tool_hooks.h"
 
 namespace wireplan::plan {
-
-/// Which states along the pulls of a start the wire is brought out of: those that lie best, or all,
-/// to hold the search against, of which each script that reaches is kept and none is weighed.
-enum class Hooks { kBest, kEvery };
-
-/// A script on its way, and where the trial that makes it is.
-struct RaisedTools {
-  ToolScript steps;
-  simulate::ToolTrial::Mark mark;
-};
-
-struct StartFindings {
-  std::vector<FoundScript> found;
-  int count = 0;  // found, of which those are kept
-  ToolScript closest;
-  double nearest_hook = -1.0, furthest = 0.0;
-  std::string stopped;
-  long branches = 0;
-};
 
 struct WayUp {
   std::unique_ptr<simulate::ToolTrial> trial;  // whose marks `depths` are
@@ -40,9 +20,6 @@ struct WayUp {
 /// So much of the trunk past the ostium it takes to lead a catheter up over a wire and pull it down
 /// into the branch [mm].
 double room_beyond();
-
-/// How far along the way the tip came in the pushes from this one on [mm].
-double furthest_since(std::size_t push, const simulate::ToolTrial& trial, const simulate::Way& way);
 
 /// The wire beyond the ostium, and the catheter over it.
 WayUp go_up(const Study& study, const ToolPair& pair, const Ostium& ostium,

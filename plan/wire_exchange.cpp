@@ -147,8 +147,9 @@ class SeatedSearch {
       if (depth < own + kExchange.ahead || depth > most || stop()) continue;
       trial_.restore(led);
       steps_ = script;
-      const double push = std::ceil(depth - own + kExchange.slack);
-      if (!go({.tool = kSeated, .push = push, .until = Until::kInBranch, .at = depth})) {
+      const double most_moved = std::ceil(depth - own + kExchange.slack);
+      const double moved = is_reshaped(steps_) ? -most_moved : most_moved;
+      if (!go({.tool = kSeated, .push = moved, .until = Until::kInBranch, .at = depth})) {
         return tell_stop(trial_.reason());
       }
       if (depth_of(kSeated) < depth - kExchange.off) {

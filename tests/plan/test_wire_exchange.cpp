@@ -58,7 +58,7 @@ TEST(WireExchange, HasToKeepTheRulesWithBothWires) {
 }
 
 TEST(WireExchange, ReadsAsTheHandMakesIt) {
-  const auto told = describe_steps(script_with(kSwap), 331.0, "super-stiff");
+  const auto told = describe_steps(script_with(kSwap), 331.0, {.spare = "super-stiff"});
   ASSERT_EQ(told.size(), 4U);
   EXPECT_EQ(told[2].text,
             "hold the catheter, withdraw the wire whole and bring in super-stiff through it, to "
@@ -68,7 +68,7 @@ TEST(WireExchange, ReadsAsTheHandMakesIt) {
   std::vector<ToolStep> seen = script_with(kSwap);
   seen[1].until = Until::kInBranch;
   seen[1].at = 12.0;
-  EXPECT_EQ(describe_steps(seen, 331.0, "super-stiff")[2].text,
+  EXPECT_EQ(describe_steps(seen, 331.0, {.spare = "super-stiff"})[2].text,
             "hold the catheter, withdraw the wire whole and bring in super-stiff through it, to "
             "10 mm behind the catheter's tip")
       << "how far the catheter is in is not known";
