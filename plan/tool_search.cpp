@@ -138,13 +138,20 @@ void gather(const Study& study, const std::vector<ToolStart>& starts, std::size_
   std::vector<FoundScript> kept = hooks == Hooks::kEvery ? without_twins(std::move(found))
                                                          : choose_different(found, kScriptsKept);
   if (pair.stopped.empty()) pair.stopped = way_up.stopped;
+  bool none_serves = true;
   for (const ReshapedWay& way : reshaped) {
     if (way.pair != slot) continue;
+    none_serves = false;
     all.branches += way.up.findings.branches;
     if (!way.up.depths.empty()) continue;
     pair.stopped += "; its curve is not reshaped in " +
                     branch_name(study.goal.way->tree(), way.side.branch, way.side.from) + ": " +
                     way.up.findings.stopped;
+  }
+  const Catheter& catheter = study.catheters[static_cast<std::size_t>(pair.pair.catheter)];
+  if (!pair.stopped.empty() && none_serves &&
+      find_shape(catheter.tool.wire).kind == CurveKind::kReversed) {
+    pair.stopped += "; no vessel that leaves the way before the ostium serves to reshape its curve";
   }
   if (pair.found > 0) pair.stopped.clear();
   if (!kept.empty()) pair.held = kept.front().share;
