@@ -6,6 +6,7 @@
 
 #include "pipeline/files/catalogue.h"
 #include "pipeline/files/text.h"
+#include "plan/candidates.h"
 #include "plan/catheters.h"
 #include "plan/manoeuvre.h"
 
@@ -110,6 +111,32 @@ std::vector<Seen> places_to_see(const Json& arm) {
   return places;
 }
 
+/// Of a script of tools, the ostium that each step is about: the target's, or that of a side vessel
+/// which it is seen at. `places` begin with the ostia of `arm`.
+std::vector<const Seen*> ostia_of_steps(const plan::Study& study, const plan::Candidate& candidate,
+                                        const Json& arm, const std::vector<Seen>& places) {
+  const auto ostia_end = places.begin() + static_cast<std::ptrdiff_t>(arm.at("ostia").size());
+  const Seen* target = nullptr;
+  for (std::size_t k = 0; k < arm.at("ostia").size(); ++k) {
+    if (arm.at("ostia")[k].at("leads_to_target").get<bool>()) target = &places[k];
+  }
+  const std::vector<simulate::SideVessel> sides = plan::tool_options(study, candidate).sides;
+  std::vector<const Seen*> seen;
+  for (const simulate::ToolStep& step : candidate.steps) {
+    const auto side = std::find_if(sides.begin(), sides.end(),
+                                   [&](const auto& one) { return one.branch == step.side; });
+    if (step.side < 0 || side == sides.end()) {
+      seen.push_back(target);
+      continue;
+    }
+    const auto off = [&](const Seen& place) { return std::abs(place.arc - side->take_off.arc); };
+    const auto nearest = std::min_element(
+        places.begin(), ostia_end, [&](const Seen& a, const Seen& b) { return off(a) < off(b); });
+    seen.push_back(nearest == ostia_end ? target : &*nearest);
+  }
+  return seen;
+}
+
 }  // namespace
 
 Json fetch_json(const ReportInput& input, const Json& anatomy) {
@@ -166,14 +193,10 @@ Json step_views_json(const plan::Study& study, const plan::Candidate& candidate,
                      {"view", seen == nullptr ? Json(nullptr) : seen->view}});
   };
   if (candidate.catheter >= 0) {
-    const Seen* target = nullptr;
-    for (std::size_t k = 0; k < arm.at("ostia").size(); ++k) {
-      if (arm.at("ostia")[k].at("leads_to_target").get<bool>()) target = &places[k];
-    }
-    for (const plan::ToldStep& step :
-         plan::describe_steps(study, candidate, trial.metrics.insertion)) {
-      add(step.text, target);
-    }
+    const std::vector<plan::ToldStep> told =
+        plan::describe_steps(study, candidate, trial.metrics.insertion);
+    const std::vector<const Seen*> seen = ostia_of_steps(study, candidate, arm, places);
+    for (std::size_t k = 0; k < told.size(); ++k) add(told[k].text, seen[k]);
     return steps;
   }
   const std::vector<std::string> texts =

@@ -12,6 +12,7 @@
 #include "pipeline/stages/stages.h"
 #include "preprocess/files/vessel_io.h"
 #include "tests/pipeline/finished_case.h"
+#include "tests/plan/iliacs.h"
 
 namespace wireplan::pipeline {
 namespace {
@@ -243,6 +244,34 @@ TEST(Report, StepsOfAScriptHaveTheViewOfThePlaceNextToTheTip) {
                        {"bend", {{"at_mm", 40.0}, {"best", nullptr}, {"second", nullptr}}},
                        {"no_views", nullptr}};
   EXPECT_TRUE(step_views_json(study, candidate, trial, straight).at(0).at("at").is_null());
+}
+
+TEST(Report, StepsAtASideVesselHaveTheViewOfItsOstium) {
+  const auto ostium = [](const char* branch, double at, bool target) {
+    return Json{{"branch", branch},
+                {"leads_to_target", target},
+                {"at_mm", at},
+                {"best", {{"view", branch}, {"reachable", true}}},
+                {"second", nullptr}};
+  };
+  const Json anatomy = {
+      {"c_arm",
+       {{"ostia", {ostium("left iliac", 66.0, false), ostium("renal", 160.0, true)}},
+        {"bend", {{"at_mm", 170.0}, {"best", nullptr}, {"second", nullptr}}},
+        {"no_views", nullptr}}}};
+  plan::Candidate candidate{.catheter = 0};
+  candidate.steps = {
+      {.tool = 1, .push = 250.0},
+      {.tool = 1, .push = 80.0, .until = simulate::Until::kInBranch, .at = 60.0, .side = 1},
+      {.tool = simulate::kBothTools, .push = -40.0},
+      {.tool = 1, .push = 60.0}};
+  plan::Measured trial;
+  trial.metrics.insertion = 286.0;
+  const Json steps = step_views_json(plan::iliacs::study(), candidate, trial, anatomy);
+  ASSERT_EQ(steps.size(), 4U);
+  for (const std::size_t k : {0U, 2U, 3U}) EXPECT_EQ(steps[k].at("at"), "ostium of renal") << k;
+  EXPECT_EQ(steps[1].at("at"), "ostium of left iliac");
+  EXPECT_EQ(steps[1].at("view"), "left iliac");
 }
 
 TEST(Report, ATargetWithoutARadiusIsTheVesselsCrossSection) {
