@@ -9,6 +9,7 @@
 #include "pipeline/stages/held_places.h"
 #include "plan/anatomy/branch_names.h"
 #include "plan/catheter_choice.h"
+#include "plan/score.h"
 #include "preprocess/centerline/centerline.h"
 #include "preprocess/cores.h"
 #include "preprocess/files/vessel_io.h"
@@ -306,6 +307,12 @@ const plan::Study& Workspace::study() {
   }
   if (study.insertion.length == 0.0) study.insertion.length = choose_insertion(study);
   if (given_.suggest_catheters) plan::keep_suggested(study);
+  if (study.catheters.empty() && plan::sum_of(given_.weights, false) <= 0.0) {
+    throw Error(given_.file.string() +
+                ": ranking.weights are 0 in all, expected one above 0 where no catheter is "
+                "suggested, as for this way, since script_weights act with catheters alone; raise "
+                "one, or name catheters");
+  }
   study_ = std::move(study);
   return *study_;
 }

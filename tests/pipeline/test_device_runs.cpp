@@ -4,6 +4,7 @@
 #include "pipeline/report/report.h"
 #include "pipeline/report/sheet_csv.h"
 #include "pipeline/stages/stages.h"
+#include "tests/messages.h"
 #include "tests/pipeline/small_case.h"
 
 namespace wireplan::pipeline {
@@ -138,6 +139,21 @@ TEST(Report, TellsTheWeakestValueBehindEachPlanAndHowFarEachWireMayBeOff) {
     EXPECT_EQ(wire.at("friction_factor"), Json({1.0, 1.0}));
     EXPECT_EQ(wire.at("shaft_stiffness_factor"), Json({0.9, 1.2}));
   }
+}
+
+TEST(Report, WeightsOfScriptsAloneAreRefusedWhereNoCatheterIsSuggested) {
+  const TemporaryFolder folder;
+  Json file = write_bend_case(folder, Json::array({bend_wire("bare")}));
+  file["catheters"] = "suggest";  // for a way that takes no branch
+  for (const char* part : {"reach", "peak_force", "mean_force", "margin"}) {
+    file["ranking"]["weights"][part] = 0;
+  }
+  write_json(file, folder / "case.json");
+  const std::string text = message_of([&] { report_of_bend(folder); });
+  EXPECT_NE(text.find("case.json: ranking.weights are 0 in all"), std::string::npos) << text;
+  file["ranking"]["weights"]["margin"] = 0.1;
+  write_json(file, folder / "case.json");
+  EXPECT_EQ(report_of_bend(folder).at("ranking").size(), 1u);
 }
 
 }  // namespace
