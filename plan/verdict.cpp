@@ -100,8 +100,8 @@ class Weighing {
       const int id = static_cast<int>(k);
       const Level level = known_.plan.levels[k];
       const auto add = [&](Endings& endings) {
-        add_ending(endings, trial(id), wire_of(id), level == Level::kScout ? coarse : own,
-                   known_.limits);
+        add_ending(endings, trial(id), wire_of(id), known_.study.goal,
+                   level == Level::kScout ? coarse : own, known_.limits);
       };
       add(all);
       if (level != Level::kScout) add(fine);
@@ -196,6 +196,7 @@ class Weighing {
     add(all.passed_by + all.wrong_branch + all.another_way, "in another vessel");
     add(all.left_image, "at an end of the imaged vessel");
     add(all.whole_wire_in + all.all_wire_in, "before the target for want of wire");
+    add(all.went_by, "beside the target or beyond it");
     add(all.missed, "with a tip that went no further along the way");
     if (ended == 0) return;
     find(answer, std::string("The wall was ") + wall_taken() + ", which is enough here: " +
@@ -341,8 +342,8 @@ class Weighing {
       if (own.trial != first.trial) continue;
       for (std::size_t k = 0; k < own.trials.size(); ++k) {
         if (repeats->repeats[k].safe) continue;
-        add_ending(failed, own.trials[k], wire_of(first.trial), known_.study.insertion,
-                   known_.limits);
+        add_ending(failed, own.trials[k], wire_of(first.trial), known_.study.goal,
+                   known_.study.insertion, known_.limits);
       }
     }
     for (std::string& text_of : changes_by(failed, known_, "failed repeat")) {

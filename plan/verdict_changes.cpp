@@ -187,13 +187,22 @@ std::string change_of_wire_length(const Endings& endings, const Known& known,
          one_decimal(known.study.insertion.length) + " mm.";
 }
 
-/// Of those that missed with wire left to push.
+/// Whether the tip came as far as the target along the way, and so did not end before it.
+bool went_by(const Measured& trial, const simulate::Goal& goal) {
+  if (!goal.way) return false;
+  const Eigen::VectorXd& arc = goal.way->path().arc_length;
+  return trial.progress >= arc[arc.size() - 1] - (goal.at_section ? kSameLength : goal.radius);
+}
+
+/// Of those that went by, or missed with wire left to push.
 std::string change_of_aim(const Endings& endings, const Known& known, const std::string& noun) {
-  const std::string missed = part_of(endings.missed, endings.trials, noun);
+  const std::string missed = part_of(endings.missed + endings.went_by, endings.trials, noun);
   const simulate::Goal& goal = known.study.goal;
   if (goal.at_section) {
     return "Another wire, entry angle or roll: " + missed +
-           " ended before the target or beside it, with wire left to push.";
+           (endings.went_by == 0 ? " ended before the target or beside it, with wire left to push."
+                                 : " ended beside the target or beyond it, or before it with wire "
+                                   "left to push.");
   }
   return "A target that is the vessel's whole cross-section, or another wire, entry angle or "
          "roll: " +
@@ -225,7 +234,8 @@ std::string capital(std::string text) {
 }
 
 void add_ending(Endings& endings, const Measured& trial, const simulate::Wire& wire,
-                const simulate::InsertionOptions& insertion, const Limits& limits) {
+                const simulate::Goal& goal, const simulate::InsertionOptions& insertion,
+                const Limits& limits) {
   using simulate::Outcome;
   const Metrics& m = trial.metrics;
   ++endings.trials;
@@ -237,6 +247,10 @@ void add_ending(Endings& endings, const Measured& trial, const simulate::Wire& w
       endings.broke_wall += m.max_penetration > limits.penetration_fail;
       return;
     case Outcome::kMissed: {
+      if (went_by(trial, goal)) {
+        ++endings.went_by;
+        return;
+      }
       const double most = simulate::longest_insertion(wire, insertion);
       ++(m.insertion < most - kSameLength     ? endings.missed
          : most > wire.length() - kSameLength ? endings.whole_wire_in
@@ -287,6 +301,7 @@ std::string describe_endings(const Endings& endings) {
       {endings.left_lumen, "went through the wall"},
       {endings.whole_wire_in + endings.all_wire_in, "ended with all wire in"},
       {endings.missed, "missed the target"},
+      {endings.went_by, "went by the target"},
       {endings.left_image, "came to an end of the imaged vessel"},
       {endings.no_equilibrium, "found no balance of forces"},
       {endings.our_fault, "failed in the program"}};
@@ -405,7 +420,7 @@ std::vector<std::string> changes_by(const Endings& endings, const Known& known,
       "A longer wire: " + part_of(endings.whole_wire_in, endings.trials, noun) +
           " ended before the target with all of the wire in.");
   add(endings.all_wire_in, change_of_wire_length(endings, known, noun));
-  add(endings.missed, change_of_aim(endings, known, noun));
+  add(endings.missed + endings.went_by, change_of_aim(endings, known, noun));
   const int past = endings.passed_by + endings.wrong_branch + endings.left_image;
   add(missing_room(known) > 0.0 ? past : endings.left_image, change_of_image(endings, known, noun));
   add(endings.crossed,

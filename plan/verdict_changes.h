@@ -29,6 +29,7 @@ struct Endings {
   int no_equilibrium = 0, our_fault = 0;
   int whole_wire_in = 0;  // of those that missed, with all of the wire in the body, ...
   int all_wire_in = 0;    // ... with as much of it as may go in ...
+  int went_by = 0;        // of those that missed, past the target, beside it or beyond
   int missed = 0;         // ... and the others
 
   int unclear() const { return left_image + crossed + no_equilibrium + our_fault; }
@@ -36,9 +37,10 @@ struct Endings {
   int held_by_wall() const { return stuck + prolapsed + left_lumen; }
 };
 
-/// Adds a trial of that wire, inserted so.
+/// Adds a trial of that wire toward that goal, inserted so.
 void add_ending(Endings& endings, const Measured& trial, const simulate::Wire& wire,
-                const simulate::InsertionOptions& insertion, const Limits& limits);
+                const simulate::Goal& goal, const simulate::InsertionOptions& insertion,
+                const Limits& limits);
 
 /// "12 passed by the branch, 3 got stuck": all that did not reach, the most frequent first.
 std::string describe_endings(const Endings& endings);

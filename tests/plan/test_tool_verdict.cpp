@@ -125,6 +125,27 @@ TEST(Verdict, TellsTheScriptsThatWereSearched) {
   EXPECT_EQ(bench.verdict().answer, Answer::kUnsure);
 }
 
+TEST(Verdict, WhatWentByTheTargetDidNotEndBeforeItForWantOfWire) {
+  for (const bool at_section : {true, false}) {
+    WhatIsKnown bench;
+    bench.study.goal = goal_below(128.0);
+    bench.study.goal.at_section = at_section;
+    bench.study.goal.radius = 0.5;
+    const Eigen::VectorXd& arc = bench.study.goal.way->path().arc_length;
+    const double whole = arc[arc.size() - 1];
+    bench.add(Outcome::kMissed).insertion = 400.0;  // all that may go in
+    bench.plan.trials[0].progress = whole - 1.0;
+    EXPECT_TRUE(tells(bench.verdict().changes, "More wire in the vessel: the one trial ended bef"));
+    bench.plan.trials[0].progress = whole;
+    const Verdict verdict = bench.verdict();
+    EXPECT_TRUE(tells(verdict.reasons, "The one trial went by the target."));
+    EXPECT_EQ(verdict.changes.size(), 1U);
+    EXPECT_TRUE(tells(verdict.changes, at_section
+                                           ? "the one trial ended beside the target or beyond it"
+                                           : "the one trial missed the sphere of 0.5 mm radius"));
+  }
+}
+
 Catheter curved(const std::string& name, double angle) {
   Catheter catheter;
   catheter.tool.wire = {
