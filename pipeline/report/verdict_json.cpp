@@ -89,9 +89,9 @@ std::string describe_best(const Json& report) {
     });
     return "no plan reaches the target within the limits: " +
            plan::count_of(static_cast<int>(trials.size()), "trial") +
-           (scouted > 0 ? ", " + std::to_string(scouted) + " of them on " +
+           (scouted > 0 ? ", " + std::to_string(scouted) + " of them only on " +
                               plan::wall_of_scouts(report.contains("vessel_motion")) +
-                              " only (--exhaustive runs all in full)"
+                              " (--exhaustive runs all in full)"
                         : "") +
            "; the report says why for each";
   }
