@@ -10,12 +10,11 @@
 namespace wireplan::plan {
 namespace {
 
+using simulate::tip_at_rest;
+
 /// Where targets and paths are: in the vessel at rest.
 const Eigen::Matrix3Xd& nodes_at_rest(const simulate::TrialResult& trial) {
   return trial.nodes_at_rest.cols() > 0 ? trial.nodes_at_rest : trial.nodes;
-}
-const Vec3& tip_at_rest(const simulate::TrialResult& trial, std::size_t push) {
-  return trial.tips_at_rest.empty() ? trial.pushes[push].tip : trial.tips_at_rest[push];
 }
 
 /// Where the tip ended: of the final shape, else of the last push, else still at the access.
@@ -165,8 +164,8 @@ std::vector<ToolMetrics> compute_tool_metrics(const simulate::TrialResult& trial
     }
     tool.insertion = track.insertion[to - 1];
     if (trial.nodes.cols() > 1 && to == track.insertion.size()) {
-      tool.progress =
-          find_progress(simulate::point_at_arc(trial.nodes, tool.insertion), study, path);
+      const simulate::PlaceOnLine at = simulate::place_at_arc(trial.nodes, tool.insertion);
+      tool.progress = find_progress(simulate::point_on(nodes_at_rest(trial), at), study, path);
     }
   };
   for (const simulate::ToolTrack& track : trial.tools) {

@@ -40,7 +40,7 @@ double furthest_since(std::size_t push, const simulate::ToolTrial& trial,
                       const simulate::Way& way) {
   double furthest = 0.0;
   for (std::size_t k = push; k < trial.pushes().size(); ++k) {
-    furthest = std::max(furthest, way.find_progress(trial.pushes()[k].tip));
+    furthest = std::max(furthest, way.find_progress(trial.tip_after(k)));
   }
   return furthest;
 }

@@ -75,15 +75,24 @@ Eigen::Matrix3Xd line_from_entry(const Eigen::Matrix3Xd& line, const Vec3& entry
   return from;
 }
 
-Vec3 point_at_arc(const Eigen::Matrix3Xd& line, double arc) {
+PlaceOnLine place_at_arc(const Eigen::Matrix3Xd& line, double arc) {
   for (Eigen::Index i = 0; i + 1 < line.cols(); ++i) {
-    const Vec3 edge = line.col(i + 1) - line.col(i);
-    const double length = edge.norm();
+    const double length = (line.col(i + 1) - line.col(i)).norm();
     const bool last = i + 2 == line.cols();
-    if (length > 0.0 && (arc <= length || last)) return line.col(i) + arc / length * edge;
+    if (length > 0.0 && (arc <= length || last)) return {i, arc / length};
     arc -= length;
   }
-  return line.col(line.cols() - 1);
+  return {line.cols() - 1, 0.0};
+}
+
+Vec3 point_on(const Eigen::Matrix3Xd& line, const PlaceOnLine& place) {
+  if (place.before + 1 == line.cols()) return line.col(place.before);
+  return line.col(place.before) +
+         place.part * (line.col(place.before + 1) - line.col(place.before));
+}
+
+Vec3 point_at_arc(const Eigen::Matrix3Xd& line, double arc) {
+  return point_on(line, place_at_arc(line, arc));
 }
 
 Eigen::Matrix3Xd line_up_to(const Eigen::Matrix3Xd& line, double arc) {

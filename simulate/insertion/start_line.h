@@ -21,6 +21,14 @@ double arc_length(const Eigen::Matrix3Xd& line);  //                            
 /// The line's part beyond its place nearest to the entry, which becomes its first point.
 Eigen::Matrix3Xd line_from_entry(const Eigen::Matrix3Xd& line, const Vec3& entry);
 
+/// A place on a line of points: so much of the edge beyond the point `before`.
+struct PlaceOnLine {
+  Eigen::Index before = 0;
+  double part = 0.0;  // above 1 on the extension of the last edge
+};
+PlaceOnLine place_at_arc(const Eigen::Matrix3Xd& line, double arc);
+Vec3 point_on(const Eigen::Matrix3Xd& line, const PlaceOnLine& place);
+
 /// Point of the line at an arc length; on its last edge's extension beyond its end.
 Vec3 point_at_arc(const Eigen::Matrix3Xd& line, double arc);
 

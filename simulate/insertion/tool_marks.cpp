@@ -149,6 +149,7 @@ ToolTrial::Mark ToolTrial::save() const {
 void ToolTrial::restore(const Mark& mark) {
   bench_.restore(mark.bench);
   record_.pushes.resize(mark.pushes);
+  if (vessel_.sections) record_.tips_at_rest.resize(mark.pushes, Vec3::Zero());
   record_.steps.resize(mark.pushes);
   step_ = mark.step;
   tries_ = mark.tries;

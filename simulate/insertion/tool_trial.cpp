@@ -415,6 +415,7 @@ void ToolTrial::note(const ToolStep& step) {
   push.residual = now.residual;
   push.iterations = now.iterations;
   record_.pushes.push_back(push);
+  if (vessel_.sections) record_.tips_at_rest.push_back(foremost_tip());
   record_.steps.push_back(step_);
   if (options_.insertion.map_forces) {
     std::map<int, double> forces;
@@ -549,6 +550,7 @@ TrialResult ToolTrial::finish() {
   }
   record_.nodes = bench_.state().x;
   record_.sections = bench_.state().sections;
+  if (vessel_.sections) record_.nodes_at_rest = bench_.at_rest(record_.nodes);
   for (const Touch& touch : bench_.touches()) {
     record_.contacts.push_back(
         contact_of(touch, bench_.composite().rod.radius - touch.thinner, vessel_.locator));

@@ -146,6 +146,7 @@ class ToolTrial {
   /// it kInBranch is the distance from its ostium, negative.
   double measure(Until until, int tool, int side = -1) const;
   const std::vector<Push>& pushes() const { return record_.pushes; }
+  const Vec3& tip_after(std::size_t push) const { return tip_at_rest(record_, push); }  // [mm]
 
   /// So far the last step may bring the foremost tip, in the place of what the options say [mm].
   void bound(double length) { options_.insertion.length = length; }

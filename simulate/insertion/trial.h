@@ -97,7 +97,7 @@ struct TrialResult {
   Eigen::Matrix3Xd nodes;          // (3, k) final shape beyond the introducer, proximal to distal
   Eigen::Matrix3Xd sections = {};  // of the final shape, as Shape has them
   /// In the vessel at rest, in which ways and targets are: the tip after each push, and the final
-  /// shape. Empty where cross-sections do not move, and of several tools                    [mm]
+  /// shape. Empty where cross-sections do not move                                          [mm]
   std::vector<Vec3> tips_at_rest = {};
   Eigen::Matrix3Xd nodes_at_rest = {};
   std::vector<WireContact> contacts;       // of the final shape
@@ -113,6 +113,11 @@ struct TrialResult {
   std::optional<Shape> start;      // the equilibrium that it started from, if from a line
   double roll = 0.0;               // of the hub before the first move                    [rad]
 };
+
+/// The tip after a push, in the vessel at rest [mm].
+inline const Vec3& tip_at_rest(const TrialResult& trial, std::size_t push) {
+  return trial.tips_at_rest.empty() ? trial.pushes[push].tip : trial.tips_at_rest[push];
+}
 
 /// "; its forces are rough: ..." where work and energy of an insertion differ by more than 1 % of
 /// the work, else empty.

@@ -210,6 +210,14 @@ TEST(Metrics, OfAVesselThatMovesAreThoseOfTheVesselAtRest) {
   EXPECT_EQ(find_progress(moved, study, straight_path()),
             find_progress(at_rest, study, straight_path()));
   EXPECT_EQ(measure(moved, study, straight_path()).last_tip, at_rest.pushes.back().tip);
+  simulate::ToolTrack track;
+  track.name = "catheter";
+  track.insertion = {20.0, 40.0, 50.0};
+  track.tip_force = track.wall_force = track.push_force = track.hub_torque = {0.0, 0.0, 0.0};
+  moved.tools = at_rest.tools = {track};
+  EXPECT_NEAR(compute_tool_metrics(at_rest, study, straight_path())[0].progress, 50.0, 1e-9);
+  EXPECT_NEAR(compute_tool_metrics(moved, study, straight_path())[0].progress, 50.0, 1e-9);
+  moved.tools.clear();
   moved.tips_at_rest.clear();
   moved.nodes_at_rest.resize(3, 0);
   EXPECT_NE(compute_metrics(moved, study, straight_path()).tip_to_target, 15.0);

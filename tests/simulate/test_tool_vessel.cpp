@@ -14,6 +14,7 @@
 #include "simulate/equilibrium/assemble.h"
 #include "simulate/insertion/insertion.h"
 #include "simulate/insertion/tool_bench.h"
+#include "simulate/insertion/tool_trial.h"
 #include "tests/shapes.h"
 #include "tests/simulate/random_values.h"
 #include "tests/simulate/tool_bench.h"
@@ -160,6 +161,36 @@ TEST(ToolVessel, OneToolMovesAVesselAsTheWireThatAnInsertionPushes) {
     EXPECT_LT((bench.record().tools[0].tip - insertion.tip()).norm(), 0.2);
     EXPECT_NEAR(bench.record().work, work, 0.05 * work);
   }
+}
+
+TEST(ToolVessel, AScriptInAVesselThatMovesIsKeptInTheVesselAtRestToo) {
+  const VesselModel vessel = moving_bend(1e-4);
+  Tool sheath = uniform_tool(300.0, 600.0), wire = uniform_tool(300.0, 60.0);
+  sheath.wire.radius = 0.8;
+  sheath.inner_radius = 0.5;
+  wire.wire.radius = 0.4;
+  ToolTrialOptions options;
+  options.insertion.element_length = 3.0;
+  options.insertion.length = 200.0;
+  ToolTrial trial({sheath, wire}, {.point = Vec3(0.0, 0.0, 20.0), .direction = Vec3::UnitZ()},
+                  {.point = Vec3(0.0, 0.0, 500.0), .radius = 1.0}, vessel, options);
+  ASSERT_TRUE(trial.make({.tool = 1, .push = 90.0}));
+  const ToolTrial::Mark mark = trial.save();
+  const std::size_t before = trial.pushes().size();
+  ASSERT_TRUE(trial.make({.tool = 0, .push = 20.0}));
+  trial.restore(mark);
+  ASSERT_EQ(trial.pushes().size(), before);
+  ASSERT_TRUE(trial.make({.tool = 0, .push = 70.0}));
+  EXPECT_EQ((trial.tip_after(trial.pushes().size() - 1) - trial.foremost_tip()).norm(), 0.0);
+  const TrialResult result = trial.finish();
+  EXPECT_GT(result.sections.colwise().norm().maxCoeff(), 1.0);
+  ASSERT_EQ(result.tips_at_rest.size(), result.pushes.size());
+  ASSERT_EQ(result.nodes_at_rest.cols(), result.nodes.cols());
+  // Carried on by the sections they are where the tools lie.
+  const Eigen::Matrix3Xd moved = vessel.sections->carried(result.nodes_at_rest, result.sections);
+  EXPECT_LT((moved - result.nodes).colwise().norm().maxCoeff(), 1e-6);
+  EXPECT_GT((result.nodes_at_rest - result.nodes).colwise().norm().maxCoeff(), 0.5);
+  EXPECT_LT((result.tips_at_rest.back() - result.nodes_at_rest.rightCols<1>()).norm(), 1e-9);
 }
 
 TEST(ToolVessel, EachToolRubsByItsOwnFriction) {
