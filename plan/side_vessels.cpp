@@ -23,8 +23,6 @@ constexpr double kWider = 2.0;       // than the catheter
 constexpr double kKneeRoom = 0.5;    // of the curve's width, in the trunk
 constexpr std::size_t kVessels = 2;
 
-double length_of(const Centerline& line) { return line.arc_length[line.arc_length.size() - 1]; }
-
 /// The first place on a line, from an arc length on, that is outside of the way's inscribed balls;
 /// the line's end where none is.
 Eigen::Index leaves_way(const Centerline& line, double from, const Centerline& way) {

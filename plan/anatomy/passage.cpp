@@ -15,8 +15,6 @@ namespace {
 
 using preprocess::Branch;
 
-double length_of(const Centerline& line) { return line.arc_length(line.arc_length.size() - 1); }
-
 /// The index of the last point at or before an arc length, with a point behind it.
 Eigen::Index segment_at(const Centerline& line, double arc) {
   const auto* begin = line.arc_length.data();
@@ -384,6 +382,8 @@ void join_turns(std::vector<Junction>& junctions) {
 }
 
 }  // namespace
+
+double length_of(const Centerline& line) { return line.arc_length(line.arc_length.size() - 1); }
 
 LinePart find_part(const Centerline& line, double arc) {
   expects(line.points.cols() >= 2);

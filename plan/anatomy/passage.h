@@ -20,6 +20,8 @@ LinePart find_part(const Centerline& line, double arc);
 /// The point of a line there.
 Vec3 point_at(const Centerline& line, double arc);
 
+double length_of(const Centerline& line);  //                                              [mm]
+
 struct Narrowest {
   double diameter = 0.0;      // of the inscribed sphere                                   [mm]
   double arc = 0.0;           //                                                           [mm]
