@@ -17,13 +17,13 @@ using simulate::Until;
 
 /// All chosen.
 struct Reshape {
-  double beyond = 45.0, above = 30.0;  // of wire and catheter past the mouth [mm]
-  double left_in = 5.0;  // of the wire, at least                                          [mm]
-  double in = 15.0;      // of a wire that goes into the vessel ...                             [mm]
-  double astray = 40.0;  // ... before so much of it is out of the catheter                   [mm]
-  double shares[2] = {0.85, 0.6};  // of the knee's length, that the tip goes in
-  double slack = 12.0;             // of pushes that end by what is seen                    [mm]
-  double cover = 6.0;              // of the curve behind its end, without a wire           [mm]
+  double beyond = 45.0, above = 30.0;  // of wire and catheter past the mouth               [mm]
+  double left_in = 5.0;                // of the wire, at least                             [mm]
+  double in = 15.0;                    // of a wire that goes into the vessel ...           [mm]
+  double astray = 40.0;                // ... before so much of it is out of the catheter   [mm]
+  double shares[2] = {0.85, 0.6};      // of the knee's length, that the tip goes in
+  double slack = 12.0;                 // of pushes that end by what is seen                    [mm]
+  double cover = 6.0;                  // of the curve behind its end, without a wire           [mm]
   double turns[3] = {0.0, 90.0 * kRadPerDeg, -90.0 * kRadPerDeg};  // as the knee rises
   double out = 2.0;   // of the tip, beyond the mouth's level, once it is out              [mm]
   double back = 0.3;  // cosine: it looks back down the trunk then
@@ -256,10 +256,7 @@ class Reshaping : private HookSearch {
 
 WayUp go_up_reshaped(const Study& study, const ToolPair& pair, const SideVessel& side,
                      const simulate::VesselModel& vessel, const std::function<bool()>& cancelled) {
-  WayUp up;
-  const Candidate begun = first_candidate(study, pair);
-  up.trial = std::make_unique<ToolTrial>(tools_of(study, begun), make_introducer(study, begun),
-                                         study.goal, vessel, tool_options(study, begun));
+  WayUp up = begin_way_up(study, pair, vessel);
   up.findings = Reshaping(study, pair, side, cancelled, *up.trial).go_up(up.depths);
   return up;
 }

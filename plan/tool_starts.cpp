@@ -270,13 +270,18 @@ class ToolSearch : private HookSearch {
 
 double room_beyond() { return kTemplate.above[0] + kTemplate.leads + kTemplate.before_end; }
 
-WayUp go_up(const Study& study, const ToolPair& pair, const Ostium& ostium,
-            const simulate::VesselModel& vessel, Hooks hooks,
-            const std::function<bool()>& cancelled) {
+WayUp begin_way_up(const Study& study, const ToolPair& pair, const simulate::VesselModel& vessel) {
   WayUp up;
   const Candidate begun = first_candidate(study, pair);
   up.trial = std::make_unique<ToolTrial>(tools_of(study, begun), make_introducer(study, begun),
                                          study.goal, vessel, tool_options(study, begun));
+  return up;
+}
+
+WayUp go_up(const Study& study, const ToolPair& pair, const Ostium& ostium,
+            const simulate::VesselModel& vessel, Hooks hooks,
+            const std::function<bool()>& cancelled) {
+  WayUp up = begin_way_up(study, pair, vessel);
   up.findings = ToolSearch(study, pair, ostium, cancelled, *up.trial, hooks).go_up(up.depths);
   return up;
 }

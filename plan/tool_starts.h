@@ -21,6 +21,9 @@ struct WayUp {
 /// into the branch [mm].
 double room_beyond();
 
+/// Both tools at the introducer, with nothing found yet.
+WayUp begin_way_up(const Study& study, const ToolPair& pair, const simulate::VesselModel& vessel);
+
 /// The wire beyond the ostium, and the catheter over it.
 WayUp go_up(const Study& study, const ToolPair& pair, const Ostium& ostium,
             const simulate::VesselModel& vessel, Hooks hooks,
