@@ -99,17 +99,6 @@ Metrics compute_push_metrics(const std::vector<simulate::Push>& pushes) {
   return metrics;
 }
 
-namespace {
-
-/// Whether a point is in a vessel that the way leaves, beyond that, as a catheter's knee is.
-bool lies_beyond(const Study& study, const Vec3& point) {
-  if (!study.goal.way) return false;
-  const std::optional<simulate::Astray> astray = study.goal.way->find_astray(point);
-  return astray && astray->passed_by;
-}
-
-}  // namespace
-
 Metrics compute_metrics(const simulate::TrialResult& trial, const Study& study,
                         const Centerline& path) {
   expects(path.points.cols() > 0 && path.radius.size() == path.points.cols());
@@ -126,7 +115,7 @@ Metrics compute_metrics(const simulate::TrialResult& trial, const Study& study,
   for (Eigen::Index k = 0; k < nodes.cols(); ++k) {
     const preprocess::PathPlace place = preprocess::find_place(nodes.col(k), path);
     metrics.centerline_deviation += place.from_axis / static_cast<double>(nodes.cols());
-    if (trial.reshaped && lies_beyond(study, nodes.col(k))) continue;
+    if (trial.reshaped && study.goal.way && study.goal.way->passes_by(nodes.col(k))) continue;
     metrics.off_path = std::max(metrics.off_path, place.from_lumen);
   }
   return metrics;

@@ -118,12 +118,13 @@ std::optional<Eigen::Index> Way::find_arrival(const Eigen::Ref<const Eigen::Matr
   return std::nullopt;
 }
 
+bool Way::passes_by(const Vec3& point) const {
+  const std::optional<Astray> astray = find_astray(point);
+  return astray && astray->passed_by;
+}
+
 std::optional<std::string> Way::find_detour(const Eigen::Ref<const Eigen::Matrix3Xd>& wire,
                                             bool knee) const {
-  const auto passes_by = [&](const Vec3& point) {
-    const std::optional<Astray> astray = find_astray(point);
-    return astray && astray->passed_by;
-  };
   double furthest = 0.0, off = 0.0;
   Vec3 off_at = Vec3::Zero();
   for (Eigen::Index i = 0; i < wire.cols(); ++i) {

@@ -63,6 +63,9 @@ class Way {
   /// Where a tip is that is not on the way; empty for one that is. Half a radius beside the way's
   /// balls counts as on it, unless it is inside another vessel's.
   std::optional<Astray> find_astray(const Vec3& tip) const;
+  /// Whether a point is in a vessel that the way leaves, beyond that: as a tip that passed by, or
+  /// a catheter's knee.
+  bool passes_by(const Vec3& point) const;
 
   /// How far along the way a tip is; 0 where it is not on it. In a flat lumen that may be far
   /// beside the balls: a tree then tells whether the tip is in a vessel of the way [mm].
