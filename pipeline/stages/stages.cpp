@@ -290,7 +290,7 @@ std::vector<Stage> stages_of(const Case& given) {
   stages.push_back(trials);
   Stage manoeuvres = trials;
   manoeuvres.name = "manoeuvres";
-  manoeuvres.version = 44;
+  manoeuvres.version = 45;
   manoeuvres.after.push_back("trials");
   read_too(manoeuvres, {"/manoeuvres"});
   const bool tools = !given.catheters.empty();

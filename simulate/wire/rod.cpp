@@ -12,9 +12,10 @@ double Section::EI(double from) const {
   if (taper == Taper::kLinear) {
     return bending_stiffness + part * (proximal_bending_stiffness - bending_stiffness);
   }
-  const double q_0 = std::pow(bending_stiffness, 0.25);
-  const double q_1 = std::pow(proximal_bending_stiffness, 0.25);
-  return std::pow(q_0 + part * (q_1 - q_0), 4);
+  const double q_0 = std::sqrt(std::sqrt(bending_stiffness));
+  const double q_1 = std::sqrt(std::sqrt(proximal_bending_stiffness));
+  const double q = q_0 + part * (q_1 - q_0);
+  return (q * q) * (q * q);
 }
 
 // A cone: with q, the fourth root of EI, linear from a to b, the integral of q^-4 over a length l

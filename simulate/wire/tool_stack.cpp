@@ -85,12 +85,21 @@ class Builder {
   }
 
  private:
+  /// A twisted tool at a place, and what its length counts with.
+  struct Curve {
+    double per_GJ = 0.0;
+    double turn = 0.0;                           // EI kappa / K                       [1/mm]
+    double stored = 0.0;                         //                                     [N]
+    std::array<double, kMostTools> mutual = {};  // with those inside it                [N]
+  };
   /// The tools at a place, and what its length counts with.
   struct Local {
     std::array<ToolSpot, kMostTools> at;
+    std::array<Curve, kMostTools> curve;                // of the twisted ones
     double compliance = 0.0, per_EA = 0.0, mass = 0.0;  // 1/K, 1/EA
     Eigen::Index outermost = 0;
-    bool even = false;  // the same up to the next end of a section
+    bool even = false;    // the same up to the next end of a section
+    bool curved = false;  // any tool, there
   };
 
   /// Ends of sections within the centreline, from the introducer on.
@@ -153,6 +162,27 @@ class Builder {
     }
     local_.compliance = 1.0 / K;
     local_.per_EA = 1.0 / EA;
+    find_curves();
+  }
+
+  /// Of the twisted tools, once K is known.
+  void find_curves() {
+    local_.curved = false;
+    for (int t = 0; t < terms_.twists(); ++t) {
+      const ToolSpot& here = spot_of(t);
+      Curve& curve = local_.curve[static_cast<std::size_t>(t)];
+      curve = {.per_GJ = 1.0 / here.GJ};
+      if (!here.there || here.curvature == 0.0) continue;
+      local_.curved = true;
+      const double moment = here.EI * here.curvature;
+      curve.turn = moment * local_.compliance;
+      curve.stored = 0.5 * moment * (here.curvature - curve.turn);
+      for (int k = t + 1; k < terms_.twists(); ++k) {
+        const ToolSpot& other = spot_of(k);
+        if (!other.there) continue;
+        curve.mutual[static_cast<std::size_t>(k)] = -curve.turn * other.EI * other.curvature;
+      }
+    }
   }
 
   void add_point(int e, double s, double length) {
@@ -166,25 +196,25 @@ class Builder {
     axial_[node] += w * local_.per_EA;
     rod_.mass[node] += w * local_.mass;
     outside_(local_.outermost, node) += w;
-    for (int t = 0; t < terms_.twists(); ++t) add_curve(t, node, w);
+    for (int t = 0; t < terms_.twists(); ++t) {
+      terms_.twist(t, node) += w * local_.curve[static_cast<std::size_t>(t)].per_GJ;
+    }
+    if (local_.curved) add_curves(node, w);
+  }
+
+  void add_curves(int node, double w) {
+    for (int t = 0; t < terms_.twists(); ++t) {
+      const Curve& curve = local_.curve[static_cast<std::size_t>(t)];
+      terms_.rest(t, node) += w * curve.turn;
+      terms_.stored += w * curve.stored;
+      for (int k = t + 1; k < terms_.twists(); ++k) {
+        terms_.mutual(ToolTerms::pair(t, k), node) += w * curve.mutual[static_cast<std::size_t>(k)];
+      }
+    }
   }
 
   const ToolSpot& spot_of(int t) const {
     return local_.at[static_cast<std::size_t>(terms_.tool[static_cast<std::size_t>(t)])];
-  }
-
-  void add_curve(int t, int node, double w) {
-    const ToolSpot& here = spot_of(t);
-    terms_.twist(t, node) += w / here.GJ;
-    if (!here.there || here.curvature == 0.0) return;
-    const double moment = here.EI * here.curvature, turn = moment * local_.compliance;
-    terms_.rest(t, node) += w * turn;
-    terms_.stored += 0.5 * w * moment * (here.curvature - turn);
-    for (int k = t + 1; k < terms_.twists(); ++k) {
-      const ToolSpot& other = spot_of(k);
-      if (!other.there) continue;
-      terms_.mutual(ToolTerms::pair(t, k), node) -= w * turn * other.EI * other.curvature;
-    }
   }
 
   void add_leads() {
