@@ -53,26 +53,24 @@ struct RestTurn {
   }
 };
 
-constexpr int kMostAngles = kMostTools;
-
-/// W of a node as a function of V, s_i and psi_i, with derivatives in that order.
+/// W of a node as a function of V, s_i and psi_i of T tools, with derivatives in that order.
+template <int T>
 struct NodeBend {
-  static constexpr int kMost = 1 + 2 * kMostAngles;
-  using Vector = Eigen::Matrix<double, kMost, 1>;
-  using Matrix = Eigen::Matrix<double, kMost, kMost>;
+  static constexpr int kCount = 1 + 2 * T;
+  using Vector = Eigen::Matrix<double, kCount, 1>;
+  using Matrix = Eigen::Matrix<double, kCount, kCount>;
   double energy = 0.0;
   Vector first = Vector::Zero();
   Matrix second = Matrix::Zero();
 
   /// With B = 0 it is the mutual part alone, as at a free tip.
-  NodeBend(const ToolTerms& tools, int node, double B, double V,
-           const std::array<double, kMostAngles>& s, const std::array<double, kMostAngles>& psi) {
-    const int T = tools.twists();
+  NodeBend(const ToolTerms& tools, int node, double B, double V, const std::array<double, T>& s,
+           const std::array<double, T>& psi) {
     const auto r = [&](int i) { return tools.rest(i, node); };
     double Q = 0.0, S = 0.0;
-    Eigen::Matrix<double, kMostAngles, 1> Q_1 = decltype(Q_1)::Zero();
-    Eigen::Matrix<double, kMostAngles, kMostAngles> Q_2 = decltype(Q_2)::Zero();
-    const auto psi_at = [](int i) { return 1 + kMostAngles + i; };
+    Eigen::Matrix<double, T, 1> Q_1 = decltype(Q_1)::Zero();
+    Eigen::Matrix<double, T, T> Q_2 = decltype(Q_2)::Zero();
+    const auto psi_at = [](int i) { return 1 + T + i; };
     for (int i = 0; i < T; ++i) {
       Q += r(i) * r(i);
       S += r(i) * s[static_cast<std::size_t>(i)];
@@ -123,19 +121,22 @@ struct NodeBend {
 
 /// Derivatives of V, s_i and psi_i with what they depend on: e_a, e_b, and the thetas of edge a and
 /// of edge b.
+template <int T>
 struct NodeJacobian {
-  static constexpr int kThetas = 6;
-  Eigen::Matrix<double, NodeBend::kMost, 6 + 2 * kMostAngles> rows = decltype(rows)::Zero();
+  static constexpr int kThetas = 6, kCount = kThetas + 2 * T;
+  Eigen::Matrix<double, NodeBend<T>::kCount, kCount> rows = decltype(rows)::Zero();
   static int theta_a(int i) { return kThetas + i; }
-  static int theta_b(int i) { return kThetas + kMostAngles + i; }
+  static int theta_b(int i) { return kThetas + T + i; }
 
   /// Adds J' H J at node i; a clamp's edge is b of a node before it, or a of one behind.
   template <class Sink>
-  void add(int i, bool has_a, bool has_b, int T, const NodeBend::Matrix& H, Sink& sink) const {
-    const Eigen::Matrix<double, 6 + 2 * kMostAngles, 6 + 2 * kMostAngles> all =
-        rows.transpose() * H * rows;
-    const auto block = [&](int p, int q) -> Mat3 { return all.block<3, 3>(p, q); };
-    const auto vector = [&](int p, int theta) -> Vec3 { return all.block<3, 1>(p, theta); };
+  void add(int i, bool has_a, bool has_b, const typename NodeBend<T>::Matrix& H, Sink& sink) const {
+    const Eigen::Matrix<double, kCount, NodeBend<T>::kCount> left = rows.transpose().lazyProduct(H);
+    const Eigen::Matrix<double, kCount, kCount> all = left.lazyProduct(rows);
+    const auto block = [&](int p, int q) -> Mat3 { return all.template block<3, 3>(p, q); };
+    const auto vector = [&](int p, int theta) -> Vec3 {
+      return all.template block<3, 1>(p, theta);
+    };
     const auto add_one = [&](int edge, int at) {
       sink.hessian(edge, edge, block(at, at));
       sink.hessian(edge + 1, edge + 1, block(at, at));
@@ -168,16 +169,15 @@ struct NodeJacobian {
   }
 };
 
-/// The curves of the tools at a node between two edges.
-template <class Sink>
+/// The curves of the T tools at a node between two edges.
+template <int T, class Sink>
 double add_tool_bend(const Problem& problem, const RodState& state, int i, Sink& sink) {
   const Rod& rod = *problem.rod;
   const ToolTerms& tools = *problem.tools;
   if (tools.is_straight(i)) return 0.0;
-  const int T = tools.twists();
   const Eigen::Index edges = state.director.cols();
-  std::array<std::optional<Lean>, kMostAngles> leans;
-  std::array<double, kMostAngles> s{}, psi{};
+  std::array<std::optional<Lean>, T> leans;
+  std::array<double, T> s{}, psi{};
   for (int t = 0; t < T; ++t) {
     const auto k = static_cast<std::size_t>(t);
     leans[k].emplace(rod, state, i, toward_m, t);
@@ -185,50 +185,49 @@ double add_tool_bend(const Problem& problem, const RodState& state, int i, Sink&
     psi[k] = 0.5 * (state.theta[t * edges + i - 1] + state.theta[t * edges + i]);
   }
   const Vec3 u = leans[0]->u;
-  const NodeBend bend(tools, i, rod.bend[i], 0.5 * u.squaredNorm(), s, psi);
+  const NodeBend<T> bend(tools, i, rod.bend[i], 0.5 * u.squaredNorm(), s, psi);
   const double a = rod.per_length[i - 1], c = rod.per_length[i];
   add_edge_gradient(i, (-bend.first[0] * a) * u, (bend.first[0] * c) * u, sink);
   for (int t = 0; t < T; ++t) {
     OneTool<Sink> own{sink, t};
     add_lean(*leans[static_cast<std::size_t>(t)], bend.first[1 + t], 0.0, own);
-    const double by_psi = 0.5 * bend.first[1 + kMostAngles + t];
+    const double by_psi = 0.5 * bend.first[1 + T + t];
     own.gradient_theta(i - 1, by_psi);
     own.gradient_theta(i, by_psi);
   }
   if constexpr (Sink::kHessian) {
     const Mat3 I = bend.first[0] * Mat3::Identity();
     add_edge_hessian(i, a * a * I, -a * c * I, c * c * I, sink);
-    NodeJacobian J;
-    J.rows.block<1, 3>(0, 0) = -a * u.transpose();
-    J.rows.block<1, 3>(0, 3) = c * u.transpose();
+    NodeJacobian<T> J;
+    J.rows.template block<1, 3>(0, 0) = -a * u.transpose();
+    J.rows.template block<1, 3>(0, 3) = c * u.transpose();
     for (int t = 0; t < T; ++t) {
       const LeanSlopes slopes(*leans[static_cast<std::size_t>(t)]);
-      J.rows.block<1, 3>(1 + t, 0) = slopes.s_a.transpose();
-      J.rows.block<1, 3>(1 + t, 3) = slopes.s_b.transpose();
-      J.rows(1 + t, NodeJacobian::theta_a(t)) = slopes.s_theta_a;
-      J.rows(1 + t, NodeJacobian::theta_b(t)) = slopes.s_theta_b;
-      J.rows(1 + kMostAngles + t, NodeJacobian::theta_a(t)) = 0.5;
-      J.rows(1 + kMostAngles + t, NodeJacobian::theta_b(t)) = 0.5;
+      J.rows.template block<1, 3>(1 + t, 0) = slopes.s_a.transpose();
+      J.rows.template block<1, 3>(1 + t, 3) = slopes.s_b.transpose();
+      J.rows(1 + t, NodeJacobian<T>::theta_a(t)) = slopes.s_theta_a;
+      J.rows(1 + t, NodeJacobian<T>::theta_b(t)) = slopes.s_theta_b;
+      J.rows(1 + T + t, NodeJacobian<T>::theta_a(t)) = 0.5;
+      J.rows(1 + T + t, NodeJacobian<T>::theta_b(t)) = 0.5;
     }
-    J.add(i, true, true, T, bend.second, sink);
+    J.add(i, true, true, bend.second, sink);
   }
   return bend.energy;
 }
 
 /// The same between an end's edge and the tangent that is held there, or at a free tip, which has
 /// no bend but the tools' mutual energy.
-template <class Sink>
+template <int T, class Sink>
 double add_tool_end(const Problem& problem, const RodState& state, bool proximal, Sink& sink) {
   const Rod& rod = *problem.rod;
   const ToolTerms& tools = *problem.tools;
   const int node = proximal ? 0 : rod.nodes() - 1, edge = proximal ? 0 : node - 1;
   const std::optional<Vec3>& tangent = (proximal ? problem.proximal : problem.distal).tangent;
   if (tools.is_straight(node)) return 0.0;
-  const int T = tools.twists();
   const Eigen::Index edges = state.director.cols();
   const Vec3 w = tangent ? (proximal ? Vec3(-*tangent) : *tangent) : Vec3(Vec3::Zero());
-  std::array<Edge, kMostAngles> at;
-  std::array<double, kMostAngles> s{}, psi{};
+  std::array<Edge, T> at;
+  std::array<double, T> s{}, psi{};
   for (int t = 0; t < T; ++t) {
     const auto k = static_cast<std::size_t>(t);
     at[k] = edge_at(state, edge, t);
@@ -239,7 +238,7 @@ double add_tool_end(const Problem& problem, const RodState& state, bool proximal
   const Vec3 e = state.x.col(edge + 1) - state.x.col(edge);
   const Vec3 u = tangent ? Vec3(per * e - *tangent) : Vec3(Vec3::Zero());
   const double B = !tangent ? 0.0 : proximal ? rod.proximal_bend : rod.distal_bend;
-  const NodeBend bend(tools, node, B, 0.5 * u.squaredNorm(), s, psi);
+  const NodeBend<T> bend(tools, node, B, 0.5 * u.squaredNorm(), s, psi);
   const Vec3 g = (bend.first[0] * per) * u;
   sink.gradient(edge, -g);
   sink.gradient(edge + 1, g);
@@ -247,26 +246,53 @@ double add_tool_end(const Problem& problem, const RodState& state, bool proximal
     const auto k = static_cast<std::size_t>(t);
     OneTool<Sink> own{sink, t};
     add_clamp_lean(edge, at[k], w, toward_m(at[k]), bend.first[1 + t], 0.0, own);
-    own.gradient_theta(edge, bend.first[1 + kMostAngles + t]);
+    own.gradient_theta(edge, bend.first[1 + T + t]);
   }
   if constexpr (Sink::kHessian) {
     const Mat3 I = (bend.first[0] * per * per) * Mat3::Identity();
     sink.hessian(edge, edge, I);
     sink.hessian(edge + 1, edge + 1, I);
     sink.hessian(edge + 1, edge, -I);
-    NodeJacobian J;
+    NodeJacobian<T> J;
     const int x = proximal ? 3 : 0;
-    J.rows.block<1, 3>(0, x) = per * u.transpose();
+    J.rows.template block<1, 3>(0, x) = per * u.transpose();
     for (int t = 0; t < T; ++t) {
       const Edge& own = at[static_cast<std::size_t>(t)];
-      const int theta = proximal ? NodeJacobian::theta_b(t) : NodeJacobian::theta_a(t);
-      J.rows.block<1, 3>(1 + t, x) = -(w.dot(own.t) / own.length) * own.m.transpose();
+      const int theta = proximal ? NodeJacobian<T>::theta_b(t) : NodeJacobian<T>::theta_a(t);
+      J.rows.template block<1, 3>(1 + t, x) = -(w.dot(own.t) / own.length) * own.m.transpose();
       J.rows(1 + t, theta) = w.dot(own.n);
-      J.rows(1 + kMostAngles + t, theta) = 1.0;
+      J.rows(1 + T + t, theta) = 1.0;
     }
-    J.add(node, !proximal, proximal, T, bend.second, sink);
+    J.add(node, !proximal, proximal, bend.second, sink);
   }
   return bend.energy;
+}
+
+/// See add_tools(); of T twisted ones.
+template <int T, class Sink>
+void add_twisted_tools(const Problem& problem, const RodState& state, const TwistChain& chain,
+                       Sink& sink, Energy& energy) {
+  const ToolTerms& tools = *problem.tools;
+  const int n = problem.rod->nodes();
+  const Eigen::Index edges = state.director.cols();
+  for (int i = std::max(1, problem.first - 1); i <= std::min(n - 2, problem.last); ++i) {
+    if (chain.skips(i)) continue;  // it is straight too
+    for (int t = 0; t < T; ++t) {
+      OneTool<Sink> own{sink, t};
+      energy.twist += add_twist(tools.twist(t, i), state, i, own, t);
+    }
+    energy.bend += add_tool_bend<T>(problem, state, i, sink);
+  }
+  if (problem.last == n) energy.bend += add_tool_end<T>(problem, state, false, sink);
+  if (problem.first > 0) return;
+  energy.bend += add_tool_end<T>(problem, state, true, sink);
+  if (chain.exists()) return;
+  for (int t = 0; t < T; ++t) {  // the straight part behind the introducer
+    const double angle = state.theta[t * edges] - tools.roll[t];
+    sink.gradient_theta(0, tools.lead[t] * angle, t);
+    if constexpr (Sink::kHessian) sink.hessian_theta_theta(0, 0, tools.lead[t], t, t);
+    energy.twist += 0.5 * tools.lead[t] * angle * angle;
+  }
 }
 
 /// All that the tools add to the rod but the twist of a chain, and the energy that no shape
@@ -274,27 +300,17 @@ double add_tool_end(const Problem& problem, const RodState& state, bool proximal
 template <class Sink>
 void add_tools(const Problem& problem, const RodState& state, const TwistChain& chain, Sink& sink,
                Energy& energy) {
-  const ToolTerms& tools = *problem.tools;
-  const int n = problem.rod->nodes();
-  const Eigen::Index edges = state.director.cols();
-  energy.bend += tools.stored;
-  for (int i = std::max(1, problem.first - 1); i <= std::min(n - 2, problem.last); ++i) {
-    if (chain.skips(i)) continue;  // it is straight too
-    for (int t = 0; t < tools.twists(); ++t) {
-      OneTool<Sink> own{sink, t};
-      energy.twist += add_twist(tools.twist(t, i), state, i, own, t);
-    }
-    energy.bend += add_tool_bend(problem, state, i, sink);
-  }
-  if (problem.last == n) energy.bend += add_tool_end(problem, state, false, sink);
-  if (problem.first > 0) return;
-  energy.bend += add_tool_end(problem, state, true, sink);
-  if (chain.exists()) return;
-  for (int t = 0; t < tools.twists(); ++t) {  // the straight part behind the introducer
-    const double angle = state.theta[t * edges] - tools.roll[t];
-    sink.gradient_theta(0, tools.lead[t] * angle, t);
-    if constexpr (Sink::kHessian) sink.hessian_theta_theta(0, 0, tools.lead[t], t, t);
-    energy.twist += 0.5 * tools.lead[t] * angle * angle;
+  static_assert(kMostTools == 3);
+  energy.bend += problem.tools->stored;
+  switch (problem.tools->twists()) {
+    case 1:
+      return add_twisted_tools<1>(problem, state, chain, sink, energy);
+    case 2:
+      return add_twisted_tools<2>(problem, state, chain, sink, energy);
+    case 3:
+      return add_twisted_tools<3>(problem, state, chain, sink, energy);
+    default:
+      return;
   }
 }
 
