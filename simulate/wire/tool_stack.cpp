@@ -5,23 +5,32 @@
 
 namespace wireplan::simulate {
 
-ToolSpot look_at(const Wire& wire, double from_tip) {
+namespace {
+
+/// The section at an arc length from the tip, past the tip the first, and where it begins [mm].
+struct SectionThere {
+  const Section& section;
+  double start = 0.0;
+};
+
+SectionThere section_at(const Wire& wire, double from_tip) {
   double start = 0.0;
   std::size_t k = 0;
   while (k + 1 < wire.sections.size() && from_tip > start + wire.sections[k].length) {
     start += wire.sections[k++].length;
   }
-  const Section& section = wire.sections[k];
-  const double from = std::clamp(from_tip - start, 0.0, section.length);
+  return {wire.sections[k], start};
+}
+
+}  // namespace
+
+ToolSpot look_at(const Wire& wire, double from_tip) {
+  const auto [section, start] = section_at(wire, from_tip);
   ToolSpot local;
   local.there = from_tip > 0.0;
-  local.tapers = section.tapered();
-  local.EI = section.EI(from);
+  local.EI = section.EI(std::clamp(from_tip - start, 0.0, section.length));
   local.GJ = section.twist_stiffness > 0.0 ? section.twist_stiffness : local.EI / 1.3;
-  local.EA = section.axial_stiffness > 0.0 ? section.axial_stiffness
-                                           : 4.0 * local.EI / (wire.radius * wire.radius);
   local.curvature = section.rest_curvature;
-  local.mass = section.mass_per_length;
   return local;
 }
 
@@ -42,6 +51,8 @@ void add_lead(const Wire& wire, double insertion, double& stored, double& compli
     stored += 0.5 * EI * part * section.rest_curvature * section.rest_curvature;
   }
 }
+
+constexpr double kNothing = 1e-12;  // of an edge: what rounding leaves of a part
 
 /// Integrals over the nodes' hats, and what comes of them, in the memory of a composite.
 class Builder {
@@ -77,7 +88,11 @@ class Builder {
 
   void build() {
     find_ends();
-    for (int e = 0; e + 1 < n_; ++e) integrate_edge(e);
+    double from = 0.0;
+    for (const double end : ends_) {
+      integrate_stretch(from, end);
+      from = end;
+    }
     add_leads();
     finish_twist();
     finish_rod();
@@ -85,24 +100,34 @@ class Builder {
   }
 
  private:
-  /// A twisted tool at a place, and what its length counts with.
+  /// A tool along a stretch that none of its sections ends in: EI is q, or q^4, which is linear in
+  /// the place s.
+  struct Along {
+    bool there = false, cone = false;
+    double q_0 = 0.0, q_s = 0.0;                          // at s = 0, and per length
+    double EA = 0.0, GJ = 0.0;                            // 0: they follow from EI
+    double EA_per_EI = 0.0, curvature = 0.0, mass = 0.0;  //                [1/mm^2, 1/mm, t/mm]
+
+    double EI(double s) const {
+      const double q = q_0 + q_s * s;
+      return cone ? (q * q) * (q * q) : q;
+    }
+  };
+  /// What a twisted tool's length counts with at a place.
   struct Curve {
     double per_GJ = 0.0;
-    double turn = 0.0;                           // EI kappa / K                       [1/mm]
-    double stored = 0.0;                         //                                     [N]
-    std::array<double, kMostTools> mutual = {};  // with those inside it                [N]
+    double turn = 0.0;                           // EI kappa / K                        [1/mm]
+    double stored = 0.0;                         //                                        [N]
+    std::array<double, kMostTools> mutual = {};  // with those inside it                   [N]
   };
-  /// The tools at a place, and what its length counts with.
+  /// What a place's length counts with.
   struct Local {
-    std::array<ToolSpot, kMostTools> at;
+    std::array<double, kMostTools> EI = {};
     std::array<Curve, kMostTools> curve;                // of the twisted ones
     double compliance = 0.0, per_EA = 0.0, mass = 0.0;  // 1/K, 1/EA
-    Eigen::Index outermost = 0;
-    bool even = false;    // the same up to the next end of a section
-    bool curved = false;  // any tool, there
   };
 
-  /// Ends of sections within the centreline, from the introducer on.
+  /// Ends of sections within the centreline, from the introducer on, and its own.
   void find_ends() {
     ends_.clear();
     for (std::size_t i = 0; i < tools_.size(); ++i) {
@@ -113,27 +138,31 @@ class Builder {
       }
     }
     std::sort(ends_.begin(), ends_.end());
+    ends_.push_back(length_);
   }
 
-  /// Part by part of the edge between ends of sections.
-  void integrate_edge(int e) {
-    const double end = e + 2 == n_ ? length_ : (e + 1) * h_;
-    double from = e * h_;
-    while (next_ < ends_.size() && ends_[next_] < end) {
-      integrate_part(e, from, ends_[next_]);
-      from = std::max(from, ends_[next_++]);
-      known_ = false;
+  /// Between ends of sections, edge by edge; where no tool tapers, whole edges at once.
+  void integrate_stretch(double from, double to) {
+    if (to - from <= kNothing * h_) return;  // of rounding; its middle may lie past a tip
+    find_along(0.5 * (from + to));
+    if (even_) look(0.5 * (from + to));
+    for (int e = std::min(static_cast<int>(from / h_), n_ - 2); e + 1 < n_ && e * h_ < to; ++e) {
+      const double end = e + 2 == n_ ? length_ : (e + 1) * h_;
+      const int whole = static_cast<int>(to / h_) - e;
+      if (even_ && from <= e * h_ && whole > 1) {
+        add_edges(e, whole);
+        e += whole - 1;
+      } else {
+        integrate_part(e, std::max(from, e * h_), std::min(to, end));
+      }
     }
-    integrate_part(e, from, end);
   }
 
   /// By the middle where no tool tapers, else by Gauss' rule.
   void integrate_part(int e, double from, double to) {
     const double part = to - from, middle = 0.5 * (from + to);
-    if (part <= 1e-12 * h_) return;  // of rounding; none of its points may lie past a tip
-    if (!known_) look(middle);
-    known_ = true;
-    if (local_.even) {
+    if (part <= kNothing * h_) return;
+    if (even_) {
       add_point(e, middle, part);
       return;
     }
@@ -146,41 +175,69 @@ class Builder {
     }
   }
 
+  /// The tools along the stretch about a place.
+  void find_along(double s) {
+    even_ = true;
+    curved_ = false;
+    outermost_ = -1;
+    for (std::size_t i = 0; i < tools_.size(); ++i) {
+      const Wire& wire = tools_[i].wire;
+      const double insertion = places_[i].insertion;
+      const auto [section, start] = section_at(wire, insertion - s);
+      Along& tool = along_[i];
+      tool = {.there = s < insertion,
+              .cone = section.tapered() && section.taper == Taper::kCone,
+              .EA = section.axial_stiffness,
+              .GJ = section.twist_stiffness,
+              .EA_per_EI = 4.0 / (wire.radius * wire.radius),
+              .curvature = section.rest_curvature,
+              .mass = section.mass_per_length};
+      const auto q = [&](double EI) { return tool.cone ? std::sqrt(std::sqrt(EI)) : EI; };
+      const double q_tip = q(section.bending_stiffness);
+      tool.q_s = (q_tip - q(section.proximal_EI())) / section.length;
+      if (!tool.there) tool.q_s = 0.0;  // what its tip has
+      tool.q_0 = q_tip - tool.q_s * (insertion - start);
+      if (!tool.there) continue;
+      even_ = even_ && !section.tapered();
+      curved_ = curved_ || tool.curvature != 0.0;
+      if (outermost_ < 0) outermost_ = static_cast<Eigen::Index>(i);
+    }
+  }
+
   void look(double s) {
     double K = 0.0, EA = 0.0;
     local_.mass = 0.0;
-    local_.even = true;
     for (std::size_t i = 0; i < tools_.size(); ++i) {
-      ToolSpot& spot = local_.at[i];
-      spot = look_at(tools_[i].wire, places_[i].insertion - s);
-      if (!spot.there) continue;
-      if (K == 0.0) local_.outermost = static_cast<Eigen::Index>(i);
-      K += spot.EI;
-      EA += spot.EA;
-      local_.mass += spot.mass;
-      local_.even = local_.even && !spot.tapers;
+      const Along& tool = along_[i];
+      const double EI = local_.EI[i] = tool.EI(s);
+      if (!tool.there) continue;
+      K += EI;
+      EA += tool.EA > 0.0 ? tool.EA : EI * tool.EA_per_EI;
+      local_.mass += tool.mass;
     }
     local_.compliance = 1.0 / K;
     local_.per_EA = 1.0 / EA;
-    find_curves();
+    for (int t = 0; t < terms_.twists(); ++t) {
+      const std::size_t i = tool_of(t);
+      local_.curve[static_cast<std::size_t>(t)].per_GJ =
+          along_[i].GJ > 0.0 ? 1.0 / along_[i].GJ : 1.3 / local_.EI[i];
+    }
+    if (curved_) find_curves();
   }
 
   /// Of the twisted tools, once K is known.
   void find_curves() {
-    local_.curved = false;
+    const auto moment_of = [&](int t) {
+      const Along& tool = along_[tool_of(t)];
+      return tool.there ? local_.EI[tool_of(t)] * tool.curvature : 0.0;
+    };
     for (int t = 0; t < terms_.twists(); ++t) {
-      const ToolSpot& here = spot_of(t);
       Curve& curve = local_.curve[static_cast<std::size_t>(t)];
-      curve = {.per_GJ = 1.0 / here.GJ};
-      if (!here.there || here.curvature == 0.0) continue;
-      local_.curved = true;
-      const double moment = here.EI * here.curvature;
+      const double moment = moment_of(t);
       curve.turn = moment * local_.compliance;
-      curve.stored = 0.5 * moment * (here.curvature - curve.turn);
+      curve.stored = 0.5 * moment * (along_[tool_of(t)].curvature - curve.turn);
       for (int k = t + 1; k < terms_.twists(); ++k) {
-        const ToolSpot& other = spot_of(k);
-        if (!other.there) continue;
-        curve.mutual[static_cast<std::size_t>(k)] = -curve.turn * other.EI * other.curvature;
+        curve.mutual[static_cast<std::size_t>(k)] = -curve.turn * moment_of(k);
       }
     }
   }
@@ -195,11 +252,27 @@ class Builder {
     rod_.bend[node] += w * local_.compliance;
     axial_[node] += w * local_.per_EA;
     rod_.mass[node] += w * local_.mass;
-    outside_(local_.outermost, node) += w;
+    outside_(outermost_, node) += w;
     for (int t = 0; t < terms_.twists(); ++t) {
       terms_.twist(t, node) += w * local_.curve[static_cast<std::size_t>(t)].per_GJ;
     }
-    if (local_.curved) add_curves(node, w);
+    if (curved_) add_curves(node, w);
+  }
+
+  /// So many whole edges on, all alike.
+  void add_edges(int e, int count) {
+    const double half = 0.5 * h_;
+    for (const int first : {e, e + 1}) {
+      rod_.bend.segment(first, count).array() += half * local_.compliance;
+      axial_.segment(first, count).array() += half * local_.per_EA;
+      rod_.mass.segment(first, count).array() += half * local_.mass;
+      outside_.row(outermost_).segment(first, count).array() += half;
+      for (int t = 0; t < terms_.twists(); ++t) {
+        terms_.twist.row(t).segment(first, count).array() +=
+            half * local_.curve[static_cast<std::size_t>(t)].per_GJ;
+      }
+      for (int k = 0; curved_ && k < count; ++k) add_curves(first + k, half);
+    }
   }
 
   void add_curves(int node, double w) {
@@ -213,15 +286,15 @@ class Builder {
     }
   }
 
-  const ToolSpot& spot_of(int t) const {
-    return local_.at[static_cast<std::size_t>(terms_.tool[static_cast<std::size_t>(t)])];
+  std::size_t tool_of(int t) const {
+    return static_cast<std::size_t>(terms_.tool[static_cast<std::size_t>(t)]);
   }
 
   void add_leads() {
     // No spring is infinitely stiff: the lead has so much of the part in front of it too [mm].
     constexpr double kLeast = 2e-5;
     for (int t = 0; t < terms_.twists(); ++t) {
-      const auto i = static_cast<std::size_t>(terms_.tool[static_cast<std::size_t>(t)]);
+      const std::size_t i = tool_of(t);
       const double insertion = places_[i].insertion;
       double compliance = kLeast / look_at(tools_[i].wire, insertion).GJ;
       terms_.twist(t, 0) -= compliance;
@@ -280,10 +353,12 @@ class Builder {
   ToolTerms& terms_;
   Eigen::MatrixXd& outside_;   // (tools, n) so far of w where a tool is the outermost
   Eigen::VectorXd& axial_;     // (n) integrals of w/EA
-  std::vector<double>& ends_;  // of sections, see find_ends()
-  std::size_t next_ = 0;       // of them
-  Local local_;
-  bool known_ = false;  // it is that of the part between ends under way
+  std::vector<double>& ends_;  // of stretches
+  // Of the stretch under way:
+  std::array<Along, kMostTools> along_;
+  Eigen::Index outermost_ = 0;          // tool
+  bool even_ = false, curved_ = false;  // no tool tapers; any has a curve
+  Local local_;                         // the latest place; of an even stretch any
 };
 
 }  // namespace

@@ -33,11 +33,9 @@ constexpr int kMostTools = 3;
 
 /// A tool at one place of it; past its tip what its tip has.
 struct ToolSpot {
-  bool there = false;                   // not past its tip
-  bool tapers = false;                  // there
-  double EI = 0.0, EA = 0.0, GJ = 0.0;  //                                     [N mm^2, N]
-  double curvature = 0.0;               //                                          [1/mm]
-  double mass = 0.0;                    // per length                               [t/mm]
+  bool there = false;         // not past its tip
+  double EI = 0.0, GJ = 0.0;  //                                                       [N mm^2]
+  double curvature = 0.0;     //                                                         [1/mm]
 };
 /// `from_tip`: arc length; below 0 past the tip [mm].
 ToolSpot look_at(const Wire& wire, double from_tip);
