@@ -4,7 +4,7 @@
 // WIREPLAN_SCREENSHOTS, where given, is a folder for pictures of every page.
 import assert from "node:assert/strict";
 import {execFileSync, spawnSync} from "node:child_process";
-import {mkdtempSync, readFileSync, rmSync, statSync} from "node:fs";
+import {mkdtempSync, readFileSync, rmSync, statSync, writeFileSync} from "node:fs";
 import {tmpdir} from "node:os";
 import {basename, dirname, join, resolve} from "node:path";
 import {after, before, describe, test} from "node:test";
@@ -373,6 +373,18 @@ if (!given.length) {
     assert.ok(!(await page.textContent("main")).includes("\u202e"), "nothing turns the text round");
     assert.deepEqual(faults, []);
     await close();
+  });
+
+  test("tells of a run with half the push that comes less far", async () => {
+    const text = readFileSync(small, "utf8"), file = join(folder, "half.html");
+    assert.ok(text.includes('"incomplete":""'), "the best plan was run so, and came as far");
+    writeFileSync(file, text.replaceAll('"incomplete":""', '"incomplete":"with pushes half as long it is stuck"'));
+    for (const [where, told] of [[small, /its tip ends at most [\d.e-]+\s*mm away/], [file, /half as long: it does not come as far/]]) {
+      const {page, faults, close} = await open(browser, where);
+      assert.match(await page.textContent("#uncertain"), told);
+      assert.deepEqual(faults, []);
+      await close();
+    }
   });
 
   test("is under 15 MB at 25 000 triangles, 300 trials, 20 insertions", async (t) => {

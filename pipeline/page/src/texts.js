@@ -137,8 +137,10 @@ export const uncertainSection = (page) => {
       e.position_error_mm === undefined || e.position_error_mm === null ? "not known" :
       `position \u00b1\u00a0${number(e.position_error_mm)}\u00a0mm, largest contact \u00b1\u00a0${number(e.peak_contact_force_error_n)}\u00a0N; score \u00b1\u00a0${number(first.score_error)}, which ties ${plural(first.tied_with.length, "plan")} with the best`]);
     if (first.sensitive !== undefined) {
+      const others = e.settings ?? [], come = others.filter((row) => row.incomplete === "");
+      const ends = come.length < others.length ? "it does not come as far" : `its tip ends at most ${number(Math.max(...come.map((row) => row.tip_apart_mm)))}\u00a0mm away`;
       rows.push(["Length of a push in the computation",
-        first.sensitive === null ? "not known" : `best plan run with pushes half as long: its tip ends at most ${number(Math.max(...(e.settings ?? []).map((row) => row.tip_apart_mm)))}\u00a0mm away`,
+        first.sensitive === null ? "not known" : `best plan run with pushes half as long: ${ends}`,
         first.sensitive ? `sensitive: ${shown(first.sensitive_reason)}` : first.sensitive === null ? "not known" : "within the errors above"]);
     }
     rows.push(sensitivity(page, best, "inclination_deg", "Inclination of the introducer"));
