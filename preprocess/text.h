@@ -13,4 +13,10 @@ inline std::string lower_case(std::string text) {
   return text;
 }
 
+/// Without spaces, tabs and carriage returns at both ends.
+inline std::string trimmed(const std::string& text) {
+  const std::size_t first = text.find_first_not_of(" \t\r"), last = text.find_last_not_of(" \t\r");
+  return first == std::string::npos ? "" : text.substr(first, last - first + 1);
+}
+
 }  // namespace wireplan

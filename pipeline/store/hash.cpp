@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "preprocess/base.h"
+#include "preprocess/text.h"
 
 namespace wireplan::pipeline {
 namespace {
@@ -59,24 +60,37 @@ std::vector<std::string> names_below(const fs::path& folder) try {
               "), expected a readable folder; check the path and its permissions");
 }
 
-/// The file with the voxels that a header of MetaImage (.mhd) or NRRD (.nhdr) names; empty where it
-/// names none, or several.
-fs::path data_of_header(const fs::path& header) {
-  const std::string ending = header.extension().string();
-  if (ending != ".mhd" && ending != ".nhdr") return {};
+/// The name of the file with the voxels that the header of a MetaImage or NRRD tells, in all the
+/// spellings that their readers take (preprocess/volume); empty where it tells none.
+std::string told_data_file(const fs::path& header, bool meta) {
+  constexpr std::size_t kMost = 100000;  // lines
   std::ifstream stream(header, std::ios::binary);
-  const std::string_view key = ending == ".mhd" ? "ElementDataFile" : "data file";
-  for (std::string line; std::getline(stream, line) && !line.empty();) {
-    const std::size_t mark = line.find_first_of("=:");
-    if (mark == std::string::npos || !line.starts_with(key)) continue;
-    const std::size_t first = line.find_first_not_of(" \t", mark + 1);
-    if (first == std::string::npos) return {};
-    const fs::path data =
-        header.parent_path() / line.substr(first, line.find_last_not_of(" \t\r") + 1 - first);
-    std::error_code unknown;
-    return fs::is_regular_file(data, unknown) ? data : fs::path();
+  std::string line;
+  for (std::size_t k = 0; k < kMost && std::getline(stream, line); ++k) {
+    if (line.starts_with("\xef\xbb\xbf")) line.erase(0, 3);  // as some editors begin a text
+    line = trimmed(line);
+    if (!meta && line.empty()) return {};  // the header's end
+    const std::size_t mark = line.find(meta ? "=" : ": ");
+    if (mark == std::string::npos || (!meta && line.find(":=") < mark)) continue;
+    const std::string key = lower_case(trimmed(line.substr(0, mark)));
+    const bool names = meta ? key == "elementdatafile" : key == "data file" || key == "datafile";
+    if (names) return trimmed(line.substr(mark + (meta ? 1 : 2)));
   }
   return {};
+}
+
+/// The file with the voxels that the header of a MetaImage or NRRD names; empty where they lie in
+/// it, or in several files.
+fs::path data_of_header(const fs::path& header) {
+  const std::string ending = lower_case(header.extension().string());
+  const bool meta = ending == ".mhd" || ending == ".mha";
+  if (!meta && ending != ".nhdr" && ending != ".nrrd") return {};
+  std::string name = told_data_file(header, meta);
+  if (name.empty()) return {};
+  std::error_code unknown;
+  const auto is_there = [&] { return fs::is_regular_file(header.parent_path() / name, unknown); };
+  if (!is_there()) std::replace(name.begin(), name.end(), '\\', '/');  // as Windows has it
+  return is_there() ? header.parent_path() / name : fs::path();
 }
 
 std::string hash_folder(const fs::path& folder) {

@@ -117,11 +117,6 @@ std::string without_path(const std::string& message, const fs::path& path) {
   return message.starts_with(start) ? message.substr(start.size()) : message;
 }
 
-std::string trimmed(const std::string& text) {
-  const std::size_t first = text.find_first_not_of(" \t\r"), last = text.find_last_not_of(" \t\r");
-  return first == std::string::npos ? "" : text.substr(first, last - first + 1);
-}
-
 void require_utf8(const std::string& text, const std::string& what, const fs::path& path) {
   std::size_t more = 0;  // bytes of a character that are to come
   bool sound = true;

@@ -50,9 +50,6 @@ void require_size(std::int64_t size, const std::string& field, const std::filesy
 /// The message of an Error about that path, without the path at its beginning.
 std::string without_path(const std::string& message, const std::filesystem::path& path);
 
-/// Without blanks at both ends.
-std::string trimmed(const std::string& text);
-
 /// Refuses text of a header that cannot be printed; `what` it is.
 void require_utf8(const std::string& text, const std::string& what,
                   const std::filesystem::path& path);

@@ -4,8 +4,10 @@
 #include <filesystem>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "pipeline/store/hash.h"
+#include "preprocess/volume/image.h"
 #include "tests/pipeline/small_case.h"
 
 namespace wireplan::pipeline {
@@ -42,6 +44,41 @@ TEST(Hash, OfAFolderFollowsNamesAndContentsAndNotItsPlace) {
   write_text("2", folder / "b" / "image_2");
   fs::rename(folder / "b" / "image_2", folder / "b" / "image_3");
   EXPECT_NE(hash_input(folder / "b"), first);
+}
+
+TEST(Hash, FollowsTheVoxelsBesideEveryHeaderThatIsRead) {
+  if (!preprocess::reads_volumes()) GTEST_SKIP() << "built without imaging";
+  const auto meta = [](const std::string& data_line) {
+    return "NDims = 3\nDimSize = 2 2 2\n\nElementSpacing = 1 1 1\nOffset = 0 0 0\n"
+           "ElementType = MET_UCHAR\n" +
+           data_line + "\n";
+  };
+  const auto nrrd = [](const std::string& data_line) {
+    return "NRRD0004\ntype: uchar\ndimension: 3\nsizes: 2 2 2\nspacings: 1 1 1\nencoding: raw\n"
+           "data file:=a key of somebody's own\n" +
+           data_line + "\n\n";
+  };
+  const TemporaryFolder folder;
+  for (const auto& [name, text] : std::vector<std::pair<std::string, std::string>>{
+           {"a.mhd", meta("ElementDataFile = in/a.raw")},
+           {"a.mha", meta("ElementDataFile = in/a.raw")},
+           {"mark.mhd", meta("\xef\xbb\xbf"
+                             "ElementDataFile = in/a.raw")},
+           {"windows.mhd", meta("  ElementDataFile = in\\a.raw\r")},
+           {"a.nhdr", nrrd("data file: in/a.raw")},
+           {"a.nrrd", nrrd("data file: in/a.raw")},
+           {"other.nhdr", nrrd("Datafile: in/a.raw")},
+           {"letters.NHDR", nrrd("Data File: in/a.raw")}}) {
+    SCOPED_TRACE(name);
+    write_text(text, folder / name);
+    write_text("abcdefgh", folder / "in/a.raw");
+    EXPECT_EQ(preprocess::read_image(folder / name).values.front(), static_cast<float>('a'));
+    const std::string first = hash_input(folder / name), stamp = input_stamp(folder / name);
+    write_text("Abcdefgh", folder / "in/a.raw");
+    EXPECT_EQ(preprocess::read_image(folder / name).values.front(), static_cast<float>('A'));
+    EXPECT_NE(hash_input(folder / name), first);
+    EXPECT_NE(input_stamp(folder / name), stamp);
+  }
 }
 
 TEST(Hash, OfAHeaderFollowsTheVoxelsBesideIt) {
