@@ -18,13 +18,23 @@ namespace fs = std::filesystem;
 
 constexpr const char* kNotMade = "to be made";  // in the place of contents not yet known
 
-// Of the files and of the names that a table gives.
-std::string hash_labels(const LabelsInput& labels) {
-  const std::string files = hash_input(labels.path);
-  if (labels.choice.table.empty()) return files;
+/// What is read of a table of label names beside its file: the names, whether they go before those
+/// in the labels, and what is told of one that is broken, wherever it lies. Empty without a table.
+std::string told_by_table(const LabelsInput& labels) {
+  std::string problem =
+      labels.table_given.empty() ? find_label_table(labels.path).problem : std::string();
+  const fs::path folder = fs::absolute(labels.path).parent_path();
+  for (const fs::path& place : {folder, folder.parent_path()}) {
+    const std::string start = place.string() + "/";
+    for (std::size_t at = 0; (at = problem.find(start, at)) != std::string::npos;) {
+      problem.erase(at, start.size());
+    }
+  }
+  if (labels.choice.table.empty() && problem.empty()) return {};
   Json names = Json::array();
   for (const auto& [value, name] : labels.choice.table) names.push_back({value, name});
-  return hash_text(files + names.dump());
+  return Json({{"names", names}, {"first", labels.choice.table_wins}, {"problem", problem}})
+      .dump(-1, ' ', false, Json::error_handler_t::replace);
 }
 
 // One line per value: objects and lists of objects are walked, lists of numbers stay whole.
@@ -73,6 +83,7 @@ std::string stage_key_text(const Stage& stage, const Workspace& work) {
   }
   if (stage.reads_labels && !work.labels_sha256.empty()) {
     lines.push_back({"labels", work.labels_sha256});
+    if (!work.labels_table.empty()) lines.push_back({"table of labels", work.labels_table});
   }
   for (const std::string& earlier : stage.after) {
     lines.push_back(
@@ -371,7 +382,8 @@ RunResult run_stages(const Case& given, const RunOptions& options,
   work.input_sha256 = hash_input(work.input);
   if (given.labels) {
     work.labels_stamp = input_stamp(given.labels->path);
-    work.labels_sha256 = hash_labels(*given.labels);
+    work.labels_sha256 = hash_input(given.labels->path);
+    work.labels_table = told_by_table(*given.labels);
   }
   for (const auto& [name, artifact] : options.beside) work.add(name, artifact);
   const auto place_of = [&](const std::string& name) {

@@ -108,6 +108,7 @@ class Workspace {
   std::string input_sha256;
   std::string input_stamp;                       // before it was hashed
   std::string labels_sha256, labels_stamp;       // of the labels; empty where the case has none
+  std::string labels_table;                      // what a table tells of their names, for keys
   Json parameters;                               // of the case after defaults, without folder names
   std::map<std::string, std::string> key_texts;  // of the stages so far and the one under way
   bool simulates = false;                        // this run goes on to stages that simulate

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cstdlib>
 
+#include "pipeline/store/hash.h"
 #include "preprocess/files/vessel_io.h"
 #include "preprocess/volume/labels.h"
 #include "tests/messages.h"
@@ -144,13 +145,37 @@ TEST_F(LabelsRun, EndsInAReportThatFollowsItsSchema) {
   EXPECT_NEAR(vessel.at("volume_mm3").get<double>(), expected, 0.03 * expected);
 
   // In the volume the wall is fitted, and both files are named.
+  write_text("1,tube\n2,other\n", folder_ / "both.csv");
   answer = run(labels, true, "-o in");
   ASSERT_EQ(answer.code, 0) << answer.out << answer.log;
   const Json in = read_json(folder_ / "in/report.json", "wireplan.report/2");
   EXPECT_EQ(in.at("provenance").at("inputs").size(), 2u);
   EXPECT_EQ(in.at("provenance").at("inputs").at(1).at("name"), "both.nii");
+  EXPECT_EQ(in.at("provenance").at("inputs").at(1).at("sha256"), hash_file(folder_ / "both.nii"));
   EXPECT_GT(in.at("vessel").at("segmentation").at("edge_contrast_hu").get<double>(), 150.0);
   expect_follows_schemas(folder_.path());
+}
+
+TEST_F(LabelsRun, FollowAllThatIsReadOfATableOfNames) {
+  // The names in the file go before those of a table that lies beside it, not before a given one's.
+  const Json named = {{"path", "both.seg.nrrd"}, {"values", {1}}};
+  Json by_table = named;
+  by_table["table"] = "both.csv";
+  write_text("1,vessel\n2,x\n", folder_ / "both.csv");
+  for (const auto& [labels, name] : {std::pair(named, "tube"), std::pair(by_table, "vessel")}) {
+    const Answer answer = run(labels, false, "--to centerline -o out");
+    ASSERT_EQ(answer.code, 0) << answer.log;
+    const std::string tree = read_text(folder_ / "out/tree.mrk.json");
+    EXPECT_TRUE(holds(tree, "\"" + std::string(name) + " (branch 1)\"")) << tree;
+  }
+
+  // What is told of a broken one is told no more when it is gone.
+  const Json unnamed = {{"path", "both.nii"}, {"values", {1}}};
+  const auto told = [&] { return run(unnamed, false, "--to segment -o out").log; };
+  write_text("1,vessel\n1,x\n", folder_ / "both.csv");
+  EXPECT_TRUE(holds(told(), "the labels have no names"));
+  fs::remove(folder_ / "both.csv");
+  EXPECT_FALSE(holds(told(), "the labels have no names"));
 }
 
 TEST_F(LabelsRun, ThatDoNotFitTheVolumeAreRefused) {
