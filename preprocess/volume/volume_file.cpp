@@ -343,7 +343,9 @@ MetaHeader read_meta_header(const fs::path& path) {
       if (line.value != "?") header.unit = line.value;
     }
     const std::string text = line.key + " = " + line.value;
-    header.has_more = header.has_more || (text != line.text && line.key != "ElementDataFile");
+    header.has_more =
+        header.has_more ||
+        (line.key == "ElementDataFile" ? !line.text.starts_with(line.key) : text != line.text);
     header.lines += text + "\n";
   }
   require_one_meaning(lines, path);
@@ -457,8 +459,9 @@ Image read_meta(const fs::path& path, VolumeHeader& told) {
       "program that made it";
   const MetaHeader header = call_itk(path, no_image, [&] { return read_meta_header(path); });
   std::optional<TemporaryFile> copy;  // of the lines that MetaIO is to see, where it must be
-  if (header.has_more) {
-    copy.emplace(path.extension().string());
+  const std::string ending = path.extension().string();
+  if (header.has_more || ending != lower_case(ending)) {
+    copy.emplace(lower_case(ending));
     std::ofstream to(copy->path(), std::ios::binary);
     to << header.lines;
     if (!to.flush()) {

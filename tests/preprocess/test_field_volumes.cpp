@@ -358,6 +358,17 @@ TEST_F(FieldVolume, MetaImageMayHoldLinesThatAreNoKeysAndNameAnyFile) {
     EXPECT_EQ(image.values[7], static_cast<float>('h'));
     EXPECT_EQ(image.grid.spacing, Vec3(1, 2, 3));
   }
+  // Keys and the file's ending in letters of another case.
+  write("in.raw", "abcdefgh");
+  const std::string small =
+      "objecttype = Image\nndims = 3\ndimsize = 2 2 2\nelementspacing = 1 2 "
+      "3\noffset = 4 5 6\nelementtype = MET_UCHAR\nelementdatafile = in.raw\n";
+  for (const auto& [name, text] :
+       {std::pair("small.mhd", small), std::pair("LARGE.MHD", meta("", "in.raw")),
+        std::pair("data.mhd", "NDims = 3\n" + small.substr(small.find("dimsize")))}) {
+    SCOPED_TRACE(name);
+    EXPECT_EQ(read_image(write(name, text)).values[7], static_cast<float>('h'));
+  }
   // The dimensions may be told behind what has as many numbers; no key twice.
   const std::string late =
       "ObjectType = Image\nDimSize = 2 2 2\nElementSpacing = 1 2 3\nNDims = 3\nElementType = "
