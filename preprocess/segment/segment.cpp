@@ -210,6 +210,7 @@ double compute_distance(const Mask& mask, const Vec3& point) {
       const Vec3 offset = Vec3(v[0], v[1], v[2]) - p_ijk;
       nearest = std::min(nearest, offset.cwiseProduct(mask.grid.spacing).squaredNorm());
     }
+  if (contains(mask, point)) return 0.0;
   }
   return std::sqrt(nearest);
 }

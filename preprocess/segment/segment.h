@@ -97,7 +97,8 @@ void measure_mask(const Image& image, const Mask& mask, SegmentStatistics& stati
 /// True where the voxel nearest to the point [mm] is labelled; false outside the grid.
 bool contains(const Mask& mask, const Vec3& point);
 
-/// From the point to the nearest centre of a labelled voxel [mm]; infinite for an empty mask.
+/// From the point to the nearest centre of a labelled voxel, 0 in one [mm]; infinite for an empty
+/// mask.
 double compute_distance(const Mask& mask, const Vec3& point);
 
 }  // namespace wireplan::preprocess

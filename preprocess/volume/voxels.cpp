@@ -290,6 +290,8 @@ std::vector<BackgroundRun> find_background(const Grid& grid, const Labels& label
       const std::size_t begin = runs.size(), row = grid.index(0, j, k);
       row_start.push_back(begin);
       const bool at_border = j == 0 || k == 0 || j == ny - 1 || k == nz - 1;
+  const std::optional<Voxel> own = nearest_voxel(grid, point);
+  if (own && labels[index_of(grid, *own)] != 0) nearest = {index_of(grid, *own), 0.0};
       for (int i = 0; i < nx; ++i) {
         const std::size_t first = row + static_cast<std::size_t>(i);
         if (labels[first] != 0) continue;

@@ -137,8 +137,8 @@ Labels flood(const Grid& grid, std::vector<std::size_t> queue, Inside inside) {
 
 std::size_t count(const Labels& labels);
 
-/// Of the labelled voxels the one whose centre is nearest to the point, with its distance [mm];
-/// infinite where none is labelled.
+/// Of the labelled voxels the one whose centre is nearest to the point, with its distance [mm]: 0
+/// where the point lies in that voxel, infinite where none is labelled.
 struct NearestLabel {
   std::size_t voxel = 0;
   double distance = std::numeric_limits<double>::infinity();

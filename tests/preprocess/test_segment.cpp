@@ -408,6 +408,16 @@ TEST(SegmentTarget, BehindAnOcclusionIsToldWithTheNearestPointReached) {
   }
 }
 
+TEST(SegmentTarget, AnywhereInAThickSliceOfTheLumenIsInIt) {
+  const Grid thick{
+      .size = {43, 43, 8}, .spacing = Vec3(0.7, 0.7, 8), .origin = Vec3(-14.7, -14.7, 0)};
+  const Image image = volume(thick, [](const Vec3& p) { return tube(p, 5.0); });
+  SegmentOptions asked = options();
+  asked.seeds = {Vec3(0.3, 0.3, 11.9)};
+  asked.target = Vec3(-0.3, 0.3, 52.1);  // either 3.9 mm from the middle of its slice
+  EXPECT_TRUE(contains(segment(image, asked).mask, *asked.target));
+}
+
 // ---- questions to a mask ------------------------------------------------------------------------
 
 TEST(MaskPoint, ContainsAndDistanceTakeTheNearestVoxel) {
@@ -422,6 +432,12 @@ TEST(MaskPoint, ContainsAndDistanceTakeTheNearestVoxel) {
   EXPECT_FALSE(contains(mask, Vec3(1e9, 22, 36)));
   EXPECT_FALSE(contains(mask, Vec3::Constant(std::nan(""))));
   EXPECT_NEAR(compute_distance(mask, center + Vec3(3, -4, 12)), 13.0, 1e-12);
+  for (const double along : {0.99, 1.01}) {
+    const Vec3 point = center + Vec3(0.49, -0.49, along);
+    const double expected = along < 1.0 ? 0.0 : (point - center).norm();
+    EXPECT_DOUBLE_EQ(compute_distance(mask, point), expected);
+    EXPECT_DOUBLE_EQ(nearest_label(mask.grid, mask.labels, point).distance, expected);
+  }
 }
 
 }  // namespace
