@@ -10,14 +10,35 @@
 namespace wireplan::preprocess {
 namespace {
 
+/// e^-t I_n(t) for 0, 1, ..., last, but for a factor: from far beyond, where it is nothing,
+/// downward by I_n-1 = I_n+1 + 2 n / t I_n (Abramowitz and Stegun 9.6.26, 9.12).
+std::vector<double> bessel_downward(double t, int last) {
+  constexpr double kLarge = 1e200;
+  std::vector<double> values(static_cast<std::size_t>(last) + 1);
+  double above = 0.0, here = 1e-300;
+  for (int n = 2 * last + 20; n >= 0; --n) {
+    if (n <= last) values[static_cast<std::size_t>(n)] = here;
+    const double below = above + 2.0 * n / t * here;
+    above = here;
+    here = below;
+    if (here < kLarge) continue;
+    above /= kLarge;
+    here /= kLarge;
+    for (double& value : values) value /= kLarge;
+  }
+  return values;
+}
+
 /// Weights of the discrete Gaussian of variance t [voxels^2] for 0, 1, ..., radius: e^-t I_n(t),
 /// whose variance is t also where a sampled Gaussian would miss it (Lindeberg 1990).
 std::vector<double> gaussian_weights(double t, int radius) {
+  constexpr double kMostOfLibrary = 600.0;  // I_0 is beyond all numbers from 713 on
   std::vector<double> weights;
+  if (t > kMostOfLibrary) weights = bessel_downward(t, radius);
   double sum = 0.0;
   for (int n = 0; n <= radius; ++n) {
-    weights.push_back(std::exp(-t) * std::cyl_bessel_i(n, t));
-    sum += (n == 0 ? 1.0 : 2.0) * weights.back();
+    if (t <= kMostOfLibrary) weights.push_back(std::exp(-t) * std::cyl_bessel_i(n, t));
+    sum += (n == 0 ? 1.0 : 2.0) * weights[static_cast<std::size_t>(n)];
   }
   for (double& weight : weights) {
     weight /= sum;
@@ -269,6 +290,8 @@ NearestLabel nearest_label(const Grid& grid, const Labels& labels, const Vec3& p
     const double here = (center_of(grid, n) - point).norm();
     if (here < nearest.distance) nearest = {n, here};
   }
+  const std::optional<Voxel> own = nearest_voxel(grid, point);
+  if (own && labels[index_of(grid, *own)] != 0) nearest = {index_of(grid, *own), 0.0};
   return nearest;
 }
 
@@ -290,8 +313,6 @@ std::vector<BackgroundRun> find_background(const Grid& grid, const Labels& label
       const std::size_t begin = runs.size(), row = grid.index(0, j, k);
       row_start.push_back(begin);
       const bool at_border = j == 0 || k == 0 || j == ny - 1 || k == nz - 1;
-  const std::optional<Voxel> own = nearest_voxel(grid, point);
-  if (own && labels[index_of(grid, *own)] != 0) nearest = {index_of(grid, *own), 0.0};
       for (int i = 0; i < nx; ++i) {
         const std::size_t first = row + static_cast<std::size_t>(i);
         if (labels[first] != 0) continue;

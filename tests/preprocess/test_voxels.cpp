@@ -43,6 +43,27 @@ TEST(DistanceTo, IsThatOfTheNearestVoxelOfTheLabel) {
   }
 }
 
+TEST(Smooth, IsTheDiscreteGaussianHoweverFineTheVoxels) {
+  for (const double sigma : {4.0, 24.0, 25.0, 60.0}) {  // of a voxel
+    SCOPED_TRACE(sigma);
+    const Grid grid{.size = {601, 1, 1}, .spacing = Vec3::Constant(0.1)};
+    std::vector<float> values(grid.voxels(), 0.0F);
+    values[300] = 1.0F;
+    smooth(grid, 0.1 * sigma, values);
+    double sum = 0.0, second = 0.0;
+    for (std::size_t n = 0; n < values.size(); ++n) {
+      sum += static_cast<double>(values[n]);
+      second += std::pow(static_cast<double>(n) - 300.0, 2) * static_cast<double>(values[n]);
+    }
+    EXPECT_NEAR(sum, 1.0, 1e-5);
+    EXPECT_NEAR(second, sigma * sigma, 2e-3 * sigma * sigma);  // cut off at four sigma
+    // Abramowitz and Stegun 9.7.1, to the third term; what is cut off is 6e-5 of all.
+    const double t = sigma * sigma;
+    const double peak = (1.0 + 1.0 / (8.0 * t) + 9.0 / (128.0 * t * t)) / std::sqrt(2.0 * kPi * t);
+    EXPECT_NEAR(static_cast<double>(values[300]), peak, 1e-4 * peak);
+  }
+}
+
 TEST(FillCavities, FillsWhatDoesNotReachTheBorderAndIsSmallEnough) {
   int filled = 0, left = 0;
   for (const unsigned percent : {0U, 50U, 70U, 90U, 100U}) {
