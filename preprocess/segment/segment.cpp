@@ -105,6 +105,14 @@ std::string band_text(const Band& band) {
   return to_text(band.connect_hu) + " to " + to_text(band.upper_hu) + " HU";
 }
 
+void require_wall(const Labels& labels, const Vec3& point, const Band& band) {
+  if (std::find(labels.begin(), labels.end(), 0) != labels.end()) return;
+  throw Error("what is connected with " + to_text(point) + " mm within " + band_text(band) +
+              " fills all of the volume that is looked at, expected a vessel with something darker "
+              "or brighter round it; give a narrower band (segmentation.lower_hu, upper_hu), or a "
+              "volume that shows what lies round the vessel");
+}
+
 Error not_connected(const Image& image, const SegmentOptions& options, const Vec3& point,
                     const Grid& grid, std::size_t nearest, const std::string& values) {
   const Voxel at = *nearest_voxel(image.grid, point);
@@ -202,6 +210,7 @@ bool contains(const Mask& mask, const Vec3& point) {
 }
 
 double compute_distance(const Mask& mask, const Vec3& point) {
+  if (contains(mask, point)) return 0.0;
   const Vec3 p_ijk = mask.grid.ijk_from_lps(point);
   double nearest = std::numeric_limits<double>::infinity();
   for (std::size_t n = 0; n < mask.labels.size(); ++n) {
@@ -210,7 +219,6 @@ double compute_distance(const Mask& mask, const Vec3& point) {
       const Vec3 offset = Vec3(v[0], v[1], v[2]) - p_ijk;
       nearest = std::min(nearest, offset.cwiseProduct(mask.grid.spacing).squaredNorm());
     }
-  if (contains(mask, point)) return 0.0;
   }
   return std::sqrt(nearest);
 }

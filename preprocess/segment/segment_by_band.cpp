@@ -228,6 +228,7 @@ Region find_by_band(const Image& image, const SegmentOptions& options,
   for (Vec3& seed : seeds) seed = find_lumen_near(image, seed, band).value_or(seed);
   Region region = find_connected(image, seeds, band);
   require_no_flood(region.grid, region.labels, options.limits);
+  require_wall(region.labels, options.seeds.front(), band);
   if (band.neck_mm > 0.0) {
     const std::size_t before = count(region.labels);
     cut_necks(region, band.neck_mm, seeds);

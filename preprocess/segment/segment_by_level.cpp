@@ -271,6 +271,7 @@ Region find_by_level(const Image& image, const SegmentOptions& options, bool bou
     }
   }
   Candidates candidates = find_candidates(field, std::move(starts), least);
+  require_wall(candidates.labels, points.front(), band);
   find_points(field, candidates, points, statistics, least);  // throws where there is none
   shrink(field, candidates, region.box);
   const std::vector<WayLevel> ends = find_points(field, candidates, points, statistics, least);

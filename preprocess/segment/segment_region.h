@@ -39,6 +39,10 @@ Error not_connected(const Image& image, const SegmentOptions& options, const Vec
 /// "160 to 300 HU"
 std::string band_text(const Band& band);
 
+/// Refuses what counts as lumen where it fills all of its grid: a vessel has a wall, from which
+/// depths count.
+void require_wall(const Labels& labels, const Vec3& point, const Band& band);
+
 /// How far beside what was found a target may lie [mm].
 inline constexpr double kTargetReachMm = 3.0;
 

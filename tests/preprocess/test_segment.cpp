@@ -418,6 +418,16 @@ TEST(SegmentTarget, AnywhereInAThickSliceOfTheLumenIsInIt) {
   EXPECT_TRUE(contains(segment(image, asked).mask, *asked.target));
 }
 
+TEST(Segment, WhatFillsTheVolumeIsNoVessel) {
+  const Image image = volume(ct_grid(), [](const Vec3&) { return kLumen; });
+  for (const bool band : {true, false}) {
+    SegmentOptions asked = options();
+    if (!band) asked = {.seeds = {Vec3(0, 0, 20)}, .target = Vec3(0, 0, 35)};
+    const std::string error = error_of(image, asked);
+    EXPECT_TRUE(has(error, "fills all of the volume that is looked at")) << error;
+  }
+}
+
 // ---- questions to a mask ------------------------------------------------------------------------
 
 TEST(MaskPoint, ContainsAndDistanceTakeTheNearestVoxel) {
