@@ -349,17 +349,19 @@ Band choose_band(const Image& image, const std::vector<LumenSample>& samples, do
   }
 
   const LumenSample* scattered = noise > kMostNoisePart * contrast ? &samples.front() : nullptr;
+  double most_part = kMostNoisePart;
   for (const LumenSample& sample : samples) {
     const bool in_core = sample.voxels > 1;
     if (!in_core && sample.noise_hu > kMostScatter * (sample.level_hu - surroundings)) {
       scattered = &sample;
+      most_part = kMostScatter;
     }
   }
   if (scattered != nullptr) {
     throw Error("the values round " + to_text(scattered->point) + " mm scatter by " +
                 to_text(std::round(scattered->noise_hu)) + " HU round " +
-                to_text(std::round(level)) + " HU, expected at most " +
-                to_text(100.0 * kMostNoisePart) +
+                to_text(std::round(scattered->level_hu)) + " HU, expected at most " +
+                to_text(100.0 * most_part) +
                 " % of the contrast: the texture of bone, or too much noise; move the point into "
                 "a contrast-filled artery, or give segmentation.lower_hu and upper_hu");
   }

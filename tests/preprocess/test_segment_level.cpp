@@ -9,6 +9,7 @@
 
 #include "preprocess/segment/mask_shape.h"
 #include "preprocess/segment/segment.h"
+#include "preprocess/segment/segment_band.h"
 #include "preprocess/segment/segment_close.h"
 #include "preprocess/segment/segment_way.h"
 #include "tests/preprocess/segment_answers.h"
@@ -270,6 +271,23 @@ TEST(SegmentLevel, LittleContrastIsRefusedByWhatItHasOverBlood) {
   EXPECT_TRUE(has(error_of(with_level(125.0), {.seeds = {kBottom}, .target = kTop}),
                   "expected at least 140 HU, 100 HU over blood without contrast"));
   EXPECT_NO_THROW(segment(with_level(150.0), {.seeds = {kBottom}, .target = kTop}));
+}
+
+TEST(SegmentLevel, AScatterIsToldWithThePointsOwnLevel) {
+  const Image image = scanned(0.0, [](const Vec3&) { return kAround; });
+  const std::vector<LumenSample> samples = {
+      {.point = kBottom, .level_hu = 500.0, .noise_hu = 10.0, .voxels = 100},
+      {.point = kTop, .level_hu = 250.0, .noise_hu = 120.0, .voxels = 1}};
+  std::string error;
+  try {
+    choose_band(image, samples, 50.0, /*hounsfield=*/true, {}, {});
+  } catch (const Error& refused) {
+    error = refused.what();
+  }
+  EXPECT_TRUE(has(error,
+                  "the values round (0.0, 0.0, 85.0) mm scatter by 120 HU round 250 HU, "
+                  "expected at most 45 % of the contrast"))
+      << error;
 }
 
 TEST(SegmentLevel, APointInMetalIsToldAsOne) {
