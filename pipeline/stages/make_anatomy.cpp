@@ -29,7 +29,7 @@ std::string tell_plaque_in_lumen(const preprocess::Calcium& calcium,
                                  const plan::AccessLimits& limits) {
   return "anatomy: " + format("%.0f mm3", calcium.inside) +
          " of what counts as lumen along the way " +
-         format("are brighter than %.0f HU", limits.calcium_hu) + ", round " +
+         format("are brighter than %.0f HU", limits.calcium_hu) + ", the largest piece round " +
          place_text(*calcium.inside_at) +
          " mm: plaque or metal there leaves less room than the lumen's widths say; look at the "
          "slices";

@@ -36,6 +36,29 @@ bool is_beside(const Vec3& point, const Centerline& way, double within) {
   return false;
 }
 
+/// Of the pieces that voxels make by their faces.
+Vec3 middle_of_largest(const Grid& grid, Labels& left) {
+  std::size_t largest = 0;
+  Vec3 middle = Vec3::Zero();
+  for (std::size_t start = 0; start < left.size(); ++start) {
+    if (left[start] == 0) continue;
+    std::vector<std::size_t> piece = {start};
+    left[start] = 0;
+    for (std::size_t next = 0; next < piece.size(); ++next) {
+      for_each_face_neighbour(grid, piece[next], [&](std::size_t m) {
+        if (left[m] != 0) piece.push_back(m);
+        left[m] = 0;
+      });
+    }
+    if (piece.size() <= largest) continue;
+    largest = piece.size();
+    Vec3 sum = Vec3::Zero();
+    for (const std::size_t n : piece) sum += center_of(grid, n);
+    middle = sum / static_cast<double>(piece.size());
+  }
+  return middle;
+}
+
 }  // namespace
 
 Calcium measure_calcium(const Image& image, const Mask& lumen, const Centerline& way,
@@ -51,7 +74,7 @@ Calcium measure_calcium(const Image& image, const Mask& lumen, const Centerline&
     return static_cast<double>(values[n]) > options.threshold_hu;
   };
   std::size_t beside = 0, inside = 0;
-  Vec3 sum = Vec3::Zero();
+  Labels plaque(values.size(), 0);
   for (std::size_t n = 0; n < values.size(); ++n) {
     if (!is_bright(n) || static_cast<double>(distance[n]) > farthest) continue;
     const bool in_lumen = labels[n] != 0;
@@ -61,12 +84,12 @@ Calcium measure_calcium(const Image& image, const Mask& lumen, const Centerline&
     const Vec3 at = center_of(grid, n);
     if (!is_beside(at, way, options.within_mm)) continue;
     ++(in_lumen ? inside : beside);
-    if (in_lumen) sum += at;
+    plaque[n] = in_lumen ? 1 : 0;
   }
   const double voxel = grid.spacing.prod();
   Calcium calcium{.beside = static_cast<double>(beside) * voxel,
                   .inside = static_cast<double>(inside) * voxel};
-  if (inside > 0) calcium.inside_at = sum / static_cast<double>(inside);
+  if (inside > 0) calcium.inside_at = middle_of_largest(grid, plaque);
   return calcium;
 }
 

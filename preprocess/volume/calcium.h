@@ -14,7 +14,7 @@ struct CalciumOptions {
 
 struct Calcium {
   double beside = 0.0, inside = 0.0;   // outside the lumen's voxels, and among them       [mm^3]
-  std::optional<Vec3> inside_at = {};  // the middle of the latter                         [mm]
+  std::optional<Vec3> inside_at = {};  // the middle of the largest piece of the latter    [mm]
 };
 
 /// Volume of the voxels that are brighter than the threshold, lie within that distance of a voxel

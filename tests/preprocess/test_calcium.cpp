@@ -52,6 +52,13 @@ TEST(Calcium, ThatASegmentationTookForLumenCountsApart) {
   ASSERT_TRUE(calcium.inside_at);
   EXPECT_LT((*calcium.inside_at - Vec3(13.25, 9.75, 10.75)).norm(), 1e-9);
 
+  // Of several pieces the largest is told, no place between them.
+  tube.image.values[tube.image.grid.index(14, 20, 50)] = 1100.0F;
+  tube.image.values[tube.image.grid.index(14, 20, 51)] = 1100.0F;
+  const Calcium both = measure_calcium(tube.image, tube.lumen, tube.way);
+  EXPECT_DOUBLE_EQ(both.inside, 8.25);
+  EXPECT_LT((*both.inside_at - Vec3(13.25, 9.75, 10.75)).norm(), 1e-9);
+
   // A voxel alone is noise of the contrast, two are none.
   BrightTube noisy;
   noisy.image.values[noisy.image.grid.index(20, 20, 30)] = 900.0F;
