@@ -5,6 +5,7 @@
 #include "pipeline/report/anatomy_json.h"
 #include "pipeline/stages/makers.h"
 #include "preprocess/centerline/section_width.h"
+#include "preprocess/segment/segment.h"
 #include "preprocess/volume/calcium.h"
 
 namespace wireplan::pipeline {
@@ -16,8 +17,11 @@ std::string calcium_unknown(Workspace& work, const plan::AccessLimits& limits) {
     return std::string("the case starts from ") + (work.given().labels ? "labels" : "a surface") +
            ", which shows no calcium";
   }
-  const std::string& modality = work.image().modality;
-  if (!modality.empty() && modality != "CT") return "the volume is no CT";
+  if (!preprocess::in_hounsfield(work.image())) {
+    return work.image().modality.empty()
+               ? "the volume does not say that it is a CT, and its values do not look like HU"
+               : "the volume is no CT";
+  }
   const double lumen = work.figures("segment").at("mean_hu").get<double>();
   if (lumen > 0.8 * limits.calcium_hu) {
     return "the contrast in the lumen is nearly as bright as calcium";

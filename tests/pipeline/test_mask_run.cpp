@@ -228,6 +228,22 @@ TEST_F(MaskRun, WhatNoReportWillTellIsToldAsTheStagesEnd) {
   }
 }
 
+TEST_F(MaskRun, CalciumIsToldOfHounsfieldUnitsAlone) {
+  for (const bool ct : {true, false}) {
+    const auto hu = [&](const Vec3& p) {
+      const double away = std::hypot(p.x() - 20.0, p.y() - 20.0);
+      if (ct && p.y() < 4.0) return -1000;  // air
+      if (away < 5.0) return 500;
+      return away < 7.0 && p.x() > 20.0 && p.z() > 15.0 && p.z() < 25.0 ? 1000 : 60;
+    };
+    const Answer answer = run_volume(40, hu, {20, 20, 8}, {20, 20, 32}, "--to anatomy");
+    ASSERT_EQ(answer.code, 0) << answer.log;
+    EXPECT_EQ(holds(answer.out, "calcium beside the lumen: not known, the volume does not say "),
+              !ct)
+        << answer.out;
+  }
+}
+
 TEST_F(MaskRun, WhereTheWayMayLeaveItsVesselIsToldWithThePlace) {
   case_["segmentation"] = Json::object();
   const auto neck = [](const Vec3& p) {
