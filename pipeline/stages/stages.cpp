@@ -224,7 +224,7 @@ std::vector<Stage> stages_to_surface(const Case& given) {
   std::vector<Stage> stages;
   if (!given.volume) {
     stages.push_back({.name = "surface",
-                      .version = 12,
+                      .version = 13,
                       .reads_input = true,
                       .parameters = {"/surface/unit", "/surface/frame", "/surface/edge_length_mm"},
                       .make = make_surface});

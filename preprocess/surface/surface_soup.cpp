@@ -292,8 +292,9 @@ void orient(Surface& s, const std::vector<SidePair>& joined, const std::string& 
     const int odd_one = turned <= of - turned ? 1 : 0;
     std::optional<Vec3> place;
     for (const int t : piece) {
-      if (turn[static_cast<std::size_t>(t)] == odd_one && !place) place = middle_of(s, t);
-      if (turn[static_cast<std::size_t>(t)] == 1) std::swap(s.triangles(1, t), s.triangles(2, t));
+      if (turn[static_cast<std::size_t>(t)] != odd_one) continue;
+      if (!place) place = middle_of(s, t);
+      std::swap(s.triangles(1, t), s.triangles(2, t));
     }
     if (minority > 0) {
       mends.push_back({.kind = MendKind::kTurned, .count = minority, .place = *place});

@@ -177,6 +177,16 @@ TEST(SurfaceRepair, TurnsAPartThatIsFlipped) {
   EXPECT_NEAR(signed_volume(repaired.surface), volume, 1e-9);
 }
 
+TEST(SurfaceRepair, TurnsTheFewerOfAPieceThoughTheyComeFirst) {
+  const Surface sound = shapes::straight_tube(3.0, 20.0, 1.0);
+  for (Surface tube : {sound, shapes::inside_out(sound)}) {
+    tube.triangles.col(0).tail<2>().reverseInPlace();
+    const RepairedSurface repaired = repair_surface(tube, "x");
+    EXPECT_EQ(mend_of(repaired, MendKind::kTurned).count, 1);
+    EXPECT_EQ(count_of(repaired, MendKind::kInward), signed_volume(tube) < 0.0 ? 1 : 0);
+  }
+}
+
 TEST(SurfaceRepair, TellsThatAllNormalsPointedInward) {
   const Surface tube = shapes::straight_tube(3.0, 20.0, 0.8);
   const RepairedSurface repaired = repair_surface(shapes::inside_out(tube), "x");
