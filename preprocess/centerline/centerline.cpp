@@ -262,7 +262,11 @@ void extend_beyond(const NearestWall& wall, Points& line, double length, double 
     for (; last + 1 < line.size(); ++last) gone += (line[last + 1] - line[last]).norm();
     return gone >= length;
   });
-  if (gone >= length) return;
+  if (gone >= length) {  // back by what the last step went too far
+    const Vec3 step = line.back() - line[line.size() - 2];
+    line.back() -= (gone - length) * step.normalized();
+    return;
+  }
   throw Error("the vessel ends " + number_text(std::floor(gone)) +
               " mm beyond the target; give a target.beyond_mm below that (" + number_text(length) +
               " mm was asked)");

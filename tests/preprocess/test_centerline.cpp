@@ -128,6 +128,10 @@ TEST(Centerline, GoesOnBeyondTheTargetAsFarAsAsked) {
     EXPECT_NEAR(length_of(line), to_target + beyond, 0.7) << beyond;
     EXPECT_NEAR(line.radius(line.radius.size() - 1), 4.0, 0.15) << beyond;
   }
+  for (const double beyond : {0.05, 0.3, 5.3}) {  // straight on, where nothing is rounded off
+    const Centerline line = find_centerline(bend, access, target, {.beyond_mm = beyond});
+    EXPECT_NEAR(length_of(line), to_target + beyond, 0.02) << beyond;
+  }
   try {
     find_centerline(bend, access, target, {.beyond_mm = 120.0});
     FAIL() << "the vessel is not that long";
