@@ -3,6 +3,7 @@
 #include <array>
 #include <cmath>
 #include <cstdio>
+#include <cstdlib>
 #include <sstream>
 
 namespace wireplan {
@@ -11,7 +12,7 @@ double clean(double value) {
   std::ostringstream text;
   text.precision(12);
   text << value;
-  return std::stod(text.str());
+  return std::strtod(text.str().c_str(), nullptr);  // of the least numbers too
 }
 
 std::string place_text(const Vec3& p) {

@@ -90,6 +90,16 @@ TEST_F(CaseFile, ParametersReadBackAsTheSameCase) {
   }
 }
 
+TEST_F(CaseFile, TakesTheLeastNumbersThatItsRangesHold) {
+  Json json = full_case(volume_case());
+  json["wall"]["young_modulus_kpa"] = 1e-310;
+  json["access"]["inclination_deg"] = {1e-312};
+  const Json parameters = case_parameters(read(json));
+  EXPECT_NEAR(parameters.at("wall").at("young_modulus_kpa").get<double>() / 1e-310, 1.0, 1e-6);
+  EXPECT_NEAR(parameters.at("access").at("inclination_deg").at(0).get<double>() / 1e-312, 1.0,
+              1e-6);
+}
+
 TEST_F(CaseFile, LeavesTheChoiceOfCathetersToTheAnatomy) {
   Json json = full_case(volume_case());
   json["catheters"] = "suggest";
