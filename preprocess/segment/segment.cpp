@@ -117,14 +117,17 @@ Error not_connected(const Image& image, const SegmentOptions& options, const Vec
                     const Grid& grid, std::size_t nearest, const std::string& values) {
   const Voxel at = *nearest_voxel(image.grid, point);
   const Vec3 reached = center_of(grid, nearest);
+  const std::string remedy = options.lower_hu
+                                 ? "lower segmentation.lower_hu or neck_opening_mm"
+                                 : "give segmentation.lower_hu and upper_hu, which were chosen";
   return Error("target " + to_text(point) + " mm is not connected with the access " +
                to_text(options.seeds.front()) +
                " mm: the nearest point that the lumen reaches is " + to_text(reached) + " mm, " +
                to_text(std::round(10.0 * (reached - point).norm()) / 10.0) +
                " mm away (values there " + values + ", at the target " +
                to_text(std::round(static_cast<double>(image.values[index_of(image.grid, at)]))) +
-               " HU); if the artery is open between them, lower segmentation.lower_hu or "
-               "neck_opening_mm, else take another access or target");
+               " HU); if the artery is open between them, " + remedy +
+               ", else take another access or target");
 }
 
 Segmentation segment(const Image& image, const SegmentOptions& options) {

@@ -405,6 +405,9 @@ TEST(SegmentTarget, BehindAnOcclusionIsToldWithTheNearestPointReached) {
         << error;
     // the last slice of the open part
     EXPECT_TRUE(has(error, ", 21.6) mm, 13.4 mm away")) << error;
+    EXPECT_TRUE(has(error, band_given ? "open between them, lower segmentation.lower_hu"
+                                      : "open between them, give segmentation.lower_hu"))
+        << error;
   }
 }
 
