@@ -237,8 +237,8 @@ std::vector<ToolStep> as_written(std::vector<ToolStep> steps) {
   for (ToolStep& step : steps) {
     step.turn = clean(step.turn / kRadPerDeg) * kRadPerDeg;
     step.push = step.turn != 0.0 ? 0.0 : clean(step.push);
-    step.at =
-        step.until == Until::kFacing ? clean(step.at / kRadPerDeg) * kRadPerDeg : clean(step.at);
+    step.at = simulate::ends_by_angle(step.until) ? clean(step.at / kRadPerDeg) * kRadPerDeg
+                                                  : clean(step.at);
     step.try_turn = clean(step.try_turn / kRadPerDeg) * kRadPerDeg;
   }
   return steps;
@@ -267,6 +267,7 @@ std::string tell_end_at_side(const ToolStep& step, const std::string& side) {
       return " until the catheter's tip is " + at + (step.at < 0.0 ? "short of" : "beyond") +
              " the level of the ostium of " + side;
     case Until::kFacing:
+    case Until::kBack:
     case Until::kMade:
       break;
   }
@@ -299,6 +300,9 @@ std::string tell_end(const ToolStep& step, const std::string& side) {
       return tip + "looks " + whole_number(std::abs(angle)) + " degrees " +
              (angle > 0.0 ? "clockwise" : "counterclockwise") + " of the branch";
     }
+    case Until::kBack:
+      return tip + "looks back, " + whole_number(step.at / kRadPerDeg) +
+             " degrees from where the vessel goes on";
   }
   return {};
 }

@@ -51,7 +51,9 @@ class Reshaping : private HookSearch {
     }
     const HookState start = here();
     why_ = "the catheter does not come up to it";
-    if (go_past()) {
+    if (lead_up()) depths = form_from(here());
+    back_to(start);
+    if (depths.empty() && !stop() && go_past()) {
       const HookState past = here();
       for (const double withdrawn : {first_, all_}) {
         back_to(past);
@@ -82,13 +84,19 @@ class Reshaping : private HookSearch {
     for (const HookState& hook : hooks) {
       if (stop()) break;
       if (!lead_into(hook, past)) continue;
-      tell(2, "its knee does not rise from there");
-      if (!open_from(here())) continue;
-      std::vector<RaisedTools> depths = raise(here());
+      std::vector<RaisedTools> depths = form_from(here());
       if (!depths.empty()) return depths;
-      tell(3, "once it has opened, " + stopped_below_);
     }
     return {};
+  }
+
+  /// With the wire in the vessel.
+  std::vector<RaisedTools> form_from(const HookState& led) {
+    tell(2, "its knee does not rise from there");
+    if (!open_from(led)) return {};
+    std::vector<RaisedTools> depths = raise(here());
+    if (depths.empty()) tell(3, "once it has opened, " + stopped_below_);
+    return depths;
   }
 
   /// Of what stopped it that which came furthest.
@@ -96,6 +104,13 @@ class Reshaping : private HookSearch {
     if (came < came_) return;
     came_ = came;
     why_ = why;
+  }
+
+  /// The wire, out of the introducer: one that lies along the wall goes into what leaves there.
+  bool lead_up() {
+    const double steered = std::floor(place_.arc - simulate::kSteerNear - insertion(kWire));
+    return (steered <= 0.0 || go({.tool = kWire, .push = steered, .steers = kTemplate.steers})) &&
+           wire_into();
   }
 
   /// Wire and catheter past the mouth.
@@ -139,9 +154,9 @@ class Reshaping : private HookSearch {
 
   bool wire_into() {
     const double to = std::round(knee_ + kWireLeads);
-    const double inside = insertion(kCatheter) - insertion(kWire);
+    const double from = std::max(insertion(kCatheter), std::floor(place_.arc));
     return go({.tool = kWire,
-               .push = std::ceil(inside + to + kReshape.astray),
+               .push = std::ceil(from - insertion(kWire) + to + kReshape.astray),
                .until = Until::kInBranch,
                .at = to,
                .side = side_}) &&
@@ -153,7 +168,9 @@ class Reshaping : private HookSearch {
     for (const double share : kReshape.shares) {
       back_to(led);
       const double to = std::round(share * knee_);
-      const double push = to + kReshape.slack - std::min(0.0, measure(Until::kInBranch, kCatheter));
+      const double outside =
+          std::max({0.0, -measure(Until::kInBranch, kCatheter), place_.arc - insertion(kCatheter)});
+      const double push = to + kReshape.slack + outside;
       if (!go({.tool = kCatheter,
                .push = std::ceil(push),
                .until = Until::kInBranch,
@@ -196,18 +213,12 @@ class Reshaping : private HookSearch {
     std::vector<HookState> all;
     for (int quarter = -kReshape.quarters; quarter <= kReshape.quarters && !stop(); ++quarter) {
       back_to(below);
-      if (quarter != 0 && !turn_below(0.5 * kPi * quarter)) continue;
+      if (quarter != 0 && !turn_below(0.5 * kPi * quarter, kReshape.lets)) continue;
       if (!rise()) continue;
       all.push_back(here());
       all.back().facing = trial_.measure(Until::kFacing, kCatheter);
     }
-    const auto aside = [](const HookState& state) {
-      return std::isfinite(state.facing) ? std::abs(state.facing) : kPi;
-    };
-    std::stable_sort(all.begin(), all.end(),
-                     [&](const HookState& a, const HookState& b) { return aside(a) < aside(b); });
-    if (all.size() > kReshape.depths) all.resize(kReshape.depths);
-    return {all.begin(), all.end()};
+    return keep_facing(std::move(all), kReshape.depths);
   }
 
   /// Both tools, until the catheter's tip is past the target's ostium: less where the image ends
@@ -227,23 +238,6 @@ class Reshaping : private HookSearch {
                             : findings_.stopped;
     }
     return false;
-  }
-
-  /// By parts that the rules allow in one place, with pushes between.
-  bool turn_below(double by) {
-    if (!may_turn()) return false;
-    const double most = study_.tool_rules.most_turn;
-    const double least = most / study_.tool_rules.turn_per_length;
-    while (std::abs(by) > 1e-9) {
-      const double part = std::clamp(by, -most, most);
-      if (!go({.tool = kCatheter, .turn = part})) return false;
-      by -= part;
-      if (std::abs(by) > 1e-9 &&
-          !go({.tool = kBothTools, .push = std::max(kReshape.lets, std::ceil(least))})) {
-        return false;
-      }
-    }
-    return true;
   }
 
   const double knee_, all_, first_;  // lengths from the tip                                  [mm]

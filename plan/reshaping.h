@@ -2,11 +2,12 @@
 /// Where the way up and the pull down of a reversed curve begin that does not open in the trunk by
 /// itself (references-2 L: a Simmons is formed in the left subclavian artery or over the
 /// bifurcation, then pulled down into the ostium). As hands do it:
-///   1. the wire goes up past a vessel that leaves the trunk, the catheter over it; the wire is
-///   withdrawn behind the first curve, the catheter turned, and both are pulled until its tip looks
-///   into that vessel;
-///   2. the wire goes out into it, the catheter follows until its knee is at the mouth, and the
-///   wire is withdrawn behind the knee;
+///   1. the wire is led up into a vessel that leaves the trunk. Where it does not go there by
+///   itself, as from one leg into the other, it goes past, the catheter over it; the wire is
+///   withdrawn behind the first curve, the catheter turned, both are pulled until its tip looks
+///   into that vessel, and the wire goes out into it;
+///   2. the catheter follows until its knee is at the mouth, and the wire is withdrawn behind the
+///   knee;
 ///   3. the catheter is pushed: its knee rises in the trunk and draws the tip out;
 ///   4. the hub is turned, and both are pushed until the tip is beyond the target's ostium.
 /// From there on it is searched as from a catheter that went up over its wire (tool_starts.h).

@@ -1,5 +1,6 @@
 #pragma once
 /// Vessels off the way that a reversed curve can be reshaped in (reshaping.h).
+#include <optional>
 #include <vector>
 
 #include "simulate/insertion/tool_trial.h"
@@ -14,15 +15,23 @@ std::vector<simulate::SideVessel> find_side_vessels(const simulate::Way& way, do
 
 /// Of these at most two, the widest, that serve: twice as wide as the catheter (assumed) as far as
 /// it goes in, long enough, and out of a trunk of half the curve's width at least, where the knee
-/// is to rise. None for a curve that is not reversed.
+/// is to rise, past the ostium too. None for a curve that is not reversed.
 std::vector<simulate::SideVessel> list_reshaping_vessels(
-    const simulate::Way& way, const std::vector<simulate::SideVessel>& sides,
+    const simulate::Way& way, double ostium, const std::vector<simulate::SideVessel>& sides,
     const simulate::Wire& tube);
+
+/// How far past an ostium at that arc length of the way a catheter's tip goes along the trunk for
+/// its reversed curve to open there [mm]: by all of the curve, where the image is seen so far, by
+/// what is before the knee at least; the trunk is as wide there as the last curve. Empty where it
+/// is not, and for a curve that is not reversed.
+std::optional<double> find_opening_depth(const simulate::Way& way, double ostium,
+                                         const simulate::Wire& tube);
 
 /// From a catheter's tip to its knee, the middle of its last curve [mm].
 double knee_length(const simulate::Wire& tube);
 
-/// So far the wire goes into a side vessel ahead of a catheter whose knee is at the mouth [mm].
-inline constexpr double kWireLeads = 20.0;
+/// So far the wire goes into a side vessel ahead of a catheter whose knee is at the mouth, and
+/// ahead of one whose curve is to open in the trunk [mm].
+inline constexpr double kWireLeads = 20.0, kWireLeadsOn = 12.0;
 
 }  // namespace wireplan::plan

@@ -12,7 +12,8 @@ using simulate::ToolStep;
 using simulate::Until;
 
 ToolScript with(ToolScript steps, const ToolStep& next) {
-  if (!steps.empty() && steps.back().tool == next.tool && steps.back().until == Until::kMade) {
+  if (!steps.empty() && steps.back().tool == next.tool && steps.back().until == Until::kMade &&
+      next.until == Until::kMade) {
     ToolStep& last = steps.back();
     if (last.push * next.push > 0.0) {
       last.push += next.push;
@@ -30,7 +31,7 @@ ToolScript with(ToolScript steps, const ToolStep& next) {
 
 void end_at(ToolStep& step, Until until, double at) {
   step.until = until;
-  const double unit = until == Until::kFacing ? 5.0 * kRadPerDeg : 0.5;  // [rad], [mm]
+  const double unit = simulate::ends_by_angle(until) ? 5.0 * kRadPerDeg : 0.5;  // [rad], [mm]
   step.at = unit * std::round(at / unit);
 }
 
@@ -177,6 +178,22 @@ bool HookSearch::let_twist_through() {
   return go({.tool = kBothTools, .push = -std::max(kTemplate.pull, std::ceil(least - 1e-9))});
 }
 
+bool HookSearch::turn_below(double by, double push) {
+  if (!may_turn()) return false;
+  const double most = study_.tool_rules.most_turn;
+  const double least = most / study_.tool_rules.turn_per_length;
+  while (std::abs(by) > 1e-9) {
+    const double part = std::clamp(by, -most, most);
+    if (!go({.tool = kCatheter, .turn = part})) return false;
+    by -= part;
+    if (std::abs(by) > 1e-9 &&
+        !go({.tool = kBothTools, .push = std::max(push, std::ceil(least))})) {
+      return false;
+    }
+  }
+  return true;
+}
+
 std::string HookSearch::find_broken(const std::vector<ToolStep>& steps) const {
   return find_broken_rule(steps, catheter_, wire_, study_.tool_rules);
 }
@@ -226,6 +243,16 @@ void HookSearch::keep_best(std::vector<HookState> own, std::vector<HookState>& h
     kept.push_back(best);
   }
   for (const std::ptrdiff_t k : kept) hooks.push_back(std::move(own[static_cast<std::size_t>(k)]));
+}
+
+std::vector<RaisedTools> HookSearch::keep_facing(std::vector<HookState> all, std::size_t most) {
+  const auto aside = [](const HookState& state) {
+    return std::isfinite(state.facing) ? std::abs(state.facing) : kPi;
+  };
+  std::stable_sort(all.begin(), all.end(),
+                   [&](const HookState& a, const HookState& b) { return aside(a) < aside(b); });
+  if (all.size() > most) all.resize(most);
+  return {all.begin(), all.end()};
 }
 
 void HookSearch::end_by_sight(const HookState& hook, std::size_t begun) {

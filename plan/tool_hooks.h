@@ -1,7 +1,7 @@
 #pragma once
-/// What the parts of a search for scripts of one pair have in common (tool_starts.h, reshaping.h):
-/// steps that are made in a trial and taken back, and the turns and pulls that bring the catheter's
-/// tip into an ostium.
+/// What the parts of a search for scripts of one pair have in common (tool_starts.h, reshaping.h,
+/// opening.h): steps that are made in a trial and taken back, and the turns and pulls that bring
+/// the catheter's tip into an ostium.
 #include <functional>
 #include <string>
 #include <vector>
@@ -125,6 +125,9 @@ class HookSearch {
   bool turn_hub(double by);
   /// A pull, as long as the rules ask for after the turn.
   bool let_twist_through();
+  /// Turns it by parts that the rules let in one place, with pushes of both tools between, so long
+  /// at least. False where it may not be turned.
+  bool turn_below(double by, double push);
   std::string find_broken(const ToolScript& steps) const;
   /// Adds the best states of a pull from here, and comes back here. From below the ostium, as where
   /// the image ends too near above it, of a push as well.
@@ -133,6 +136,8 @@ class HookSearch {
   void move_past(double by, std::vector<HookState>& hooks);
   /// Of the states along a pull those that lie best, and not next to each other.
   static void keep_best(std::vector<HookState> own, std::vector<HookState>& hooks);
+  /// At most so many, first those whose tips look toward the branch.
+  static std::vector<RaisedTools> keep_facing(std::vector<HookState> all, std::size_t most);
   /// The last turn of a hook, past the steps begun with, and the pull after it end where they
   /// brought the tip to, not by their length.
   void end_by_sight(const HookState& hook, std::size_t begun);

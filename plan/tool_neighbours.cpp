@@ -118,8 +118,9 @@ bool alike(const FoundScript& a, const FoundScript& b, double turn, double depth
 }  // namespace
 
 bool is_reshaped(const ToolScript& script) {
-  return std::any_of(script.begin(), script.end(),
-                     [](const ToolStep& step) { return step.side >= 0; });
+  return std::any_of(script.begin(), script.end(), [](const ToolStep& step) {
+    return step.side >= 0 || step.until == Until::kBack;
+  });
 }
 
 std::vector<ToolScript> list_neighbours(const ToolScript& script, std::size_t begun) {

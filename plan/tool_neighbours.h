@@ -15,8 +15,8 @@ using ToolScript = std::vector<simulate::ToolStep>;
 inline constexpr double kNeighbourDepth = 2.0;               // of the pull, of the advance    [mm]
 inline constexpr double kNeighbourTurn = 15.0 * kRadPerDeg;  // of the hub, or where it looks [rad]
 
-/// Whether a catheter's curve was reshaped in a side vessel: it hangs from its knee then, and goes
-/// deeper into a branch by a pull.
+/// Whether a catheter's curve was reshaped, in a side vessel or the trunk: it hangs from its knee
+/// then, and goes deeper into a branch by a pull.
 bool is_reshaped(const ToolScript& script);
 
 /// The script itself, then with the last move of both tools ended earlier and later, the last

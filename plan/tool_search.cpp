@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "plan/catheter_choice.h"
+#include "plan/opening.h"
 #include "plan/reshaping.h"
 #include "plan/side_vessels.h"
 #include "plan/tool_starts.h"
@@ -49,14 +50,18 @@ void add_starts(const Study& study, const ToolPair& pair, std::size_t slot, cons
   }
 }
 
-/// A way up on which the curve of a pair's catheter is reshaped in a side vessel.
+/// A way up on which the curve of a pair's catheter is reshaped: in a side vessel, or, where that
+/// is none, in the trunk beyond the ostium.
 struct ReshapedWay {
   std::size_t pair = 0;  // as above
   simulate::SideVessel side;
+  double depth = 0.0;  // of the catheter in the trunk, past the ostium                       [mm]
   WayUp up;
+
+  bool in_trunk() const { return side.branch < 0; }
 };
 
-/// Of each pair without a script that holds those that its catheter's curve can be reshaped in.
+/// Of each pair without a script that holds those on which its catheter's curve can be reshaped.
 std::vector<ReshapedWay> list_reshaped_ways(const Study& study, const Ostium& ostium,
                                             const std::vector<ToolPair>& pairs,
                                             const std::vector<ToolStart>& starts) {
@@ -72,10 +77,15 @@ std::vector<ReshapedWay> list_reshaped_ways(const Study& study, const Ostium& os
     if (holds || !pairs[k].unfit.empty()) continue;
     const Catheter& catheter = study.catheters[static_cast<std::size_t>(pairs[k].catheter)];
     for (const simulate::SideVessel& side :
-         list_reshaping_vessels(*study.goal.way, sides, catheter.tool.wire)) {
+         list_reshaping_vessels(*study.goal.way, ostium.arc, sides, catheter.tool.wire)) {
       ways.emplace_back().pair = k;
       ways.back().side = side;
     }
+    const std::optional<double> depth =
+        find_opening_depth(*study.goal.way, ostium.arc, catheter.tool.wire);
+    if (!depth) continue;
+    ways.emplace_back().pair = k;
+    ways.back().depth = *depth;
   }
   return ways;
 }
@@ -141,12 +151,15 @@ void gather(const Study& study, const std::vector<ToolStart>& starts, std::size_
   bool none_serves = true;
   for (const ReshapedWay& way : reshaped) {
     if (way.pair != slot) continue;
-    none_serves = false;
+    none_serves = none_serves && way.in_trunk();
     all.branches += way.up.findings.branches;
     if (!way.up.depths.empty()) continue;
-    pair.stopped += "; its curve is not reshaped in " +
-                    branch_name(study.goal.way->tree(), way.side.branch, way.side.from) + ": " +
-                    way.up.findings.stopped;
+    pair.stopped +=
+        (way.in_trunk()
+             ? std::string("; its curve does not open in the trunk beyond the ostium: ")
+             : "; its curve is not reshaped in " +
+                   branch_name(study.goal.way->tree(), way.side.branch, way.side.from) + ": ") +
+        way.up.findings.stopped;
   }
   const Catheter& catheter = study.catheters[static_cast<std::size_t>(pair.pair.catheter)];
   if (!pair.stopped.empty() && none_serves &&
@@ -268,7 +281,10 @@ void search_on(const Study& study, const simulate::VesselModel& vessel, const Ba
         static_cast<int>(reshaped.size()),
         [&](int slot) {
           ReshapedWay& way = reshaped[static_cast<std::size_t>(slot)];
-          way.up = go_up_reshaped(scout, pairs[way.pair], way.side, vessel, options.cancelled);
+          const ToolPair& pair = pairs[way.pair];
+          way.up = way.in_trunk()
+                       ? go_up_opened(scout, pair, *ostium, way.depth, vessel, options.cancelled)
+                       : go_up_reshaped(scout, pair, way.side, vessel, options.cancelled);
         },
         options);
     const std::size_t plain = starts.size();

@@ -8,8 +8,8 @@
 ///   4. the wire goes out into the branch, and where it comes no further, the catheter follows it;
 ///   5. once the wire is at the target, the catheter follows into the branch (ToolRules::seat).
 /// A reversed curve, as a Simmons, whose scripts do not hold is formed in a vessel off the way
-/// first and goes up with its knee ahead (reshaping.h); from step 3 on all is as above, but that it
-/// is pulled deeper.
+/// first and goes up with its knee ahead (reshaping.h), or in the trunk beyond (opening.h); from
+/// step 3 on all is as above, but that it is pulled deeper.
 #include <functional>
 #include <string>
 #include <vector>
@@ -77,10 +77,10 @@ Study tool_scout_study(const Study& study);
 /// holds where friction and stiffness are others. Where it does not reach so when made again, and
 /// does by the same lengths, it turns and pulls by these. The way up is made once for a pair, and
 /// not again for neighbours; of a reversed curve without a script that holds one more, for each of
-/// at most two side vessels. Keeps up to six scripts of a pair, which differ
-/// in turn, or in depth, first those of whose neighbours (tool_neighbours.h) most reach too; of
-/// every hook all that are not told alike. The same at any thread count. The first script that is
-/// found is told to `on_first`, where given, at once and from any thread.
+/// at most two side vessels and where the trunk beyond is wide enough. Keeps up to six scripts of a
+/// pair, which differ in turn, or in depth, first those of whose neighbours (tool_neighbours.h)
+/// most reach too; of every hook all that are not told alike. The same at any thread count. The
+/// first script that is found is told to `on_first`, where given, at once and from any thread.
 ToolScripts find_tool_scripts(const Study& study, const simulate::VesselModel& vessel,
                               const BatchOptions& options,
                               const std::function<void(const Candidate&)>& on_first = nullptr,

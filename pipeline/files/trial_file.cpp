@@ -164,7 +164,8 @@ std::vector<simulate::ToolTrack> tracks_from_json(const Json& list) {
 }
 
 constexpr std::array kToolNames = {"both", "catheter", "wire"};  // of ToolStep::tool, from -1
-constexpr std::array kUntilNames = {"level_mm", "in_branch_mm", "facing_deg"};  // from kLevel on
+constexpr std::array kUntilNames = {"level_mm", "in_branch_mm", "facing_deg",
+                                    "back_deg"};  // from kLevel on
 
 const char* until_name(simulate::Until until) {
   return kUntilNames.at(static_cast<std::size_t>(until) - 1);
@@ -350,7 +351,7 @@ Json steps_json(const std::vector<simulate::ToolStep>& steps) {
       row["push_mm"] = clean(step.push);
     }
     if (step.until != simulate::Until::kMade) {
-      const bool angle = step.until == simulate::Until::kFacing;
+      const bool angle = simulate::ends_by_angle(step.until);
       row["until"] = {{until_name(step.until), clean(angle ? step.at / kRadPerDeg : step.at)}};
     }
     if (step.tries > 0) {
@@ -393,8 +394,7 @@ std::vector<simulate::ToolStep> steps_of(const Json& list) {
     if (!row.contains("until")) continue;
     const Json::const_iterator until = row.at("until").begin();
     step.until = until_of(until.key());
-    step.at =
-        number_of(until.value()) * (step.until == simulate::Until::kFacing ? kRadPerDeg : 1.0);
+    step.at = number_of(until.value()) * (simulate::ends_by_angle(step.until) ? kRadPerDeg : 1.0);
   }
   return steps;
 }

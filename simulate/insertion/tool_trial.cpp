@@ -31,6 +31,7 @@ constexpr double kSteerAstray = 10.0;  // pushed on in another vessel: less may 
 constexpr int kSteerPlaces = 4;        // each so much further back; near the access ...
 constexpr int kSteersOfRound = 8, kSteerShift = 2;          // the next time round from other places
 constexpr double kSteerShare = 0.6, kSteerShareLess = 0.1;  // ... so much of the insertion
+constexpr double kBackPush = 10.0;   // that turns a tip back by a radian, near the end      [mm]
 constexpr double kLooksAside = 0.1;  // sine, of a tip against the trunk: less looks nowhere
 
 std::string in_mm(double value) {
@@ -135,6 +136,10 @@ double ToolTrial::measure(Until until, int tool, int side) const {
   }
   if (until == Until::kLevel) return (tip(watched) - branch.point).dot(branch.trunk);
   const Vec3 looks = tip_direction(watched);
+  if (until == Until::kBack) {
+    const double onward = looks.dot(goal_.way->direction_at(tip(watched)));
+    return std::acos(std::clamp(onward, -1.0, 1.0));
+  }
   const Vec3 aside = looks - looks.dot(branch.trunk) * branch.trunk;
   const Vec3 to = branch.branch - branch.branch.dot(branch.trunk) * branch.trunk;
   if (until == Until::kMade || aside.norm() < kLooksAside || to.norm() < kLooksAside)
@@ -149,6 +154,7 @@ std::optional<double> ToolTrial::missing(const ToolStep& step) const {
   if (!std::isfinite(now)) return {};
   if (step.until == Until::kInBranch) return step.at - now;
   if (step.until == Until::kLevel) return step.push > 0.0 ? step.at - now : now - step.at;
+  if (step.until == Until::kBack) return (step.at - now) * (step.turn == 0.0 ? kBackPush : 1.0);
   // The tip has passed what ends it by a quarter turn at most; beyond that it has yet to come.
   double left = std::remainder(step.at - now, 2.0 * kPi);
   if (step.turn < 0.0) left = -left;
@@ -161,7 +167,8 @@ bool ToolTrial::make(const ToolStep& step, bool last) {
   expects(std::min(step.tries, step.steers) == 0);
   expects(std::max(step.tries, step.steers) == 0 || (step.tool > 0 && step.push > 0.0));
   ++step_;
-  record_.reshaped = record_.reshaped || (step.side >= 0 && step.tool <= 0);
+  const bool reshapes = step.side >= 0 || step.until == Until::kBack;
+  record_.reshaped = record_.reshaped || (reshapes && step.tool <= 0);
   const TryPlace from = step.tries > 0 ? place_of_try(step.tool) : TryPlace{};
   if (step.spare >= 0) {
     exchange(step);

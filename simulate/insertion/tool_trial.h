@@ -58,7 +58,11 @@ enum class Until {
   kInBranch,  // the tip is `at` mm past the ostium along the way, in the branch
   kFacing,    // the tip, seen against the trunk, comes to look `at` rad from the branch, turned
               // right-handed about the trunk
+  kBack,      // the tip comes to look `at` rad away from where the vessel goes on that it is in
 };
+
+/// Whether `at` is an angle there.
+inline bool ends_by_angle(Until until) { return until == Until::kFacing || until == Until::kBack; }
 
 /// One step of the hand on one tool, or on all together, which is pushed (pulled where negative) or
 /// turned.
@@ -115,8 +119,9 @@ struct ToolTrialOptions {
   /// That take the innermost's place: ToolStep. The goal is theirs: before the first exchange a tip
   /// may pass it.
   std::vector<Wire> spares = {};
-  /// That steps may be seen at. Once the outermost tool has been in one, its knee may lie in the
-  /// trunk beyond the take-off when the target is reached, with its tip below.
+  /// That steps may be seen at. Once the outermost tool has been in one, or its tip was to look
+  /// back, its knee may lie in the trunk beyond the take-off when the target is reached, with its
+  /// tip below.
   std::vector<SideVessel> sides = {};
 };
 

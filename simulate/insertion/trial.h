@@ -105,8 +105,8 @@ struct TrialResult {
   std::vector<ToolTrack> tools;            // of several tools, from the outside in; else empty
   std::vector<int> steps;  // of several tools: the step of the script that each push belongs to
   std::optional<CatheterSupport> support;  // of two, where the catheter ends in the branch
-  /// Of several tools: the outermost has been in a side vessel, and may lie in the trunk beyond the
-  /// target's branch with its knee.
+  /// Of several tools: the outermost has been in a side vessel, or was to look back, and may lie in
+  /// the trunk beyond the target's branch with its knee.
   bool reshaped = false;
   std::vector<Shape> shapes;       // every `record_every` of the hand's way, and the final one
   std::vector<std::string> terms;  // energy terms that the scene built: "stretch", "bend", ...

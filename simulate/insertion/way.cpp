@@ -245,6 +245,29 @@ double Way::find_progress(const Vec3& tip) const {
   return is_on_path(place) || is_in_own_vessel(tip, place) ? place.arc : 0.0;
 }
 
+Vec3 Way::direction_at(const Vec3& point) const {
+  const Centerline* line = &path_;
+  double arc = 0.0;
+  if (tree_.empty()) {
+    arc = find_place(point, path_).arc;
+  } else {
+    const BranchPlace place = find_branch(tree_, point);
+    line = &tree_[static_cast<std::size_t>(place.branch)].line;
+    arc = place.arc;
+  }
+  // The points of the line next to a radius behind and before it.
+  const auto* arcs = line->arc_length.data();
+  const Eigen::Index last = line->arc_length.size() - 1;
+  const auto at = [&](double length) {
+    return std::clamp<Eigen::Index>(
+        std::lower_bound(arcs, arcs + line->arc_length.size(), length) - arcs, 0, last);
+  };
+  const double radius = line->radius[at(arc)];
+  Eigen::Index from = at(arc - radius), to = at(arc + radius);
+  if (from == to) (from > 0 ? from : to) += from > 0 ? -1 : 1;
+  return (line->points.col(to) - line->points.col(from)).normalized();
+}
+
 std::optional<int> Way::find_image_end(const Vec3& tip, const Lumen& lumen) const {
   for (std::size_t k = 0; k < tree_.size(); ++k) {
     const Centerline& line = tree_[k].line;

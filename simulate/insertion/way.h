@@ -71,6 +71,10 @@ class Way {
   /// beside the balls: a tree then tells whether the tip is in a vessel of the way [mm].
   double find_progress(const Vec3& tip) const;
 
+  /// Where the vessel that a point is in goes on, away from the access: a chord of its diameter,
+  /// unit. Without a tree of the way.
+  Vec3 direction_at(const Vec3& point) const;
+
   /// The end of the image that a tip has come to: within half a radius of where a branch ends with
   /// nothing but wall ahead. An artery goes on there in the patient, whether the model ends flat or
   /// round. Ends within two diameters of their parent are none (sacs of aneurysms, stumps), nor is

@@ -123,6 +123,7 @@ TEST(TrialFile, StepsOfAScriptAreReadAsTheyAreWritten) {
       {.tool = 1, .at = 10.0, .spare = 0},
       {.tool = 0, .push = 120.0, .until = Until::kLevel, .at = 2.0, .side = 0},
       {.tool = 1, .push = 90.0, .until = Until::kInBranch, .at = 70.0, .side = 3},
+      {.tool = 0, .push = 158.0, .until = Until::kBack, .at = 100.0 * kRadPerDeg},
       {.tool = 0, .push = -60.0, .until = Until::kInBranch, .at = 10.0, .seats = true}};
   EXPECT_EQ(steps_json(steps)[7].at("side_branch"), 4) << "as it is called: branch 4";
   EXPECT_FALSE(steps_json(steps)[0].contains("side_branch"));

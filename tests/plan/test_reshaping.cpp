@@ -1,5 +1,6 @@
 // A reversed curve that does not open in the trunk: the vessels that it can be reshaped in, what
-// the hand is told, and, in an aorta above two legs, that it comes into a branch that runs down.
+// the hand is told, and that it comes into a branch that runs down from an aorta above two legs,
+// and into one of an arch that leans back, over a vessel before it or out of the aorta beyond.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -12,6 +13,7 @@
 #include "plan/side_vessels.h"
 #include "plan/tool_neighbours.h"
 #include "plan/tool_search.h"
+#include "tests/plan/arch.h"
 #include "tests/plan/iliacs.h"
 
 namespace wireplan::plan {
@@ -33,7 +35,7 @@ double ostium_arc(const simulate::Way& way) {
 std::vector<int> served(const simulate::Way& way, const simulate::Wire& tube) {
   std::vector<int> branches;
   const std::vector<SideVessel> sides = find_side_vessels(way, ostium_arc(way));
-  for (const SideVessel& side : list_reshaping_vessels(way, sides, tube)) {
+  for (const SideVessel& side : list_reshaping_vessels(way, ostium_arc(way), sides, tube)) {
     branches.push_back(side.branch);
   }
   return branches;
@@ -120,6 +122,61 @@ TEST(SideVessels, TheOtherLegIsFoundWhereTheTreeGoesOnInItToo) {
   EXPECT_EQ(served(way, iliacs::simmons().tool.wire), (std::vector<int>{0}));
 }
 
+TEST(SideVessels, AnArchGoesOnPastTheOstiumOfTheTarget) {
+  // The way turns up into the carotid artery, and back, before the knee of a curve has its room.
+  const arch::Arch wide{.descending = 15.0, .ascending = 15.0};
+  std::vector<Branch> tree = arch::tree(wide);
+  const double beyond = 150.0 * kRadPerDeg;  // a vessel next to the target's, further on
+  tree.push_back({arch::line_through(
+                      wide, {arch::on_arch(beyond), arch::on_arch(beyond) + Vec3(0, 0, 120)}, 5.0),
+                  0, arch::arc_to(beyond)});
+  const simulate::Way way = *arch::way(wide, tree);
+  const std::vector<SideVessel> sides = find_side_vessels(way, ostium_arc(way));
+  ASSERT_EQ(sides.size(), 1U);
+  EXPECT_EQ(sides[0].branch, 1);
+  const simulate::TakeOff& place = sides[0].take_off;
+  EXPECT_NEAR(place.branch.dot(Vec3(0.6, 0.0, 0.8)), 1.0, 0.01);
+  // From half a width of the aorta behind the mouth to two: the chord of a circle.
+  const double level = std::atan2(place.point.z(), place.point.x());
+  EXPECT_NEAR(place.arc, arch::arc_to(level), 0.5);
+  const double middle = level + 1.25 * 30.0 / arch::kBend;
+  EXPECT_GT(place.arc + 60.0, arch::arc_to(arch::kCarotidAt)) << "the way leaves it before that";
+  EXPECT_NEAR(place.trunk.dot(Vec3(-std::sin(middle), 0.0, std::cos(middle))), 1.0, 0.01);
+  const arch::Arch narrow;
+  EXPECT_EQ(served(*arch::way(narrow, arch::tree(narrow)), iliacs::simmons().tool.wire),
+            (std::vector<int>{1}));
+}
+
+TEST(SideVessels, ACurveOpensInATrunkThatIsWideAndLongEnoughBeyondTheOstium) {
+  const simulate::Wire simmons = iliacs::simmons().tool.wire;
+  const auto with_straight = [&](double length) {
+    simulate::Wire tube = simmons;
+    tube.sections[2].length = length;
+    return tube;
+  };
+  const auto depth_in = [](const arch::Arch& shape, const simulate::Wire& tube) {
+    const simulate::Way way = *arch::way(shape, arch::tree(shape));
+    const std::optional<double> depth = find_opening_depth(way, ostium_arc(way), tube);
+    return depth ? ostium_arc(way) + *depth : 0.0;
+  };
+  const arch::Arch wide{.ascending = 17.0};
+  const std::optional<Ostium> ostium = find_ostium(arch::study(wide).goal);
+  ASSERT_TRUE(ostium);
+  const double level = arch::arc_to(std::atan2(ostium->point.z(), ostium->point.x()));
+  // Its length and a radius of the last curve past the level of the ostium; no further than the
+  // image, of which a wire takes 12 mm ahead and 9 mm short of the end.
+  EXPECT_NEAR(depth_in(wide, simmons), level + 77.0 + 12.0, 0.5);
+  EXPECT_NEAR(depth_in(wide, with_straight(10.0)), level + 62.0 + 12.0, 0.5);
+  const double end = arch::arc_to(kPi) + arch::kUp - 2.0;
+  ASSERT_GT(level + 87.0 + 12.0, end - 21.0);
+  EXPECT_NEAR(depth_in(wide, with_straight(35.0)), end - 21.0, 0.5);
+  EXPECT_EQ(depth_in(wide, with_straight(70.0)), 0.0) << "104 mm before the knee, and 94 of aorta";
+  EXPECT_EQ(depth_in({}, simmons), 0.0) << "21 mm for a curve of 24";
+  simulate::Wire hooked = simmons;
+  hooked.sections[3].rest_curvature = 0.0;
+  EXPECT_EQ(depth_in(wide, hooked), 0.0);
+}
+
 const ToolScript kReshaped = {
     {.tool = 1, .push = 107.0},
     {.tool = 0, .push = 92.0},
@@ -159,6 +216,27 @@ TEST(ReshapingSteps, CallTheVesselByItsName) {
             std::string::npos);
   EXPECT_EQ(as_written(kReshaped), kReshaped);
   EXPECT_EQ(find_broken_rule(kReshaped, study.catheters[0], study.wires[0], {}), "");
+}
+
+TEST(ReshapingSteps, TellThatATipLooksBack) {
+  const ToolScript steps = {
+      {.tool = 0, .push = 219.0, .until = Until::kBack, .at = 100.0 * kRadPerDeg}};
+  EXPECT_EQ(describe_steps(steps, 286.0)[0].text,
+            "advance the catheter until its tip looks back, 100 degrees from where the vessel goes "
+            "on, by 219 mm at most");
+  EXPECT_TRUE(is_reshaped(steps));
+  EXPECT_EQ(as_written(steps), steps);
+  ToolStep rounded = steps[0];
+  end_at(rounded, Until::kBack, 98.0 * kRadPerDeg);
+  EXPECT_NEAR(rounded.at, 100.0 * kRadPerDeg, 1e-12) << "to five degrees";
+}
+
+TEST(ReshapingSteps, APushThatEndsByWhatIsSeenIsAStepOfItsOwn) {
+  const ToolStep up{.tool = 1, .push = 60.0, .steers = 16}, on{.tool = 1, .push = 30.0};
+  const ToolStep into{.tool = 1, .push = 90.0, .until = Until::kInBranch, .at = 79.0, .side = 1};
+  EXPECT_EQ(with(with({}, up), into), (ToolScript{up, into}));
+  ASSERT_EQ(with(with({}, up), on).size(), 1U);
+  EXPECT_EQ(with(with({}, up), on)[0].push, 90.0);
 }
 
 TEST(ReshapingSteps, AKneeIsPulledDeeperAndItsNeighboursReshapeAlike) {
@@ -206,6 +284,64 @@ TEST(Reshaping, BringsASimmonsOverTheBifurcationIntoABranchThatRunsDown) {
                                         "to reshape its curve"),
             std::string::npos)
       << plain.pairs[0].stopped;
+}
+
+TEST(Reshaping, BringsASimmonsOverTheSubclavianArteryIntoACarotidThatLeansBack) {
+  const arch::Arch shape;
+  const simulate::VesselModel vessel = arch::vessel(shape);
+  const Study study = arch::study(shape);
+  const std::optional<Ostium> ostium = find_ostium(study.goal);
+  ASSERT_TRUE(ostium);
+  EXPECT_EQ(asked_for(take_off_of(*ostium)), CurveKind::kReversed);
+  const ToolScripts found = find_tool_scripts(study, vessel, {.threads = 2});
+  ASSERT_GT(found.pairs.at(0).found, 0) << found.pairs[0].stopped;
+  EXPECT_GE(found.pairs[0].held, kSteadyShare);
+  for (const Candidate& script : found.found) {
+    // The wire goes into the subclavian artery, the catheter after it, and comes out as a knee.
+    EXPECT_TRUE(is_reshaped(script.steps)) << describe_script(study, script, 300.0);
+    EXPECT_EQ(find_broken_rule(script.steps, study.catheters[0], study.wires[0], {}), "");
+  }
+  const simulate::TrialResult trial = run_candidate(study, found.found[0], vessel);
+  EXPECT_EQ(trial.outcome, simulate::Outcome::kReached) << trial.reason;
+  EXPECT_LT(trial.nodes.row(0).minCoeff(), ostium->point.x() - 20.0) << "the knee is beyond";
+  EXPECT_GT(trial.nodes.row(2).maxCoeff(), arch::carotid(50.0).z()) << "the tip in the carotid";
+}
+
+TEST(Reshaping, OpensASimmonsInAWideAscendingAortaAndPullsItBackIntoACarotid) {
+  // No wire goes into the subclavian artery: that is told as narrow.
+  const arch::Arch shape{.ascending = 17.0};
+  const simulate::VesselModel vessel = arch::vessel(shape);
+  Study study = arch::study(shape);
+  std::vector<Branch> tree = arch::tree(shape);
+  tree[1].line.radius.tail(150).setConstant(1.5);
+  study.goal.way = arch::way(shape, tree);
+  const ToolScripts found = find_tool_scripts(study, vessel, {.threads = 2});
+  ASSERT_GT(found.pairs.at(0).found, 0) << found.pairs[0].stopped;
+  EXPECT_GE(found.pairs[0].held, kSteadyShare);
+  for (const Candidate& script : found.found) {
+    EXPECT_TRUE(is_reshaped(script.steps)) << describe_script(study, script, 300.0);
+    for (const ToolStep& step : script.steps) EXPECT_EQ(step.side, -1);
+    EXPECT_EQ(find_broken_rule(script.steps, study.catheters[0], study.wires[0], {}), "");
+  }
+  const Candidate& first = found.found[0];
+  const simulate::TrialResult trial = run_candidate(study, first, vessel);
+  EXPECT_EQ(trial.outcome, simulate::Outcome::kReached) << trial.reason;
+  EXPECT_GT(trial.nodes.row(2).maxCoeff(), arch::carotid(50.0).z()) << "the tip in the carotid";
+  // It opens where the aorta runs straight down: a tip that looks back looks up.
+  simulate::ToolTrial made(tools_of(study, first), make_introducer(study, first), study.goal,
+                           vessel, tool_options(study, first));
+  int opened = 0;
+  for (const ToolStep& step : first.steps) {
+    const double before = made.measure(Until::kBack, 0);
+    made.make(step);
+    if (step.until != Until::kBack) continue;
+    ++opened;
+    EXPECT_LT(before, step.at);
+    ASSERT_LT(made.tip(0).z(), -shape.ascending);
+    EXPECT_NEAR(made.measure(Until::kBack, 0), std::acos(-made.tip_direction(0).z()), 1e-9);
+    EXPECT_GT(made.measure(Until::kBack, 0), step.at - 0.05);
+  }
+  EXPECT_EQ(opened, 1);
 }
 
 }  // namespace

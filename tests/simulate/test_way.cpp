@@ -197,6 +197,32 @@ TEST(Way, WhatIsPassedByDoesNotDependOnWhichVesselTheTreeFollowsFirst) {
   EXPECT_FALSE(way.find_astray(Vec3(15.0, 1.0, kSecond)));
 }
 
+TEST(Way, WhereAVesselGoesOnIsToldOnItsAxisAndBesideIt) {
+  // Along a circle, by a chord of the vessel's width; and in a branch that the way does not take.
+  constexpr double kBend = 30.0;
+  std::vector<Vec3> corners;
+  for (int k = 0; k <= 180; ++k) {
+    const double angle = k * kRadPerDeg;
+    corners.push_back(kBend * Vec3(-std::cos(angle), 0.0, std::sin(angle)));
+  }
+  const Centerline bend = line_through(corners, kTrunk);
+  const Vec3 top(0.0, 0.0, kBend);
+  const Way alone(bend),
+      way(bend, {{bend, -1, 0.0},
+                 {line_through({top, top + Vec3(0, 0, 40)}, kSide), 0, kBend * 0.5 * kPi}});
+  for (const double angle : {0.5, 1.0, 2.0, 2.5}) {
+    for (const double beside : {-0.8 * kTrunk, 0.0, 0.8 * kTrunk}) {
+      const Vec3 out(-std::cos(angle), 0.0, std::sin(angle));
+      const Vec3 onward(std::sin(angle), 0.0, std::cos(angle));
+      // Points of the line are half a millimetre apart: 0.5 / 30 rad.
+      EXPECT_GT(alone.direction_at((kBend + beside) * out).dot(onward), std::cos(0.5 / kBend));
+      EXPECT_GT(way.direction_at((kBend + beside) * out).dot(onward), std::cos(0.5 / kBend));
+    }
+  }
+  EXPECT_NEAR(way.direction_at(top + Vec3(1.0, 0.0, 20.0)).z(), 1.0, 1e-12);
+  EXPECT_NEAR(way.direction_at(top + Vec3(1.0, 0.0, 39.9)).z(), 1.0, 1e-12) << "at its end";
+}
+
 TEST(Way, ATipInTheMouthOfAnotherBranchIsInThatBranch) {
   // 1.2 mm beside the trunk's balls, which alone may be an oval lumen.
   const Way way(into_branch(kSecond, 25.0), tree_of_fork());
