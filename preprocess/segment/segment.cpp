@@ -213,17 +213,7 @@ bool contains(const Mask& mask, const Vec3& point) {
 }
 
 double compute_distance(const Mask& mask, const Vec3& point) {
-  if (contains(mask, point)) return 0.0;
-  const Vec3 p_ijk = mask.grid.ijk_from_lps(point);
-  double nearest = std::numeric_limits<double>::infinity();
-  for (std::size_t n = 0; n < mask.labels.size(); ++n) {
-    if (mask.labels[n] != 0) {
-      const Voxel v = voxel_at(mask.grid, n);
-      const Vec3 offset = Vec3(v[0], v[1], v[2]) - p_ijk;
-      nearest = std::min(nearest, offset.cwiseProduct(mask.grid.spacing).squaredNorm());
-    }
-  }
-  return std::sqrt(nearest);
+  return nearest_label(mask.grid, mask.labels, point).distance;
 }
 
 }  // namespace wireplan::preprocess
