@@ -38,33 +38,27 @@ class OpenedCurve : private HookSearch {
         all_(curved_length(catheter_.tool.wire, false) + kOpening.cover) {}
 
   StartFindings go_up(std::vector<RaisedTools>& depths) {
-    if (trial_.ended()) {
-      findings_.stopped = trial_.reason();
-      return std::move(findings_);
-    }
-    const HookState start = here();
-    std::string why = "the catheter does not come up to there";
-    if (go_past()) {
-      why = "its tip does not come to look back";
-      const HookState past = here();
-      std::vector<HookState> all;
-      for (int quarter = -kOpening.quarters; quarter <= kOpening.quarters && !stop(); ++quarter) {
-        back_to(past);
-        if (quarter != 0 && !turn_below(0.5 * kPi * quarter, kOpening.lets)) continue;
-        if (!push_open()) continue;
-        why = "once it has opened, it does not come back to the ostium";
-        if (pull_down()) all.push_back(here());
-      }
-      depths = keep_facing(std::move(all), kOpening.depths);
-    }
-    findings_.stopped = depths.empty() ? why : "";
-    findings_.nearest_hook = -1.0;  // none was looked for
-    back_to(start);
-    return std::move(findings_);
+    return raise_from_here(depths, [&] { return open(depths); });
   }
 
  private:
   void keep(ToolScript) override {}
+
+  std::string open(std::vector<RaisedTools>& depths) {
+    if (!go_past()) return "the catheter does not come up to there";
+    std::string why = "its tip does not come to look back";
+    const HookState past = here();
+    std::vector<HookState> all;
+    for (int quarter = -kOpening.quarters; quarter <= kOpening.quarters && !stop(); ++quarter) {
+      back_to(past);
+      if (quarter != 0 && !turn_below(0.5 * kPi * quarter, kOpening.lets)) continue;
+      if (!push_open()) continue;
+      why = "once it has opened, it does not come back to the ostium";
+      if (pull_down()) all.push_back(here());
+    }
+    depths = keep_facing(std::move(all), kOpening.depths);
+    return why;
+  }
 
   bool go_past() {
     return go({.tool = kWire,
@@ -90,8 +84,7 @@ class OpenedCurve : private HookSearch {
   bool looks_back(double least) const { return measure(Until::kBack, kCatheter) > least; }
 
   bool pull_down() {
-    const double ahead = insertion(kCatheter) - all_ - insertion(kWire);
-    if (ahead >= 1.0 && !go({.tool = kWire, .push = std::floor(ahead)})) return false;
+    if (!follow_behind(all_)) return false;
     // The knee comes no nearer than to the ostium.
     const double most = std::floor(insertion(kCatheter) - place_.arc - knee_);
     return most > 0.0 &&

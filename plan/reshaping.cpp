@@ -45,12 +45,14 @@ class Reshaping : private HookSearch {
         first_(curved_length(catheter_.tool.wire, true) + kReshape.cover) {}
 
   StartFindings go_up(std::vector<RaisedTools>& depths) {
-    if (trial_.ended()) {
-      findings_.stopped = trial_.reason();
-      return std::move(findings_);
-    }
+    return raise_from_here(depths, [&] { return reshape(depths); });
+  }
+
+ private:
+  void keep(ToolScript) override {}
+
+  std::string reshape(std::vector<RaisedTools>& depths) {
     const HookState start = here();
-    why_ = "the catheter does not come up to it";
     if (lead_up()) depths = form_from(here());
     back_to(start);
     if (depths.empty() && !stop() && go_past()) {
@@ -60,14 +62,8 @@ class Reshaping : private HookSearch {
         if (depths.empty() && !stop()) depths = form(withdrawn);
       }
     }
-    findings_.stopped = depths.empty() ? why_ : "";
-    findings_.nearest_hook = -1.0;  // those of that vessel are none of the target's
-    back_to(start);
-    return std::move(findings_);
+    return why_;
   }
-
- private:
-  void keep(ToolScript) override {}
 
   /// With the wire withdrawn by so much behind the catheter's tip, into the vessel and on.
   std::vector<RaisedTools> form(double withdrawn) {
@@ -207,8 +203,7 @@ class Reshaping : private HookSearch {
   /// The wire behind the knee, and both up past the target's ostium, the hub turned below.
   std::vector<RaisedTools> raise(const HookState& formed) {
     back_to(formed);
-    const double ahead = insertion(kCatheter) - all_ - insertion(kWire);
-    if (ahead >= 1.0 && !go({.tool = kWire, .push = std::floor(ahead)})) return {};
+    if (!follow_behind(all_)) return {};
     const HookState below = here();
     std::vector<HookState> all;
     for (int quarter = -kReshape.quarters; quarter <= kReshape.quarters && !stop(); ++quarter) {
@@ -241,9 +236,9 @@ class Reshaping : private HookSearch {
   }
 
   const double knee_, all_, first_;  // lengths from the tip                                  [mm]
-  std::string stopped_below_ = "its hub is not turned";  // what kept it from coming up
-  std::string why_;                                      // no depth was come to
-  int came_ = 0;                                         // of the steps of form(), until that
+  std::string stopped_below_ = "its hub is not turned";      // what kept it from coming up
+  std::string why_ = "the catheter does not come up to it";  // no depth was come to
+  int came_ = 0;                                             // of the steps of form(), until that
 };
 
 }  // namespace

@@ -178,6 +178,25 @@ bool HookSearch::let_twist_through() {
   return go({.tool = kBothTools, .push = -std::max(kTemplate.pull, std::ceil(least - 1e-9))});
 }
 
+StartFindings HookSearch::raise_from_here(std::vector<RaisedTools>& depths,
+                                          const std::function<std::string()>& raise) {
+  if (trial_.ended()) {
+    findings_.stopped = trial_.reason();
+    return std::move(findings_);
+  }
+  const HookState start = here();
+  const std::string why = raise();
+  findings_.stopped = depths.empty() ? why : "";
+  findings_.nearest_hook = -1.0;  // of the target's ostium none was looked for
+  back_to(start);
+  return std::move(findings_);
+}
+
+bool HookSearch::follow_behind(double by) {
+  const double ahead = insertion(kCatheter) - by - insertion(kWire);
+  return ahead < 1.0 || go({.tool = kWire, .push = std::floor(ahead)});
+}
+
 bool HookSearch::turn_below(double by, double push) {
   if (!may_turn()) return false;
   const double most = study_.tool_rules.most_turn;

@@ -125,6 +125,12 @@ class HookSearch {
   bool turn_hub(double by);
   /// A pull, as long as the rules ask for after the turn.
   bool let_twist_through();
+  /// A way up from here by `raise`, which says what stopped it where it comes to no depth; then
+  /// back to here.
+  StartFindings raise_from_here(std::vector<RaisedTools>& depths,
+                                const std::function<std::string()>& raise);
+  /// The wire, on to so far behind the catheter's tip, by whole millimetres.
+  bool follow_behind(double by);
   /// Turns it by parts that the rules let in one place, with pushes of both tools between, so long
   /// at least. False where it may not be turned.
   bool turn_below(double by, double push);
