@@ -285,7 +285,7 @@ std::vector<Stage> stages_of(const Case& given) {
        .make = make_wall});
   const bool sections_move = given.wall.support.has_value();
   Stage trials{.name = "trials",
-               .version = sections_move ? 39 : 38,  // each counts its own changes
+               .version = sections_move ? 40 : 39,  // each counts its own changes
                .after = {"surface", "centerline"},
                .parameters = {"/access", "/target", "/wires", "/tip_roll_deg", "/friction",
                               "/friction_factor", "/wall/model", "/insertion"},
@@ -301,7 +301,7 @@ std::vector<Stage> stages_of(const Case& given) {
   stages.push_back(trials);
   Stage manoeuvres = trials;
   manoeuvres.name = "manoeuvres";
-  manoeuvres.version = 45;
+  manoeuvres.version = 46;
   manoeuvres.after.push_back("trials");
   read_too(manoeuvres, {"/manoeuvres"});
   const bool tools = !given.catheters.empty();
@@ -321,7 +321,7 @@ std::vector<Stage> stages_of(const Case& given) {
   stages.push_back(manoeuvres);
   Stage plans = trials;
   plans.name = "plans";
-  plans.version = 26;
+  plans.version = 27;
   plans.after.insert(plans.after.end(), {"trials", "manoeuvres"});
   if (voxels != nullptr) plans.after.emplace_back(voxels);
   read_too(plans, {"/manoeuvres", "/robustness"});

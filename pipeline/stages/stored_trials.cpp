@@ -19,7 +19,7 @@ using plan::Level;
 constexpr std::array kTrialStages = {"trials", "manoeuvres"};
 
 // Of what trials of catheter and wire do; counts up where the same script comes to something else.
-constexpr int kToolTrialVersion = 17;
+constexpr int kToolTrialVersion = 18;
 
 std::string level_folder(Level level) {
   return level == Level::kFull ? "" : plan::level_name(level);

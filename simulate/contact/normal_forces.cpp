@@ -133,7 +133,7 @@ void NormalForces::find_slopes(const ContactSample& sample) {
   for (std::size_t k = 0; k < sample.active.size(); ++k) {
     foot_slopes_[k] = feet_.weight_slopes(sample.active[k], coupled_feet_[k]);
   }
-  coupling_.find_slopes(coupled_feet_, foot_slopes_);
+  coupling_.find_slopes(coupled_feet_, foot_slopes_, forces_);
 }
 
 /// The first active point that couples with the k-th, or it itself, for which a block-banded
@@ -149,18 +149,34 @@ int NormalForces::first_in_band(const ContactPoints& points, const ContactSample
   return first;
 }
 
-/// The sizes of the entries that have no place in the band.
-void NormalForces::find_folded(const ContactPoints& points, const ContactSample& sample) {
-  const int m = static_cast<int>(sample.active.size());
-  folded_.setZero(m);
-  for (int i = 0; i < m; ++i) {
-    const int end = first_in_band(points, sample, i);
-    for (int j = coupling_.first_coupled(i); j < end; ++j) {
-      const double size = std::abs(coupling_.stiffness(i, j));
-      folded_[i] += size;
-      folded_[j] += size;
+/// Visits the entries of the wall's stiffness between two points, `in_band` telling which of them
+/// have a place in the band: visit(i, j, value, in_band), j <= i.
+template <class Visit>
+void NormalForces::for_each_coupling(const ContactPoints& points, const ContactSample& sample,
+                                     Visit&& visit) const {
+  const std::vector<int>& pressed = coupling_.pressed();
+  const auto point = [&](int i) {
+    return points[sample.active[static_cast<std::size_t>(i)].point];
+  };
+  for (int p = 0; p < static_cast<int>(pressed.size()); ++p) {
+    const int i = pressed[static_cast<std::size_t>(p)];
+    bool near = true;  // all after the first that is not are further along the wire
+    for (int q = p; q >= coupling_.first_pressed(p); --q) {
+      const int j = pressed[static_cast<std::size_t>(q)];
+      near = near && (q == p || in_band(point(i), point(j)));
+      visit(i, j, coupling_.pressed_stiffness(p, q), near);
     }
   }
+}
+
+/// The sizes of the entries that have no place in the band.
+void NormalForces::find_folded(const ContactPoints& points, const ContactSample& sample) {
+  folded_.setZero(static_cast<Eigen::Index>(sample.active.size()));
+  for_each_coupling(points, sample, [&](int i, int j, double stiffness, bool in_band) {
+    if (in_band) return;
+    folded_[i] += std::abs(stiffness);
+    folded_[j] += std::abs(stiffness);
+  });
 }
 
 /// What the forces fall by in a motion.
@@ -179,7 +195,7 @@ void NormalForces::find_fall(const ContactPoints& points, const ContactSample& s
   if (yielding_) {
     if (sample.own_lag && !feet_.held()) {
       find_slopes(sample);
-      coupling_.add_change_of_compliance(motion_, forces_, fall_);
+      coupling_.add_change_of_compliance(motion_, fall_);
     }
     coupling_.multiply_by_stiffness(fall_);
   } else {
@@ -205,13 +221,11 @@ NormalForces::Change NormalForces::find_change(const ContactPoints& points,
   left_out_.setZero(m);
   if (!yielding_) return {fall_, left_out_};
   left_out_ = fall_ - folded_.cwiseProduct(approach_);
-  for (int i = 0; i < m; ++i) {
-    for (int j = first_in_band(points, sample, i); j <= i; ++j) {
-      const double s = coupling_.stiffness(i, j);
-      left_out_[i] -= s * approach_[j];
-      if (j < i) left_out_[j] -= s * approach_[i];
-    }
-  }
+  for_each_coupling(points, sample, [&](int i, int j, double stiffness, bool in_band) {
+    if (!in_band) return;
+    left_out_[i] -= stiffness * approach_[j];
+    if (j < i) left_out_[j] -= stiffness * approach_[i];
+  });
   return {fall_, left_out_};
 }
 

@@ -71,6 +71,9 @@ class NormalForces {
   void find_stiffness(const ContactPoints& points, const ContactSample& sample);
   void find_slopes(const ContactSample& sample);
   int first_in_band(const ContactPoints& points, const ContactSample& sample, int k) const;
+  template <class Visit>
+  void for_each_coupling(const ContactPoints& points, const ContactSample& sample,
+                         Visit&& visit) const;
   void find_folded(const ContactPoints& points, const ContactSample& sample);
   void find_fall(const ContactPoints& points, const ContactSample& sample,
                  const WireMotion& motion);

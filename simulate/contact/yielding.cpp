@@ -5,70 +5,81 @@
 #include <limits>
 #include <utility>
 
+#include "simulate/wire/lanes.h"
+
 namespace wireplan::simulate {
 
-void Yielding::Envelope::clear() {
-  first_.clear();
-  offset_.clear();
-  values_.clear();
-}
-
-void Yielding::Envelope::add_row(int first) {
-  offset_.push_back(static_cast<std::ptrdiff_t>(values_.size()) - first);
-  values_.resize(values_.size() + static_cast<std::size_t>(size() - first + 1));
-  first_.push_back(first);
-}
-
-void Yielding::grow() {
-  const std::size_t side = std::max(kSmallestTable, 2 * table_side_);
-  std::vector<double> grown(side * side);
-  for (std::size_t row = 0; row < table_side_; ++row) {
-    std::copy_n(table_.begin() + static_cast<std::ptrdiff_t>(row * table_side_), table_side_,
-                grown.begin() + static_cast<std::ptrdiff_t>(row * side));
+void Yielding::Envelope::reset(const std::vector<int>& first) {
+  end_.resize(first.size());
+  for (std::size_t i = 0; i < first.size(); ++i) {
+    std::fill(end_.begin() + first[i], end_.begin() + static_cast<std::ptrdiff_t>(i) + 1,
+              static_cast<int>(i) + 1);
   }
-  table_ = std::move(grown);
-  for (std::size_t row = side; row-- > table_side_;) free_rows_.push_back(static_cast<int>(row));
-  vertex_.resize(side);
-  half_.resize(side);
-  table_side_ = side;
+  rows_.clear();
+  std::size_t offset = 0;
+  for (std::size_t i = 0; i < first.size(); ++i) {
+    rows_.push_back({first[i], static_cast<std::size_t>(end_[i] - first[i]), offset});
+    offset += rows_.back().size;
+  }
+  values_.assign(offset, 0.0);
 }
 
-void Yielding::free_rows(const std::vector<SurfacePoint>& feet) {
-  needed_.assign(table_side_, 0);
-  for (const SurfacePoint& foot : feet) {
-    if (foot.triangle < 0) continue;
-    for (const int vertex : foot.vertex) {
-      const int row = row_[static_cast<std::size_t>(vertex)];
-      if (row >= 0) needed_[static_cast<std::size_t>(row)] = 1;
+// ---------------------------------------------------------------- C
+
+namespace {
+
+constexpr std::size_t kInBox = 8;  // feet
+constexpr double kFar = std::numeric_limits<double>::infinity();
+
+}  // namespace
+
+bool Yielding::may_couple(std::size_t i, std::size_t j) const {
+  if (table_.rows_of(i)[0] == ComplianceTable::kNoRow ||
+      table_.rows_of(j)[0] == ComplianceTable::kNoRow) {
+    return false;
+  }
+  const auto from = foot_place_.col(static_cast<Eigen::Index>(i));
+  const auto to = foot_place_.col(static_cast<Eigen::Index>(j));
+  return (from - to).squaredNorm() <= squared_reach_;
+}
+
+bool Yielding::may_couple(std::size_t i, const Box& box) const {
+  const auto place = foot_place_.col(static_cast<Eigen::Index>(i));
+  const Vec3 off = (box.low - place).cwiseMax(place - box.high).cwiseMax(0.0);
+  return off.squaredNorm() <= squared_reach_;
+}
+
+/// Round the feet's vertices; of points without a foot, nothing.
+void Yielding::find_boxes() {
+  const auto m = static_cast<std::size_t>(foot_place_.cols());
+  boxes_.assign((m + kInBox - 1) / kInBox, {Vec3::Constant(kFar), Vec3::Constant(-kFar)});
+  for (std::size_t i = 0; i < m; ++i) {
+    if (table_.rows_of(i)[0] == ComplianceTable::kNoRow) continue;
+    Box& box = boxes_[i / kInBox];
+    box.low = box.low.cwiseMin(foot_place_.col(static_cast<Eigen::Index>(i)));
+    box.high = box.high.cwiseMax(foot_place_.col(static_cast<Eigen::Index>(i)));
+  }
+}
+
+double Yielding::compliance_between(const std::vector<SurfacePoint>& feet, std::size_t i,
+                                    std::size_t j) {
+  if (known_[i] >= 0 && known_[j] >= 0) {
+    return known_[j] >= before_.first(known_[i]) ? before_.row(known_[i])[known_[j]] : 0.0;
+  }
+  if (!may_couple(i, j)) return 0.0;
+  return table_.between(table_.rows_of(i), feet[i].weight, table_.rows_of(j), feet[j].weight);
+}
+
+/// The first foot that moves under a force at the i-th, or it itself.
+int Yielding::find_first_coupled(const std::vector<SurfacePoint>& feet, std::size_t i) {
+  if (table_.rows_of(i)[0] == ComplianceTable::kNoRow) return static_cast<int>(i);
+  for (std::size_t b = 0; kInBox * b < i; ++b) {
+    if (!may_couple(i, boxes_[b])) continue;
+    for (std::size_t j = kInBox * b; j < std::min(i, kInBox * (b + 1)); ++j) {
+      if (compliance_between(feet, i, j) != 0.0) return static_cast<int>(j);
     }
   }
-  for (std::size_t row = 0; row < table_side_; ++row) {
-    if (needed_[row] != 0) continue;
-    row_[static_cast<std::size_t>(vertex_[row])] = kNoRow;
-    free_rows_.push_back(static_cast<int>(row));
-  }
-}
-
-int Yielding::row_of(const WallCompliance& wall, int vertex,
-                     const std::vector<SurfacePoint>& feet) {
-  int& row = row_[static_cast<std::size_t>(vertex)];
-  if (row >= 0) return row;
-  if (free_rows_.empty()) free_rows(feet);
-  if (free_rows_.empty()) grow();
-  row = free_rows_.back();
-  free_rows_.pop_back();
-  vertex_[static_cast<std::size_t>(row)] = vertex;
-  half_[static_cast<std::size_t>(row)] = &wall.half_response(vertex);
-  for (int other = 0; other < static_cast<int>(table_side_); ++other) {
-    entry(row, other) = entry(other, row) = std::numeric_limits<double>::quiet_NaN();
-  }
-  return row;
-}
-
-void Yielding::find_entry(int a, int b) {
-  if (!std::isnan(entry(a, b))) return;
-  entry(a, b) = entry(b, a) = WallCompliance::between(*half_[static_cast<std::size_t>(a)],
-                                                      *half_[static_cast<std::size_t>(b)]);
+  return static_cast<int>(i);
 }
 
 void Yielding::find_known(const std::vector<SurfacePoint>& feet) {
@@ -87,143 +98,171 @@ void Yielding::find_known(const std::vector<SurfacePoint>& feet) {
 }
 
 void Yielding::set_feet(const WallCompliance& wall, const std::vector<SurfacePoint>& feet) {
-  row_.resize(static_cast<std::size_t>(wall.normals().cols()), kNoRow);
   const std::size_t m = feet.size();
   squared_reach_ = wall.reach() * wall.reach();
-  foot_rows_.resize(m);
+  table_.take(wall, feet);
   foot_place_.resize(3, static_cast<Eigen::Index>(m));
   for (std::size_t i = 0; i < m; ++i) {
-    const bool stands = feet[i].triangle >= 0;
-    for (std::size_t a = 0; a < 3; ++a) {
-      foot_rows_[i][a] = stands ? row_of(wall, feet[i].vertex[a], feet) : kNoRow;
-    }
-    if (stands)
-      foot_place_.col(static_cast<Eigen::Index>(i)) = wall.vertices().col(feet[i].vertex[0]);
+    if (feet[i].triangle < 0) continue;
+    foot_place_.col(static_cast<Eigen::Index>(i)) = wall.vertices().col(feet[i].vertex[0]);
   }
-
-  // Rows of C, each from the first foot that moves under a force at its own. What the table does
-  // not know yet makes a sum that is no number.
-  const auto compliance_between = [&](std::size_t i, std::size_t j) {
-    if (known_[i] >= 0 && known_[j] >= 0) {
-      return known_[j] >= before_.first(known_[i]) ? before_.row(known_[i])[known_[j]] : 0.0;
-    }
-    if (!may_couple(i, j)) return 0.0;
-    const std::array<int, 3>&rows = foot_rows_[i], &columns = foot_rows_[j];
-    const Vec3 &u = feet[i].weight, &v = feet[j].weight;
-    const auto sum = [&] {
-      const auto part = [&](std::size_t a) {
-        const double* row = &entry(rows[a], 0);
-        return v[0] * row[columns[0]] + v[1] * row[columns[1]] + v[2] * row[columns[2]];
-      };
-      return u[0] * part(0) + u[1] * part(1) + u[2] * part(2);
-    };
-    const double known = sum();
-    if (!std::isnan(known)) return known;
-    for (const int row : rows) {
-      for (const int column : columns) find_entry(row, column);
-    }
-    return sum();
-  };
+  find_boxes();
   find_known(feet);
+  first_coupled_.resize(m);
   std::swap(compliance_, before_);
-  compliance_.clear();
+  for (std::size_t i = 0; i < m; ++i) first_coupled_[i] = find_first_coupled(feet, i);
+  compliance_.reset(first_coupled_);
   for (std::size_t i = 0; i < m; ++i) {
-    std::size_t first = 0;
-    while (first < i && compliance_between(i, first) == 0.0) ++first;
-    compliance_.add_row(static_cast<int>(first));
     double* row = compliance_.row(static_cast<int>(i));
-    for (std::size_t j = first; j <= i; ++j) row[j] = compliance_between(i, j);
+    for (auto j = static_cast<std::size_t>(first_coupled_[i]); j <= i; ++j) {
+      row[j] = compliance_.row(static_cast<int>(j))[i] = compliance_between(feet, i, j);
+    }
   }
   feet_ = feet;
 }
 
-void Yielding::find_slopes(const std::vector<SurfacePoint>& feet, const std::vector<Mat3>& slopes) {
-  slope_.resize(compliance_.entries());
-  for (std::size_t i = 0; i < feet.size(); ++i) {
-    auto* slope = slope_.data() + compliance_.offset(static_cast<int>(i));
-    for (std::size_t j = static_cast<std::size_t>(first_coupled(static_cast<int>(i))); j <= i;
-         ++j) {
-      if (!may_couple(i, j)) {
-        slope[j].setZero();
+namespace {
+
+/// w += the columns of points with a force, times it.
+template <class Row>
+WIREPLAN_INLINE void add_columns(const Row* columns, const double* values, const double* f,
+                                 std::size_t count, double* w) {
+  for (std::size_t j = 0; j < count; ++j) {
+    if (f[j] == 0.0) continue;
+    lanes::add_scaled(f[j], values + columns[j].offset, w + columns[j].first, columns[j].size);
+  }
+}
+
+template <class Row>
+WIREPLAN_WIDE void add_columns_wide(const Row* columns, const double* values, const double* f,
+                                    std::size_t count, double* w) {
+  add_columns(columns, values, f, count, w);
+}
+
+/// w += three columns for each of some points, times their motion.
+template <class Row>
+WIREPLAN_INLINE void add_slopes(const Row* columns, const std::vector<int>& sloped,
+                                const std::vector<std::size_t>& offset, const double* values,
+                                const double* motion, double* w) {
+  for (std::size_t k = 0; k < sloped.size(); ++k) {
+    const auto j = static_cast<std::size_t>(sloped[k]);
+    for (std::size_t c = 0; c < 3; ++c) {
+      lanes::add_scaled(motion[3 * j + c], values + offset[k] + c * columns[j].size,
+                        w + columns[j].first, columns[j].size);
+    }
+  }
+}
+
+template <class Row>
+WIREPLAN_WIDE void add_slopes_wide(const Row* columns, const std::vector<int>& sloped,
+                                   const std::vector<std::size_t>& offset, const double* values,
+                                   const double* motion, double* w) {
+  add_slopes(columns, sloped, offset, values, motion, w);
+}
+
+}  // namespace
+
+void Yielding::multiply_by_compliance(const Eigen::VectorXd& f, Eigen::VectorXd& w) const {
+  w.setZero(size());
+  const auto points = static_cast<std::size_t>(size());
+  if (has_wide_registers()) {
+    add_columns_wide(compliance_.rows(), compliance_.values(), f.data(), points, w.data());
+  } else {
+    add_columns(compliance_.rows(), compliance_.values(), f.data(), points, w.data());
+  }
+}
+
+// ---------------------------------------------------------------- how C f changes
+
+void Yielding::find_slopes(const std::vector<SurfacePoint>& feet, const std::vector<Mat3>& slopes,
+                           const Eigen::VectorXd& f) {
+  own_slope_.setZero(3, size());  // first per weight of each foot, in place of its motion
+  sloped_.clear();
+  slope_offset_.clear();
+  std::size_t offset = 0;
+  for (int j = 0; j < size(); ++j) {
+    const auto at = static_cast<std::size_t>(j);
+    if (f[j] == 0.0) continue;
+    const Envelope::Row& column = compliance_.rows()[j];
+    sloped_.push_back(j);
+    slope_offset_.push_back(offset);
+    slopes_.resize(std::max(slopes_.size(), offset + 3 * column.size));
+    for (std::size_t k = 0; k < column.size; ++k) {
+      const std::size_t i = static_cast<std::size_t>(column.first) + k;
+      double* const slope = slopes_.data() + offset + k;
+      if (!may_couple(i, at)) {
+        for (std::size_t c = 0; c < 3; ++c) slope[c * column.size] = 0.0;
         continue;
       }
       Mat3 response;  // between the vertices of either foot
       for (std::size_t a = 0; a < 3; ++a) {
         for (std::size_t b = 0; b < 3; ++b) {
           response(static_cast<int>(a), static_cast<int>(b)) =
-              entry(foot_rows_[i][a], foot_rows_[j][b]);
+              table_.entry(table_.rows_of(i)[a], table_.rows_of(at)[b]);
         }
       }
-      slope[j].col(0) = slopes[i].transpose() * (response * feet[j].weight);
-      slope[j].col(1) = slopes[j].transpose() * (response.transpose() * feet[i].weight);
+      const Vec3 over_motion =
+          f[j] * (slopes[at].transpose() * (response.transpose() * feet[i].weight));
+      for (std::size_t c = 0; c < 3; ++c) {
+        slope[c * column.size] = over_motion[static_cast<Eigen::Index>(c)];
+      }
+      own_slope_.col(static_cast<Eigen::Index>(i)) += f[j] * (response * feet[at].weight);
     }
+    offset += 3 * column.size;
+  }
+  for (int i = 0; i < size(); ++i) {
+    own_slope_.col(i) =
+        (slopes[static_cast<std::size_t>(i)].transpose() * own_slope_.col(i)).eval();
   }
 }
 
-void Yielding::add_change_of_compliance(const Eigen::Matrix3Xd& motion, const Eigen::VectorXd& f,
-                                        Eigen::VectorXd& w) const {
-  for (int i = 0; i < size(); ++i) {
-    const auto* row = slope_.data() + compliance_.offset(i);
-    for (int j = first_coupled(i); j <= i; ++j) {
-      const double change = row[j].col(0).dot(motion.col(i)) + row[j].col(1).dot(motion.col(j));
-      w[i] += change * f[j];
-      if (j < i) w[j] += change * f[i];
-    }
+void Yielding::add_change_of_compliance(const Eigen::Matrix3Xd& motion, Eigen::VectorXd& w) const {
+  for (int i = 0; i < size(); ++i) w[i] += own_slope_.col(i).dot(motion.col(i));
+  if (has_wide_registers()) {
+    add_slopes_wide(compliance_.rows(), sloped_, slope_offset_, slopes_.data(), motion.data(),
+                    w.data());
+  } else {
+    add_slopes(compliance_.rows(), sloped_, slope_offset_, slopes_.data(), motion.data(), w.data());
   }
 }
 
-void Yielding::multiply_by_compliance(const Eigen::VectorXd& f, Eigen::VectorXd& w) const {
-  w.setZero(size());
-  for (int i = 0; i < size(); ++i) {
-    const int first = first_coupled(i), before = i - first;
-    const Eigen::Map<const Eigen::VectorXd> row(compliance_.row(i) + first, before);
-    w[i] += row.dot(f.segment(first, before)) + compliance_.row(i)[i] * f[i];
-    w.segment(first, before) += row * f[i];
-  }
-}
+// ---------------------------------------------------------------- forces
 
 void Yielding::factor() {
-  stiff_.clear();
+  pressed_.clear();
   place_.clear();
   factor_.clear();
-  reciprocal_.clear();
   for (int i = 0; i < size(); ++i) {
-    place_.push_back(root_[i] > 0.0 ? factor_.size() : -1);
-    if (root_[i] == 0.0) continue;
-    const int p = factor_.size();
-    int first = p;
-    while (first > 0 && stiff_[static_cast<std::size_t>(first - 1)] >= first_coupled(i)) --first;
-    stiff_.push_back(i);
-    factor_.add_row(first);
-    const double* c = compliance_.row(i);
-    double* row = factor_.row(p);
-    for (int q = first; q <= p; ++q) {
-      const int j = stiff_[static_cast<std::size_t>(q)];
-      const double* above = factor_.row(q);
-      double sum = root_[i] * c[j] * root_[j];
-      for (int k = std::max(first, factor_.first(q)); k < q; ++k) sum -= row[k] * above[k];
-      row[q] = q < p ? sum * reciprocal_[static_cast<std::size_t>(q)] : std::sqrt(1.0 + sum);
-    }
-    reciprocal_.push_back(1.0 / row[p]);
+    place_.push_back(root_[i] > 0.0 ? static_cast<int>(pressed_.size()) : -1);
+    if (root_[i] > 0.0) pressed_.push_back(i);
   }
+  const int count = static_cast<int>(pressed_.size());
+  const auto point = [&](int p) { return pressed_[static_cast<std::size_t>(p)]; };
+  for (int begin = 0; begin < count; begin = factor_.rows()) {
+    const int end = std::min(count, begin + static_cast<int>(kLane));
+    int coupled = point(begin);  // the first point that one of these rows couples with
+    for (int p = begin; p < end; ++p) coupled = std::min(coupled, first_coupled(point(p)));
+    int first = begin;
+    while (first > 0 && point(first - 1) >= coupled) --first;
+    factor_.add_rows(first);
+    for (int p = begin; p < end; ++p) {
+      const int i = point(p);
+      const double* c = compliance_.row(i);
+      for (int q = p; q >= first && point(q) >= first_coupled(i); --q) {
+        factor_.at(p, q) = root_[i] * c[point(q)] * root_[point(q)];
+      }
+      factor_.at(p, p) += 1.0;
+    }
+    for (int p = end; p < factor_.rows(); ++p) factor_.at(p, p) = 1.0;
+  }
+  factor_.factor();
 }
 
 void Yielding::solve_factored(Eigen::VectorXd& v) {
-  const int count = factor_.size();
-  stiff_values_.resize(count);
-  double* x = stiff_values_.data();
-  for (int p = 0; p < count; ++p) {
-    const double* row = factor_.row(p);
-    x[p] = v[stiff_[static_cast<std::size_t>(p)]];
-    for (int q = factor_.first(p); q < p; ++q) x[p] -= row[q] * x[q];
-    x[p] *= reciprocal_[static_cast<std::size_t>(p)];
-  }
-  for (int p = count - 1; p >= 0; --p) {
-    const double* row = factor_.row(p);
-    x[p] *= reciprocal_[static_cast<std::size_t>(p)];
-    for (int q = factor_.first(p); q < p; ++q) x[q] -= row[q] * x[p];
-    v[stiff_[static_cast<std::size_t>(p)]] = x[p];
-  }
+  values_.assign(static_cast<std::size_t>(factor_.rows()), 0.0);
+  for (std::size_t p = 0; p < pressed_.size(); ++p) values_[p] = v[pressed_[p]];
+  factor_.solve(values_.data());
+  for (std::size_t p = 0; p < pressed_.size(); ++p) v[pressed_[p]] = values_[p];
 }
 
 double Yielding::solve(const ContactLaw& law, const Eigen::VectorXd& gap,
@@ -277,33 +316,12 @@ double Yielding::solve(const ContactLaw& law, const Eigen::VectorXd& gap,
 void Yielding::find_stiffness(const Eigen::VectorXd& law_stiffness) {
   root_ = law_stiffness.cwiseSqrt();
   factor();
-  // Inverse of the factored matrix within the envelope (Takahashi), from the last row upward. Rows
-  // k > j couple with j where their envelope reaches it; two of them then couple with each other.
-  inverse_ = factor_;
-  last_coupled_.resize(stiff_.size());
-  for (int i = 0; i < factor_.size(); ++i) {
-    for (int j = factor_.first(i); j <= i; ++j) last_coupled_[static_cast<std::size_t>(j)] = i;
-  }
-  for (int j = factor_.size() - 1; j >= 0; --j) {
-    const double diagonal = factor_.row(j)[j];
-    const int last = last_coupled_[static_cast<std::size_t>(j)];
-    const auto couples = [&](int k) { return factor_.first(k) <= j; };
-    for (int i = last; i >= j; --i) {
-      if (!couples(i)) continue;
-      double sum = i == j ? 1.0 / diagonal : 0.0;
-      for (int k = j + 1; k <= last; ++k) {
-        if (!couples(k)) continue;
-        sum -= factor_.row(k)[j] * inverse_.row(std::max(i, k))[std::min(i, k)];
-      }
-      inverse_.row(i)[j] = sum / diagonal;
-    }
-  }
+  factor_.invert();
 }
 
 double Yielding::stiffness(int i, int j) const {
   const int p = place_[static_cast<std::size_t>(i)], q = place_[static_cast<std::size_t>(j)];
-  if (p < 0 || q < 0 || q < factor_.first(p)) return 0.0;
-  return root_[i] * inverse_.row(p)[q] * root_[j];
+  return p < 0 || q < 0 || q < first_pressed(p) ? 0.0 : pressed_stiffness(p, q);
 }
 
 void Yielding::multiply_by_stiffness(Eigen::VectorXd& v) {

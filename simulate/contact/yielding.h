@@ -1,10 +1,11 @@
 #pragma once
 /// Contact points on a wall that yields: their forces couple through the wall (compliance.h).
 #include <Eigen/Core>
-#include <array>
 #include <vector>
 
+#include "simulate/contact/compliance_table.h"
 #include "simulate/contact/contact_law.h"
+#include "simulate/contact/envelope_factor.h"
 #include "simulate/wall/compliance.h"
 #include "simulate/wall/locator.h"
 
@@ -12,8 +13,8 @@ namespace wireplan::simulate {
 
 /// Forces f >= 0 of m points with gaps g to the resting wall, where the wall gives way by w = C f
 /// and each force follows the contact law at the gap g + w: the minimum over w of the energy of law
-/// and wall. The matrices are kept by rows within an envelope: the wall yields near a force alone,
-/// and neighbours along the wire are neighbours on the wall. Memory only ever grows.
+/// and wall. The matrices are kept within an envelope: the wall yields near a force alone, and
+/// neighbours along the wire are neighbours on the wall. Memory only ever grows.
 class Yielding {
  public:
   /// Where the points' forces act, in the order of the wire; finds C.
@@ -31,86 +32,92 @@ class Yielding {
   double stiffness(int i, int j) const;  // j <= i; 0 beyond the envelope
   int first_coupled(int i) const { return compliance_.first(i); }
   void multiply_by_stiffness(Eigen::VectorXd& v);
+  /// S by the points that the law presses, in order; entries of others are 0.
+  const std::vector<int>& pressed() const { return pressed_; }
+  int first_pressed(int p) const { return factor_.first(p); }  // with which the p-th may couple
+  double pressed_stiffness(int p, int q) const {               // q <= p, from the first on
+    return root_[pressed_[static_cast<std::size_t>(p)]] * factor_.inverse(p, q) *
+           root_[pressed_[static_cast<std::size_t>(q)]];
+  }
 
-  /// How C changes as the points move along the wall: `slopes` of each foot's weights over the
+  /// How C f changes as the points move along the wall: `slopes` of each foot's weights over the
   /// motion of its point (TriangleLocator::weight_slopes), of those that set_feet() had.
-  void find_slopes(const std::vector<SurfacePoint>& feet, const std::vector<Mat3>& slopes);
+  void find_slopes(const std::vector<SurfacePoint>& feet, const std::vector<Mat3>& slopes,
+                   const Eigen::VectorXd& f);
   /// Adds (dC) f to `w`, for motions (3, m) of the points.
-  void add_change_of_compliance(const Eigen::Matrix3Xd& motion, const Eigen::VectorXd& f,
-                                Eigen::VectorXd& w) const;
+  void add_change_of_compliance(const Eigen::Matrix3Xd& motion, Eigen::VectorXd& w) const;
 
  private:
-  /// Lower triangle of a symmetric matrix, row i from column first(i) on.
+  /// A symmetric matrix, of which row i has the columns from the first that it couples with to the
+  /// last.
   class Envelope {
    public:
-    void clear();
-    /// One more row of zeros.
-    void add_row(int first);
-    int size() const { return static_cast<int>(first_.size()); }
-    std::size_t entries() const { return values_.size(); }
-    int first(int i) const { return first_[static_cast<std::size_t>(i)]; }
+    struct Row {
+      int first;
+      std::size_t size, offset;  // of `first` among the values
+    };
+    /// Of zeros, from the first column of each row, none beyond its diagonal.
+    void reset(const std::vector<int>& first);
+    int size() const { return static_cast<int>(rows_.size()); }
+    int first(int i) const { return rows()[i].first; }
+    const Row* rows() const { return rows_.data(); }
+    const double* values() const { return values_.data(); }
     /// Row i, indexed by column.
-    double* row(int i) { return values_.data() + offset(i); }
-    const double* row(int i) const { return values_.data() + offset(i); }
-    /// Place of column 0 of row i among the entries, were it there.
-    std::ptrdiff_t offset(int i) const { return offset_[static_cast<std::size_t>(i)]; }
+    double* row(int i) { return values_.data() + begin(i); }
+    const double* row(int i) const { return values_.data() + begin(i); }
 
    private:
-    std::vector<int> first_;
-    std::vector<std::ptrdiff_t> offset_;
+    std::ptrdiff_t begin(int i) const {  // of column 0, were it there
+      return static_cast<std::ptrdiff_t>(rows()[i].offset) - first(i);
+    }
+    std::vector<Row> rows_;
+    std::vector<int> end_;  // scratch
     std::vector<double> values_;
   };
-  /// Row of a vertex in the table, which it enters if it is new. Where the table is full, rows of
-  /// vertices that none of the feet needs are freed; where there are none, the table grows.
-  int row_of(const WallCompliance& wall, int vertex, const std::vector<SurfacePoint>& feet);
-  void free_rows(const std::vector<SurfacePoint>& feet);
-  void grow();
+  /// Round the vertices under eight feet, to pass by those that are far away.
+  struct Box {
+    Vec3 low, high;
+  };
+
   /// Whether both points have feet, near enough to each other to feel each other's forces.
-  bool may_couple(std::size_t i, std::size_t j) const {
-    if (foot_rows_[i][0] == kNoRow || foot_rows_[j][0] == kNoRow) return false;
-    const auto from = foot_place_.col(static_cast<Eigen::Index>(i));
-    const auto to = foot_place_.col(static_cast<Eigen::Index>(j));
-    return (from - to).squaredNorm() <= squared_reach_;
-  }
-  /// Has the table know the compliance between the vertices of two rows.
-  void find_entry(int a, int b);
-  double& entry(int a, int b) {
-    return table_[static_cast<std::size_t>(a) * table_side_ + static_cast<std::size_t>(b)];
-  }
+  bool may_couple(std::size_t i, std::size_t j) const;
+  bool may_couple(std::size_t i, const Box& box) const;
+  double compliance_between(const std::vector<SurfacePoint>& feet, std::size_t i, std::size_t j);
+  int find_first_coupled(const std::vector<SurfacePoint>& feet, std::size_t i);
+  /// Which of the feet before each of these is, in the same place; -1: none. Both are in the order
+  /// of the wire.
+  void find_known(const std::vector<SurfacePoint>& feet);
+  void find_boxes();
   void multiply_by_compliance(const Eigen::VectorXd& f, Eigen::VectorXd& w) const;
   /// Of I + D^1/2 C D^1/2, D the law's stiffness. Points with none have rows and columns of the
   /// identity, which are left out.
   void factor();
   void solve_factored(Eigen::VectorXd& v);
 
-  /// Which of the feet before each of these is, in the same place; -1: none. Both are in the order
-  /// of the wire.
-  void find_known(const std::vector<SurfacePoint>& feet);
+  ComplianceTable table_;
+  double squared_reach_ = 0.0;      // of the wall                                     [mm^2]
+  Eigen::Matrix3Xd foot_place_;     // a vertex under each                               [mm]
+  std::vector<Box> boxes_;          // of feet in turn
+  std::vector<SurfacePoint> feet_;  // of `compliance_`
+  std::vector<int> known_;          // see find_known()
 
-  /// Compliances between the vertices that feet stood on lately, NaN where not asked for yet.
-  static constexpr std::size_t kSmallestTable = 300;
-  static constexpr int kNoRow = -1;
-  std::size_t table_side_ = 0;
-  std::vector<double> table_;  // table_side_ squared                        [mm/N]
-  std::vector<int> row_;       // of each of the wall's vertices in the table, or kNoRow
-  std::vector<int> vertex_;    // of each row; meaningless where it is free
-  std::vector<const WallCompliance::HalfResponse*> half_;  // of each row
-  std::vector<int> free_rows_;
-  std::vector<char> needed_;                   // rows; scratch
-  std::vector<std::array<int, 3>> foot_rows_;  // kNoRow: without a foot
-  Eigen::Matrix3Xd foot_place_;                // a vertex under each                  [mm]
-  double squared_reach_ = 0.0;                 // of the wall                        [mm^2]
-  std::vector<SurfacePoint> feet_;             // of `compliance_`
-  std::vector<int> known_;                     // see find_known()
+  Envelope compliance_, before_;    // C; that of the feet before
+  std::vector<int> first_coupled_;  // scratch
 
-  Envelope compliance_, factor_, inverse_;  // of all points; of those with a stiff law
-  Envelope before_;                         // the compliance of the feet before; scratch
-  std::vector<int> stiff_, place_;          // those, in order; the place of each point there, or -1
-  std::vector<double> reciprocal_;          // of the factor's diagonal
-  std::vector<int> last_coupled_;           // of the factor: last row with an entry in each column
-  std::vector<Eigen::Matrix<double, 3, 2>> slope_;  // of each entry of C, over either motion
-  Eigen::VectorXd root_;                            // D^1/2
-  Eigen::VectorXd lawful_, residual_, step_, stiff_values_;
+  EnvelopeFactor factor_;       // of the points that the law presses
+  std::vector<int> pressed_;    // those, in order
+  std::vector<int> place_;      // of each point there, or -1
+  std::vector<double> values_;  // scratch, per row of the factor
+  Eigen::VectorXd root_;        // D^1/2
+
+  // How C f changes: at each point over its own motion (3, m), and for each point with a force the
+  // values of its column, times the force, over its motion's x, y and z.
+  Eigen::Matrix3Xd own_slope_;
+  std::vector<int> sloped_;
+  std::vector<double> slopes_;
+  std::vector<std::size_t> slope_offset_;
+
+  Eigen::VectorXd lawful_, residual_, step_;
 };
 
 }  // namespace wireplan::simulate

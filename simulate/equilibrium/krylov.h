@@ -6,10 +6,24 @@
 #include <cmath>
 
 #include "simulate/equilibrium/newton.h"
+#include "simulate/wire/lanes.h"
 
 namespace wireplan::simulate {
 
 inline constexpr int kMostDirections = NewtonTuning().most_directions;
+
+/// Takes what lies along `count` unit columns, of n numbers each, out of v; `along` tells how much.
+WIREPLAN_INLINE void take_out_columns(const double* columns, int count, std::size_t n, double* v,
+                                      double* along) {
+  for (int i = 0; i < count; ++i, columns += n) {
+    along[i] = lanes::dot(columns, v, n);
+    lanes::add_scaled(-along[i], columns, v, n);
+  }
+}
+WIREPLAN_WIDE inline void take_out_columns_wide(const double* columns, int count, std::size_t n,
+                                                double* v, double* along) {
+  take_out_columns(columns, count, n, v, along);
+}
 
 /// Adds to the step the best combination of directions, the first of which is `memory.refined`, of
 /// length `start`, until no more than `enough` of that is left. `apply` puts H^-1 R v into
@@ -32,10 +46,9 @@ void add_krylov(SolveMemory& memory, double start, double enough, Eigen::VectorX
     direction = krylov.col(k);
     apply(direction);
     refined += direction;
-    for (int i = 0; i <= k; ++i) {
-      upper(i, k) = krylov.col(i).dot(refined);
-      refined -= upper(i, k) * krylov.col(i);
-    }
+    (has_wide_registers() ? take_out_columns_wide : take_out_columns)(
+        krylov.data(), k + 1, static_cast<std::size_t>(krylov.rows()), refined.data(),
+        &upper(0, k));
     upper(k + 1, k) = refined.norm();
     if (upper(k + 1, k) > 0.0) krylov.col(k + 1) = refined / upper(k + 1, k);
     for (int i = 0; i < k; ++i) {

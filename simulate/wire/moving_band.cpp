@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <tuple>
 
+#include "simulate/wire/lanes.h"
+
 namespace wireplan::simulate {
 
 // ---------------------------------------------------------------- blocks
@@ -177,30 +179,7 @@ void MovingBand::find_order(int nodes, int per_node, const SectionBlocks& blocks
 
 // ---------------------------------------------------------------- numbers
 
-// What is WIDE is compiled for registers of four numbers too, and taken where the processor has
-// them; what it calls is compiled into it.
-#if defined(__GNUC__) && defined(__x86_64__)
-#define WIREPLAN_WIDE __attribute__((target("avx2")))
-#define WIREPLAN_INLINE __attribute__((always_inline)) inline
-#else
-#define WIREPLAN_WIDE
-#define WIREPLAN_INLINE inline
-#endif
-
 namespace {
-
-/// Four numbers at once, in one register where the processor has such, else in two: the same bits.
-using Lane = double __attribute__((vector_size(32)));
-using StoredLane = double __attribute__((vector_size(32), aligned(8), may_alias));
-
-bool has_wide_registers() {
-#if defined(__GNUC__) && defined(__x86_64__)
-  static const bool has = __builtin_cpu_supports("avx2");
-  return has;
-#else
-  return false;
-#endif
-}
 
 /// A block of D columns, each filled up to P numbers.
 template <int D, int P>

@@ -104,10 +104,11 @@ TEST(Yielding, PointsWithoutAFootFeelNoWallMove) {
                                           foot_in(surface, 0, Vec3(0.5, 0.25, 0.25))};
   points.set_feet(wall, feet);
   ASSERT_EQ(points.first_coupled(2), 0);  // past the point without a foot
-  points.find_slopes(feet, {Mat3::Identity(), Mat3::Identity(), Mat3::Identity()});
+  points.find_slopes(feet, {Mat3::Identity(), Mat3::Identity(), Mat3::Identity()},
+                     Eigen::VectorXd::Ones(3));
   const Eigen::Matrix3Xd motion = Eigen::Matrix3Xd::Constant(3, 3, 0.1);
   Eigen::VectorXd w = Eigen::VectorXd::Zero(3);
-  points.add_change_of_compliance(motion, Eigen::VectorXd::Ones(3), w);
+  points.add_change_of_compliance(motion, w);
   EXPECT_TRUE(w.allFinite());
   EXPECT_EQ(w[1], 0.0);
   EXPECT_NE(w[0], 0.0);
@@ -128,11 +129,11 @@ TEST(Yielding, WireThatComesBackFeelsNothingOfTheFarPointsBetween) {
     Yielding points;
     points.set_feet(wall, feet);
     EXPECT_EQ(points.first_coupled(points.size() - 1), 0);
-    points.find_slopes(feet, std::vector<Mat3>(feet.size(), Mat3::Identity()));
     const auto m = static_cast<Eigen::Index>(feet.size());
+    points.find_slopes(feet, std::vector<Mat3>(feet.size(), Mat3::Identity()),
+                       Eigen::VectorXd::Ones(m));
     Eigen::VectorXd w = Eigen::VectorXd::Zero(m);
-    points.add_change_of_compliance(Eigen::Matrix3Xd::Constant(3, m, 0.1), Eigen::VectorXd::Ones(m),
-                                    w);
+    points.add_change_of_compliance(Eigen::Matrix3Xd::Constant(3, m, 0.1), w);
     return w;
   };
   const Eigen::VectorXd with = change({here, far, beside}), without = change({here, beside});
