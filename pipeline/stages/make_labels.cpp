@@ -197,7 +197,7 @@ void look_at_shape(const Case& given, const preprocess::Mask& mask, Json& figure
                               .labels = preprocess::crop_values(mask.grid, box, mask.labels)};
   const preprocess::MaskShape shape = preprocess::measure_shape(part.grid, part.labels);
   add_shape(shape, figures);
-  preprocess::require_simple(shape, given.mask_limits, /*by_labels=*/true);
+  preprocess::require_simple(shape, given.mask_limits, preprocess::MaskBy::kLabels);
   std::vector<std::size_t> ends;
   std::vector<Vec3> points;
   for (const auto& [key, point] : end_points(given)) {

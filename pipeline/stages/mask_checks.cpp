@@ -19,7 +19,16 @@ Vec3 nearest_of_piece(const preprocess::Grid& grid, const preprocess::Labels& pi
   return preprocess::center_of(grid, preprocess::nearest_label(grid, piece, point).voxel);
 }
 
-std::string touch_warning(const preprocess::Touch& touch, bool by_values, bool of_labels) {
+/// How limbs that a mask joins, and that only touch, can be parted.
+std::string tell_parting(const Case& given) {
+  if (given.labels) return "part them in the labels";
+  return std::string(given.segmentation.lower_hu
+                         ? "raise segmentation.lower_hu and neck_opening_mm"
+                         : "give segmentation.lower_hu, upper_hu and neck_opening_mm") +
+         " so that the contact is left out, or give labels that part them";
+}
+
+std::string touch_warning(const preprocess::Touch& touch, bool by_values, const Case& given) {
   const std::string place = place_in_mask(touch.place);
   const std::string measured =
       by_values ? "the contact has " + format("%.0f", touch.level) + " HU, both sides " +
@@ -34,12 +43,8 @@ std::string touch_warning(const preprocess::Touch& touch, bool by_values, bool o
            "; if they are open to each other, " + seed + " keeps them so";
   }
   return "segment: limbs touch at " + place + ", and the way leads through the touch: " + measured +
-         ways +
-         (of_labels ? "; if they only touch, part them in the labels; if the vessel is open there, "
-                      "nothing is to be done"
-                    : "; if they only touch, raise segmentation.lower_hu or neck_opening_mm; if "
-                      "the vessel is open there, " +
-                          seed + " says so");
+         ways + "; if they only touch, " + tell_parting(given) + "; if the vessel is open there, " +
+         (given.labels ? "nothing is to be done" : seed + " says so");
 }
 
 }  // namespace
@@ -73,7 +78,9 @@ bool require_ends_in_one_piece(const Case& given, preprocess::Mask& mask, Json& 
       add(key + " is " + to_json(point).dump() + ", in another piece of the vessel than " + first +
           ", which comes no nearer than " + place_in_mask(nearest_of_piece(grid, piece, point)) +
           ", expected one piece that holds both (if the artery is open between them, " +
-          (given.labels ? "" : "lower segmentation.lower_hu or neck_opening_mm, or ") +
+          (given.labels                  ? ""
+           : given.segmentation.lower_hu ? "lower segmentation.lower_hu or neck_opening_mm, or "
+                                         : "give segmentation.lower_hu and upper_hu, or ") +
           "draw what is missing)");
     }
   }
@@ -121,7 +128,7 @@ void add_touches(const Case& given, const std::vector<preprocess::Touch>& touche
                                   {"way_through_mm", touch.through_mm},
                                   {"way_round_mm", touch.round_mm},
                                   {"cut", touch.cut}});
-    figures["warnings"].push_back(touch_warning(touch, by_values, given.labels.has_value()));
+    figures["warnings"].push_back(touch_warning(touch, by_values, given));
   }
 }
 

@@ -232,7 +232,7 @@ std::vector<Stage> stages_to_surface(const Case& given) {
   }
   stages.push_back({.name = "volume", .version = 5, .reads_input = true, .make = make_volume});
   stages.push_back({.name = "segment",
-                    .version = 17,
+                    .version = 18,
                     .reads_input = true,
                     .parameters = {"/segmentation", "/mask"},
                     .make = make_segment});

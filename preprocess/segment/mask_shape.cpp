@@ -92,8 +92,24 @@ struct Most {
   double handles = 0.0, faces = 0.0, voxels = 0.0;
 };
 
-void refuse_beyond(const MaskShape& shape, const Most& most, const std::string& what,
-                   bool by_labels) {
+/// `noise`: the mask looks like noise, else like more than arteries.
+std::string remedy_for(MaskBy by, bool noise) {
+  switch (by) {
+    case MaskBy::kLabels:
+      return "choose the classes that are arteries, and smooth what noise left of them";
+    case MaskBy::kBand:
+      return noise ? "raise segmentation.smoothing_mm, neck_opening_mm or lower_hu"
+                   : "take a narrower band (segmentation.lower_hu, upper_hu) or raise "
+                     "neck_opening_mm, so that arteries alone are left";
+    case MaskBy::kLevels:
+      return noise ? "give a larger segmentation.smoothing_mm or neck_opening_mm than were chosen"
+                   : "give a narrow band (segmentation.lower_hu, upper_hu) and neck_opening_mm, so "
+                     "that arteries alone are left";
+  }
+  return "";
+}
+
+void refuse_beyond(const MaskShape& shape, const Most& most, const std::string& what, MaskBy by) {
   const bool handles = static_cast<double>(shape.handles) > most.handles,
              faces = static_cast<double>(shape.faces) > most.faces,
              voxels = static_cast<double>(shape.voxels) > most.voxels;
@@ -102,18 +118,13 @@ void refuse_beyond(const MaskShape& shape, const Most& most, const std::string& 
   const std::string looks = noise     ? "noise"
                             : handles ? "noise or veins, bone and organs that touch"
                                       : "an organ, bone or the whole body";
-  const std::string remedy =
-      by_labels ? "choose the classes that are arteries, and smooth what noise left of them"
-      : noise   ? "raise segmentation.smoothing_mm, neck_opening_mm or lower_hu"
-                : "take a narrower band (segmentation.lower_hu, upper_hu) or raise "
-                  "neck_opening_mm, so that arteries alone are left";
   const double limit = handles ? most.handles : faces ? most.faces : most.voxels;
   throw Error(what + " has " + describe_shape(shape) + ": " + looks +
               ", expected a vessel, of at most " + count_text(limit) +
               (handles ? " handles"
                : faces ? " outer faces"
                        : " voxels") +
-              "; " + remedy + "; if it is a vessel all the same, raise mask." +
+              "; " + remedy_for(by, noise) + "; if it is a vessel all the same, raise mask." +
               (handles ? "most_handles" : "most_faces"));
 }
 
@@ -149,13 +160,13 @@ std::string describe_shape(const MaskShape& shape) {
          count_text(static_cast<double>(shape.faces)) + " outer faces)";
 }
 
-void require_simple(const MaskShape& shape, const MaskLimits& limits, bool by_labels) {
+void require_simple(const MaskShape& shape, const MaskLimits& limits, MaskBy by) {
   refuse_beyond(shape,
                 {1.0 * limits.handles, 1.0 * limits.faces, std::numeric_limits<double>::infinity()},
-                "the mask", by_labels);
+                "the mask", by);
 }
 
-void require_no_flood(const Grid& grid, const Labels& labels, const MaskLimits& limits) {
+void require_no_flood(const Grid& grid, const Labels& labels, const MaskLimits& limits, MaskBy by) {
   constexpr double kHandles = 400.0, kFaces = 20.0, kVoxels = 25.0;
   MaskShape shape;
   const std::ptrdiff_t euler = count_cells(grid, labels, shape);
@@ -164,7 +175,9 @@ void require_no_flood(const Grid& grid, const Labels& labels, const MaskLimits& 
   refuse_beyond(
       shape,
       {kHandles * std::max(1, limits.handles), kFaces * limits.faces, kVoxels * limits.faces},
-      "what the band connects to the points", /*by_labels=*/false);
+      by == MaskBy::kBand ? "what the band connects to the points"
+                          : "what is connected to the points",
+      by);
 }
 
 }  // namespace wireplan::preprocess

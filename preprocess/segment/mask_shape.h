@@ -27,6 +27,9 @@ struct MaskLimits {
   std::size_t pieces() const { return 4 * static_cast<std::size_t>(handles > 1 ? handles : 1); }
 };
 
+/// What a mask was made by, which remedies follow from.
+enum class MaskBy { kLabels, kBand, kLevels };
+
 /// In time linear in the voxels: handles from the Euler number of the complex of voxel centres,
 /// the pairs, squares and cubes of neighbours among them, which is pieces - handles + cavities.
 /// `largest`, where given, becomes the largest piece.
@@ -39,12 +42,11 @@ std::ptrdiff_t euler_number(const Grid& grid, const Labels& labels);
 std::string describe_shape(const MaskShape& shape);
 
 /// Throws `Error` with these, the limit and a remedy where the shape is beyond the limits.
-/// `by_labels`: whether the mask was given by labels, and not found in a volume.
-void require_simple(const MaskShape& shape, const MaskLimits& limits, bool by_labels);
+void require_simple(const MaskShape& shape, const MaskLimits& limits, MaskBy by);
 
-/// The same of what a band connects to the seeds, before contacts and leaks are cut from it: 400
+/// The same of what is connected to the seeds, before contacts and leaks are cut from it: 400
 /// times the handles (of which the cavities are taken off here), 20 times the faces, and 25 voxels
 /// for each of the limit's faces. This bounds the time of what follows.
-void require_no_flood(const Grid& grid, const Labels& labels, const MaskLimits& limits);
+void require_no_flood(const Grid& grid, const Labels& labels, const MaskLimits& limits, MaskBy by);
 
 }  // namespace wireplan::preprocess

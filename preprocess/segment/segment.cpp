@@ -171,14 +171,15 @@ Segmentation segment(const Image& image, const SegmentOptions& options) {
     constexpr int kMost = std::numeric_limits<int>::max() / kThinLoops;
     limits.handles = kThinLoops * std::min(limits.handles, kMost);
   }
-  require_simple(statistics.shape, limits, /*by_labels=*/false);
+  const MaskBy by = options.lower_hu ? MaskBy::kBand : MaskBy::kLevels;
+  require_simple(statistics.shape, limits, by);
   part_touches(region, region.seeds, options, statistics);
   if (!options.lower_hu) {
     const double thin = kThinVoxels * std::cbrt(region.grid.spacing.prod());
     statistics.loops = cut_loops(region.grid, nearest_labelled(region, region.seeds.front()),
                                  statistics.search.route.points, thin, region.labels);
     statistics.shape = measure_shape(region.grid, region.labels);
-    require_simple(statistics.shape, options.limits, /*by_labels=*/false);
+    require_simple(statistics.shape, options.limits, by);
   }
   result.mask = whole_mask(image, region, statistics);
   return result;

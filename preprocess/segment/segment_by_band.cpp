@@ -227,7 +227,7 @@ Region find_by_band(const Image& image, const SegmentOptions& options,
   std::vector<Vec3> seeds = options.seeds;
   for (Vec3& seed : seeds) seed = find_lumen_near(image, seed, band).value_or(seed);
   Region region = find_connected(image, seeds, band);
-  require_no_flood(region.grid, region.labels, options.limits);
+  require_no_flood(region.grid, region.labels, options.limits, MaskBy::kBand);
   require_wall(region.labels, options.seeds.front(), band);
   if (band.neck_mm > 0.0) {
     const std::size_t before = count(region.labels);

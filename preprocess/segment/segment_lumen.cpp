@@ -197,7 +197,7 @@ LocalLumen find_local_lumen(const LumenField& field, const Candidates& candidate
                             const MaskLimits& limits) {
   std::vector<float> level = nearest_levels(field, candidates, ways);
   const Labels core = find_core(field, candidates, ways, level);
-  require_no_flood(field.grid, core, limits);
+  require_no_flood(field.grid, core, limits, MaskBy::kLevels);
   const std::vector<float> depth = measure_depth(field.grid, core);
   const VesselParts parts = divide_vessels(field, core, depth, level, ways, neck);
 

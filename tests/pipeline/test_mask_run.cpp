@@ -244,6 +244,26 @@ TEST_F(MaskRun, CalciumIsToldOfHounsfieldUnitsAlone) {
   }
 }
 
+TEST_F(MaskRun, HowToPartLimbsIsToldByWhatTheCaseGives) {
+  // Two limbs of radius 4 that overlap at z = 20 and join at z = 42.
+  const auto limbs = [](const Vec3& p) {
+    const double x = std::abs(p.x() - 30.0), y = p.y() - 30.0;
+    const double bow = 9.0 - 5.6 * std::exp(-std::pow((p.z() - 20.0) / 6.0, 2.0));
+    const double off =
+        p.z() > 42.0 ? std::hypot(std::hypot(x, p.z() - 42.0) - 9.0, y) : std::hypot(x - bow, y);
+    return p.z() > 2.0 && off < 4.0 ? 300 : 40;
+  };
+  for (const bool band : {false, true}) {
+    case_["segmentation"] = Json::object();
+    if (band) case_["segmentation"] = {{"lower_hu", 150}, {"upper_hu", 600}};
+    const Answer answer = run_volume(60, limbs, {21, 30, 6}, {39, 30, 6}, "--to segment");
+    ASSERT_EQ(answer.code, 0) << answer.log;
+    EXPECT_TRUE(holds(answer.log, "the way leads through the touch")) << answer.log;
+    EXPECT_EQ(holds(answer.log, "raise segmentation.lower_hu and neck_opening_mm"), band);
+    EXPECT_EQ(holds(answer.log, "give segmentation.lower_hu, upper_hu and neck_opening_mm"), !band);
+  }
+}
+
 TEST_F(MaskRun, WhereTheWayMayLeaveItsVesselIsToldWithThePlace) {
   case_["segmentation"] = Json::object();
   const auto neck = [](const Vec3& p) {

@@ -45,8 +45,8 @@ void expect_holds(const std::string& text, const std::vector<std::string>& parts
   }
 }
 
-std::string refusal(const Mask& mask, bool by_labels = false, const MaskLimits& limits = {}) {
-  return message_of([&] { require_simple(shape_of(mask), limits, by_labels); });
+std::string refusal(const Mask& mask, MaskBy by = MaskBy::kBand, const MaskLimits& limits = {}) {
+  return message_of([&] { require_simple(shape_of(mask), limits, by); });
 }
 
 TEST(MaskShape, CountsBoxRingAndShell) {
@@ -124,7 +124,10 @@ TEST(MaskShape, NoiseIsRefusedAsNoise) {
   expect_holds(
       text, {" handles (loops or holes) in ", ": noise, expected a vessel, of at most 50 handles",
              "raise segmentation.smoothing_mm", "raise mask.most_handles"});
-  expect_holds(refusal(noise(40), /*by_labels=*/true), {"choose the classes that are arteries"});
+  expect_holds(refusal(noise(40), MaskBy::kLabels), {"choose the classes that are arteries"});
+  const std::string by_levels = refusal(noise(40), MaskBy::kLevels);
+  expect_holds(by_levels, {"give a larger segmentation.smoothing_mm or neck_opening_mm"});
+  EXPECT_EQ(by_levels.find("lower_hu"), std::string::npos) << "there is none to raise";
 }
 
 TEST(MaskShape, HandlesFarApartMayBeVeins) {
@@ -136,14 +139,14 @@ TEST(MaskShape, HandlesFarApartMayBeVeins) {
   EXPECT_GT(shape.handles, 50U);
   expect_holds(refusal(mask), {std::to_string(shape.handles) + " handles (loops or holes) in ",
                                ": noise or veins, bone and organs that touch"});
-  EXPECT_EQ(refusal(mask, false, {.handles = static_cast<int>(shape.handles)}), "no error");
+  EXPECT_EQ(refusal(mask, MaskBy::kBand, {.handles = static_cast<int>(shape.handles)}), "no error");
 }
 
 TEST(MaskShape, ABodyIsRefusedByItsFaces) {
   const Mask body = mask_of(
       60, [](int i, int j, int k) { return std::hypot(i - 30.0, j - 30.0, k - 30.0) < 28.0; });
   EXPECT_EQ(refusal(body), "no error");
-  expect_holds(refusal(body, false, {.faces = 10000}),
+  expect_holds(refusal(body, MaskBy::kBand, {.faces = 10000}),
                {"0 handles (loops or holes) in 92 ml", ": an organ, bone or the whole body",
                 "of at most 10 thousand outer faces", "raise mask.most_faces"});
 }
@@ -151,10 +154,12 @@ TEST(MaskShape, ABodyIsRefusedByItsFaces) {
 TEST(MaskShape, AFloodIsRefusedBeforeWhatCutsIt) {
   const Mask mask = noise(80);
   const std::string text =
-      message_of([&] { require_no_flood(mask.grid, mask.labels, MaskLimits{}); });
+      message_of([&] { require_no_flood(mask.grid, mask.labels, MaskLimits{}, MaskBy::kBand); });
   expect_holds(text, {"what the band connects to the points has ", ": noise",
                       "of at most 20 thousand handles"});
-  EXPECT_EQ(message_of([&] { require_no_flood(mask.grid, mask.labels, {.handles = 1000}); }),
+  EXPECT_EQ(message_of([&] {
+              require_no_flood(mask.grid, mask.labels, {.handles = 1000}, MaskBy::kBand);
+            }),
             "no error");
 }
 

@@ -138,6 +138,16 @@ TEST(SegmentTouch, WithoutADipIsToldAndStays) {
   }
 }
 
+TEST(SegmentTouch, ABandAboveTheContactAndItsWidthPartTheLimbs) {
+  // What a person is told to give. The contact has 300 HU and is 1.05 mm in radius.
+  SegmentOptions options = between_limbs(true);
+  options.lower_hu = 300.0;
+  options.neck_opening_mm = 1.35;
+  const Segmentation found = segment(touching_limbs(0.0), options);
+  EXPECT_TRUE(found.statistics.touches.empty());
+  EXPECT_NEAR(found.statistics.search.route.length_mm, kRound, 0.05 * kRound);
+}
+
 TEST(SegmentTouch, ARealLoopStaysAndIsNotTold) {
   // A vessel as wide as both limbs joins them half way up.
   const std::vector<Vec3> axis = limbs_axis(14.0);
