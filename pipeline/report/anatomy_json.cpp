@@ -258,7 +258,7 @@ std::string describe_anatomy(const Json& figures) {
             number(row.at("at_mm"), ", %.0f mm in\n");
   }
   const Json& calcium = access.at("calcium");
-  text += "calcium beside the lumen: " +
+  text += "calcium in and beside the lumen: " +
           (calcium.at("volume_mm3").is_null()
                ? "not known, " + calcium.at("null_reasons").at("volume_mm3").get<std::string>()
                : number(calcium.at("volume_mm3"), "%.0f mm3")) +

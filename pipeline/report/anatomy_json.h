@@ -21,7 +21,8 @@ std::string doubt_of_axes(const simulate::Way& way);
 /// that it is not weighed.
 std::string describe_fit(const Json& passage);
 
-/// The row of calcium: a volume [mm^3], or null with the reason where `unknown` tells one.
+/// The row of calcium in and beside the lumen: a volume [mm^3], or null with the reason where
+/// `unknown` tells one.
 Json calcium_json(double volume, const std::string& unknown, const plan::AccessLimits& limits);
 
 /// The grade that a name in those figures stands for, 0 to 3; see plan::grade_of.

@@ -140,7 +140,8 @@ void add_anatomy(Table& table, const Json& anatomy) {
   table.row("sharpest bend: place from the access", bend.at("at_mm"), "mm", nullptr,
             bend.at("at_ostium_of"));
   const Json& calcium = access.at("calcium");
-  table.row("calcium beside the lumen", calcium.at("volume_mm3"), "mm3", calcium.at("above_hu"),
+  table.row("calcium in and beside the lumen", calcium.at("volume_mm3"), "mm3",
+            calcium.at("above_hu"),
             calcium.at("volume_mm3").is_null()
                 ? calcium.at("null_reasons").at("volume_mm3")
                 : Json("limit in HU; blur hides most of thin plaque, and metal or bone above it "

@@ -11,7 +11,7 @@
 namespace wireplan::pipeline {
 
 /// Of what the report shows, and of the pieces that it keeps.
-inline constexpr int kReportVersion = 45;
+inline constexpr int kReportVersion = 46;
 
 /// Each fills `folder` with the artifact of its stage. All but the report write figures.json,
 /// numbers for the report with a list of warnings.

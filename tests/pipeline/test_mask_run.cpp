@@ -238,9 +238,35 @@ TEST_F(MaskRun, CalciumIsToldOfHounsfieldUnitsAlone) {
     };
     const Answer answer = run_volume(40, hu, {20, 20, 8}, {20, 20, 32}, "--to anatomy");
     ASSERT_EQ(answer.code, 0) << answer.log;
-    EXPECT_EQ(holds(answer.out, "calcium beside the lumen: not known, the volume does not say "),
-              !ct)
+    EXPECT_EQ(
+        holds(answer.out, "calcium in and beside the lumen: not known, the volume does not say "),
+        !ct)
         << answer.out;
+  }
+}
+
+TEST_F(MaskRun, CalciumIsToldWithWhatCountsAsLumen) {
+  const auto is_plaque = [](const Vec3& p) {
+    const double away = std::hypot(p.x() - 20.0, p.y() - 20.0);
+    return away >= 5.0 && away < 7.0 && p.x() > 20.0 && p.z() > 15.0 && p.z() < 25.0;
+  };
+  const auto hu = [&](const Vec3& p) {
+    if (p.y() < 4.0) return -1000;
+    if (is_plaque(p)) return 1000;
+    return std::hypot(p.x() - 20.0, p.y() - 20.0) < 5.0 ? 500 : 60;
+  };
+  int voxels = 0;  // of 1 mm3
+  for (int n = 0; n < 64000; ++n) voxels += is_plaque(Vec3(n % 40, n / 40 % 40, n / 1600)) ? 1 : 0;
+  ASSERT_GT(voxels, 100);
+  for (const int upper : {600, 1500}) {  // beside the lumen, and taken for it
+    case_["segmentation"] = {{"lower_hu", 150}, {"upper_hu", upper}};
+    const Answer answer = run_volume(40, hu, {20, 20, 8}, {20, 20, 32}, "--to anatomy");
+    ASSERT_EQ(answer.code, 0) << answer.log;
+    EXPECT_TRUE(
+        holds(answer.out, "calcium in and beside the lumen: " + std::to_string(voxels) + " mm3"))
+        << answer.out;
+    EXPECT_EQ(holds(answer.log, "of what counts as lumen along the way"), upper == 1500)
+        << answer.log;
   }
 }
 

@@ -107,8 +107,8 @@ TEST(Report, TellsAccessViewsAndLengthsOfTheTube) {
   expect_valid(report, folder.path());
   const std::string told = describe_anatomy(report.at("anatomy"));
   for (const char* part : {"way: 22 mm, tortuosity 1.0", "device of 9.00 mm: does not fit",
-                           "sheath of 2.70 mm: not weighed", "calcium beside the lumen: not known",
-                           "22 mm in: target\n"}) {
+                           "sheath of 2.70 mm: not weighed",
+                           "calcium in and beside the lumen: not known", "22 mm in: target\n"}) {
     EXPECT_NE(told.find(part), std::string::npos) << part << " in\n" << told;
   }
 

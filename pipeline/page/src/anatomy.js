@@ -36,9 +36,9 @@ const accessTable = ({device, sheath, tortuosity, sharpest_bend: bend, calcium})
      `${degrees(bend.angle_deg)} between its arms of ${mm(bend.arm_mm)} (180\u00b0 is straight), ${mm(bend.at_mm)} from the access at ${place(bend.place_mm)}${bend.at_ostium_of ? `, where the way turns into ${bend.at_ostium_of}: an ostium's turn, no bend of the access vessels` : ""}`,
      thresholds("down from", bend.thresholds_deg.map(degrees)),
      bend.grade, shown(bend.source)],
-    ["Calcium beside the lumen",
+    ["Calcium in and beside the lumen",
      calcium.volume_mm3 === null ? `not known: ${shown(calcium.null_reasons.volume_mm3)}` : `${number(calcium.volume_mm3)}\u00a0mm\u00b3`,
-     `voxels above ${number(calcium.above_hu)}\u00a0HU within ${mm(calcium.within_mm)} of the lumen`,
+     `voxels above ${number(calcium.above_hu)}\u00a0HU in the lumen and within ${mm(calcium.within_mm)} of it`,
      calcium.volume_mm3 === null ? "not known" : `${calcium.volume_mm3 > 0 ? "look at the slices: bone and metal (stents) beside the lumen count too" : "none found"}; blur hides most of thin plaque`,
      shown(calcium.source)],
   ]);

@@ -131,7 +131,7 @@ const accessTable = ({anatomy}) => {
      `severe from ${number(severe(tortuosity.thresholds))}`, tortuosity.grade],
     ["Sharpest bend", `${along(bend.at_mm)} in${bend.at_ostium_of ? `, the turn into ${bend.at_ostium_of}` : ""}`, degrees(Math.round(bend.angle_deg)),
      `severe below ${degrees(severe(bend.thresholds_deg))}`, bend.grade],
-    ["Calcium beside it", calcium.volume_mm3 === null ? "not known without a CT" : `above ${number(calcium.above_hu)}\u00a0HU within ${mm(calcium.within_mm)}`,
+    ["Calcium in and beside it", calcium.volume_mm3 === null ? "not known without a CT" : `above ${number(calcium.above_hu)}\u00a0HU within ${mm(calcium.within_mm)}`,
      calcium.volume_mm3 === null ? "\u2013" : `${number(calcium.volume_mm3)}\u00a0mm\u00b3`, "no grade agreed on",
      calcium.volume_mm3 > 0 ? "look at the slices" : calcium.volume_mm3 === null ? "not known" : "none found"],
   ];
