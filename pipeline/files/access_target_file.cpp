@@ -106,16 +106,17 @@ std::string point_key(const char* one, const char* list, std::size_t index, bool
 
 AccessesAndTargets read_accesses_and_targets(JsonReader& root) {
   const std::size_t problems_before = root.problems().count();
-  const bool accesses_listed = root.has("accesses"), targets_listed = root.has("targets");
   AccessesAndTargets all;
+  all.accesses_listed = root.has("accesses");
+  all.targets_listed = root.has("targets");
   all.accesses = read_one_or_list<AccessInput>(root, "access", "accesses", read_access);
   all.targets = read_one_or_list<TargetInput>(root, "target", "targets", read_target);
   if (root.problems().count() > problems_before) return all;
   for (std::size_t a = 0; a < all.accesses.size(); ++a) {
-    const std::string access = point_key("access", "accesses", a, accesses_listed);
+    const std::string access = point_key("access", "accesses", a, all.accesses_listed);
     for (std::size_t t = 0; t < all.targets.size(); ++t) {
       const TargetInput& target = all.targets[t];
-      const std::string key = point_key("target", "targets", t, targets_listed);
+      const std::string key = point_key("target", "targets", t, all.targets_listed);
       if ((target.point - all.accesses[a].point).norm() > target.radius) continue;
       root.problems().add(key, to_json(target.point).dump(),
                           target.at_section

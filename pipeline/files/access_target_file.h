@@ -25,6 +25,7 @@ struct TargetInput {
 struct AccessesAndTargets {
   std::vector<AccessInput> accesses;  // one at least of each, where there were no problems
   std::vector<TargetInput> targets;
+  bool accesses_listed = false, targets_listed = false;  // by the file: "accesses", "targets"
 };
 
 /// Reads the four keys. A list of one counts as the singular form, which may have a name too.

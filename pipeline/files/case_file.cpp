@@ -422,6 +422,8 @@ Case read_case(const std::filesystem::path& path, const std::vector<std::string>
   AccessesAndTargets ends = read_accesses_and_targets(root);
   input.accesses = std::move(ends.accesses);
   input.targets = std::move(ends.targets);
+  input.accesses_listed = ends.accesses_listed;
+  input.targets_listed = ends.targets_listed;
   if (problems.count() == problems_before) choose_section(input, 0, 0);
   input.study.rolls =
       read_angles(root, "tip_roll_deg", {0.0, 90.0, 180.0, 270.0}, {.min = -360.0, .max = 360.0});
@@ -480,11 +482,11 @@ void choose_section(Case& given, std::size_t access, std::size_t target) {
 }
 
 std::string access_key(const Case& given) {
-  return given.accesses.size() == 1 ? "access" : "accesses[" + std::to_string(given.access) + "]";
+  return !given.accesses_listed ? "access" : "accesses[" + std::to_string(given.access) + "]";
 }
 
 std::string target_key(const Case& given) {
-  return given.targets.size() == 1 ? "target" : "targets[" + std::to_string(given.target) + "]";
+  return !given.targets_listed ? "target" : "targets[" + std::to_string(given.target) + "]";
 }
 
 std::vector<std::pair<std::string, Vec3>> end_points(Case given) {

@@ -72,7 +72,8 @@ struct Case {
   WallInput wall;
   std::vector<AccessInput> accesses;  // one at least of each; every pair is a section
   std::vector<TargetInput> targets;
-  std::size_t access = 0, target = 0;  // of the section that the study is for
+  bool accesses_listed = false, targets_listed = false;  // by the file, be it one
+  std::size_t access = 0, target = 0;                    // of the section that the study is for
   /// Its tangent and the goal's way are found later, from the centerline. Where insertion.length is
   /// 0 the trials stage takes 1.25 times the path's length and 20 mm more.
   plan::Study study;
@@ -99,7 +100,7 @@ Case read_case(const std::filesystem::path& path, const std::vector<std::string>
 /// Makes the study that of one access and one target.
 void choose_section(Case& given, std::size_t access, std::size_t target);
 
-/// The keys of the section's access and target in the case file: "target", "targets[1]".
+/// The keys of the section's access and target as the case file has them: "target", "targets[1]".
 std::string access_key(const Case& given);
 std::string target_key(const Case& given);
 

@@ -183,14 +183,17 @@ void read_too(Stage& stage, std::initializer_list<const char*> pointers) {
   }
 }
 
-/// Adds the points of all accesses and targets of the case.
+/// Adds the points of all accesses and targets of the case; the parameters have a list of one in
+/// the singular form.
 void read_points(Stage& stage, const Case& given) {
-  for (auto [key, point] : end_points(given)) {  // "targets[1].point_mm"
-    std::replace_if(
-        key.begin(), key.end(), [](char c) { return c == '[' || c == '.'; }, '/');
-    std::erase(key, ']');
-    stage.parameters.push_back("/" + key);
-  }
+  const auto read = [&](const std::string& one, const std::string& list, std::size_t count) {
+    for (std::size_t k = 0; k < count; ++k) {
+      const std::string key = count == 1 ? one : list + "/" + std::to_string(k);
+      stage.parameters.push_back("/" + key + "/point_mm");
+    }
+  };
+  read("access", "accesses", given.accesses.size());
+  read("target", "targets", given.targets.size());
 }
 
 /// The stages from labels, with the volume that they were drawn in or without, to the surface.

@@ -30,12 +30,15 @@ TEST_F(CaseFile, TakesListsOfNamedAccessesAndTargets) {
   one["targets"].erase(2);
   one["targets"].erase(1);
   EXPECT_EQ(section_name(read(one)), "") << "a list of one is the singular form";
+  EXPECT_EQ(end_points(read(one)).front().first, "accesses[0].point_mm") << "as the file has it";
+  EXPECT_EQ(end_points(read(one)).back().first, "targets[0].point_mm");
   EXPECT_TRUE(case_parameters(read(one)).contains("target"));
   // Its name is kept; folders and sections are not called after it.
   EXPECT_EQ(read(one).targets[0].name, one["targets"][0]["name"]);
   EXPECT_EQ(section_folder(read(one)), "");
   Json singular = case_parameters(read(one));
   EXPECT_EQ(singular["access"]["name"], "right femoral");
+  EXPECT_EQ(end_points(read(singular)).front().first, "access.point_mm");
   EXPECT_EQ(case_parameters(read(singular)), singular);
   one["targets"] = listed_case()["targets"];
   EXPECT_EQ(section_folder(read(one)), "sac");

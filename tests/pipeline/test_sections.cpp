@@ -192,8 +192,8 @@ TEST_F(Sections, OfOneTellBothItsEndsOutsideTheVesselAtOnce) {
   write_json(file_, folder_ / "case.json");
   const Answer answer = run_program(folder_.path(), "run case.json -o out");
   EXPECT_EQ(answer.code, 2);
-  EXPECT_TRUE(holds(answer.log, "access.point_mm is [0.0,30.0,20.0], ")) << answer.log;
-  EXPECT_TRUE(holds(answer.log, "target.point_mm is [20.0,0.0,20.0], ")) << answer.log;
+  EXPECT_TRUE(holds(answer.log, "accesses[0].point_mm is [0.0,30.0,20.0], ")) << answer.log;
+  EXPECT_TRUE(holds(answer.log, "targets[0].point_mm is [20.0,0.0,20.0], ")) << answer.log;
 }
 
 TEST_F(Sections, KeepTheNameOfTheOnlyTarget) {
