@@ -8,6 +8,7 @@
 
 #include "pipeline/files/text.h"
 #include "pipeline/report/inspect.h"
+#include "preprocess/segment/segment.h"
 #include "preprocess/volume/describe.h"
 
 namespace wireplan::pipeline {
@@ -121,13 +122,18 @@ Lines volume_lines(const Json& told) {
   if (volume.contains("values")) {
     const bool image = told["kind"] == "image";
     const std::string modality = text_or(volume["modality"], "");
+    const auto least = volume["values"][0].get<double>(),
+               largest = volume["values"][1].get<double>();
     lines.emplace_back(
-        "values", format("%.6g to %.6g", volume["values"][0].get<double>(),
-                         volume["values"][1].get<double>()) +
-                      (modality == "CT"    ? " HU"
-                       : !modality.empty() ? ", no Hounsfield units: its modality is " + modality
-                       : image             ? ", which a case takes as HU (no modality is told)"
-                                           : ""));
+        "values",
+        format("%.6g to %.6g", least, largest) +
+            (modality == "CT"    ? " HU"
+             : !modality.empty() ? ", no Hounsfield units: its modality is " + modality
+             : !image            ? ""
+             : preprocess::looks_hounsfield(least, largest)
+                 ? ", which a case takes as HU (no modality is told)"
+                 : ", which a case takes as no Hounsfield units (no modality is told, and "
+                   "no air below zero)"));
   }
   return lines;
 }

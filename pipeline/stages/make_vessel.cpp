@@ -364,10 +364,19 @@ void require_apart(const Case& given, const Surface& surface, const Centerline& 
 }  // namespace
 
 std::vector<std::string> warn_of_values(const preprocess::Image& image) {
+  const std::string follows =
+      "no Hounsfield units: bone is not told by its brightness, and calcium is not measured";
   std::vector<std::string> warnings;
   if (!image.modality.empty() && image.modality != "CT") {
-    warnings.push_back("volume: its modality is " + image.modality +
-                       ", not CT: values are no Hounsfield units");
+    warnings.push_back("volume: its modality is " + image.modality + ", not CT: values are " +
+                       follows);
+  } else if (!preprocess::in_hounsfield(image)) {
+    const auto [least, largest] = std::minmax_element(image.values.begin(), image.values.end());
+    warnings.push_back("volume: its file names no modality, and values from " +
+                       number_text(static_cast<double>(*least)) + " to " +
+                       number_text(static_cast<double>(*largest)) +
+                       " are not those of a CT, which has air below zero: taken as " + follows +
+                       "; if it is a CT, give it with air, or as DICOM");
   } else if (!image.unit.empty() && image.unit != "HU") {
     warnings.push_back("volume: its values are of rescale type " + image.unit +
                        (image.unit == "US" ? " (unspecified)" : " (modified)") +

@@ -201,7 +201,7 @@ std::vector<Stage> stages_from_labels(const Case& given) {
   const bool in_volume = given.volume.has_value();
   std::vector<Stage> stages;
   if (in_volume) {
-    stages.push_back({.name = "volume", .version = 5, .reads_input = true, .make = make_volume});
+    stages.push_back({.name = "volume", .version = 6, .reads_input = true, .make = make_volume});
   }
   stages.push_back({.name = "segment",
                     .version = 11,
@@ -233,7 +233,7 @@ std::vector<Stage> stages_to_surface(const Case& given) {
                       .make = make_surface});
     return stages;
   }
-  stages.push_back({.name = "volume", .version = 5, .reads_input = true, .make = make_volume});
+  stages.push_back({.name = "volume", .version = 6, .reads_input = true, .make = make_volume});
   stages.push_back({.name = "segment",
                     .version = 18,
                     .reads_input = true,

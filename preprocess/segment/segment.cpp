@@ -185,12 +185,15 @@ Segmentation segment(const Image& image, const SegmentOptions& options) {
   return result;
 }
 
+bool looks_hounsfield(double least, double largest) {
+  constexpr double kAir = -50.0, kMostHu = 700.0;
+  return least < kAir || largest < kMostHu;
+}
+
 bool in_hounsfield(const Image& image) {
-  constexpr float kLeastAir = -50.0F, kMostHu = 700.0F;
   if (!image.modality.empty()) return image.modality == "CT";
-  const auto& values = image.values;
-  return std::any_of(values.begin(), values.end(), [](float value) { return value < kLeastAir; }) ||
-         std::all_of(values.begin(), values.end(), [](float value) { return value < kMostHu; });
+  const auto [least, largest] = std::minmax_element(image.values.begin(), image.values.end());
+  return looks_hounsfield(static_cast<double>(*least), static_cast<double>(*largest));
 }
 
 void measure_mask(const Image& image, const Mask& mask, SegmentStatistics& statistics) {

@@ -91,6 +91,9 @@ Segmentation segment(const Image& image, const SegmentOptions& options);
 /// other modality writes below zero, or no values that only others have.
 bool in_hounsfield(const Image& image);
 
+/// The same of the least and the largest value of a volume whose file does not tell.
+bool looks_hounsfield(double least, double largest);
+
 /// Volume, mean and whether the border is touched, of a mask on the image's grid.
 void measure_mask(const Image& image, const Mask& mask, SegmentStatistics& statistics);
 

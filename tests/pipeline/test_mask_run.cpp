@@ -245,6 +245,26 @@ TEST_F(MaskRun, CalciumIsToldOfHounsfieldUnitsAlone) {
   }
 }
 
+TEST_F(MaskRun, ValuesOfNoModalityThatAreTakenAsNoHounsfieldUnitsAreTold) {
+  for (const bool ct : {false, true}) {
+    const auto values = [&](const Vec3& p) {
+      const double away = std::hypot(p.x() - 10.0, p.y() - 20.0);
+      if (away < 6.0) return 900;
+      if (away >= 20.0) return ct ? -1000 : 0;
+      return 60 + static_cast<int>(7.0 * p.x() + 13.0 * p.y() + 3.0 * p.z()) % 301;
+    };
+    const Answer answer = run_volume(40, values, Vec3(10, 20, 6), Vec3(10, 20, 34), "--to volume");
+    const std::string told =
+        "volume: its file names no modality, and values from 0 to 900 are not those of a CT, "
+        "which has air below zero: taken as no Hounsfield units: bone is not told by its "
+        "brightness, and calcium is not measured";
+    EXPECT_EQ(holds(answer.log, told), !ct) << answer.log;
+    EXPECT_EQ(holds(run_program(folder_.path(), "check case.json").out, told), !ct);
+    EXPECT_TRUE(holds(run_program(folder_.path(), "inspect ct.nrrd").out,
+                      ct ? "a case takes as HU" : "a case takes as no Hounsfield units"));
+  }
+}
+
 TEST_F(MaskRun, CalciumIsToldWithWhatCountsAsLumen) {
   const auto is_plaque = [](const Vec3& p) {
     const double away = std::hypot(p.x() - 20.0, p.y() - 20.0);
