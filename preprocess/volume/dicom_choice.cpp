@@ -31,14 +31,16 @@ std::size_t images_of(const Series& series) {
   return count;
 }
 
-/// Not a scout of one to three images.
+/// Not a scout of few images, nor images of few places, as of contrast tracking. Slices that lie
+/// unevenly, or twice, have it: one may have been lost, or copied, of the very series that is
+/// meant.
 bool has_volume_shape(const Series& series) {
   if (images_of(series) < kLeastOfVolume) return false;
   if (series.front().grid.size[2] > 1) return true;
   const auto refused = static_cast<std::size_t>(std::count_if(
       series.begin(), series.end(), [](const Slice& slice) { return !slice.refused.empty(); }));
   if (refused > 0 && refused < series.size()) return true;  // and is told why it is none
-  return stack(origins_of(series), series.front().grid).problem.empty();
+  return stack(origins_of(series), series.front().grid).places >= kLeastOfVolume;
 }
 
 /// Clearly made to place the others: two of few images, of another orientation, and said to be one.
@@ -155,7 +157,8 @@ Error several_series(const fs::path& folder, const std::string& wanted, std::vec
     if (first.refused.empty()) text << " of " << shown_spacing(first.grid) << " mm";
     if (series.size() > 1) {
       const Stack stacked = stack(origins_of(series), first.grid);
-      text << ", " << stacked.grid.spacing[2] << " mm apart";
+      if (stacked.problem.empty()) text << ", " << stacked.grid.spacing[2] << " mm apart";
+      if (!stacked.problem.empty()) text << ", which are no even stack";
     }
     text << ";";
   }

@@ -15,7 +15,13 @@ namespace {
 /// two; nothing where they form a regular stack. Scanners round positions, so a slice may lie a
 /// tenth of the step from its place.
 void find_uneven(const std::vector<double>& positions, Stack& stack) {
+  constexpr double kSamePlace = 0.01;  // [mm]
   const std::size_t gaps = positions.size() - 1;
+  std::vector<double> sizes(gaps);
+  for (std::size_t k = 0; k < gaps; ++k) sizes[k] = positions[k + 1] - positions[k];
+  const auto same = static_cast<std::size_t>(
+      std::count_if(sizes.begin(), sizes.end(), [&](double size) { return size <= kSamePlace; }));
+  stack.places = gaps + 1 - same;
   const double step = (positions.back() - positions.front()) / static_cast<double>(gaps);
   bool even = step > 0.0;
   for (std::size_t k = 0; k <= gaps; ++k) {
@@ -24,18 +30,13 @@ void find_uneven(const std::vector<double>& positions, Stack& stack) {
   }
   if (even) return;
 
-  std::vector<double> sizes(gaps);
-  for (std::size_t k = 0; k < gaps; ++k) sizes[k] = positions[k + 1] - positions[k];
   std::vector<double> sorted = sizes;
   std::nth_element(sorted.begin(), sorted.begin() + gaps / 2, sorted.end());
   const double usual = sorted[gaps / 2];
   std::ostringstream text;
-  constexpr double kSamePlace = 0.01;  // [mm]
-  const auto same =
-      std::count_if(sizes.begin(), sizes.end(), [&](double size) { return size <= kSamePlace; });
-  if (2 * static_cast<std::size_t>(same) >= gaps) {
+  if (2 * same >= gaps) {
     text << "images lie at the same place (" << positions.size()
-         << " images, places: " << gaps + 1 - static_cast<std::size_t>(same)
+         << " images, places: " << stack.places
          << "; contrast tracking, or several phases), expected one at each; keep one phase "
             "or "
             "reconstruction in the folder";

@@ -14,6 +14,7 @@ struct Stack {
   Grid grid;
   std::string problem = {};              // why they form no volume; empty where they do
   std::vector<std::size_t> images = {};  // at which the problem is, where it is at one or two
+  std::size_t places = 1;                // that differ along the normal
 };
 
 /// The grid of images that lie at `origins` and are else as `first`, which is one of them.

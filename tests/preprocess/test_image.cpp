@@ -298,6 +298,26 @@ TEST_F(DicomFolder, SeveralSeriesAreListedByNumberOfSlices) {
   EXPECT_FALSE(has(error, "LOVELACE") || has(error, "1.2.3.")) << error;
 }
 
+TEST_F(DicomFolder, ASeriesThatLostASliceIsNotPassedOverForAnother) {
+  write_series({0.0, 1.5, 3.0, 4.5, 6.0, 7.5}, {.series = "1.2.3.2", .number = "2"});
+  write_series({0.0, 0.0, 0.0, 0.0, 0.0}, {.series = "1.2.3.3", .number = "3"});
+  EXPECT_EQ(read_image(folder_).grid.size[2], 6) << "beside contrast tracking";
+  write_series({0.0, 1.5, 3.0, 6.0, 7.5, 9.0}, {.series = "1.2.3.1", .number = "1"});
+  std::string error = read_error(folder_);
+  EXPECT_TRUE(has(error, "3 DICOM series, expected one")) << error;
+  EXPECT_TRUE(has(error,
+                  "number 1 has 6 images of 3 x 2 pixels of 0.6 x 0.8 mm, which are no even "
+                  "stack"))
+      << error;
+  EXPECT_TRUE(has(message_of([&] { read_image(folder_, "1"); }), "uneven slices"));
+  EXPECT_EQ(read_image(folder_, "2").grid.size[2], 6);
+  // Nor is one of which each image is there twice.
+  write_series({0.0, 0.0, 1.5, 1.5, 3.0, 3.0, 4.5, 4.5, 6.0, 6.0},
+               {.series = "1.2.3.1", .number = "1"});
+  error = read_error(folder_);
+  EXPECT_TRUE(has(error, "3 DICOM series, expected one")) << error;
+}
+
 TEST_F(DicomFolder, ASeriesIsChosenByNumberOrDescription) {
   write_series({0.0, 1.5}, {.series = "1.2.3.1", .number = "1", .description = "portal"});
   write_series({0.0, 1.5, 3.0}, {.series = "1.2.3.2", .number = "2", .description = "arterial"});
