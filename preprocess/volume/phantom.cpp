@@ -293,14 +293,61 @@ Centerline clip_to_volume(const Centerline& line, const Grid& grid) {
   return part;
 }
 
-/// The line as the volume shows it.
-Centerline move_line(const PhantomSpec& spec, Centerline line) {
-  if (!spec.breath) return line;
-  for (Eigen::Index i = 0; i < line.points.cols(); ++i) {
-    line.points.col(i) = moved_by_breath(spec, line.points.col(i));
+/// Points of a line, from `begin` to before `end`, that are seen where they are or shifted.
+struct SeenRun {
+  Eigen::Index begin = 0, end = 0;
+  bool shifted = false;
+};
+
+/// Runs of the line's points that a volume with a breath shows, in their order along the line. A
+/// shift up shows what lies just below the breath's height twice, one down hides what lies above.
+std::vector<SeenRun> find_seen(const PhantomBreath& breath, const Eigen::Matrix3Xd& points) {
+  std::vector<SeenRun> runs;
+  for (const bool shifted : {false, true}) {
+    bool open = false;
+    for (Eigen::Index i = 0; i < points.cols(); ++i) {
+      const double z = points(2, i) + (shifted ? breath.shift_mm.z() : 0.0);
+      const bool seen = (z > breath.above_z_mm) == shifted;
+      if (seen && !open) runs.push_back({i, i, shifted});
+      open = seen;
+      if (seen) runs.back().end = i + 1;
+    }
   }
-  line.arc_length = arc_length_of(line.points);
-  return line;
+  // What is seen twice and leads nowhere else counts once.
+  std::vector<SeenRun> kept;
+  for (const SeenRun& run : runs) {
+    const bool within = std::any_of(runs.begin(), runs.end(), [&](const SeenRun& other) {
+      if (&other == &run || other.begin > run.begin || other.end < run.end) return false;
+      return other.begin < run.begin || other.end > run.end || run.shifted;
+    });
+    if (!within) kept.push_back(run);
+  }
+  std::stable_sort(kept.begin(), kept.end(),
+                   [](const SeenRun& a, const SeenRun& b) { return a.begin < b.begin; });
+  return kept;
+}
+
+/// The line as the volume shows it.
+Centerline move_line(const PhantomSpec& spec, const Centerline& line) {
+  if (!spec.breath) return line;
+  std::vector<Vec3> points;
+  std::vector<double> radius;
+  for (const SeenRun& run : find_seen(*spec.breath, line.points)) {
+    const Vec3 shift = run.shifted ? spec.breath->shift_mm : Vec3(Vec3::Zero());
+    for (Eigen::Index i = run.begin; i < run.end; ++i) {
+      points.emplace_back(line.points.col(i) + shift);
+      radius.push_back(line.radius(i));
+    }
+  }
+  Centerline moved{
+      .points = Eigen::Matrix3Xd(3, static_cast<Eigen::Index>(points.size())),
+      .radius = Eigen::VectorXd::Map(radius.data(), static_cast<Eigen::Index>(radius.size())),
+      .arc_length = {}};
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    moved.points.col(static_cast<Eigen::Index>(i)) = points[i];
+  }
+  moved.arc_length = arc_length_of(moved.points);
+  return moved;
 }
 
 }  // namespace

@@ -380,6 +380,38 @@ TEST(Phantom, ABreathShiftsAllAboveItAndTheTruthToo) {
   }
 }
 
+TEST(Phantom, TheTruthOfABreathAlongTheVesselIsWhatTheVolumeShows) {
+  for (const double up : {-8.0, 8.0}) {
+    SCOPED_TRACE(up);
+    PhantomSpec spec = make_fat({60, 40, 60}, 1.0);
+    spec.tubes = {make_tube("artery", {{-12, 0, -24}, {12, 0, 24}}, {5.0, 5.0})};
+    spec.breath = PhantomBreath{.above_z_mm = 3.2, .shift_mm = {3.0, -2.0, up}};
+    const Phantom moved = make_phantom(spec);
+    const Centerline& line = moved.centerlines[0];
+    ASSERT_GT(line.points.cols(), 40);
+    int above = 0;
+    for (Eigen::Index i = 0; i < line.points.cols(); ++i) {
+      // The tube's axis is x = z / 2, as it is or shifted.
+      const bool shifted = line.points(2, i) > 3.2;
+      const Vec3 p = line.points.col(i) - (shifted ? spec.breath->shift_mm : Vec3(0, 0, 0));
+      EXPECT_NEAR(p.x(), 0.5 * p.z(), 1e-9);
+      EXPECT_NEAR(p.y(), 0.0, 1e-9);
+      const Vec3 ijk = spec.grid.ijk_from_lps(line.points.col(i)).array().round();
+      const std::size_t voxel = spec.grid.index(
+          static_cast<int>(ijk.x()), static_cast<int>(ijk.y()), static_cast<int>(ijk.z()));
+      const bool slice_shifted = spec.grid.lps_from_ijk(ijk).z() > 3.2;
+      if (slice_shifted == shifted) {
+        EXPECT_EQ(moved.lumen.labels[voxel], 1) << line.points.col(i).transpose();
+      }
+      const double before = i > 0 ? line.points(2, i - 1) : -100.0;
+      EXPECT_GT(line.points(2, i), before) << "the way never turns back";
+      above += shifted ? 1 : 0;
+    }
+    EXPECT_GT(above, 15);
+    EXPECT_LT(above, line.points.cols() - 15);
+  }
+}
+
 TEST(PhantomLumen, DistanceIsThatToTheWallAndToPlaqueWhereABreathHasPutThem) {
   PhantomSpec spec = make_fat({40, 40, 40}, 1.0);
   spec.tubes = {make_tube("artery", {{0, 0, -40}, {0, 0, 40}}, {5.0, 5.0}),
