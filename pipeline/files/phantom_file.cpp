@@ -39,6 +39,21 @@ Vec3 read_three(JsonReader& reader, const std::string& key, const Range& range,
   return otherwise;
 }
 
+/// Tells of a point so far away that the number is a slip; a tube that went there would fill the
+/// memory.
+void expect_near(JsonReader& reader, const std::string& key, const Vec3& point) {
+  constexpr double kFarthest = 1e4;  // [mm]
+  if (point.cwiseAbs().maxCoeff() <= kFarthest) return;
+  reader.problems().add(reader.path_of(key), to_json(point).dump(),
+                        "coordinates from -10000 to 10000", "given in um?");
+}
+
+Vec3 read_place(JsonReader& reader, const std::string& key) {
+  const Vec3 place = reader.point(key, std::nullopt);
+  expect_near(reader, key, place);
+  return place;
+}
+
 Vec3 read_semi_axes(JsonReader& reader) {
   return read_three(reader, "semi_axes_mm", kPositiveMm, Vec3::Constant(kPositiveMm.max));
 }
@@ -65,13 +80,13 @@ preprocess::Grid read_grid(JsonReader reader) {
     for (int axis = 0; axis < 3; ++axis) grid.size[axis] = static_cast<int>(size(axis));
   }
   grid.spacing = read_three(reader, "spacing_mm", {.min = 0.05, .max = 20.0}, Vec3::Ones());
-  grid.origin = reader.point("origin_mm", std::nullopt);
+  grid.origin = read_place(reader, "origin_mm");
   reader.finish();
   return grid;
 }
 
 void read_body(JsonReader reader, PhantomSpec& spec) {
-  spec.body_center = reader.point("center_mm", std::nullopt);
+  spec.body_center = read_place(reader, "center_mm");
   spec.body_semi_axes = read_semi_axes(reader);
   spec.air_hu = reader.number("air_hu", spec.air_hu, kHu);
   spec.fat_hu = reader.number("fat_hu", spec.fat_hu, kHu);
@@ -100,7 +115,7 @@ PhantomEllipsoid read_organ(JsonReader reader) {
   PhantomEllipsoid organ;
   organ.name = reader.text("name", std::nullopt);
   organ.hu = reader.number("hu", std::nullopt, kHu);
-  organ.center = reader.point("center_mm", std::nullopt);
+  organ.center = read_place(reader, "center_mm");
   organ.semi_axes = read_semi_axes(reader);
   organ.rotation = read_rotation(reader);
   organ.shell_mm = read_shell(reader, organ.shell_mm, organ.semi_axes.minCoeff());
@@ -111,7 +126,7 @@ PhantomEllipsoid read_organ(JsonReader reader) {
 
 PhantomVertebra read_vertebra(JsonReader reader) {
   PhantomVertebra vertebra;
-  vertebra.center = reader.point("center_mm", std::nullopt);
+  vertebra.center = read_place(reader, "center_mm");
   vertebra.semi_axes = read_semi_axes(reader);
   const double room = preprocess::thinnest_part(vertebra);
   vertebra.shell_mm = read_shell(reader, std::min(vertebra.shell_mm, 0.5 * room), room);
@@ -160,6 +175,7 @@ PhantomTube read_tube(JsonReader reader, const std::vector<PhantomTube>& others)
   tube.points.resize(3, points.size());
   for (std::size_t i = 0; i < points.size(); ++i) {
     tube.points.col(i) = points[i];
+    expect_near(reader, "points_mm[" + std::to_string(i) + "]", points[i]);
     if (i > 0 && (points[i] - points[i - 1]).norm() < 0.1) {
       problems.add(reader.path_of("points_mm") + "[" + std::to_string(i) + "]",
                    to_json(points[i]).dump(), "0.1 mm or more from the point before it",

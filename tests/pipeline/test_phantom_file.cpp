@@ -94,6 +94,22 @@ TEST_F(PhantomFile, AllProblemsAreToldAtOnce) {
   EXPECT_EQ(std::count(message.begin(), message.end(), '\n') + 1, 14) << message;
 }
 
+TEST_F(PhantomFile, PlacesThatNoBodyReachesAreToldByTheirKeys) {
+  Json file = Json::parse(kTube);
+  file["grid"]["origin_mm"][0] = 1e9;
+  file["body"]["center_mm"][1] = -1e300;
+  file["organs"] = {
+      {{"name", "o"}, {"hu", 9}, {"center_mm", {0, 0, 2e4}}, {"semi_axes_mm", {1, 1, 1}}}};
+  file["vertebrae"] = {{{"center_mm", {0, -2e4, 0}}, {"semi_axes_mm", {9, 9, 9}}}};
+  file["tubes"][0]["points_mm"][1][2] = 1e300;
+  const std::string message = message_of(file.dump());
+  for (const std::string key : {"grid.origin_mm is", "body.center_mm is", "organs[0].center_mm is",
+                                "vertebrae[0].center_mm is", "tubes[0].points_mm[1] is"}) {
+    EXPECT_NE(message.find("spec.json: " + key), std::string::npos) << key << " in:\n" << message;
+  }
+  EXPECT_EQ(std::count(message.begin(), message.end(), '\n') + 1, 5) << message;
+}
+
 TEST_F(PhantomFile, HuAlongATubeStentsABreathAndTextureAreRead) {
   Json file = Json::parse(kTube);
   file["tubes"][0]["hu"] = {300, 280, 250};
