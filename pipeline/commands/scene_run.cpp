@@ -68,7 +68,7 @@ std::string roll_name(const InsertionScene& scene, double roll) {
   return "roll_" + format("%.10g", (roll - scene.roll_zero) / kRadPerDeg);
 }
 
-constexpr double kFarOutside = 10.0;  // of a line to start from                           [mm]
+constexpr double kFarOutside = 10.0;  // of a line to start from, and of a target          [mm]
 
 /// Refuses a line to start from that leaves the vessel by more than a measurement may.
 void look_at_start(const SceneFile& scene, const Surface& surface) {
@@ -92,6 +92,25 @@ void look_at_start(const SceneFile& scene, const Surface& surface) {
   problems.throw_if_any();
 }
 
+/// Refuses a target that no wire in the vessel comes to: a wall that yields, or a vessel that
+/// moves, brings the wire no further than so far outside.
+void look_at_target(const SceneFile& scene, const Surface& surface) {
+  if (!scene.insertion || !scene.insertion->has_target) return;
+  const simulate::Goal& goal = scene.insertion->goal;
+  const WallInput& wall = scene.vessel->wall;
+  const double beyond = wall.elastic || wall.support ? kFarOutside : 0.0;
+  const preprocess::InsideAnswer answer = preprocess::locate_point(surface, goal.point);
+  if (answer.inside || answer.distance <= goal.radius + beyond) return;
+  Problems problems(scene.file.string());
+  problems.add(
+      "target.point_mm", to_json(goal.point).dump(),
+      format("a point inside the vessel, or within target.radius_mm of it; it lies %.1f mm "
+             "outside",
+             answer.distance),
+      "move it, or correct the surface's unit or frame");
+  problems.throw_if_any();
+}
+
 /// The surface of a scene's vessel, sound and with the wire's entry in it.
 struct SceneSurface {
   Surface surface;
@@ -104,6 +123,7 @@ SceneSurface read_scene_surface(const SceneFile& scene) {
       preprocess::read_sound_surface(file.path, file.unit, file.frame);
   std::vector<std::string> entry = look_at_entry(scene, repaired.surface);
   look_at_start(scene, repaired.surface);
+  look_at_target(scene, repaired.surface);
   return {std::move(repaired.surface), preprocess::tell_mends(repaired.mends), std::move(entry)};
 }
 

@@ -228,16 +228,23 @@ TEST_F(CommandLine, SimulatesAnInsertionIntoAYieldingVessel) {
   EXPECT_EQ(last.at("push_work_n_mm"), result.at("push_work_n_mm"));
 }
 
-TEST_F(CommandLine, RefusesASceneWhoseWireEntersOutsideOfTheVessel) {
-  Json scene = tube_scene();
-  scene["insertion"]["point_mm"] = {30, 0, 6};
-  write_json(scene, folder_ / "scene.json");
-  for (const char* command : {"check scene.json", "simulate scene.json -o pushed"}) {
-    const Answer answer = call(command);
-    EXPECT_EQ(answer.code, 2) << command;
-    EXPECT_NE(answer.log.find("insertion.point_mm is [30.0,0.0,6.0]"), std::string::npos);
-    EXPECT_NE(answer.log.find("26.0 mm outside"), std::string::npos) << answer.log;
+TEST_F(CommandLine, RefusesASceneWhoseEntryOrTargetLiesOutsideOfTheVessel) {
+  for (const std::string key : {"insertion", "target"}) {
+    Json scene = tube_scene();
+    scene[key]["point_mm"] = {30, 0, 6};
+    write_json(scene, folder_ / "scene.json");
+    for (const char* command : {"check scene.json", "simulate scene.json -o pushed"}) {
+      const Answer answer = call(command);
+      EXPECT_EQ(answer.code, 2) << command;
+      EXPECT_NE(answer.log.find(key + ".point_mm is [30.0,0.0,6.0]"), std::string::npos);
+      EXPECT_NE(answer.log.find("26.0 mm outside"), std::string::npos) << answer.log;
+    }
   }
+  // A sphere that reaches into the vessel may be reached.
+  Json scene = tube_scene();
+  scene["target"] = {{"point_mm", {30, 0, 6}}, {"radius_mm", 26.5}};
+  write_json(scene, folder_ / "scene.json");
+  EXPECT_EQ(call("check scene.json").code, 0);
 }
 
 TEST_F(CommandLine, TellsThatASceneEntersWithinAWiresRadiusOfTheWall) {
