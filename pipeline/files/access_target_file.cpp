@@ -43,8 +43,21 @@ std::string read_section_name(JsonReader& reader, bool required, std::set<std::s
   return name;
 }
 
+/// Tells of a place in a branch where the branch itself is not named; with one it is a point by
+/// now.
+void refuse_place_of_branch(JsonReader& reader) {
+  if (reader.has("branch")) return;  // told already
+  for (const char* key : {"beyond_ostium_mm", "end"}) {
+    if (!reader.has(key)) continue;
+    reader.problems().add(
+        reader.path_of(key), "given without branch", "\"branch\" beside it",
+        "it tells a place in a class of the labels; delete it, or name the class");
+  }
+}
+
 AccessInput read_access(JsonReader& reader) {
   AccessInput access;
+  refuse_place_of_branch(reader);
   access.point = reader.point("point_mm", std::nullopt);
   access.inclinations =
       read_angles(reader, "inclination_deg", {0.0, 15.0, 30.0}, {.min = 0.0, .max = 80.0});
@@ -55,6 +68,7 @@ AccessInput read_access(JsonReader& reader) {
 
 TargetInput read_target(JsonReader& reader) {
   TargetInput target;
+  refuse_place_of_branch(reader);
   target.point = reader.point("point_mm", std::nullopt);
   target.at_section = !reader.has("radius_mm");
   if (!target.at_section) {

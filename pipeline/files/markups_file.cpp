@@ -347,8 +347,12 @@ class PointFinder {
   Json find(const Json& given, const std::string& key) {
     const std::size_t before = problems_.count();
     JsonReader reader(given, key, problems_);
+    const bool is_voxel = reader.has("ijk");
+    if (is_voxel && reader.has("markups")) {
+      problems_.add(key + ".ijk", "given beside " + key + ".markups", "one of the two");
+    }
     const std::optional<Vec3> point =
-        given.contains("ijk") ? find_voxel(reader, before) : find_markup(reader, before);
+        is_voxel ? find_voxel(reader, before) : find_markup(reader, before);
     if (point) return to_json(*point);
     // Apart from every other point.
     return to_json(Vec3(1000.0 * static_cast<double>(problems_.count()), 0.0, 0.0));

@@ -56,6 +56,10 @@ TEST_F(CaseFile, NamesMistakesOfListedAccessesAndTargets) {
   expect_mentions(told([](Json& j) { j["accesses"] = Json::array(); }),
                   {"accesses is [], expected a list of objects"});
   expect_mentions(told([](Json& j) { j.erase("accesses"); }), {"access is missing"});
+  expect_mentions(told([](Json& j) { j["accesses"][0]["beyond_ostium_mm"] = 15; }),
+                  {"accesses[0].beyond_ostium_mm is given without branch, expected \"branch\""});
+  expect_mentions(told([](Json& j) { j["targets"][2]["end"] = "distal"; }),
+                  {"targets[2].end is given without branch"});
   expect_mentions(told([](Json& j) { j["targets"][1].erase("name"); }),
                   {"targets[1].name is missing"});
   expect_mentions(told([](Json& j) { j["targets"][1]["name"] = "../sac"; }),

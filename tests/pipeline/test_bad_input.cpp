@@ -72,7 +72,7 @@ const std::vector<BadInput> kOfAVolume = {
     {R"~(access.azimuth_deg=["north"])~",
      R"~(access.azimuth_deg[0] is "north", expected a number from -360 to 360)~"},
     {R"~(access.angle=3)~",
-     R"~(access.angle is not a known key, expected one of "name", "point_mm", "inclination_deg", "azimuth_deg")~"},
+     R"~(access.angle is not a known key, expected one of "name", "branch", "beyond_ostium_mm", "end", "point_mm", "inclination_deg", "azimuth_deg")~"},
     {R"~(target.radius_mm=0)~",
      R"~(target.radius_mm is 0, expected a number from 0.1 to 50 (given in m?))~"},
     {R"~(target.radius_mm=100)~",

@@ -112,6 +112,12 @@ TEST_F(Markups, AnyPointOfASceneMayBeOne) {
   write("pushed.json", pushed);
   EXPECT_NE(message_of([&] { read_scene(folder_ / "pushed.json"); }).find("target.point_mm.ijk"),
             std::string::npos);
+  pushed["target"]["point_mm"]["markups"] = "points.mrk.json";
+  write("pushed.json", pushed);
+  EXPECT_NE(message_of([&] {
+              read_scene(folder_ / "pushed.json");
+            }).find("target.point_mm.ijk is given beside target.point_mm.markups"),
+            std::string::npos);
 }
 
 TEST_F(Markups, ALineOfASceneMayBeAllPointsOfAFile) {
