@@ -16,6 +16,7 @@
 #include "preprocess/centerline/centerline.h"
 #include "preprocess/cores.h"
 #include "preprocess/files/vessel_io.h"
+#include "preprocess/surface/openings.h"
 #include "preprocess/surface/surface.h"
 #include "preprocess/surface/surface_repair.h"
 #include "preprocess/wall/wall.h"
@@ -111,6 +112,35 @@ void look_at_target(const SceneFile& scene, const Surface& surface) {
   problems.throw_if_any();
 }
 
+/// Refuses supports that hold an end of the wire where it would not feel the vessel: outside, and
+/// not in front of an opening.
+void look_at_supports(const SceneFile& scene, const Surface& surface) {
+  constexpr double kBeside = 1.5;  // radii of an opening, from its axis
+  std::vector<Vec3> points;
+  if (scene.bench) {
+    for (const simulate::Support& support : scene.bench->supports) points.push_back(support.point);
+  }
+  if (scene.tools && scene.tools->scene.distal) points.push_back(scene.tools->scene.distal->point);
+  if (points.empty()) return;
+  const std::vector<preprocess::Opening> openings = preprocess::find_openings(surface);
+  Problems problems(scene.file.string());
+  for (std::size_t k = 0; k < points.size(); ++k) {
+    const preprocess::InsideAnswer answer = preprocess::locate_point(surface, points[k]);
+    const auto is_before = [&](const preprocess::Opening& opening) {
+      const Vec3 off = points[k] - opening.center;
+      const double depth = opening.normal.dot(off);
+      return depth >= 0.0 && (off - depth * opening.normal).norm() <= kBeside * opening.radius;
+    };
+    if (answer.inside || std::any_of(openings.begin(), openings.end(), is_before)) continue;
+    problems.add("supports[" + std::to_string(k) + "].point_mm", to_json(points[k]).dump(),
+                 format("a point inside the vessel, or in front of an opening of it; it lies %.1f "
+                        "mm outside",
+                        answer.distance),
+                 "move it, or correct the surface's unit or frame");
+  }
+  problems.throw_if_any();
+}
+
 /// The surface of a scene's vessel, sound and with the wire's entry in it.
 struct SceneSurface {
   Surface surface;
@@ -124,6 +154,7 @@ SceneSurface read_scene_surface(const SceneFile& scene) {
   std::vector<std::string> entry = look_at_entry(scene, repaired.surface);
   look_at_start(scene, repaired.surface);
   look_at_target(scene, repaired.surface);
+  look_at_supports(scene, repaired.surface);
   return {std::move(repaired.surface), preprocess::tell_mends(repaired.mends), std::move(entry)};
 }
 
@@ -255,15 +286,17 @@ void write_result(Json result, const SceneFile& scene, const LoadedVessel* vesse
   write_json(result, folder / "result.json");
 }
 
+constexpr const char* kPeakForce = "peak_force_n";  // of all pushes
+constexpr const char* kForce = "force_n";           // at the end
+
 /// Each triangle of the wall with the force that it took.
-void write_forces(const LoadedVessel& vessel, const std::vector<simulate::TriangleForce>& peaks,
-                  const fs::path& folder) {
+void write_forces(const LoadedVessel& vessel, const char* name,
+                  const std::vector<simulate::TriangleForce>& forces, const fs::path& folder) {
   std::vector<double> force(static_cast<std::size_t>(vessel.surface.triangles.cols()), 0.0);
-  for (const simulate::TriangleForce& peak : peaks) {
-    force.at(static_cast<std::size_t>(peak.triangle)) = peak.force;
+  for (const simulate::TriangleForce& one : forces) {
+    force.at(static_cast<std::size_t>(one.triangle)) = one.force;
   }
-  preprocess::write_wall(vessel.surface, vessel.wall, folder / "forces.vtu",
-                         {{"peak_force_n", force}});
+  preprocess::write_wall(vessel.surface, vessel.wall, folder / "forces.vtu", {{name, force}});
 }
 
 /// In the vessel as they leave it. Nothing is drawn of a wire that has no place.
@@ -301,7 +334,7 @@ SceneAnswer run_bench_scene(const SceneFile& file, const LoadedVessel* vessel,
     for (const simulate::Touch& touch : result.contacts) {
       contacts.push_back(simulate::contact_of(touch, scene.wire.radius, vessel->model->locator));
     }
-    write_forces(*vessel, sum_by_triangle(contacts), folder);
+    write_forces(*vessel, kForce, sum_by_triangle(contacts), folder);
   }
   write_result(result_json(result, contacts), file, vessel, {}, folder);
   preprocess::write_polyline(result.nodes, {}, folder / "wire.vtp");
@@ -351,7 +384,7 @@ SceneAnswer run_tools(const SceneFile& file, const LoadedVessel* vessel, const f
       contacts.push_back(
           simulate::contact_of(touch, radius - touch.thinner, vessel->model->locator));
     }
-    write_forces(*vessel, sum_by_triangle(contacts), folder);
+    write_forces(*vessel, kForce, sum_by_triangle(contacts), folder);
   }
   const Shifts& shifts = result.shapes.back().sections;
   write_result(result_json(result, scene, contacts, file.tools->roll_zero, seconds), file, vessel,
@@ -416,7 +449,7 @@ SceneAnswer run_insertion_scene(const SceneFile& file, const InsertionScene& sce
   if (!support_fit.is_null()) json["support_fit"] = support_fit;
   const std::string told = scene.start ? tell_start(json.at("start")) : "";
   write_result(std::move(json), file, &vessel, result.sections, folder);
-  write_forces(vessel, result.peak_forces, folder);
+  write_forces(vessel, kPeakForce, result.peak_forces, folder);
   preprocess::write_polyline(result.nodes, {}, folder / "wire.vtp");
   write_shapes(result, "shapes", folder);
   write_vessel(vessel, result.shapes, folder);

@@ -24,8 +24,9 @@ std::vector<std::string> check_scene_vessel(const SceneFile& scene);
 /// each that is out of the introducer, and wire.png; of
 /// an insertion also the shapes on the way, shapes.pvd, of several tools shapes-NAME.pvd of each,
 /// at the start and after each move; in a vessel also forces.vtu, the wall with
-/// the force that each triangle took (`peak_force_n`), and of one that moves as a whole
-/// vessel.pvd, as it was on the way. Throws Error where check_scene_vessel() does or a file cannot
+/// the force that each triangle takes at the end (`force_n`), of an insertion the largest of all
+/// pushes (`peak_force_n`), and of a vessel that moves as a whole vessel.pvd, as it was on the way.
+/// Throws Error where check_scene_vessel() does or a file cannot
 /// be written.
 SceneAnswer run_scene_file(const SceneFile& scene, const std::filesystem::path& folder);
 
