@@ -46,8 +46,8 @@ void expect_apart(Case given, const Surface& surface, Problems& problems) {
     for (given.target = 0; at.inside && given.target < given.targets.size(); ++given.target) {
       const TargetInput& target = given.targets[given.target];
       if (target.beyond_mm > 0.0 || (target.point - access).norm() >= at.distance) continue;
-      problems.add(target_key(given) + ".point_mm", to_json(target.point).dump(),
-                   "a point further from " + access_key(given) + ".point_mm than the wall is, " +
+      problems.add(target_point_key(given), to_json(target.point).dump(),
+                   "a point further from " + access_point_key(given) + " than the wall is, " +
                        format("%.1f mm", at.distance),
                    "a wire would be there before it is pushed");
     }

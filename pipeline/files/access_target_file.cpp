@@ -89,13 +89,16 @@ TargetInput read_target(JsonReader& reader) {
 /// The only one, or each of the list, with its name.
 template <typename Input>
 std::vector<Input> read_one_or_list(JsonReader& root, const std::string& one,
-                                    const std::string& list, Input (*read)(JsonReader&)) {
+                                    const std::string& list, Input (*read)(JsonReader&),
+                                    const std::vector<std::string>& keys) {
   std::vector<Input> all;
   std::set<std::string> taken;
   const auto add = [&](JsonReader& reader, bool listed) {
     const std::string name = read_section_name(reader, listed, taken);
+    const std::size_t k = all.size();
     all.push_back(read(reader));
     all.back().name = name;
+    all.back().told_by = k < keys.size() ? keys[k] : "point_mm";
   };
   if (!root.has(list)) {
     JsonReader reader = root.object(one, true);
@@ -111,26 +114,49 @@ std::vector<Input> read_one_or_list(JsonReader& root, const std::string& one,
   return all;
 }
 
-/// "target.point_mm", "targets[1].point_mm"
-std::string point_key(const char* one, const char* list, std::size_t index, bool listed) {
-  return (listed ? list + ("[" + std::to_string(index) + "]") : std::string(one)) + ".point_mm";
+/// "target.point_mm", "targets[1].branch"
+std::string point_key(const char* one, const char* list, std::size_t index, bool listed,
+                      const std::string& told_by) {
+  return (listed ? list + ("[" + std::to_string(index) + "]") : std::string(one)) + "." + told_by;
+}
+
+std::string point_key_of(const Json& end) {
+  for (const char* key : {"point_mm", "point", "branch"}) {
+    if (end.is_object() && end.contains(key)) return key;
+  }
+  return "point_mm";
 }
 
 }  // namespace
 
-AccessesAndTargets read_accesses_and_targets(JsonReader& root) {
+PointKeys find_point_keys(const Json& file) {
+  const auto find = [&](const char* one, const char* list) {
+    std::vector<std::string> keys;
+    if (file.contains(list) && file[list].is_array()) {
+      for (const Json& end : file[list]) keys.push_back(point_key_of(end));
+    } else if (file.contains(one)) {
+      keys.push_back(point_key_of(file[one]));
+    }
+    return keys;
+  };
+  return {.accesses = find("access", "accesses"), .targets = find("target", "targets")};
+}
+
+AccessesAndTargets read_accesses_and_targets(JsonReader& root, const PointKeys& keys) {
   const std::size_t problems_before = root.problems().count();
   AccessesAndTargets all;
   all.accesses_listed = root.has("accesses");
   all.targets_listed = root.has("targets");
-  all.accesses = read_one_or_list<AccessInput>(root, "access", "accesses", read_access);
-  all.targets = read_one_or_list<TargetInput>(root, "target", "targets", read_target);
+  all.accesses =
+      read_one_or_list<AccessInput>(root, "access", "accesses", read_access, keys.accesses);
+  all.targets = read_one_or_list<TargetInput>(root, "target", "targets", read_target, keys.targets);
   if (root.problems().count() > problems_before) return all;
   for (std::size_t a = 0; a < all.accesses.size(); ++a) {
-    const std::string access = point_key("access", "accesses", a, all.accesses_listed);
+    const std::string access =
+        point_key("access", "accesses", a, all.accesses_listed, all.accesses[a].told_by);
     for (std::size_t t = 0; t < all.targets.size(); ++t) {
       const TargetInput& target = all.targets[t];
-      const std::string key = point_key("target", "targets", t, all.targets_listed);
+      const std::string key = point_key("target", "targets", t, all.targets_listed, target.told_by);
       if ((target.point - all.accesses[a].point).norm() > target.radius) continue;
       root.problems().add(key, to_json(target.point).dump(),
                           target.at_section

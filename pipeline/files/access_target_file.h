@@ -9,18 +9,28 @@
 namespace wireplan::pipeline {
 
 struct AccessInput {
-  std::string name;           // the only one of a case may have none
+  std::string name;                  // the only one of a case may have none
+  std::string told_by = "point_mm";  // the key that its point has in the file
   Vec3 point = Vec3::Zero();  //                                                          [mm]
   std::vector<double> inclinations, azimuths;  //                                        [rad]
 };
 
 struct TargetInput {
-  std::string name;           // the only one of a case may have none
+  std::string name;                  // the only one of a case may have none
+  std::string told_by = "point_mm";  // the key that its point has in the file
   Vec3 point = Vec3::Zero();  //                                                          [mm]
   bool at_section = true;     // else a sphere of this radius
   double radius = 0.0;        //                                                          [mm]
   double beyond_mm = 0.0;     // the cross-section is so much further along the vessel
 };
+
+/// Under which key the file tells each point: "point_mm", "point" or "branch".
+struct PointKeys {
+  std::vector<std::string> accesses, targets;
+};
+
+/// Of a case file as it was written, before points and branches are looked up.
+PointKeys find_point_keys(const Json& file);
 
 struct AccessesAndTargets {
   std::vector<AccessInput> accesses;  // one at least of each, where there were no problems
@@ -29,7 +39,7 @@ struct AccessesAndTargets {
 };
 
 /// Reads the four keys. A list of one counts as the singular form, which may have a name too.
-AccessesAndTargets read_accesses_and_targets(JsonReader& root);
+AccessesAndTargets read_accesses_and_targets(JsonReader& root, const PointKeys& keys);
 
 /// The angles under a key, in degrees in the file [rad].
 std::vector<double> read_angles(JsonReader& reader, const std::string& key,

@@ -413,13 +413,14 @@ Case read_case(const std::filesystem::path& path, const std::vector<std::string>
   for (const std::string& override_text : overrides) apply_override(file, override_text);
 
   Problems problems(input.file.string());
+  const PointKeys point_keys = find_point_keys(file);
   resolve_points(file, input.file.parent_path(), problems);
   resolve_branches(file, input.file.parent_path(), problems);
   JsonReader root(file, "", problems);
   root.text("schema", std::nullopt);
   input.name = read_name(root, input.file);
   const std::size_t problems_before = problems.count();
-  AccessesAndTargets ends = read_accesses_and_targets(root);
+  AccessesAndTargets ends = read_accesses_and_targets(root, point_keys);
   input.accesses = std::move(ends.accesses);
   input.targets = std::move(ends.targets);
   input.accesses_listed = ends.accesses_listed;
@@ -489,13 +490,21 @@ std::string target_key(const Case& given) {
   return !given.targets_listed ? "target" : "targets[" + std::to_string(given.target) + "]";
 }
 
+std::string access_point_key(const Case& given) {
+  return access_key(given) + "." + given.accesses.at(given.access).told_by;
+}
+
+std::string target_point_key(const Case& given) {
+  return target_key(given) + "." + given.targets.at(given.target).told_by;
+}
+
 std::vector<std::pair<std::string, Vec3>> end_points(Case given) {
   std::vector<std::pair<std::string, Vec3>> points;
   for (given.access = 0; given.access < given.accesses.size(); ++given.access) {
-    points.emplace_back(access_key(given) + ".point_mm", given.accesses[given.access].point);
+    points.emplace_back(access_point_key(given), given.accesses[given.access].point);
   }
   for (given.target = 0; given.target < given.targets.size(); ++given.target) {
-    points.emplace_back(target_key(given) + ".point_mm", given.targets[given.target].point);
+    points.emplace_back(target_point_key(given), given.targets[given.target].point);
   }
   return points;
 }

@@ -104,7 +104,11 @@ void choose_section(Case& given, std::size_t access, std::size_t target);
 std::string access_key(const Case& given);
 std::string target_key(const Case& given);
 
-/// Every access and target of the case by its key: "access.point_mm", [mm].
+/// And of their points: "target.point_mm", "targets[1].branch".
+std::string access_point_key(const Case& given);
+std::string target_point_key(const Case& given);
+
+/// Every access and target of the case by the key of its point, [mm].
 std::vector<std::pair<std::string, Vec3>> end_points(Case given);
 
 /// "right femoral to left renal"; of what the case has only one, without its name. Empty for a case

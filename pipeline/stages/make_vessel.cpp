@@ -327,8 +327,8 @@ std::vector<Vec3> known_way(const Workspace& work, const Vec3& access, const Vec
 /// Refuses the section's access and target outside the vessel, by their keys, both at once.
 void require_inside(const Surface& surface, const fs::path& folder, const Case& given) {
   const std::array<std::pair<std::string, Vec3>, 2> ends = {
-      {{access_key(given) + ".point_mm", given.study.access},
-       {target_key(given) + ".point_mm", given.study.goal.point}}};
+      {{access_point_key(given), given.study.access},
+       {target_point_key(given), given.study.goal.point}}};
   std::string outside, pieces;
   int found = 0;
   for (const auto& [key, point] : ends) {
@@ -355,8 +355,8 @@ void require_apart(const Case& given, const Surface& surface, const Centerline& 
                wall = preprocess::locate_point(surface, study.access).distance,
                apart = onward ? length : std::min(length, (study.goal.point - study.access).norm());
   if (length >= radius && (onward || apart >= wall)) return;
-  throw Error(target_key(given) + ".point_mm is " + format("%.1f mm", apart) + " from " +
-              access_key(given) + ".point_mm, expected more than the lumen's radius there, " +
+  throw Error(target_point_key(given) + " is " + format("%.1f mm", apart) + " from " +
+              access_point_key(given) + ", expected more than the lumen's radius there, " +
               format("%.1f mm", std::max(radius, wall)) +
               ": a wire would be there before it is pushed; move one of the two along the vessel");
 }

@@ -45,6 +45,16 @@ TEST_F(CaseFile, TakesListsOfNamedAccessesAndTargets) {
   EXPECT_EQ(section_name(read(one)), "sac");
 }
 
+TEST_F(CaseFile, KeysOfPointsAreThoseOfTheFile) {
+  Json file;
+  file["accesses"] = {{{"branch", "aorta"}}, {{"point", {{"ijk", {1, 2, 3}}}}}, {{"name", "x"}}};
+  file["target"]["point_mm"] = {1, 2, 3};
+  const PointKeys keys = find_point_keys(file);
+  EXPECT_EQ(keys.accesses, (std::vector<std::string>{"branch", "point", "point_mm"}));
+  EXPECT_EQ(keys.targets, std::vector<std::string>{"point_mm"});
+  EXPECT_TRUE(find_point_keys({{"access", 3}}).targets.empty());
+}
+
 TEST_F(CaseFile, NamesMistakesOfListedAccessesAndTargets) {
   const auto told = [&](const std::function<void(Json&)>& change) {
     Json json = listed_case();

@@ -238,6 +238,13 @@ TEST_F(LabelsRun, TellsEveryPointThatLiesOutside) {
   EXPECT_TRUE(holds(answer.log, "target.point_mm") &&
               holds(answer.log, "it lies in other, of which"))
       << answer.log;
+  // By the key that the case has.
+  case_["access"].erase("point_mm");
+  case_["access"]["point"] = {{"ijk", {20, 20, 8}}};
+  const Answer voxel =
+      run({{"path", "both.nii"}, {"values", {1, 2}}, {"names", {"tube", "other"}}}, false, "");
+  EXPECT_TRUE(holds(voxel.log, "access.point is [20.0,20.0,8.0], 5.0 mm outside the labels"))
+      << voxel.log;
 }
 
 TEST_F(LabelsRun, AreGrownToATargetThatTheyLack) {

@@ -177,7 +177,7 @@ TEST_F(NewCaseTest, NamesOfArteriesAreKnownHoweverTheyAreWritten) {
   given.markups = points({{"access", Vec3(6, 10, 3)}, {"target", Vec3(34, 3, 3)}});
   const NewCaseAnswer outside = write_new_case(given);
   ASSERT_EQ(outside.missing.size(), 1u);
-  EXPECT_TRUE(holds(outside.missing[0], "target.point_mm") &&
+  EXPECT_TRUE(holds(outside.missing[0], "target.point is [34.0,3.0,3.0]") &&
               holds(outside.missing[0], "outside the labels"))
       << outside.missing[0];
   EXPECT_TRUE(holds(outside.found.back(), "\"target\" at (34.0, 3.0, 3.0) mm LPS"))
