@@ -6,6 +6,7 @@
 
 #include "pipeline/commands/scene_sensitivity.h"
 #include "pipeline/commands/scene_support.h"
+#include "pipeline/files/disk.h"
 #include "pipeline/files/result_file.h"
 #include "pipeline/files/text.h"
 #include "pipeline/files/trial_file.h"
@@ -64,9 +65,11 @@ std::vector<std::string> look_at_entry(const SceneFile& scene, const Surface& su
   return {};
 }
 
+constexpr const char* kRollFolder = "roll_";
+
 /// "roll_45", as the scene counts it.
 std::string roll_name(const InsertionScene& scene, double roll) {
-  return "roll_" + format("%.10g", (roll - scene.roll_zero) / kRadPerDeg);
+  return kRollFolder + format("%.10g", (roll - scene.roll_zero) / kRadPerDeg);
 }
 
 constexpr double kFarOutside = 10.0;  // of a line to start from, and of a target          [mm]
@@ -510,6 +513,25 @@ SceneAnswer run_measured(const SceneFile& file, LoadedVessel& vessel, const fs::
   return answer;
 }
 
+/// Takes the results of an earlier scene out of the folder, which would be taken for those of this
+/// one where it writes them elsewhere, or is stopped.
+void remove_results(const fs::path& folder) {
+  constexpr const char* kResult = "result.json";
+  std::vector<fs::path> old = {folder / kResult};
+  std::error_code unknown;
+  for (const fs::directory_entry& entry : fs::directory_iterator(folder, unknown)) {
+    const bool of_roll = entry.path().filename().string().starts_with(kRollFolder);
+    if (of_roll && entry.is_directory()) old.push_back(entry.path() / kResult);
+  }
+  for (const fs::path& file : old) {
+    if (read_if_there(file).find("\"wireplan.result/") == std::string::npos) continue;  // no result
+    fs::remove(file, unknown);
+    if (unknown)
+      throw DiskError(file.string() + ": an earlier result cannot be removed (" +
+                      unknown.message() + "); check its permissions");
+  }
+}
+
 }  // namespace
 
 std::vector<std::string> check_scene_vessel(const SceneFile& scene) {
@@ -524,6 +546,7 @@ SceneAnswer run_scene_file(const SceneFile& scene, const fs::path& folder) {
   std::optional<LoadedVessel> vessel;
   if (scene.vessel) vessel = load_vessel(scene);
   fs::create_directories(folder);
+  remove_results(folder);
   if (scene.tools) return run_tools(scene, vessel ? &*vessel : nullptr, folder);
   if (scene.bench) return run_bench_scene(scene, vessel ? &*vessel : nullptr, folder);
   if (!scene.insertion->rolls.empty()) return run_rolls(scene, *vessel, folder);

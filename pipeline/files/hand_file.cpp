@@ -28,9 +28,10 @@ void read_rolls(JsonReader& insertion, bool starts, InsertionScene& scene) {
     return;
   }
   const std::vector<double> given = insertion.numbers("roll_deg", std::nullopt, kHubRoll);
+  constexpr double kSameName = 1e-6;  // degrees
   for (std::size_t k = 0; k < given.size(); ++k) {
-    if (std::find(given.begin(), given.begin() + static_cast<std::ptrdiff_t>(k), given[k]) !=
-        given.begin() + static_cast<std::ptrdiff_t>(k)) {
+    const auto is_same = [&](double roll) { return std::abs(roll - given[k]) < kSameName; };
+    if (std::any_of(given.begin(), given.begin() + static_cast<std::ptrdiff_t>(k), is_same)) {
       insertion.problems().add(insertion.path_of("roll_deg") + "[" + std::to_string(k) + "]",
                                Json(given[k]).dump() + " again", "each roll once",
                                "its result has the roll's name");

@@ -86,5 +86,33 @@ TEST(ScenePlaces, ForcesAtTheEndAreNotCalledThePeakOfAllPushes) {
   }
 }
 
+TEST(ScenePlaces, ResultsOfAnEarlierSceneDoNotStayBesideThoseOfThisOne) {
+  const TemporaryFolder folder;
+  write_stl(shapes::straight_tube(4.0, 36.0, 1.5), folder / "tube.stl");
+  Json one = clamped_in_tube(Vec3(0, 0, 6));
+  one.erase("supports");
+  one["insertion"] = {{"point_mm", {0, 0, 6}}, {"direction", {0, 0, 1}}, {"length_mm", 10}};
+  Json two = one;
+  two["insertion"]["roll_deg"] = {0, 45};
+  const auto names = [&](const Json& scene) {
+    write_json(scene, folder / "scene.json");
+    EXPECT_EQ(run_program(folder.path(), "simulate scene.json -o out").code, 0);
+    std::string found;
+    for (const char* name : {"result.json", "roll_0/result.json", "roll_45/result.json"}) {
+      if (std::filesystem::exists(folder / "out" / name)) found += std::string(name) + " ";
+    }
+    return found;
+  };
+  std::filesystem::create_directories(folder / "out" / "mine");
+  write_text("kept", folder / "out" / "mine" / "result.json");
+  EXPECT_EQ(names(one), "result.json ");
+  EXPECT_EQ(names(two), "roll_0/result.json roll_45/result.json ");
+  EXPECT_EQ(names(one), "result.json ");
+  EXPECT_EQ(read_text(folder / "out" / "mine" / "result.json"), "kept");
+  two["insertion"]["roll_deg"] = {45, 45.0000000001};
+  write_json(two, folder / "scene.json");
+  EXPECT_TRUE(holds(run_program(folder.path(), "check scene.json").log, "each roll once"));
+}
+
 }  // namespace
 }  // namespace wireplan::pipeline
