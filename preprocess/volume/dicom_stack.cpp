@@ -12,10 +12,11 @@ namespace wireplan::preprocess {
 namespace {
 
 /// Tells what is wrong with the places [mm, sorted] of slices along their normal, and between which
-/// two; nothing where they form a regular stack. Scanners round positions, so a slice may lie a
-/// tenth of the step from its place.
+/// two; nothing where they form a regular stack. Scanners round positions, some to one decimal, so
+/// a slice may lie a tenth of the step from its place, or as far as two such roundings.
 void find_uneven(const std::vector<double>& positions, Stack& stack) {
-  constexpr double kSamePlace = 0.01;  // [mm]
+  constexpr double kSamePlace = 0.01, kRounding = 0.1;   // [mm]
+  constexpr double kOfStep = 0.1, kMostRounding = 0.25;  // of the step
   const std::size_t gaps = positions.size() - 1;
   std::vector<double> sizes(gaps);
   for (std::size_t k = 0; k < gaps; ++k) sizes[k] = positions[k + 1] - positions[k];
@@ -23,10 +24,11 @@ void find_uneven(const std::vector<double>& positions, Stack& stack) {
       std::count_if(sizes.begin(), sizes.end(), [&](double size) { return size <= kSamePlace; }));
   stack.places = gaps + 1 - same;
   const double step = (positions.back() - positions.front()) / static_cast<double>(gaps);
+  const double most_off = std::max(kOfStep * step, std::min(kRounding, kMostRounding * step));
   bool even = step > 0.0;
   for (std::size_t k = 0; k <= gaps; ++k) {
     const double place = positions.front() + static_cast<double>(k) * step;
-    even = even && std::abs(positions[k] - place) <= 0.1 * step;
+    even = even && std::abs(positions[k] - place) <= most_off;
   }
   if (even) return;
 
@@ -50,7 +52,7 @@ void find_uneven(const std::vector<double>& positions, Stack& stack) {
                                     [&](double a, double b) { return differs(a) < differs(b); });
   const std::size_t k = static_cast<std::size_t>(odd - sizes.begin());
   const auto count = std::count_if(sizes.begin(), sizes.end(),
-                                   [&](double size) { return differs(size) > 0.1 * usual; });
+                                   [&](double size) { return differs(size) > kOfStep * usual; });
   text << "uneven slices: the ones at " << positions[k] << " and " << positions[k + 1]
        << " mm along the normal are " << *odd << " mm apart, the others " << usual << " mm";
   if (count > 1) text << " (" << count << " of " << gaps << " gaps differ)";

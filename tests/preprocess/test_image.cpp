@@ -269,8 +269,17 @@ TEST_F(DicomFolder, EachSliceIsRescaledByItsOwnHeader) {
 }
 
 TEST_F(DicomFolder, PositionsRoundedByTheScannerAreAccepted) {
-  write_series({0.0, 0.6, 1.3, 1.9, 2.5});  // 0.625 mm, written with one decimal
-  EXPECT_NEAR(read_image(folder_).grid.spacing[2], 0.625, 1e-12);
+  for (const double step : {0.4, 0.5, 0.625, 0.75, 1.25}) {  // written with one decimal
+    std::vector<double> places;
+    for (int k = 0; k < 11; ++k) places.push_back(std::round(10.0 * step * k) / 10.0);
+    write_series(places);
+    EXPECT_NEAR(read_image(folder_).grid.spacing[2], step, 0.011);
+    fs::remove_all(folder_);
+    fs::create_directories(folder_);
+    places.erase(places.begin() + 4);
+    write_series(places);
+    EXPECT_TRUE(has(read_error(folder_), "uneven slices")) << step << read_error(folder_);
+  }
 }
 
 TEST_F(DicomFolder, MissingSliceIsAnErrorWithItsPlaceAndWithoutThePatient) {
