@@ -59,6 +59,7 @@ Json json_of(const PatientRow& row) {
           {"axis_mean_mm", or_null(row.axis_mean_mm)},
           {"axis_p95_mm", or_null(row.axis_p95_mm)},
           {"radius_within_5_percent", percent(row.radius_within)},
+          {"closed_within_5_percent", percent(row.closed_within)},
           {"ball_within_5_percent", percent(row.ball_within)},
           {"way_right", or_null(row.way_right)},
           {"outside_percent", percent(row.outside)},
@@ -254,7 +255,9 @@ Json describe_columns() {
       {"axis_mean_mm", "from the centerline to the true axis; also axis_p95_mm"},
       {"radius_within_5_percent",
        "half the diameter of the circle as large as the section, of the places along the "
-       "centerline where the lumen is a single tube without plaque, over two voxels in radius"},
+       "centerline where the lumen is a single round tube without plaque, over two voxels in "
+       "radius"},
+      {"closed_within_5_percent", "the same of those whose wall lies at that radius all round"},
       {"ball_within_5_percent", "the inscribed ball's radius there"},
       {"way_right",
        "each point of the centerline lies within the true radius of the true axis (of the wider "
@@ -296,6 +299,7 @@ BenchReport bench_segmentation(const BenchOptions& options) {
                               spread(drawn, "surface_mean_mm", &PatientRow::surface_mean_mm),
                               spread(drawn, "axis_mean_mm", &PatientRow::axis_mean_mm),
                               spread(drawn, "radius_within_share", &PatientRow::radius_within),
+                              spread(drawn, "closed_within_share", &PatientRow::closed_within),
                               spread(drawn, "ball_within_share", &PatientRow::ball_within),
                               spread(drawn, "outside_share", &PatientRow::outside),
                               spread(drawn, "outside_silent_share", &PatientRow::outside_silent)};

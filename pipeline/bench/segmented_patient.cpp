@@ -1,5 +1,6 @@
 #include "pipeline/bench/segmented_patient.h"
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 
@@ -145,27 +146,55 @@ Centerline widened(Centerline way) {
   return way;
 }
 
+constexpr double kSameRadius = 0.01;  // of the radius
+
+/// Whether the true lumen at point i of the way is as deep as the way's radius there: mouths of
+/// branches and places within a wider vessel are deeper, places by plaque less deep.
+bool is_single(const Centerline& way, Eigen::Index i, const preprocess::PhantomLumen& truth) {
+  const double radius = way.radius(i);
+  return std::abs(-truth.distance(way.points.col(i)) - radius) <= kSameRadius * radius;
+}
+
+/// Whether its wall lies at that radius all round, across the way.
+bool is_closed(const Centerline& way, Eigen::Index i, const preprocess::PhantomLumen& truth) {
+  constexpr int kDirections = 24;
+  const double radius = way.radius(i);
+  const Eigen::Index last = way.points.cols() - 1;
+  const Vec3 along =
+      (way.points.col(std::min(i + 1, last)) - way.points.col(std::max<Eigen::Index>(i - 1, 0)))
+          .normalized();
+  const Vec3 u = along.unitOrthogonal(), w = along.cross(u);
+  for (int k = 0; k < kDirections; ++k) {
+    const double angle = 2.0 * kPi * k / kDirections;
+    const Vec3 wall = way.points.col(i) + radius * (std::cos(angle) * u + std::sin(angle) * w);
+    if (std::abs(truth.distance(wall)) > kSameRadius * radius) return false;
+  }
+  return true;
+}
+
 /// The line that was found against the true way. A radius counts where the lumen there is a single
 /// round tube, so neither at mouths of branches nor by plaque, and where it is over two voxels.
 void measure_line(const Surface& surface, const Centerline& line, const Centerline& way,
                   double voxel_mm, const preprocess::PhantomLumen& truth, PatientRow& row) {
   std::vector<double> off;
   const Eigen::VectorXd section = 0.5 * preprocess::section_diameters(surface, line);
-  int asked = 0, within = 0, ball_within = 0;
+  int asked = 0, within = 0, ball_within = 0, closed = 0, closed_within = 0;
   for (Eigen::Index i = 0; i < line.points.cols(); ++i) {
     const Vec3 p = line.points.col(i);
     off.push_back(preprocess::find_place(p, way).from_axis);
     Eigen::Index nearest = 0;
     (way.points.colwise() - p).colwise().squaredNorm().minCoeff(&nearest);
     const double radius = way.radius(nearest);
-    const double open = -truth.distance(way.points.col(nearest));
-    if (radius < kWideEnough * voxel_mm || std::abs(open - radius) > 0.01 * radius) continue;
+    if (radius < kWideEnough * voxel_mm || !is_single(way, nearest, truth)) continue;
     ++asked;
     const auto is_near = [&](double r) {
       return std::abs(r - radius) <= kRadiusTolerance * radius;
     };
     within += is_near(section(i)) ? 1 : 0;
     ball_within += is_near(line.radius(i)) ? 1 : 0;
+    if (!is_closed(way, nearest, truth)) continue;
+    ++closed;
+    closed_within += is_near(section(i)) ? 1 : 0;
   }
   row.axis_mean_mm = mean_of(off);
   row.axis_p95_mm = p95_of(off);
@@ -173,6 +202,7 @@ void measure_line(const Surface& surface, const Centerline& line, const Centerli
   if (asked == 0) return;
   row.radius_within = static_cast<double>(within) / asked;
   row.ball_within = static_cast<double>(ball_within) / asked;
+  if (closed > 0) row.closed_within = static_cast<double>(closed_within) / closed;
 }
 
 /// The steps on which a patient can end. Returns the surface's centerline.

@@ -29,7 +29,7 @@ struct PatientRow {
   std::optional<double> axis_mean_mm = {}, axis_p95_mm = {};
   // Shares of the places within 5 % of the true radius: of half the section's diameter, which the
   // report tells, and of the inscribed ball's radius.
-  std::optional<double> radius_within = {}, ball_within = {};
+  std::optional<double> radius_within = {}, closed_within = {}, ball_within = {};
   std::optional<bool> way_right = {};
   std::optional<double> outside = {};         // of the mask, not next to the truth, over the truth
   std::optional<double> outside_silent = {};  // and that no warning names with its place

@@ -23,6 +23,13 @@ constexpr double kRay = 2.0 * kPi / kRays;
 constexpr double kSteep = 1.7, kRim = 0.3;  // of the radius, per radian
 constexpr double kBack = 1.1;               // of the radius at one rim: the other has come near
 constexpr std::size_t kWidestMouth = 30;    // rays: more is no mouth of a branch
+// Tilted cuts: by the first angle in so many directions as long as that makes them smaller, then by
+// half of it, and on to the last. Smaller ones lie within so many radii of the first. A cut across
+// the line stands where none has much less of its area: noise alone makes some smaller.
+constexpr double kFirstTilt = kPi / 9.0, kLastTilt = kPi / 40.0;
+constexpr int kTilts = 6, kTiltTries = 4;
+constexpr double kNear = 2.5;
+constexpr double kMuchLess = 0.9;
 
 /// An edge of the surface as a key.
 std::uint64_t key_of(int a, int b) {
@@ -164,16 +171,90 @@ Vec3 direction_at(const Centerline& line, Eigen::Index k) {
   return (line.points.col(after) - line.points.col(before)).normalized();
 }
 
-/// Of the smallest cut that goes round the point; the sphere's where none does.
-double diameter_at(const Surface& surface, const Centerline& line, Eigen::Index k) {
-  const Vec3 point = line.points.col(k), normal = direction_at(line, k);
+/// Of the smallest loop of a cut that goes round the point; infinite where none does.
+double area_of_cut(const Surface& surface, const Vec3& point, const Vec3& normal) {
   double least = std::numeric_limits<double>::infinity();
   for (const std::vector<Vec3>& loop : PlaneCut(surface, point, normal).loops()) {
     const auto [area, turns] = area_and_turns(loop, point, normal);
-    if (turns == 0 || area >= least) continue;
-    least = area_without_branches(loop, area, point, normal);
+    if (turns != 0) least = std::min(least, area);
   }
-  return std::isfinite(least) ? std::sqrt(4.0 * least / kPi) : 2.0 * line.radius(k);
+  return least;
+}
+
+/// The triangles of the surface that come within `reach` of a point.
+Surface near_part(const Surface& surface, const Vec3& point, double reach) {
+  const Eigen::Index n = surface.vertices.cols();
+  std::vector<int> index(static_cast<std::size_t>(n), -1);
+  std::vector<Eigen::Index> kept;
+  for (Eigen::Index v = 0; v < n; ++v) {
+    if ((surface.vertices.col(v) - point).squaredNorm() > reach * reach) continue;
+    index[static_cast<std::size_t>(v)] = static_cast<int>(kept.size());
+    kept.push_back(v);
+  }
+  Surface part;
+  part.vertices = surface.vertices(Eigen::all, kept);
+  std::vector<Eigen::Vector3i> triangles;
+  for (const auto& t : surface.triangles.colwise()) {
+    const Eigen::Vector3i moved(index[static_cast<std::size_t>(t(0))],
+                                index[static_cast<std::size_t>(t(1))],
+                                index[static_cast<std::size_t>(t(2))]);
+    if (moved.minCoeff() >= 0) triangles.push_back(moved);
+  }
+  part.triangles.resize(3, static_cast<Eigen::Index>(triangles.size()));
+  for (std::size_t t = 0; t < triangles.size(); ++t) {
+    part.triangles.col(static_cast<Eigen::Index>(t)) = triangles[t];
+  }
+  return part;
+}
+
+/// The direction across which a cut through the point is smallest, tilted from the one along the
+/// line as long as that makes it smaller: where the line turns from one vessel into another its
+/// chord runs across both.
+Vec3 smallest_cut(const Surface& part, const Vec3& point, Vec3 normal, double area) {
+  for (double tilt = kFirstTilt; tilt >= kLastTilt; tilt *= 0.5) {
+    for (int tries = 0; tries < kTiltTries; ++tries) {
+      const Vec3 u = normal.unitOrthogonal(), w = normal.cross(u);
+      double least = area;
+      Vec3 best = normal;
+      for (int k = 0; k < kTilts; ++k) {
+        const double angle = 2.0 * kPi * k / kTilts;
+        const Vec3 tilted =
+            (normal + std::tan(tilt) * (std::cos(angle) * u + std::sin(angle) * w)).normalized();
+        const double found = area_of_cut(part, point, tilted);
+        if (found >= least) continue;
+        least = found;
+        best = tilted;
+      }
+      if (least >= area) break;
+      area = least;
+      normal = best;
+    }
+  }
+  return normal;
+}
+
+/// Of the smallest loop that goes round the point, without branches.
+double area_of_vessel(const Surface& surface, const Vec3& point, const Vec3& normal) {
+  double least = std::numeric_limits<double>::infinity();
+  for (const std::vector<Vec3>& loop : PlaneCut(surface, point, normal).loops()) {
+    const auto [whole, turns] = area_and_turns(loop, point, normal);
+    if (turns == 0 || whole >= least) continue;
+    least = area_without_branches(loop, whole, point, normal);
+  }
+  return least;
+}
+
+/// By the cut across the line, or by a tilted one; the sphere's where none goes round the point.
+double diameter_at(const Surface& surface, const Centerline& line, Eigen::Index k) {
+  const Vec3 point = line.points.col(k), across = direction_at(line, k);
+  const double area = area_of_cut(surface, point, across);
+  if (!std::isfinite(area)) return 2.0 * line.radius(k);
+  const Surface part = near_part(surface, point, kNear * std::sqrt(area / kPi));
+  const Vec3 tilted = smallest_cut(part, point, across, area);
+  const bool turns = area_of_cut(part, point, tilted) < kMuchLess * area;
+  double closed = area_of_vessel(surface, point, across);
+  if (turns) closed = std::min(closed, area_of_vessel(surface, point, tilted));
+  return std::sqrt(4.0 * closed / kPi);
 }
 
 }  // namespace

@@ -9,9 +9,10 @@ namespace wireplan::preprocess {
 /// there, as a radiologist measures it; mean over 1.5 mm of line to either side. The inscribed
 /// sphere, which touches the deepest dent of the noise, is some per cent thinner. Where no closed
 /// cut goes round the point, it is the sphere's. The cut is across the chord of one radius (1 mm at
-/// least) to either side. What of it lies in the mouth of a branch does not count: where, seen from
-/// the point, the wall turns away steeply and comes back within 150 degrees. Of a lumen bent like a
-/// crescent that is an arm, so it comes out narrower.
+/// least) to either side, or tilted from that where it has a tenth less area so: where a line turns
+/// from one vessel into another its chord runs across both. What of it lies in the mouth of a
+/// branch does not count: where, seen from the point, the wall turns away steeply and comes back
+/// within 150 degrees. Of a lumen bent like a crescent that is an arm, so it comes out narrower.
 /// Expects a line of two points or more.
 Eigen::VectorXd section_diameters(const Surface& surface, const Centerline& line);
 

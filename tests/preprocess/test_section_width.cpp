@@ -66,6 +66,29 @@ TEST(SectionWidth, DoesNotCountTheBranchThatACutRunsInto) {
   }
 }
 
+TEST(SectionWidth, IsAcrossTheVesselThatALineIsAboutToLeave) {
+  // Along the axis of a tube of 8 mm and, from its middle on, out at right angles into a branch of
+  // 3 mm: there the chord of one radius to either side runs at 45 degrees, and the cut across it
+  // holds 1.4 times the tube's section and the branch.
+  const Surface tube = shapes::level_set(
+      [](const Vec3& p) {
+        const double trunk = std::min({8.0 - std::hypot(p.x(), p.y()), p.z(), 60.0 - p.z()});
+        const double branch =
+            std::min({3.0 - std::hypot(p.y(), p.z() - 30.0), p.x(), 30.0 - p.x()});
+        return std::max(trunk, branch);
+      },
+      Vec3(-9.0, -9.0, -1.0), Vec3(31.0, 9.0, 61.0), 0.7);
+  Centerline line = line_along_z(0.0);
+  line.radius.setConstant(7.9);
+  for (Eigen::Index k = 41; k < line.points.cols(); ++k) {
+    line.points.col(k) = Vec3(line.arc_length(k) - 20.0, 0.0, 30.0);
+  }
+  const Eigen::VectorXd diameters = section_diameters(tube, line);
+  EXPECT_NEAR(diameters.head(38).minCoeff(), 16.0, 0.4);
+  EXPECT_NEAR(diameters.head(38).maxCoeff(), 16.0, 0.8);
+  EXPECT_NEAR(diameters(75), 6.0, 0.2);  // 17.5 mm from the trunk's axis
+}
+
 TEST(SectionWidth, OfALongOvalIsWholeFromItsMiddle) {
   // Three times as long as wide, as a flattened lumen may be: no end of it is a branch.
   EXPECT_NEAR(section_diameters(oval_tube(2.0, 6.0), line_along_z(0.0)).mean(),
