@@ -241,7 +241,7 @@ std::vector<Stage> stages_to_surface(const Case& given) {
                     .make = make_segment});
   read_points(stages.back(), given);
   stages.push_back({.name = "surface",
-                    .version = 12,
+                    .version = 13,
                     .reads_input = true,
                     .after = {"segment"},
                     .parameters = {"/surface/edge_length_mm"},

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "preprocess/surface/vertex_graph.h"
+#include "preprocess/surface/wall_profile.h"
 
 namespace wireplan::preprocess {
 namespace {
@@ -34,9 +35,11 @@ constexpr double kMostUnit = 2.0;      // ... but at most so many voxels
 constexpr double kLeastContrast = 0.35;
 // How strongly a vertex without an edge is held where the mask has it, against one with an edge.
 constexpr double kHold = 0.15;
-constexpr int kRounds = 3;        // the first finds the unit
-constexpr double kDeep = 0.8413;  // part of a blurred step one sigma inside of it
-constexpr double kThick = 1.2;    // slices so much thicker than pixels are thick
+constexpr int kRounds = 3;         // the first finds the unit
+constexpr double kDeep = 0.8413;   // part of a blurred step one sigma inside of it
+constexpr double kForWalls = 0.7;  // of kSmoothing, before and after walls are looked for
+constexpr double kAcross = 0.3;    // a wall's normal this near to the slices' plane lies in it
+constexpr double kThick = 1.2;     // slices so much thicker than pixels are thick
 // Smoothing rounds the rim of a cap about so deep, however thick the slices are [mm]; chosen.
 constexpr double kRim = 1.7;
 // Blur moves the half level of a disc by sigma^2/(2 r), but not by more than this part of sigma: in
@@ -165,19 +168,24 @@ std::optional<double> way_inward(const std::vector<double>& profile, double from
   return {};
 }
 
-/// How far blur with this sigma moves the edge inward at each vertex: sigma^2 times the mean
-/// curvature, to first order, as averaging over the surface moves the vertices themselves.
+/// How far blur moves the edge inward at each vertex: sigma^2 times the mean curvature, to first
+/// order, as averaging over the surface by so many passes moves the vertices themselves. Between
+/// whole passes in proportion.
 Eigen::VectorXd moved_by_blur(const Surface& surface, const Neighbours& neighbours,
-                              const Eigen::Matrix3Xd& normals, double sigma, double edge) {
+                              const Eigen::Matrix3Xd& normals, double passes) {
   Eigen::VectorXd inward = Eigen::VectorXd::Zero(surface.vertices.cols());
-  // Spread along each of the surface's two directions by sigma.
-  const int passes = passes_for(std::sqrt(2.0) * sigma, edge);
+  const int whole = static_cast<int>(passes);
+  const double rest = passes - whole;
   for (int axis = 0; axis < 3; ++axis) {
-    Eigen::VectorXd place = surface.vertices.row(axis),
-                    weight = Eigen::VectorXd::Ones(place.size());
-    average(neighbours, passes, place, weight);
-    inward -= (place - surface.vertices.row(axis).transpose())
-                  .cwiseProduct(normals.row(axis).transpose());
+    const Eigen::VectorXd start = surface.vertices.row(axis);
+    Eigen::VectorXd place = start, weight = Eigen::VectorXd::Ones(place.size());
+    average(neighbours, whole, place, weight);
+    if (rest > 0.0) {
+      Eigen::VectorXd next = place;
+      average(neighbours, 1, next, weight);
+      place += rest * (next - place);
+    }
+    inward -= (place - start).cwiseProduct(normals.row(axis).transpose());
   }
   return inward;
 }
@@ -248,6 +256,7 @@ class Fit {
     }
   }
 
+  /// Walls are looked for once the blur is known.
   void round(FitStatistics* statistics) {
     const Eigen::Matrix3Xd normals = area_weighted_normals(fitted_);
     Levels levels = read_levels(normals);
@@ -256,7 +265,11 @@ class Fit {
       statistics->outside_value = levels.usual_outside;
     }
     // The wall is soft tissue, though thin enough for the fat behind it to be what was read.
-    if (levels.contrast() > kLeastHu) levels.outside = levels.outside.cwiseMax(kWallHu);
+    if (levels.contrast() > kLeastHu) {
+      levels.outside = levels.outside.cwiseMax(kWallHu);
+      // Not where slices blur more than all else: that is no Gaussian.
+      if (grey_.thickness_variance() < sigma_ * sigma_) look_for_walls(normals, levels);
+    }
 
     Edges edges = find_edges(normals, levels);
     certainty_ = edges.certainty;
@@ -329,6 +342,32 @@ class Fit {
     return levels;
   }
 
+  /// Where fat or air lies outside, the wall before it is in the profile across the edge.
+  void look_for_walls(const Eigen::Matrix3Xd& normals, Levels& levels) {
+    const Eigen::Index n = total_.size();
+    WallProfiles profiles(n);
+    const Vec3 across = grey_.across_slices();
+#pragma omp parallel for schedule(static)
+    for (Eigen::Index v = 0; v < n; ++v) {
+      const Vec3 p = fitted_.vertices.col(v), out = normals.col(v);
+      const double slope = out.dot(across);
+      const double sigma = std::sqrt(sigma_ * sigma_ + grey_.thickness_variance() * slope * slope);
+      profiles.sigma(v) = sigma;
+      for (int k = 0; k < WallProfiles::kSamples; ++k) {
+        const double way = sigma * (WallProfiles::kFirst + k * WallProfiles::kStep);
+        profiles.values(k, v) = static_cast<float>(grey_.at(p + way * out));
+      }
+    }
+    const int passes = passes_for(kForWalls * levels.reach * unit_, edge_);
+    average_profiles(neighbours_, passes, profiles);
+    const WallsSeen seen = see_walls(profiles);
+    if (seen.outside.array().isNaN().all()) return;
+    levels.outside = seen.outside.array().isNaN().select(levels.outside, seen.outside);
+    Eigen::VectorXd weight = Eigen::VectorXd::Ones(n);
+    average(neighbours_, passes, levels.outside, weight);
+    blur_ = seen.blur * sigma_;
+  }
+
   Edges find_edges(const Eigen::Matrix3Xd& normals, const Levels& levels) const {
     const Eigen::Index n = total_.size();
     const int half = static_cast<int>(std::lround(kReach / kStep));
@@ -359,6 +398,18 @@ class Fit {
     return edges;
   }
 
+  /// Of the edges that show the blur within slices, if these are thick.
+  double sigma_in_plane(const Eigen::Matrix3Xd& normals, const Edges& edges, double of_all) const {
+    if (grey_.thickness_variance() <= 0.0) return of_all;
+    const Vec3 across = grey_.across_slices();
+    std::vector<double> widths;
+    for (Eigen::Index v = 0; v < edges.width.size(); ++v) {
+      const bool lies_so = std::abs(normals.col(v).dot(across)) < kAcross;
+      if (edges.width(v) > 0.0 && lies_so) widths.push_back(edges.width(v));
+    }
+    return widths.empty() ? of_all : std::min(of_all, median(std::move(widths)));
+  }
+
   /// Blur moved the edges toward the middle of the vessel. Its width is the next round's unit.
   void undo_blur(const Eigen::Matrix3Xd& normals, Edges& edges) {
     std::vector<double> widths;
@@ -366,15 +417,23 @@ class Fit {
                  [](double w) { return w > 0.0; });
     if (widths.empty()) return;
     const double sigma = median(widths);
-    Eigen::VectorXd inward = moved_by_blur(fitted_, neighbours_, normals, sigma, edge_);
-    Eigen::VectorXd most = Eigen::VectorXd::Constant(inward.size(), kMostMoved * sigma);
+    sigma_ = sigma_in_plane(normals, edges, sigma);
+    const bool by_walls = blur_ > 0.0 && grey_.thickness_variance() <= 0.0;
+    const double blur = by_walls ? blur_ : sigma;
+    // Spread along each of the surface's two directions by sigma. By walls it is known to less than
+    // a pass.
+    const double spread = std::sqrt(2.0) * blur;
+    const double blur_passes =
+        by_walls ? passes_within(spread, edge_) : static_cast<double>(passes_for(spread, edge_));
+    Eigen::VectorXd inward = moved_by_blur(fitted_, neighbours_, normals, blur_passes);
+    Eigen::VectorXd most = Eigen::VectorXd::Constant(inward.size(), kMostMoved * blur);
     // More across the slices: by half of that variance times the curvature there.
     if (const double more = grey_.thickness_variance(); more > 0.0) {
       const int passes = passes_for(std::sqrt(2.0 * more), edge_);
       const CurvatureAlong along =
           curvature_along(fitted_, neighbours_, normals, grey_.across_slices(), passes);
       inward += 0.5 * more * along.inside.cwiseProduct(along.curvature);
-      most = kMostMoved * (sigma * sigma + more * along.inside.array()).sqrt().matrix();
+      most = kMostMoved * (blur * blur + more * along.inside.array()).sqrt().matrix();
     }
     edges.shift += (edges.certainty.array() == 1.0).select(inward.cwiseMin(most), 0.0).matrix();
     unit_ = std::clamp(kUnitPerSigma * sigma, voxel_, kMostUnit * voxel_);
@@ -394,6 +453,8 @@ class Fit {
   Neighbours neighbours_;
   double voxel_, edge_;  // sizes of the image's voxels and of the surface's edges          [mm]
   double unit_;          // of distances along the normal                                   [mm]
+  double sigma_ = 0.0;   // of the blur, in slices, by the last edges' inner half           [mm]
+  double blur_ = 0.0;    // the same by profiles with the wall, or 0: not found              [mm]
   double far_ = 0.0;     // how far vertices may move in any case                           [mm]
   Surface fitted_;
   Eigen::VectorXd total_;      // (n) moved so far, outward                                 [mm]

@@ -28,7 +28,8 @@ struct FitStatistics {
 ///   1. The edge is where the grey value passes half way between the lumen's and the least within
 ///      1.2 units outside, which counts as no darker than soft tissue. Levels are local, so that
 ///      neither bright bone nor dark fat beyond the wall pulls the edge. Where it is brighter
-///      outside (calcium), the edge is half way to that.
+///      outside (calcium), the edge is half way to that. From the second round on the wall before
+///      fat is seen in the profile (wall_profile.h), unless slices blur more than all else.
 ///   2. Blur draws a curved edge toward the middle of the vessel by sigma^2 times the mean
 ///      curvature; the vertex moves out by as much.
 ///   3. Against noise, shifts are averaged over 2 units of the surface, up to 3 in a noisy image.

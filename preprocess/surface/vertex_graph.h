@@ -70,9 +70,13 @@ inline double mean_edge(const Surface& surface) {
   return sum / static_cast<double>(surface.triangles.cols());
 }
 
-/// How many passes of average() spread values by about `distance`: one spreads by edge / sqrt(2).
+/// How many passes of average() spread values by `distance`: one spreads by edge / sqrt(2).
+inline double passes_within(double distance, double edge) {
+  return std::clamp(2.0 * std::pow(distance / edge, 2), 1.0, 200.0);
+}
+/// The same in whole passes.
 inline int passes_for(double distance, double edge) {
-  return std::clamp(static_cast<int>(std::lround(2.0 * std::pow(distance / edge, 2))), 1, 200);
+  return static_cast<int>(std::lround(passes_within(distance, edge)));
 }
 
 }  // namespace wireplan::preprocess

@@ -254,7 +254,7 @@ TEST(SurfaceFromImage, MovesAndMirrorsWithItsGrid) {
   Image image = grey_tube(grid, axis, 3.0);
   Mask mask = tube_mask(grid, axis - 10.0 * Vec3::UnitZ(), axis + 50.0 * Vec3::UnitZ(), 3.0);
   // Fine: how the remesh cuts corners depends on the order of their triangles, which a mirror
-  // turns.
+  // turns, and a little the walls that are seen, by averages over neighbours.
   const SurfaceOptions options{.edge_length_mm = 0.5};
   const Surface here = surface_from_image(image, mask, options);
   const Grid turned = oblique_grid();
@@ -262,7 +262,7 @@ TEST(SurfaceFromImage, MovesAndMirrorsWithItsGrid) {
   image.grid.direction = mask.grid.direction = turned.direction;
   const Surface there = surface_from_image(image, mask, options);
   EXPECT_TRUE(is_sound(check_surface(there)));
-  EXPECT_NEAR(signed_volume(there), signed_volume(here), 1e-3 * signed_volume(here));
+  EXPECT_NEAR(signed_volume(there), signed_volume(here), 3e-3 * signed_volume(here));
 }
 
 TEST(SurfaceFromImage, HoldsATubesRadiusAtVoxelsFinerThanTheBlur) {
@@ -295,22 +295,46 @@ TEST(SurfaceFromImage, HoldsATubesRadiusAtVoxelsFinerThanTheBlur) {
   EXPECT_NEAR(sum / count, 0.0, 0.08);
 }
 
-/// Of a straight tube of 300 HU along that unit vector through the origin, in fat, with 5 HU of
-/// noise.
-Surface surface_of_tube(const Grid& grid, const Vec3& along, double radius) {
+/// Of a straight tube of 300 HU along that unit vector through the origin, with a wall of soft
+/// tissue in fat, with 5 HU of noise.
+Surface surface_of_tube(const Grid& grid, const Vec3& along, double radius, double wall = 1.0) {
   PhantomSpec spec;
   spec.grid = grid;
   spec.body_semi_axes = {90.0, 90.0, 1.0};
   spec.fat_mm = 85.0;
   spec.skin_mm = 1.0;
   spec.noise_hu = 5.0;
-  PhantomTube tube{.name = "tube", .hu = 300.0, .wall_mm = 1.0, .points = {}, .radius = {}};
+  PhantomTube tube{.name = "tube", .hu = 300.0, .wall_mm = wall, .points = {}, .radius = {}};
   tube.points.resize(3, 2);
   tube.points << -100.0 * along, 100.0 * along;
   tube.radius = Eigen::Vector2d::Constant(radius);
   spec.tubes = {tube};
   const Phantom phantom = make_phantom(spec);
   return surface_from_image(phantom.image, phantom.lumen, {.edge_length_mm = 1.0});
+}
+
+TEST(SurfaceFromImage, HoldsAThinTubesRadiusHoweverThickItsWallInFatIs) {
+  // Half way to soft tissue, whatever fat was seen through the wall, it was 4.1 % too narrow with
+  // the thinnest wall.
+  constexpr double kRadius = 2.5;
+  Grid grid;
+  grid.size = {40, 40, 40};
+  grid.spacing = Vec3(0.75, 0.75, 1.0);
+  grid.origin = Vec3(-15.0, -15.0, -20.0);
+  const Vec3 along = Vec3(0.2, 0.1, 1.0).normalized();
+  for (const double wall : {0.3, 0.5, 1.0, 1.5}) {
+    SCOPED_TRACE(wall);
+    const Surface surface = surface_of_tube(grid, along, kRadius, wall);
+    double sum = 0.0, count = 0.0;
+    for (const auto& vertex : surface.vertices.colwise()) {
+      const Vec3 p = vertex;
+      if (std::abs(p.z()) > 12.0) continue;
+      sum += (p - p.dot(along) * along).norm() / kRadius - 1.0;
+      count += 1.0;
+    }
+    ASSERT_GT(count, 50.0);
+    EXPECT_NEAR(sum / count, 0.0, 0.025);
+  }
 }
 
 TEST(SurfaceFromImage, HoldsAnObliqueTubesRadiusAcrossThickSlices) {
