@@ -157,7 +157,6 @@ void EnvelopeFactor::invert() {
     offset += end_[static_cast<std::size_t>(row)] - first(row);
   }
   inverse_.resize(static_cast<std::size_t>(offset));
-  column_.resize(static_cast<std::size_t>(n));
   sum_.resize(static_cast<std::size_t>(n));
   const auto row_of = [&](int row) {
     return inverse_.data() + inverse_place_[static_cast<std::size_t>(row)];

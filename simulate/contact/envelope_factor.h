@@ -53,7 +53,7 @@ class EnvelopeFactor {
   std::vector<std::ptrdiff_t> inverse_place_;  // of column 0 of each row, were it there
   std::vector<int> end_;
   std::vector<double> inverse_;
-  std::vector<double> column_, sum_;  // scratch
+  std::vector<double> sum_;  // scratch
 };
 
 }  // namespace wireplan::simulate
