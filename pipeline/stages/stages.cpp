@@ -270,7 +270,7 @@ std::vector<Stage> stages_of(const Case& given) {
   // Names of branches, or the way that was found.
   if (from_labels || from_volume) stages.back().after.emplace_back("segment");
   Stage anatomy{.name = "anatomy",
-                .version = 18,
+                .version = 19,
                 .reads_input = from_volume,
                 .after = {"surface", "centerline"},
                 .parameters = {"/access_limits", "/axes"},

@@ -30,6 +30,14 @@ constexpr double kFirstTilt = kPi / 9.0, kLastTilt = kPi / 40.0;
 constexpr int kTilts = 6, kTiltTries = 4;
 constexpr double kNear = 2.5;
 constexpr double kMuchLess = 0.9;
+// A section is open where, against the inscribed sphere, it is so many times as wide as the median
+// within so much line to either side.
+constexpr double kOpen = 1.2;
+constexpr double kBeside = 20.0;  // [mm]
+// So many points are cut out of one part of the surface, which holds what lies within so many
+// radii of them.
+constexpr Eigen::Index kStretch = 16;
+constexpr double kReach = 3.0;
 
 /// An edge of the surface as a key.
 std::uint64_t key_of(int a, int b) {
@@ -57,18 +65,19 @@ class PlaneCut {
     }
   }
 
-  /// Each loop once.
+  /// Each loop once, without those that end where the surface does.
   std::vector<std::vector<Vec3>> loops() {
     std::vector<std::vector<Vec3>> all;
     while (!next_.empty()) {
       std::vector<Vec3> loop;
-      std::uint64_t edge = next_.begin()->first;
+      const std::uint64_t first = next_.begin()->first;
+      std::uint64_t edge = first;
       for (auto found = next_.find(edge); found != next_.end(); found = next_.find(edge)) {
         loop.push_back(crossing(edge));
         edge = found->second;
         next_.erase(found);
       }
-      all.push_back(std::move(loop));
+      if (edge == first) all.push_back(std::move(loop));
     }
     return all;
   }
@@ -244,17 +253,55 @@ double area_of_vessel(const Surface& surface, const Vec3& point, const Vec3& nor
   return least;
 }
 
+/// Points of a line from `first` to before `last`, and the surface round them.
+struct Stretch {
+  Eigen::Index first, last;
+  Surface part;
+  double reach;  // of the part, from each of the points                                   [mm]
+};
+
+Stretch stretch_from(const Surface& surface, const Centerline& line, Eigen::Index first) {
+  const Eigen::Index last = std::min(first + kStretch, line.points.cols());
+  const Vec3 middle = line.points.col((first + last) / 2);
+  const auto points = line.points.middleCols(first, last - first);
+  const double half = (points.colwise() - middle).colwise().norm().maxCoeff();
+  const double reach =
+      kReach * std::max(kLeastChord, line.radius.segment(first, last - first).maxCoeff());
+  return {first, last, near_part(surface, middle, half + reach), reach};
+}
+
 /// By the cut across the line, or by a tilted one; the sphere's where none goes round the point.
-double diameter_at(const Surface& surface, const Centerline& line, Eigen::Index k) {
+double diameter_at(const Surface& surface, const Stretch& stretch, const Centerline& line,
+                   Eigen::Index k) {
   const Vec3 point = line.points.col(k), across = direction_at(line, k);
-  const double area = area_of_cut(surface, point, across);
+  double area = area_of_cut(stretch.part, point, across);
+  if (!std::isfinite(area)) area = area_of_cut(surface, point, across);
   if (!std::isfinite(area)) return 2.0 * line.radius(k);
-  const Surface part = near_part(surface, point, kNear * std::sqrt(area / kPi));
+  const double reach = kNear * std::sqrt(area / kPi);
+  const Surface& from = reach <= stretch.reach ? stretch.part : surface;
+  const Surface part = near_part(from, point, reach);
   const Vec3 tilted = smallest_cut(part, point, across, area);
   const bool turns = area_of_cut(part, point, tilted) < kMuchLess * area;
-  double closed = area_of_vessel(surface, point, across);
-  if (turns) closed = std::min(closed, area_of_vessel(surface, point, tilted));
+  double closed = area_of_vessel(from, point, across);
+  if (turns) closed = std::min(closed, area_of_vessel(from, point, tilted));
   return std::sqrt(4.0 * closed / kPi);
+}
+
+/// Of open sections, what a closed one as wide beside its sphere as those near it would have.
+Eigen::VectorXd without_openings(const Centerline& line, const Eigen::VectorXd& diameters) {
+  const Eigen::VectorXd times = diameters.array() / (2.0 * line.radius.array()).max(1e-9);
+  Eigen::VectorXd result = diameters;
+  std::vector<double> beside;
+  for (Eigen::Index k = 0; k < line.points.cols(); ++k) {
+    beside.clear();
+    for (Eigen::Index i = 0; i < line.points.cols(); ++i) {
+      if (std::abs(line.arc_length(i) - line.arc_length(k)) <= kBeside) beside.push_back(times(i));
+    }
+    const auto middle = beside.begin() + static_cast<std::ptrdiff_t>(beside.size() / 2);
+    std::nth_element(beside.begin(), middle, beside.end());
+    if (times(k) > kOpen * *middle) result(k) = *middle * 2.0 * line.radius(k);
+  }
+  return result;
 }
 
 }  // namespace
@@ -263,7 +310,14 @@ Eigen::VectorXd section_diameters(const Surface& surface, const Centerline& line
   const Eigen::Index count = line.points.cols();
   expects(count >= 2);
   Eigen::VectorXd single(count), mean(count);
-  for (Eigen::Index k = 0; k < count; ++k) single(k) = diameter_at(surface, line, k);
+#pragma omp parallel for schedule(dynamic)
+  for (Eigen::Index first = 0; first < count; first += kStretch) {
+    const Stretch stretch = stretch_from(surface, line, first);
+    for (Eigen::Index k = first; k < stretch.last; ++k) {
+      single(k) = diameter_at(surface, stretch, line, k);
+    }
+  }
+  single = without_openings(line, single);
   for (Eigen::Index k = 0; k < count; ++k) {
     double sum = 0.0;
     int some = 0;

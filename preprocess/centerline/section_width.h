@@ -13,6 +13,9 @@ namespace wireplan::preprocess {
 /// from one vessel into another its chord runs across both. What of it lies in the mouth of a
 /// branch does not count: where, seen from the point, the wall turns away steeply and comes back
 /// within 150 degrees. Of a lumen bent like a crescent that is an arm, so it comes out narrower.
+/// Where a section is over a fifth wider, as a part of its inscribed sphere, than those within 20
+/// mm in the median, it is open, as where the line leaves one vessel for another: there the sphere
+/// counts, with the median's part.
 /// Expects a line of two points or more.
 Eigen::VectorXd section_diameters(const Surface& surface, const Centerline& line);
 

@@ -89,6 +89,28 @@ TEST(SectionWidth, IsAcrossTheVesselThatALineIsAboutToLeave) {
   EXPECT_NEAR(diameters(75), 6.0, 0.2);  // 17.5 mm from the trunk's axis
 }
 
+TEST(SectionWidth, WhereALineLeavesAVesselForABranchIsTheBranchs) {
+  // Out of a tube of 8 mm into a branch of 2 mm at right angles: where that begins the line still
+  // turns, and cuts across it go through the tube too.
+  const Vec3 mouth(0.0, 0.0, 30.0), away(1.0, 0.0, 0.0);
+  const Surface tube = shapes::level_set(
+      [&](const Vec3& p) {
+        const double trunk = std::min({8.0 - std::hypot(p.x(), p.y()), p.z(), 80.0 - p.z()});
+        return std::max(trunk, shapes::depth_in_tube(p, mouth, mouth + 60.0 * away, 2.0));
+      },
+      Vec3(-9.0, -9.0, -1.0), Vec3(62.0, 9.0, 81.0), 0.7);
+  const Centerline line = find_centerline(tube, Vec3(0.0, 0.0, 5.0), mouth + 55.0 * away);
+  const Eigen::VectorXd diameters = section_diameters(tube, line);
+  int outside = 0;
+  for (Eigen::Index k = 0; k < line.points.cols(); ++k) {
+    const double along = (line.points.col(k) - mouth).dot(away);
+    if (along < 8.5 || along > 50.0) continue;
+    ++outside;
+    EXPECT_NEAR(diameters(k), 4.0, 0.5) << along << " mm from the trunk's axis";
+  }
+  EXPECT_GT(outside, 60);
+}
+
 TEST(SectionWidth, OfALongOvalIsWholeFromItsMiddle) {
   // Three times as long as wide, as a flattened lumen may be: no end of it is a branch.
   EXPECT_NEAR(section_diameters(oval_tube(2.0, 6.0), line_along_z(0.0)).mean(),
