@@ -517,13 +517,6 @@ InsertionScene read_insertion_scene(JsonReader& root, const simulate::Scene& wir
   return scene;
 }
 
-/// Of several tools.
-void refuse_contact_spacing(const Json& vessel, Problems& problems) {
-  if (!vessel.is_object() || !vessel.contains("contact_spacing_mm")) return;
-  problems.add("vessel.contact_spacing_mm", vessel["contact_spacing_mm"].dump(), "no such key",
-               "tools touch the wall at their nodes; give element_length_mm");
-}
-
 /// Of a bench with one wire.
 void refuse_support(const SceneVessel& vessel, Problems& problems) {
   if (!vessel.wall.support) return;
@@ -563,16 +556,14 @@ SceneFile read_scene(const std::filesystem::path& path) {
       contact.friction = scene.vessel->friction;
       contact.law = scene.vessel->contact_law;
       refuse_contact_spacing(file["vessel"], problems);
+    } else {
+      refuse_frictions(file["tools"], problems);
     }
     root.finish();
     problems.throw_if_any();
     return scene;
   }
   const simulate::Scene wire = read_wire_of_scene(root);
-  JsonReader output = root.object("output", false);
-  const double every = output.number("every_mm", simulate::InsertionOptions().record_every,
-                                     {.min = 0.001, .max = 1e4});
-  output.finish();
 
   // An insertion has a vessel; a bench may have one.
   const bool inserted = root.has("insertion");
@@ -586,9 +577,17 @@ SceneFile read_scene(const std::filesystem::path& path) {
   }
   if (inserted) {
     scene.insertion = read_insertion_scene(root, wire, *scene.vessel);
-    scene.insertion->options.record_every = every;
+    JsonReader output = root.object("output", false);
+    double& every = scene.insertion->options.record_every;
+    every = output.number("every_mm", every, {.min = 0.001, .max = 1e4});
+    output.finish();
   } else {
-    if (scene.vessel) refuse_support(*scene.vessel, problems);
+    refuse(root, "output", "histories of a bench are");
+    if (scene.vessel) {
+      refuse_support(*scene.vessel, problems);
+    } else {
+      refuse_friction(file["wire"], "wire", problems);
+    }
     scene.bench = read_bench(root, wire, scene.vessel);
   }
   root.finish();

@@ -396,4 +396,22 @@ simulate::Loads read_loads(JsonReader& root) {
   return loads;
 }
 
+void refuse_contact_spacing(const Json& vessel, Problems& problems) {
+  if (!vessel.is_object() || !vessel.contains("contact_spacing_mm")) return;
+  problems.add("vessel.contact_spacing_mm", vessel["contact_spacing_mm"].dump(), "no such key",
+               "tools touch the wall at their nodes; give element_length_mm");
+}
+
+void refuse_friction(const Json& tool, const std::string& key, Problems& problems) {
+  if (!tool.is_object() || !tool.contains("friction")) return;
+  problems.add(key + ".friction", tool["friction"].dump(), "no such key without a \"vessel\"",
+               "it is the friction with the wall; delete it, or give a vessel");
+}
+
+void refuse_frictions(const Json& tools, Problems& problems) {
+  for (std::size_t k = 0; tools.is_array() && k < tools.size(); ++k) {
+    refuse_friction(tools[k], "tools[" + std::to_string(k) + "]", problems);
+  }
+}
+
 }  // namespace wireplan::pipeline

@@ -37,4 +37,12 @@ void check_table(const std::optional<Vec3>& normal, const std::vector<simulate::
 /// at less than a hundredth; chosen.
 bool is_out_of_reach(double length, const simulate::Support& from, const simulate::Support& to);
 
+/// Tells of keys of a scene's "vessel" that several tools have not.
+void refuse_contact_spacing(const Json& vessel, Problems& problems);
+
+/// Tells of a wire's or a tool's own friction, which is that with the wall, where there is none;
+/// and of that of all "tools".
+void refuse_friction(const Json& tool, const std::string& key, Problems& problems);
+void refuse_frictions(const Json& tools, Problems& problems);
+
 }  // namespace wireplan::pipeline

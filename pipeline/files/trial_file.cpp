@@ -321,11 +321,10 @@ std::string trial_text(const plan::Study& study, const plan::Candidate& candidat
 Json moves_json(const std::vector<simulate::Move>& moves) {
   Json list = Json::array();
   for (const simulate::Move& move : moves) {
-    if (move.turn != 0.0) {
-      list.push_back({{"turn_deg", clean(move.turn / kRadPerDeg)}});
-    } else {
-      list.push_back({{"push_mm", clean(move.push)}});
-    }
+    Json row = Json::object();
+    if (move.push != 0.0 || move.turn == 0.0) row["push_mm"] = clean(move.push);
+    if (move.turn != 0.0) row["turn_deg"] = clean(move.turn / kRadPerDeg);
+    list.push_back(std::move(row));
   }
   return list;
 }

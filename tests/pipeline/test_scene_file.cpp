@@ -117,6 +117,10 @@ TEST_F(CaseFile, ASceneMayNameAWireOfTheCatalogue) {
 
   pushed["vessel"]["friction"] = 0.2;
   expect_mentions(scene_problem(pushed), {"vessel.friction is 0.2", "give wire.friction"});
+  // Where nothing rubs it would do nothing.
+  bench.erase("vessel");
+  bench["wire"]["friction"] = 0.2;
+  expect_mentions(scene_problem(bench), {"wire.friction is 0.2", "without a \"vessel\""});
   bench["wire"] = {{"device", "amplatz-stif"}};
   expect_mentions(scene_problem(bench), {"wire.device is", "did you mean \"amplatz-stiff\"?"});
   bench["wire"] = {{"device", "amplatz-stiff"}, {"length_mm", 2000}};
@@ -432,6 +436,7 @@ TEST_F(SceneMistakes, AreToldAndWhatIsNotInThisVersion) {
        {1, 0},
        {"sections[0].bending_stiffness_n_mm2[1] is 0", "above 0"}},
       {cantilever(), "/target", {{"point_mm", {0, 0, 1}}}, {"target is not a known key"}},
+      {cantilever(), "/output", {{"every_mm", 5}}, {"output is given", "histories of a bench"}},
       {pushed_wire(), "/vessel/friction", -0.1, {"vessel.friction is -0.1", "from 0"}},
       {pushed_wire(), "/vessel/wall/model", "soft", {"vessel.wall.model", "\"elastic\""}},
       {motion("conjugate_gradient"),

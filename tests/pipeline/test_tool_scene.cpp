@@ -167,6 +167,8 @@ TEST_F(ToolMistakes, AreToldByKey) {
          for (int k = 0; k < 2; ++k) json["tools"].push_back(straight_wire());
        }},
       {"introducer is missing", [](Json& json) { json.erase("introducer"); }},
+      {"tools[0].friction is 0.1, expected no such key without a \"vessel\"",
+       [](Json& json) { json["tools"][0]["friction"] = 0.1; }},
   };
   expect_told(rows);
   // All of them at once.

@@ -106,6 +106,18 @@ TEST(TrialFile, KeepsWhatASeatedCatheterBears) {
   }
 }
 
+TEST(TrialFile, MovesAreReadAsTheyAreWritten) {
+  const std::vector<simulate::Move> moves = {
+      {.push = -10.0}, {.turn = 0.5 * kPi}, {.push = 3.0, .turn = -0.5 * kPi}};
+  const std::vector<simulate::Move> read = moves_of(moves_json(moves));
+  ASSERT_EQ(read.size(), moves.size());
+  for (std::size_t k = 0; k < moves.size(); ++k) {
+    EXPECT_EQ(read[k].push, moves[k].push);
+    EXPECT_DOUBLE_EQ(read[k].turn, moves[k].turn);
+  }
+  EXPECT_EQ(moves_json(moves)[0].dump(), "{\"push_mm\":-10.0}");
+}
+
 TEST(TrialFile, StepsOfAScriptAreReadAsTheyAreWritten) {
   using simulate::Until;
   const std::vector<simulate::ToolStep> steps = {
