@@ -120,18 +120,26 @@ std::vector<PatientRow> run_patients(const BenchOptions& options) {
   return rows;
 }
 
-std::vector<PatientRow> run_labelled(const BenchOptions& options) {
-  const char* named = std::getenv("WIREPLAN_DATA");
-  const fs::path data = !options.data.empty() ? options.data : fs::path(named ? named : "");
-  std::vector<PatientRow> rows;
-  for (const LabelledCase& one : find_labelled_cases(data)) {
-    rows.push_back(guarded(one.name, [&] { return segment_labelled(one); }));
+/// The real cases to run, none with quick. Throws Error where --data asks for what cannot be run.
+std::vector<LabelledCase> labelled_of(const BenchOptions& options) {
+  const bool asked = !options.data.empty();
+  if (asked && !preprocess::reads_volumes()) {
+    throw Error(
+        "bench: --data needs images, and this wireplan is built without them; configure with "
+        "-DWIREPLAN_IMAGING=ON");
   }
-  if (rows.empty() && !options.data.empty()) {
+  if (asked && options.quick) {
+    throw Error("bench: --data is given with --quick, which runs no real cases; leave one out");
+  }
+  if (options.quick || !preprocess::reads_volumes()) return {};
+  const char* named = std::getenv("WIREPLAN_DATA");
+  std::vector<LabelledCase> cases =
+      find_labelled_cases(asked ? options.data : fs::path(named ? named : ""));
+  if (asked && cases.empty()) {
     throw Error("bench: --data is '" + options.data.string() +
                 "', expected a folder with ct-aorta-dissection-labelled");
   }
-  return rows;
+  return cases;
 }
 
 /// Of those rows that have the value, ascending.
@@ -276,16 +284,11 @@ Json describe_columns() {
 }  // namespace
 
 BenchReport bench_segmentation(const BenchOptions& options) {
-  if (!preprocess::reads_volumes() && !options.data.empty()) {
-    throw Error(
-        "bench: --data needs images, and this wireplan is built without them; configure with "
-        "-DWIREPLAN_IMAGING=ON");
-  }
+  const std::vector<LabelledCase> labelled = labelled_of(options);
   const std::vector<PatientRow> drawn = run_patients(options);
   std::vector<PatientRow> all = drawn;
-  if (preprocess::reads_volumes() && !options.quick) {
-    const std::vector<PatientRow> real = run_labelled(options);
-    all.insert(all.end(), real.begin(), real.end());
+  for (const LabelledCase& one : labelled) {
+    all.push_back(guarded(one.name, [&] { return segment_labelled(one); }));
   }
   BenchReport report;
   for (const PatientRow& row : all) report.rows.push_back(json_of(row));

@@ -265,6 +265,11 @@ TEST(Bench, SegmentationHoldsPatientsAgainstTheirTruth) {
   EXPECT_EQ(results.at("criteria").size(), 6u);
   EXPECT_EQ(results.at("spread")[0].at("patients"), done);
   expect_written(segmentation, "segmentation", "dice_way");
+  // Before a patient is drawn.
+  const TemporaryFolder empty;
+  EXPECT_THROW(run_bench("segmentation", empty.path(), {.data = empty.path()}), Error);
+  EXPECT_THROW(run_bench("segmentation", empty.path(), {.quick = true, .data = empty.path()}),
+               Error);
 }
 
 /// Frames of a wire that was pushed into a bent tube, as a file of measurements has them.
