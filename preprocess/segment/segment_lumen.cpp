@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <utility>
 
 #include "preprocess/segment/side_branches.h"
@@ -11,6 +12,8 @@ namespace wireplan::preprocess {
 namespace {
 
 constexpr double kEdgePart = 0.4;   // of the contrast
+constexpr double kFatHu = -100.0;   // beyond an artery's wall, as dark as it gets
+constexpr double kWallMm = 0.9;     // of arteries: aortas have more, their branches less; assumed
 constexpr double kNearWayMm = 3.0;  // where less of it is enough
 constexpr double kSpeckMm3 = 15.0;
 constexpr float kMiddlePart = 0.6F;  // of a part's depth: what is deeper is surely its own
@@ -97,12 +100,32 @@ double value_beyond(const LumenField& field, const std::vector<float>& away, std
   return least;
 }
 
+/// The darkest that a vessel's surroundings look from its edge: half way from the lumen's level to
+/// this lies what blur leaves of a wall before fat [HU].
+double darkest_beside(const LumenField& field) {
+  if (!field.hounsfield) return field.surroundings;
+  const double fat = std::erfc(kWallMm / (std::numbers::sqrt2 * LevelRule(field).blur()));
+  return field.surroundings + fat * (kFatHu - field.surroundings);
+}
+
+/// The least value that an artery of this level has at its edge, where `beyond` lies behind it:
+/// kEdgePart of the contrast, less before fat. `darkest`: as darkest_beside() [HU].
+double least_at_edge(const LumenField& field, double level, double beyond, double darkest) {
+  constexpr double kHalf = 0.5;
+  const double usual = field.surroundings + kEdgePart * (level - field.surroundings);
+  if (darkest >= field.surroundings) return usual;
+  const double dark = std::clamp(beyond, darkest, field.surroundings);
+  const double fat = (field.surroundings - dark) / (field.surroundings - darkest);
+  const double part = kEdgePart + fat * (kHalf - kEdgePart);
+  return std::min(usual, dark + part * (level - dark));
+}
+
 /// Step 3.
 void add_rim(const LumenField& field, std::vector<float>& level, Labels& artery, Labels& other) {
   constexpr int kLayers = 2;
   constexpr double kByLevel = 2.0;  // voxels that a difference by the whole contrast counts for
   const Grid& grid = field.grid;
-  const double voxel = std::cbrt(grid.spacing.prod());
+  const double voxel = std::cbrt(grid.spacing.prod()), darkest = darkest_beside(field);
   const std::vector<float> to_artery = distance_to(1, grid, artery);
   const std::vector<float> to_other = distance_to(1, grid, other);
   const auto contrast_of = [&](float of) { return static_cast<double>(of) - field.surroundings; };
@@ -124,9 +147,10 @@ void add_rim(const LumenField& field, std::vector<float>& level, Labels& artery,
       if (mine == 0.0F && others == 0.0F) continue;
       const auto reaches = [&](float of, const std::vector<float>& distance) {
         const auto level_of = static_cast<double>(of);
-        if (of == 0.0F || value < field.surroundings + kEdgePart * contrast_of(of)) return false;
+        if (of == 0.0F || value < least_at_edge(field, level_of, darkest, darkest)) return false;
         const double beyond = value_beyond(field, distance, n);
-        return beyond >= level_of || value >= beyond + kEdgePart * (level_of - beyond);
+        return value >= least_at_edge(field, level_of, beyond, darkest) &&
+               (beyond >= level_of || value >= beyond + kEdgePart * (level_of - beyond));
       };
       const auto away = [&](float distance, float of) {
         return static_cast<double>(distance) / voxel +

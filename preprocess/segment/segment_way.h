@@ -32,6 +32,9 @@ class LevelRule {
   double seen(float depth) const;
   double seen_raw(float depth) const;
 
+  /// Sigma of all that blurs the smoothed values [mm].
+  double blur() const { return blur_; }
+
   /// The level [HU] after a step [mm] to where the middle of the vessel has this value. It is
   /// followed over 10 mm; a vessel of which blur takes over a fifth tells nothing.
   float follow(float level, double value, double seen, double step) const;

@@ -6,6 +6,7 @@
 #include <numbers>
 #include <random>
 #include <string>
+#include <vector>
 
 #include "preprocess/segment/mask_shape.h"
 #include "preprocess/segment/segment.h"
@@ -66,6 +67,21 @@ TEST(SegmentLevel, ContrastThatFallsAlongTheVesselIsFollowed) {
   ASSERT_GE(found.statistics.along.size(), 9U);
   for (const LevelAlong& place : found.statistics.along) {
     EXPECT_NEAR(place.level_hu, falling(place.place), 5.0) << place.place.transpose();
+  }
+}
+
+TEST(SegmentLevel, AnArteryOfLittleContrastInFatIsAsWideAsInSoftTissue) {
+  // Noise asks for smoothing, which draws the fat behind a wall of 1 mm into the lumen's edge.
+  for (const double around : {kAround, -100.0}) {
+    SCOPED_TRACE(around);
+    const Image image = scanned(20.0, [&](const Vec3& p) {
+      return off_axis(p, 0) < 5.0 ? 150.0 : off_axis(p, 0) < 6.0 ? kAround : around;
+    });
+    const Segmentation found = segment(image, {.seeds = {kBottom}, .target = kTop});
+    EXPECT_EQ(found.statistics.band.smoothing_mm, 0.8);
+    const double height = image.grid.spacing.z() * image.grid.size[2];
+    const double radius = std::sqrt(found.statistics.volume_mm3 / height / std::numbers::pi);
+    EXPECT_NEAR(radius, 5.0, 0.15);
   }
 }
 
