@@ -22,9 +22,11 @@ constexpr double kSteady = 2.2;    // by which sections may differ from those be
 constexpr double kOstium = 0.3;    // least contact with the artery, of the cross-section
 constexpr double kLeavesMm = 5.0;  // from the contact, behind which the artery is far
 constexpr double kOfArtery = 0.7, kAlwaysMm = 2.0;  // of the artery's radius; what always is
-constexpr int kMostRounds = 3;                      // of branches that leave branches
-constexpr double kSectionVoxels = 2.0;              // how long a section is, at least
-constexpr double kOwnPart = 0.5;                    // of its own contrast, where a branch ends
+constexpr double kAlikePart = 0.75,
+                 kAlikeMm = 2.5;        // of the artery's contrast; what then always is
+constexpr int kMostRounds = 3;          // of branches that leave branches
+constexpr double kSectionVoxels = 2.0;  // how long a section is, at least
+constexpr double kOwnPart = 0.5;        // of its own contrast, where a branch ends
 
 /// Voxels of one distance from the contact.
 struct Section {
@@ -68,25 +70,18 @@ class BranchSearch {
         section_mm_(section_length(field.grid)),
         least_contrast_(least_contrast(field)),
         distance_(artery.size(), std::numeric_limits<double>::infinity()),
+        before_(artery.size(), 0),
         open_(artery.size(), 0) {}
 
-  /// The sections of the branch at this contact; empty where there is none.
+  /// The sections of the branch at this contact; empty where there is none. Where what lies at the
+  /// contact falls into pieces next to the artery, one of them may be the branch.
   std::vector<Section> follow(const Contact& contact) {
     std::vector<Section> sections = follow_steady(contact);
-    for (const std::size_t n : touched_) {
-      distance_[n] = std::numeric_limits<double>::infinity();
-      open_[n] = 0;
+    if (!is_branch(contact, sections)) {
+      sections = pieces_.empty() ? std::vector<Section>() : follow_pieces(contact, sections);
     }
+    forget();
     touched_.clear();
-    const auto count = static_cast<double>(sections.size());
-    const double across =
-        mean_voxels(sections) * voxel_ / section_mm_;  // voxels of a cross-section
-    const double radius = voxel_ * std::sqrt(across / std::numbers::pi);
-    if (across < kLeastVoxels || count * section_mm_ < std::max(kLeastMm, kLeastRadii * radius) ||
-        static_cast<double>(contact.voxels.size()) < kOstium * across ||
-        radius > std::max(kAlwaysMm, kOfArtery * contact.radius)) {
-      sections.clear();
-    }
     return sections;
   }
 
@@ -99,16 +94,84 @@ class BranchSearch {
     return sum / std::max(1.0, static_cast<double>(sections.size()));
   }
 
+  /// Whether the sections are long, wide and narrow enough for a branch at the contact.
+  bool is_branch(const Contact& contact, const std::vector<Section>& sections) const {
+    const auto count = static_cast<double>(sections.size());
+    const double across =
+        mean_voxels(sections) * voxel_ / section_mm_;  // voxels of a cross-section
+    const double radius = voxel_ * std::sqrt(across / std::numbers::pi);
+    return across >= kLeastVoxels &&
+           count * section_mm_ >= std::max(kLeastMm, kLeastRadii * radius) &&
+           static_cast<double>(contact.voxels.size()) >= kOstium * across &&
+           radius <= std::max(is_alike(contact, sections) ? kAlikeMm : kAlwaysMm,
+                              kOfArtery * contact.radius);
+  }
+
+  /// Whether the sections are nearly as bright as the artery.
+  bool is_alike(const Contact& contact, const std::vector<Section>& sections) const {
+    double sum = 0.0, voxels = 0.0;
+    for (const Section& section : sections) {
+      sum += section.sum;
+      voxels += static_cast<double>(section.voxels.size());
+    }
+    return sum - voxels * field_.surroundings >=
+           kAlikePart * voxels * (contact.level - field_.surroundings);
+  }
+
+  /// The first of the pieces, the largest first, that a branch begins in: its sections, and before
+  /// them the voxels that lead there from the contact. What was visited on the way to the pieces is
+  /// closed.
+  std::vector<Section> follow_pieces(const Contact& contact, const std::vector<Section>& visited) {
+    const std::vector<std::vector<std::size_t>> pieces = std::move(pieces_);
+    for (const std::vector<std::size_t>& piece : pieces) {
+      if (static_cast<double>(piece.size()) < kLeastVoxels) break;
+      Section stem;
+      for (const std::size_t n : piece) open_[n] = 1;
+      for (std::size_t n : piece) {
+        for (n = before_[n]; open_[n] == 0; n = before_[n]) {
+          open_[n] = 1;
+          stem.voxels.push_back(n);
+          stem.sum += static_cast<double>(field_.raw[n]);
+          if (before_[n] == n) break;
+        }
+      }
+      forget();
+      for (const Section& section : visited) close(section.voxels);
+      for (const std::vector<std::size_t>& other : pieces) close(other);
+      for (const std::size_t n : piece) distance_[n] = std::numeric_limits<double>::infinity();
+      const Contact begin{.voxels = piece, .level = contact.level, .radius = contact.radius};
+      std::vector<Section> sections = follow_steady(begin);
+      if (!is_branch(begin, sections) || !is_alike(begin, sections)) continue;
+      sections.insert(sections.begin(), std::move(stem));
+      return sections;
+    }
+    return {};
+  }
+
+  /// As before anything was visited.
+  void forget() {
+    for (const std::size_t n : touched_) {
+      distance_[n] = std::numeric_limits<double>::infinity();
+      open_[n] = 0;
+    }
+  }
+
+  void close(const std::vector<std::size_t>& voxels) {
+    for (const std::size_t n : voxels) distance_[n] = 0.0;
+  }
+
   std::vector<Section> follow_steady(const Contact& contact) {
+    pieces_.clear();
     const double least = least_value(field_, part_, least_contrast_, contact.level);
     std::priority_queue<Visit, std::vector<Visit>, std::greater<>> visits;
-    const auto reach = [&](std::size_t n, double distance) {
+    const auto reach = [&](std::size_t n, double distance, std::size_t from) {
       if (distance >= distance_[n]) return;
       if (std::isinf(distance_[n])) touched_.push_back(n);
       distance_[n] = distance;
+      before_[n] = static_cast<std::uint32_t>(from);
       visits.push({distance, n});
     };
-    for (const std::size_t n : contact.voxels) reach(n, 0.0);
+    for (const std::size_t n : contact.voxels) reach(n, 0.0, n);
     std::vector<Section> sections;
     Section open;
     while (!visits.empty()) {
@@ -133,8 +196,8 @@ class BranchSearch {
         }
         const auto value = static_cast<double>(field_.values[m]);
         if (value < least || value > field_.upper) return;
-        reach(m,
-              distance + Vec3(step[0], step[1], step[2]).cwiseProduct(field_.grid.spacing).norm());
+        const Vec3 by = Vec3(step[0], step[1], step[2]).cwiseProduct(field_.grid.spacing);
+        reach(m, distance + by.norm(), n);
       });
     }
     if (open.returns) return {};
@@ -153,16 +216,18 @@ class BranchSearch {
                             voxels * kSteady < kLeastVoxels * section_mm_ / voxel_)) {
       return false;
     }
-    return static_cast<double>(largest_piece(section)) >= kOnePiece * voxels;
+    std::vector<std::vector<std::size_t>> pieces = pieces_of(section);
+    if (static_cast<double>(pieces.front().size()) >= kOnePiece * voxels) return true;
+    if (static_cast<double>(before.size()) * section_mm_ < kLeavesMm) pieces_ = std::move(pieces);
+    return false;
   }
 
-  /// Voxels of the largest piece of the open section.
-  std::size_t largest_piece(const Section& section) {
-    std::vector<std::size_t> queue;
-    std::size_t largest = 0;
+  /// Pieces of the open section, the largest first.
+  std::vector<std::vector<std::size_t>> pieces_of(const Section& section) {
+    std::vector<std::vector<std::size_t>> pieces;
     for (const std::size_t start : section.voxels) {
       if (open_[start] == 0) continue;
-      queue.assign(1, start);
+      std::vector<std::size_t> queue = {start};
       open_[start] = 0;
       for (std::size_t next = 0; next < queue.size(); ++next) {
         for_each_neighbour(field_.grid, queue[next], [&](std::size_t m, const Voxel&) {
@@ -171,18 +236,23 @@ class BranchSearch {
           queue.push_back(m);
         });
       }
-      largest = std::max(largest, queue.size());
+      pieces.push_back(std::move(queue));
     }
-    return largest;
+    std::stable_sort(pieces.begin(), pieces.end(),
+                     [](const auto& a, const auto& b) { return a.size() > b.size(); });
+    return pieces;
   }
 
   const LumenField& field_;
   const Labels& artery_;
-  double part_;                   // of the artery's contrast, that a branch has
-  double voxel_, section_mm_;     //                                                       [mm]
-  double least_contrast_;         //                                                       [HU]
-  std::vector<double> distance_;  // in the branch, from the contact                       [mm]
-  Labels open_;                   // 1 in the section that is being visited
+  double part_;                        // of the artery's contrast, that a branch has
+  double voxel_, section_mm_;          //                                                       [mm]
+  double least_contrast_;              //                                                       [HU]
+  std::vector<double> distance_;       // in the branch, from the contact                       [mm]
+  std::vector<std::uint32_t> before_;  // the voxel from which each was reached; itself at contacts
+  Labels open_;                        // 1 in the section that is being visited
+  std::vector<std::vector<std::size_t>>
+      pieces_;  // of a section next to the contact, that it ends in
   std::vector<std::size_t> touched_;
 };
 

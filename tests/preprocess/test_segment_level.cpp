@@ -211,6 +211,24 @@ TEST(SegmentLevel, ABranchWhoseMouthTouchesAnOrganIsKept) {
             0.95);
 }
 
+TEST(SegmentLevel, ABranchThatLeavesBesideANodeIsKept) {
+  // What plaque leaves of the branch's mouth and the node touch the artery in one place.
+  const auto branch = [](const Vec3& p) {
+    return p.x() > 0.0 && std::hypot(p.y(), p.z() - 45) < 2;
+  };
+  const auto node = [](const Vec3& p) { return (p - Vec3(7.0, 4.4, 45.0)).norm() < 2.8; };
+  const Image image = scanned(8.0, [&](const Vec3& p) {
+    return off_axis(p, 0) < 5.0       ? 300.0
+           : branch(p) && p.x() > 7.0 ? 300.0
+           : branch(p) || node(p)     ? 205.0
+                                      : kAround;
+  });
+  const Segmentation found = segment(image, {.seeds = {kBottom}, .target = kTop});
+  EXPECT_TRUE(contains(found.mask, Vec3(18, 0, 45)));
+  EXPECT_FALSE(contains(found.mask, Vec3(7.5, 5.5, 45)));
+  EXPECT_EQ(found.statistics.branches.size(), 1U);
+}
+
 TEST(SegmentLevel, AVeinThatPassesByOrAnOrganIsNoBranch) {
   const auto vein = [](const Vec3& p) { return std::hypot(p.x() - 6.5, p.z() - 45.0) < 2.0; };
   const auto organ = [](const Vec3& p) { return (p - Vec3(14, 0, 45)).norm() < 10.0; };
