@@ -23,6 +23,7 @@ constexpr double kMostNoisePart = 0.35;  // of the contrast; more is marrow, or 
 constexpr double kSeenPart = 0.4;        // of the least contrast: below, a point has none at all
 constexpr double kCalciumHu = 800.0;     // references B5: arterial phase, calcium above
 constexpr double kSnapMm = 2.5;          // how far a point may lie beside the lumen it means
+constexpr double kWideMm = 2.0;          // ball of a point that is dark in the smallest one
 constexpr double kNoiseMm = 10.0;        // ball in which noise is measured
 constexpr double kApartMm = 1.2;
 constexpr double kLumenMm = 6.0;        // ball in which the lumen's values are taken
@@ -59,8 +60,8 @@ double measure_noise(const Image& image, const Vec3& point) {
   return differences.empty() ? 0.0 : 1.4826 * median_of(std::move(differences)) / std::sqrt(6.0);
 }
 
-double median_near(const Image& image, const Vec3& center) {
-  const double radius = std::max(1.0, 1.01 * image.grid.spacing.minCoeff());
+double median_near(const Image& image, const Vec3& center, double least_radius = 1.0) {
+  const double radius = std::max(least_radius, 1.01 * image.grid.spacing.minCoeff());
   std::vector<double> values;
   for (const std::size_t n : voxels_in_ball(image.grid, center, radius)) {
     values.push_back(static_cast<double>(image.values[n]));
@@ -247,7 +248,13 @@ LumenSample sample_lumen(const Image& image, const Vec3& point, double surroundi
                      .level_hu = median_near(image, point),
                      .noise_hu = measure_noise(image, point)};
   sample.voxels = 1;
-  if (sample.level_hu < surroundings + kSeenPart * kLeastContrastHu) return with_error(sample);
+  const double seen = surroundings + kSeenPart * kLeastContrastHu;
+  if (sample.level_hu < seen) {
+    // so few voxels may be dark by noise alone
+    const double wide = median_near(image, point, kWideMm);
+    if (wide < seen) return with_error(sample);
+    sample.level_hu = wide;
+  }
   // the middle of the vessel nearby tells more than a point near the wall
   const double contrast = sample.level_hu - surroundings;
   measure_near(image, surroundings + 0.5 * contrast,

@@ -37,10 +37,10 @@ struct Band {
 };
 
 /// Level: the median of the lumen within 6 mm of the vessel's middle, over `surroundings` [HU];
-/// where that are too few voxels, of a ball of 1 mm (or one voxel) there. A point without contrast
-/// keeps the level at the point. Noise: the smaller of two estimates, since each can only be too
-/// large. One is from second differences within 10 mm, to which edges add; the other is the spread
-/// of the lumen within 6 mm, to which the wall adds.
+/// where that are too few voxels, of a ball of 1 mm (or one voxel) there. A point without contrast,
+/// in a ball of 2 mm either, keeps the level at the point. Noise: the smaller of two estimates,
+/// since each can only be too large. One is from second differences within 10 mm, to which edges
+/// add; the other is the spread of the lumen within 6 mm, to which the wall adds.
 LumenSample sample_lumen(const Image& image, const Vec3& point, double surroundings);
 
 /// Samples again, without what is brighter than lumen, each point that lies in plaque: its core

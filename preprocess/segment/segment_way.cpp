@@ -23,6 +23,8 @@ constexpr double kPartSteps = 200.0;     // of the expected contrast: resolution
 constexpr int kLeastBottleneck = 60;     // of these: 30 %, less joins nothing
 constexpr int kSlack = 4;                // of these: ways a little darker than the brightest
 constexpr double kSlackNoises = 1.5;     // by which noise alone makes a way's worst place darker
+constexpr double kFarNoises = 2.5;       // the same of a way that is cheaper by a quarter
+constexpr float kFarCheaper = 0.75F;     // of the cost: less is a detour through another vessel
 constexpr double kNoiseLeft = 1.5;       // noise that smoothing leaves, against independent voxels
 constexpr double kWideningMm = 40.0;     // that a way may be longer to widen by a factor e less
 constexpr double kMeanMm = 1.5;          // sigma of the means that tell a vein from an artery
@@ -137,10 +139,11 @@ std::vector<std::uint8_t> bright_parts(const LumenField& field, const Candidates
   return parts;
 }
 
-/// How much darker than the brightest connection a way may be in its worst place, in steps of the
-/// expected contrast at the darkest point. Of two ways of one level noise decides which has the
-/// darker place, and a thin one has more such places: that alone is not to shut it out.
-int find_slack(const LumenField& field, const std::vector<WayLevel>& points) {
+/// How much darker than the brightest connection a way may be in its worst place, by so many sigma
+/// of the noise, in steps of the expected contrast at the darkest point. Of two ways of one level
+/// noise decides which has the darker place, and a thin one has more such places: that alone is not
+/// to shut it out.
+int find_slack(const LumenField& field, const std::vector<WayLevel>& points, double noises) {
   double contrast = std::numeric_limits<double>::infinity();
   for (const WayLevel& point : points) {
     contrast = std::min(contrast, static_cast<double>(point.level) - field.surroundings);
@@ -148,7 +151,7 @@ int find_slack(const LumenField& field, const std::vector<WayLevel>& points) {
   const double left =
       field.smoothing_mm > 0.0 ? smoothed_noise(field.grid, field.smoothing_mm) : 1.0;
   const double noise = kNoiseLeft * left * field.noise;
-  return std::max(kSlack, static_cast<int>(kSlackNoises * noise / contrast * kPartSteps));
+  return std::max(kSlack, static_cast<int>(noises * noise / contrast * kPartSteps));
 }
 
 /// The largest part such that voxels of it or more join `start` and `end`; 0 where none do.
@@ -192,11 +195,18 @@ WidthSoFar widen(const WidthSoFar& before, float here, double& log_wider) {
   return next;
 }
 
+/// A way, the least part of its voxels that it was found over, and what it costs [mm].
+struct PricedWay {
+  std::vector<WayLevel> places;
+  int least = 0;
+  float cost = 0.0F;
+};
+
 /// Step 2 or 3: the cheapest way over voxels of `least` or more. `widening` is the cost of widening
 /// again by a factor e [mm].
-std::vector<WayLevel> find_way(const LumenField& field, const Candidates& candidates,
-                               const WayMap& map, const std::vector<std::uint8_t>& parts, int least,
-                               double widening, const WayLevel& start, std::size_t end) {
+PricedWay find_way(const LumenField& field, const Candidates& candidates, const WayMap& map,
+                   const std::vector<std::uint8_t>& parts, int least, double widening,
+                   const WayLevel& start, std::size_t end) {
   constexpr float kFar = std::numeric_limits<float>::infinity();
   const LevelRule rule(field);
   const double half_voxel = 0.5 * field.grid.spacing.minCoeff();
@@ -241,11 +251,11 @@ std::vector<WayLevel> find_way(const LumenField& field, const Candidates& candid
       queue.push({next, m});
     });
   }
-  std::vector<WayLevel> way;
+  PricedWay way{.places = {}, .least = least, .cost = cost[end]};
   if (cost[end] == kFar) return way;
-  for (std::size_t n = end; n != start.voxel; n = before[n]) way.push_back({n, levels[n]});
-  way.push_back(start);
-  std::reverse(way.begin(), way.end());
+  for (std::size_t n = end; n != start.voxel; n = before[n]) way.places.push_back({n, levels[n]});
+  way.places.push_back(start);
+  std::reverse(way.places.begin(), way.places.end());
   return way;
 }
 
@@ -384,18 +394,24 @@ std::vector<std::vector<WayLevel>> find_level_ways(const LumenField& field,
                       .mean = local_means(field, candidates),
                       .seen = seen_parts(field, candidates)};
   const std::vector<std::uint8_t> parts = bright_parts(field, candidates, map.expected);
-  const int slack = find_slack(field, points);
+  const int slack = find_slack(field, points, kSlackNoises);
+  const int far_slack = find_slack(field, points, kFarNoises);
   std::vector<std::vector<WayLevel>> ways;
   for (const WayLevel& end : points) {
     const int most = find_bottleneck(field.grid, parts, points.front().voxel, end.voxel);
     ways.emplace_back();
     if (most < kLeastBottleneck) continue;
-    const int least = std::max(kLeastBottleneck, most - slack);
-    ways.back() =
-        find_way(field, candidates, map, parts, least, kWideningMm, points.front(), end.voxel);
+    const auto cheapest = [&](const std::vector<std::uint8_t>& over, int least, double widening) {
+      return find_way(field, candidates, map, over, least, widening, points.front(), end.voxel);
+    };
+    PricedWay way = cheapest(parts, std::max(kLeastBottleneck, most - slack), kWideningMm);
+    if (far_slack > slack && way.least > kLeastBottleneck) {
+      PricedWay darker = cheapest(parts, std::max(kLeastBottleneck, most - far_slack), kWideningMm);
+      if (darker.cost < kFarCheaper * way.cost) way = std::move(darker);
+    }
     std::vector<std::uint8_t> vessels = parts;
-    keep_vessels(field.grid, candidates.depth, ways.back(), vessels);
-    ways.back() = find_way(field, candidates, map, vessels, least, 0.0, points.front(), end.voxel);
+    keep_vessels(field.grid, candidates.depth, way.places, vessels);
+    ways.back() = cheapest(vessels, way.least, 0.0).places;
     average_levels(field, candidates, ways.back());
   }
   return ways;
