@@ -275,10 +275,11 @@ double diameter_at(const Surface& surface, const Stretch& stretch, const Centerl
                    Eigen::Index k) {
   const Vec3 point = line.points.col(k), across = direction_at(line, k);
   double area = area_of_cut(stretch.part, point, across);
-  if (!std::isfinite(area)) area = area_of_cut(surface, point, across);
+  const bool leaves_part = !std::isfinite(area);
+  if (leaves_part) area = area_of_cut(surface, point, across);
   if (!std::isfinite(area)) return 2.0 * line.radius(k);
   const double reach = kNear * std::sqrt(area / kPi);
-  const Surface& from = reach <= stretch.reach ? stretch.part : surface;
+  const Surface& from = leaves_part || reach > stretch.reach ? surface : stretch.part;
   const Surface part = near_part(from, point, reach);
   const Vec3 tilted = smallest_cut(part, point, across, area);
   const bool turns = area_of_cut(part, point, tilted) < kMuchLess * area;
