@@ -22,11 +22,11 @@ constexpr double kSteady = 2.2;    // by which sections may differ from those be
 constexpr double kOstium = 0.3;    // least contact with the artery, of the cross-section
 constexpr double kLeavesMm = 5.0;  // from the contact, behind which the artery is far
 constexpr double kOfArtery = 0.7, kAlwaysMm = 2.0;  // of the artery's radius; what always is
-constexpr double kAlikePart = 0.75,
-                 kAlikeMm = 2.5;        // of the artery's contrast; what then always is
-constexpr int kMostRounds = 3;          // of branches that leave branches
-constexpr double kSectionVoxels = 2.0;  // how long a section is, at least
-constexpr double kOwnPart = 0.5;        // of its own contrast, where a branch ends
+constexpr double kAlikePart = 0.75;                 // of the artery's contrast: as bright as it
+constexpr double kAlikeMm = 2.5;                    // what then always is
+constexpr int kMostRounds = 3;                      // of branches that leave branches
+constexpr double kSectionVoxels = 2.0;              // how long a section is, at least
+constexpr double kOwnPart = 0.5;                    // of its own contrast, where a branch ends
 
 /// Voxels of one distance from the contact.
 struct Section {
@@ -77,9 +77,7 @@ class BranchSearch {
   /// contact falls into pieces next to the artery, one of them may be the branch.
   std::vector<Section> follow(const Contact& contact) {
     std::vector<Section> sections = follow_steady(contact);
-    if (!is_branch(contact, sections)) {
-      sections = pieces_.empty() ? std::vector<Section>() : follow_pieces(contact, sections);
-    }
+    if (!is_branch(contact, sections)) sections = follow_pieces(contact, sections);
     forget();
     touched_.clear();
     return sections;
