@@ -39,6 +39,56 @@ PhantomTube with_columns(const PhantomTube& tube, const std::vector<Vec3>& point
   return tube_through(tube.name, tube.kind, tube.wall_mm, points, radius);
 }
 
+/// How much further from an artery's axis than they lie a vein's points have to be, so that their
+/// lumens, the artery's with its wall, overlap by no more than half the radius of the thinner.
+struct Nearness {
+  Eigen::VectorXd missing;          // of each point of the vein [mm]; negative: far enough
+  std::vector<Eigen::Index> place;  // of the artery's axis, nearest to its lumen
+};
+
+Nearness find_nearness(const PhantomTube& vein, const Centerline& artery, double wall) {
+  Nearness found{Eigen::VectorXd(vein.points.cols()), {}};
+  for (Eigen::Index i = 0; i < vein.points.cols(); ++i) {
+    const double radius = vein.radius(i);
+    const Eigen::VectorXd away = (artery.points.colwise() - vein.points.col(i)).colwise().norm();
+    const Eigen::ArrayXd needed =
+        artery.radius.array() + wall + radius - 0.5 * artery.radius.array().min(radius);
+    Eigen::Index place = 0;
+    found.missing(i) = (needed - away.array()).maxCoeff(&place);
+    found.place.push_back(place);
+  }
+  return found;
+}
+
+/// Moves each stretch of the vein that is too near to one side of the artery, that on which it lies
+/// where it is nearest. Tells whether there was one.
+bool press_aside(PhantomTube& vein, const Centerline& artery, double wall) {
+  const Nearness near = find_nearness(vein, artery, wall);
+  const Centerline before{vein.points, vein.radius, arc_length_of(vein.points)};
+  const Eigen::Index count = vein.points.cols();
+  for (Eigen::Index begin = 0, end = 0; begin < count; begin = end + 1) {
+    for (end = begin; end < count && near.missing(end) > 0.0;) ++end;
+    if (end == begin) continue;
+    Eigen::Index nearest = 0;
+    near.missing.segment(begin, end - begin).maxCoeff(&nearest);
+    nearest += begin;
+    const Eigen::Index at = near.place[static_cast<std::size_t>(nearest)];
+    const Vec3 along = tangent_at(before, nearest);
+    Vec3 side = vein.points.col(nearest) - artery.points.col(at);
+    side -= side.dot(along) * along;
+    if (side.norm() < 1e-3) side = along.cross(tangent_at(artery, at));  // straight through it
+    side = side.norm() > 0.0 ? side.normalized() : along.unitOrthogonal();
+    for (Eigen::Index i = begin; i < end; ++i) {
+      const Vec3 off =
+          vein.points.col(i) - artery.points.col(near.place[static_cast<std::size_t>(i)]);
+      const double across = off.dot(side), needed = off.norm() + near.missing(i);
+      vein.points.col(i) +=
+          (std::sqrt(across * across + needed * needed - off.squaredNorm()) - across) * side;
+    }
+  }
+  return near.missing.maxCoeff() > 0.0;
+}
+
 }  // namespace
 
 double DrawnScan::arterial_hu() const { return kBloodHu + contrast_hu * (1.0 - 0.5 * fall); }
@@ -101,6 +151,26 @@ void add_vein(PhantomTube vein, double level, const DrawnScan& scan, Draws& draw
   body.tubes.push_back(std::move(vein));
   body.level.resize(body.tubes.size(), 0.0);
   if (scan.veins) body.level.back() = own;
+}
+
+void press_veins_aside(DrawnAnatomy& body) {
+  constexpr double kSpacing = 2.5;  // of points of what was moved                      [mm]
+  constexpr int kRounds = 12;       // away from one artery may be toward another
+  std::vector<std::pair<Centerline, double>> arteries;  // axis and wall
+  for (const PhantomTube& tube : body.tubes) {
+    if (tube.kind == PhantomTubeKind::kArtery || tube.kind == PhantomTubeKind::kThrombus) {
+      arteries.emplace_back(phantom_axis(tube), tube.wall_mm);
+    }
+  }
+  for (PhantomTube& tube : body.tubes) {
+    if (tube.kind != PhantomTubeKind::kVein) continue;
+    for (int round = 0; round < kRounds; ++round) {
+      bool moved = false;
+      for (const auto& [axis, wall] : arteries) moved = press_aside(tube, axis, wall) || moved;
+      if (!moved) break;
+      tube = with_points_every(tube, kSpacing);
+    }
+  }
 }
 
 void add_bends(PhantomTube& tube, double amplitude, double waves, const Vec3& across) {

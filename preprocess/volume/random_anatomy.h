@@ -79,6 +79,10 @@ PhantomTube vein_beside(const std::string& name, const PhantomTube& artery, doub
 void add_vein(PhantomTube vein, double level, const DrawnScan& scan, Draws& draws,
               DrawnAnatomy& body);
 
+/// Moves veins off arteries and their thrombus, so that lumens overlap by no more than half the
+/// radius of the thinner: an artery dents a vein that it presses on, and never runs inside of it.
+void press_veins_aside(DrawnAnatomy& body);
+
 /// Bends part of a tube to either side of its course: by a sine of this amplitude across it that is
 /// zero at both ends.
 void add_bends(PhantomTube& tube, double amplitude, double waves, const Vec3& across);
