@@ -213,7 +213,7 @@ std::vector<Stage> stages_from_labels(const Case& given) {
   if (!given.labels->choice.names.empty()) read_too(stages.back(), {"/labels/names"});
   read_points(stages.back(), given);
   stages.push_back({.name = "surface",
-                    .version = 13,
+                    .version = 14,
                     .reads_input = in_volume,
                     .after = {"segment"},
                     .parameters = {"/surface/edge_length_mm"},
@@ -227,7 +227,7 @@ std::vector<Stage> stages_to_surface(const Case& given) {
   std::vector<Stage> stages;
   if (!given.volume) {
     stages.push_back({.name = "surface",
-                      .version = 13,
+                      .version = 14,
                       .reads_input = true,
                       .parameters = {"/surface/unit", "/surface/frame", "/surface/edge_length_mm"},
                       .make = make_surface});
@@ -241,7 +241,7 @@ std::vector<Stage> stages_to_surface(const Case& given) {
                     .make = make_segment});
   read_points(stages.back(), given);
   stages.push_back({.name = "surface",
-                    .version = 13,
+                    .version = 14,
                     .reads_input = true,
                     .after = {"segment"},
                     .parameters = {"/surface/edge_length_mm"},

@@ -35,11 +35,12 @@ constexpr double kMostUnit = 2.0;      // ... but at most so many voxels
 constexpr double kLeastContrast = 0.35;
 // How strongly a vertex without an edge is held where the mask has it, against one with an edge.
 constexpr double kHold = 0.15;
-constexpr int kRounds = 3;         // the first finds the unit
-constexpr double kDeep = 0.8413;   // part of a blurred step one sigma inside of it
-constexpr double kForWalls = 0.7;  // of kSmoothing, before and after walls are looked for
-constexpr double kAcross = 0.3;    // a wall's normal this near to the slices' plane lies in it
-constexpr double kThick = 1.2;     // slices so much thicker than pixels are thick
+constexpr int kRounds = 3;             // the first finds the unit
+constexpr double kDeep = 0.8413;       // part of a blurred step one sigma inside of it
+constexpr double kForWalls = 0.7;      // of kSmoothing, before and after walls are looked for
+constexpr double kAcross = 0.3;        // a wall's normal this near to the slices' plane lies in it
+constexpr double kThick = 1.2;         // slices so much thicker than pixels are thick
+constexpr double kLikeInSlices = 1.2;  // blur along a normal, of that in slices, that is a Gaussian
 // Smoothing rounds the rim of a cap about so deep, however thick the slices are [mm]; chosen.
 constexpr double kRim = 1.7;
 // Blur moves the half level of a disc by sigma^2/(2 r), but not by more than this part of sigma: in
@@ -267,8 +268,7 @@ class Fit {
     // The wall is soft tissue, though thin enough for the fat behind it to be what was read.
     if (levels.contrast() > kLeastHu) {
       levels.outside = levels.outside.cwiseMax(kWallHu);
-      // Not where slices blur more than all else: that is no Gaussian.
-      if (grey_.thickness_variance() < sigma_ * sigma_) look_for_walls(normals, levels);
+      if (sigma_ > 0.0) look_for_walls(normals, levels);
     }
 
     Edges edges = find_edges(normals, levels);
@@ -360,7 +360,10 @@ class Fit {
     }
     const int passes = passes_for(kForWalls * levels.reach * unit_, edge_);
     average_profiles(neighbours_, passes, profiles);
-    const WallsSeen seen = see_walls(profiles);
+    WallsSeen seen = see_walls(profiles);
+    // Across thick slices the blur is no Gaussian.
+    seen.outside = (profiles.sigma.array() < kLikeInSlices * sigma_)
+                       .select(seen.outside, std::numeric_limits<double>::quiet_NaN());
     if (seen.outside.array().isNaN().all()) return;
     levels.outside = seen.outside.array().isNaN().select(levels.outside, seen.outside);
     Eigen::VectorXd weight = Eigen::VectorXd::Ones(n);

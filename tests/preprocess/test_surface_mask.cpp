@@ -313,6 +313,19 @@ Surface surface_of_tube(const Grid& grid, const Vec3& along, double radius, doub
   return surface_from_image(phantom.image, phantom.lumen, {.edge_length_mm = 1.0});
 }
 
+/// By how much of its radius a tube is too wide, up to 12 mm from the origin along z.
+double width_error(const Surface& surface, const Vec3& along, double radius) {
+  double sum = 0.0, count = 0.0;
+  for (const auto& vertex : surface.vertices.colwise()) {
+    const Vec3 p = vertex;
+    if (std::abs(p.z()) > 12.0) continue;
+    sum += (p - p.dot(along) * along).norm() / radius - 1.0;
+    count += 1.0;
+  }
+  EXPECT_GT(count, 50.0);
+  return sum / count;
+}
+
 TEST(SurfaceFromImage, HoldsAThinTubesRadiusHoweverThickItsWallInFatIs) {
   // Half way to soft tissue, whatever fat was seen through the wall, it was 4.1 % too narrow with
   // the thinnest wall.
@@ -325,15 +338,34 @@ TEST(SurfaceFromImage, HoldsAThinTubesRadiusHoweverThickItsWallInFatIs) {
   for (const double wall : {0.3, 0.5, 1.0, 1.5}) {
     SCOPED_TRACE(wall);
     const Surface surface = surface_of_tube(grid, along, kRadius, wall);
-    double sum = 0.0, count = 0.0;
-    for (const auto& vertex : surface.vertices.colwise()) {
-      const Vec3 p = vertex;
-      if (std::abs(p.z()) > 12.0) continue;
-      sum += (p - p.dot(along) * along).norm() / kRadius - 1.0;
-      count += 1.0;
-    }
-    ASSERT_GT(count, 50.0);
-    EXPECT_NEAR(sum / count, 0.0, 0.025);
+    EXPECT_NEAR(width_error(surface, along, kRadius), 0.0, 0.025);
+  }
+}
+
+TEST(SurfaceFromImage, SeesTheWallInFatOfATubeAcrossThickSlices) {
+  // A carotid artery. In slices that blur more than all else its wall was not looked for: 7.9, 5.6
+  // and 2.6 % too narrow.
+  constexpr double kRadius = 3.3;
+  const Vec3 along = Vec3(0.06, 0.03, 1.0).normalized();
+  for (const double wall : {0.5, 0.7, 1.0}) {
+    SCOPED_TRACE(wall);
+    PhantomSpec spec;
+    spec.grid.size = {44, 44, 20};
+    spec.grid.spacing = Vec3(0.7, 0.7, 4.0);
+    spec.grid.origin = Vec3(-15.0, -15.0, -38.0);
+    spec.body_semi_axes = {90.0, 90.0, 1000.0};
+    spec.organs = {{.name = "fat", .hu = -90.0, .center = {0, 0, 0}, .semi_axes = {40, 40, 400}}};
+    spec.blur_mm = 0.75;
+    spec.noise_hu = 5.0;
+    PhantomTube tube{.name = "tube", .hu = 200.0, .wall_mm = wall, .points = {}, .radius = {}};
+    tube.points.resize(3, 2);
+    tube.points << -100.0 * along, 100.0 * along;
+    tube.radius = Eigen::Vector2d::Constant(kRadius);
+    spec.tubes = {tube};
+    const Phantom phantom = make_phantom(spec);
+    const Surface surface =
+        surface_from_image(phantom.image, phantom.lumen, {.edge_length_mm = 1.0});
+    EXPECT_NEAR(width_error(surface, along, kRadius), 0.0, 0.045);
   }
 }
 
