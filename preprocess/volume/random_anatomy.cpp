@@ -39,13 +39,14 @@ PhantomTube with_columns(const PhantomTube& tube, const std::vector<Vec3>& point
   return tube_through(tube.name, tube.kind, tube.wall_mm, points, radius);
 }
 
-/// How much further from an artery's axis than they lie a vein's points have to be, so that their
-/// lumens, the artery's with its wall, overlap by no more than half the radius of the thinner.
+/// How near the points of a vein are to an artery.
 struct Nearness {
-  Eigen::VectorXd missing;          // of each point of the vein [mm]; negative: far enough
-  std::vector<Eigen::Index> place;  // of the artery's axis, nearest to its lumen
+  Eigen::VectorXd missing;          // how much further off each has to be; negative: none [mm]
+  std::vector<Eigen::Index> place;  // the point of the artery's axis that asks for that
 };
 
+/// Far enough is where the lumens, the artery's with its wall, overlap by no more than half the
+/// radius of the thinner.
 Nearness find_nearness(const PhantomTube& vein, const Centerline& artery, double wall) {
   Nearness found{Eigen::VectorXd(vein.points.cols()), {}};
   for (Eigen::Index i = 0; i < vein.points.cols(); ++i) {

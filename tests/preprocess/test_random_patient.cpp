@@ -261,7 +261,7 @@ TEST(RandomPatient, VeinsHaveTheirShareOfTheArteriesHuBesideTheirWalls) {
 }
 
 TEST(RandomPatient, ArteriesDentVeinsAndNeverRunInsideOfThem) {
-  // Of these the last two had 25 mm of a renal and of a carotid artery whole inside a vein.
+  // The last two had 25 mm of a carotid and of a renal artery whole inside of a vein.
   for (const std::uint64_t seed : {1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 9104, 9123}) {
     SCOPED_TRACE(seed);
     const RandomPatient patient = draw_patient(seed);

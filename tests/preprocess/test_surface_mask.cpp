@@ -295,6 +295,15 @@ TEST(SurfaceFromImage, HoldsATubesRadiusAtVoxelsFinerThanTheBlur) {
   EXPECT_NEAR(sum / count, 0.0, 0.08);
 }
 
+/// Along that unit vector through the origin.
+PhantomTube straight_tube(const Vec3& along, double hu, double radius, double wall) {
+  PhantomTube tube{.name = "tube", .hu = hu, .wall_mm = wall, .points = {}, .radius = {}};
+  tube.points.resize(3, 2);
+  tube.points << -100.0 * along, 100.0 * along;
+  tube.radius = Eigen::Vector2d::Constant(radius);
+  return tube;
+}
+
 /// Of a straight tube of 300 HU along that unit vector through the origin, with a wall of soft
 /// tissue in fat, with 5 HU of noise.
 Surface surface_of_tube(const Grid& grid, const Vec3& along, double radius, double wall = 1.0) {
@@ -304,11 +313,7 @@ Surface surface_of_tube(const Grid& grid, const Vec3& along, double radius, doub
   spec.fat_mm = 85.0;
   spec.skin_mm = 1.0;
   spec.noise_hu = 5.0;
-  PhantomTube tube{.name = "tube", .hu = 300.0, .wall_mm = wall, .points = {}, .radius = {}};
-  tube.points.resize(3, 2);
-  tube.points << -100.0 * along, 100.0 * along;
-  tube.radius = Eigen::Vector2d::Constant(radius);
-  spec.tubes = {tube};
+  spec.tubes = {straight_tube(along, 300.0, radius, wall)};
   const Phantom phantom = make_phantom(spec);
   return surface_from_image(phantom.image, phantom.lumen, {.edge_length_mm = 1.0});
 }
@@ -357,11 +362,7 @@ TEST(SurfaceFromImage, SeesTheWallInFatOfATubeAcrossThickSlices) {
     spec.organs = {{.name = "fat", .hu = -90.0, .center = {0, 0, 0}, .semi_axes = {40, 40, 400}}};
     spec.blur_mm = 0.75;
     spec.noise_hu = 5.0;
-    PhantomTube tube{.name = "tube", .hu = 200.0, .wall_mm = wall, .points = {}, .radius = {}};
-    tube.points.resize(3, 2);
-    tube.points << -100.0 * along, 100.0 * along;
-    tube.radius = Eigen::Vector2d::Constant(kRadius);
-    spec.tubes = {tube};
+    spec.tubes = {straight_tube(along, 200.0, kRadius, wall)};
     const Phantom phantom = make_phantom(spec);
     const Surface surface =
         surface_from_image(phantom.image, phantom.lumen, {.edge_length_mm = 1.0});
