@@ -1,5 +1,6 @@
 #include "preprocess/base.h"
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdio>
@@ -13,6 +14,13 @@ double clean(double value) {
   text.precision(12);
   text << value;
   return std::strtod(text.str().c_str(), nullptr);  // of the least numbers too
+}
+
+double median(std::vector<double> values) {
+  expects(!values.empty());
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
 }
 
 std::string place_text(const Vec3& p) {

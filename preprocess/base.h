@@ -7,6 +7,7 @@
 #include <numbers>
 #include <stdexcept>
 #include <string>
+#include <vector>
 
 namespace wireplan {
 
@@ -46,6 +47,9 @@ inline void expects(bool condition, const char* file = __builtin_FILE(),
 /// The number rounded to 12 digits, which removes what converting units adds: 15 deg and not
 /// 15.000000000000002.
 double clean(double value);
+
+/// The value in the middle, of an even number the upper of two; of one at least.
+double median(std::vector<double> values);
 
 /// For messages: a point as "(12.3, -4.5, 6.7)", a number with three digits.
 std::string place_text(const Vec3& place);

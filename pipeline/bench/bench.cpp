@@ -1,6 +1,5 @@
 #include "pipeline/bench/bench.h"
 
-#include <algorithm>
 #include <iostream>
 #include <sstream>
 
@@ -92,13 +91,6 @@ std::string aims_text(const Json& aims) {
             format("%g\n", one.at("aim").get<double>());
   }
   return text;
-}
-
-double median(std::vector<double> values) {
-  expects(!values.empty());
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
 }
 
 void run_bench(const std::string& name, const std::filesystem::path& folder,

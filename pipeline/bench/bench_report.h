@@ -55,6 +55,4 @@ Json aim_row(const std::string& what, const std::string& aim, const Json& found)
 Json aim_entry(const char* what, double aim, bool at_least, const Json& found);
 std::string aims_text(const Json& aims);
 
-double median(std::vector<double> values);
-
 }  // namespace wireplan::pipeline

@@ -426,9 +426,7 @@ std::vector<Twig> find_twigs(GridSearch& search) {
     std::vector<double> radii;
     for (const int n : twig.nodes)
       radii.push_back(search.at(static_cast<std::size_t>(n)).wall.distance);
-    std::nth_element(radii.begin(), radii.begin() + static_cast<std::ptrdiff_t>(radii.size() / 2),
-                     radii.end());
-    const double widest = radii[radii.size() / 2];
+    const double widest = median(std::move(radii));
     if (twig.parent >= 0 && length < from + widest + 2.0 * search.spacing()) continue;
     const int number = static_cast<int>(twigs.size());
     for (std::size_t k = twig.parent >= 0 ? 1 : 0; k < twig.nodes.size(); ++k) {

@@ -298,9 +298,8 @@ Eigen::VectorXd without_openings(const Centerline& line, const Eigen::VectorXd& 
     for (Eigen::Index i = 0; i < line.points.cols(); ++i) {
       if (std::abs(line.arc_length(i) - line.arc_length(k)) <= kBeside) beside.push_back(times(i));
     }
-    const auto middle = beside.begin() + static_cast<std::ptrdiff_t>(beside.size() / 2);
-    std::nth_element(beside.begin(), middle, beside.end());
-    if (times(k) > kOpen * *middle) result(k) = *middle * 2.0 * line.radius(k);
+    const double usual = median(beside);
+    if (times(k) > kOpen * usual) result(k) = usual * 2.0 * line.radius(k);
   }
   return result;
 }

@@ -35,13 +35,6 @@ constexpr double kNoisyPart = 0.15;  // of the contrast: values are smoothed to 
 constexpr double kConnectPart = 0.65, kUpperPart = 0.4, kNoisePart = 0.05;
 constexpr double kNeckMm = 0.5;
 
-double median_of(std::vector<double> values) {
-  expects(!values.empty());
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
-
 /// Sigma of the noise from second differences along i, whose variance is 6 times that of
 /// independent noise; 1.4826 makes a sigma of a median. Reconstruction correlates neighbours, so
 /// the differences are of voxels more than a millimetre apart.
@@ -57,7 +50,7 @@ double measure_noise(const Image& image, const Vec3& point) {
                    static_cast<double>(image.values[n + static_cast<std::size_t>(step)])));
     }
   }
-  return differences.empty() ? 0.0 : 1.4826 * median_of(std::move(differences)) / std::sqrt(6.0);
+  return differences.empty() ? 0.0 : 1.4826 * median(std::move(differences)) / std::sqrt(6.0);
 }
 
 double median_near(const Image& image, const Vec3& center, double least_radius = 1.0) {
@@ -66,7 +59,7 @@ double median_near(const Image& image, const Vec3& center, double least_radius =
   for (const std::size_t n : voxels_in_ball(image.grid, center, radius)) {
     values.push_back(static_cast<double>(image.values[n]));
   }
-  return median_of(std::move(values));
+  return median(std::move(values));
 }
 
 /// Offsets of the voxels round one that have to be lumen as well where it is deeper than the neck.
@@ -175,12 +168,12 @@ void measure_lumen(const Image& image, const Eroded& eroded, const Vec3& middle,
     sample.level_hu = median_near(image, middle);
     return;
   }
-  sample.level_hu = median_of(values);
+  sample.level_hu = median(values);
   sample.voxels = values.size();
   for (double& value : values) {
     value = std::abs(value - sample.level_hu);
   }
-  sample.scatter_hu = 1.4826 * median_of(std::move(values));
+  sample.scatter_hu = 1.4826 * median(std::move(values));
 }
 
 /// The lumen round a point, of values from `least` to `most`; smoothed before where it is noisy.
@@ -308,7 +301,7 @@ double find_surroundings(const Image& image, const std::vector<Vec3>& points, bo
       }
     }
   }
-  return dark.empty() ? 0.0 : median_of(std::move(dark));
+  return dark.empty() ? 0.0 : median(std::move(dark));
 }
 
 Band choose_band(const Image& image, const std::vector<LumenSample>& samples, double surroundings,

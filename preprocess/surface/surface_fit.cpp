@@ -135,13 +135,6 @@ class Interpolated {
   double thickness_ = 0.0;
 };
 
-double median(std::vector<double> values) {
-  if (values.empty()) return 0.0;
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
-
 /// Where the values along a normal pass the level nearest to 0 [in steps], rising or falling
 /// outward as asked.
 std::optional<double> crossing(const std::vector<double>& profile, double level, bool falling) {

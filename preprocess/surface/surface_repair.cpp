@@ -87,9 +87,8 @@ InsideAnswer locate_piece(const Surface& piece, const Surface& closed) {
     inside += answer.inside ? 1 : 0;
     distances.push_back(answer.distance);
   }
-  const auto middle = distances.begin() + static_cast<std::ptrdiff_t>(distances.size() / 2);
-  std::nth_element(distances.begin(), middle, distances.end());
-  return {.inside = 10 * inside >= 9 * static_cast<int>(distances.size()), .distance = *middle};
+  return {.inside = 10 * inside >= 9 * static_cast<int>(distances.size()),
+          .distance = median(distances)};
 }
 
 void require_length(const Surface& s, const std::string& origin) {

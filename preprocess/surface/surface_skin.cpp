@@ -57,9 +57,7 @@ double wall_thickness(const Surface& s, const WallTree& wall) {
     thickness.push_back(behind);
   }
   if (inside < kInsidePart * all) return 0.0;
-  const auto middle = thickness.begin() + static_cast<std::ptrdiff_t>(thickness.size() / 2);
-  std::nth_element(thickness.begin(), middle, thickness.end());
-  return *middle;
+  return median(std::move(thickness));
 }
 
 /// Part of the rays from a triangle outward that meet the surface again.

@@ -32,9 +32,7 @@ void find_uneven(const std::vector<double>& positions, Stack& stack) {
   }
   if (even) return;
 
-  std::vector<double> sorted = sizes;
-  std::nth_element(sorted.begin(), sorted.begin() + gaps / 2, sorted.end());
-  const double usual = sorted[gaps / 2];
+  const double usual = median(sizes);
   std::ostringstream text;
   if (2 * same >= gaps) {
     text << "images lie at the same place (" << positions.size()
@@ -76,11 +74,9 @@ std::vector<Vec3> sidesteps(const std::vector<Vec3>& origins, const Stack& stack
   }
   Vec3 usual = Vec3::Zero();
   for (Eigen::Index axis = 0; axis < 2; ++axis) {
-    std::vector<double> sorted;
-    for (const Vec3& step : steps) sorted.push_back(step[axis]);
-    const auto middle = sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2);
-    std::nth_element(sorted.begin(), middle, sorted.end());
-    usual[axis] = *middle;
+    std::vector<double> along;
+    for (const Vec3& step : steps) along.push_back(step[axis]);
+    usual[axis] = median(std::move(along));
   }
   for (Vec3& step : steps) step -= usual;
   return steps;
