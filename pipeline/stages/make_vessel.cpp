@@ -530,13 +530,12 @@ void make_centerline(Workspace& work, const fs::path& folder) {
 
   Json figures = figures_of("centerline");
   figures.update(line_figures(line));
-  const std::optional<Vec3> shortcut =
-      guide.empty() ? std::nullopt : preprocess::find_shortcut(surface, line, guide);
-  if (shortcut) {
+  if (const std::optional<Vec3> place = preprocess::find_departure(surface, line, guide)) {
     figures["warnings"].push_back(
-        "centerline: at " + place_text(*shortcut) +
-        " mm it takes a shortcut that the arteries' levels do not: vessels that touch there, or a "
-        "narrow place that the surface has closed; look at the outline there");
+        "centerline: at " + place_text(*place) +
+        " mm it has left the way that the arteries' levels show, by a shortcut or through a vessel "
+        "beside it: vessels that touch there, or a narrow place that the surface has closed; look "
+        "at the outline there");
   }
   figures["target_lumen_radius_mm"] = line.radius(line.radius.size() - 1);
   std::vector<preprocess::Branch> tree = preprocess::find_tree(surface, study.access);

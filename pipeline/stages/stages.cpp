@@ -262,7 +262,7 @@ std::vector<Stage> stages_of(const Case& given) {
   const bool from_volume = given.volume.has_value(), from_labels = given.labels.has_value();
   std::vector<Stage> stages = stages_to_surface(given);
   stages.push_back({.name = "centerline",
-                    .version = 11,
+                    .version = 12,
                     .after = {"surface"},
                     .parameters = {"/access/point_mm", "/target/point_mm"},
                     .make = make_centerline});

@@ -46,18 +46,6 @@ struct RawPath {
   double spacing = 0.0;  // of the grid it was found on
 };
 
-/// The first place at which a path takes a shortcut of the guide.
-std::optional<Vec3> shortcut_on(const NearestWall& wall, const Guide& guide, const Points& path) {
-  double before = guide.arc_of(path.front()), radius = 0.0;
-  for (const Vec3& p : path) {
-    const double arc = guide.arc_of(p), here = wall.find(p).distance;
-    if (Guide::is_shortcut(before, arc, std::max(radius, here))) return p;
-    before = arc;
-    radius = here;
-  }
-  return std::nullopt;
-}
-
 /// Searches from the target, which mostly lies in the thinner vessel: then most of the wide one is
 /// never visited.
 RawPath search_path(const NearestWall& wall, const Surface& surface, const Vec3& access,
@@ -77,7 +65,7 @@ RawPath search_path(const NearestWall& wall, const Surface& surface, const Vec3&
     GridSearch search = search_on(spacing, target, access);
     if (search.run(Cost::kRoute)) {
       const Guide guide(wall, way);
-      if (!way.empty() && shortcut_on(wall, guide, search.path())) {
+      if (guide.departure_of(search.path())) {
         for (double finer = spacing; finer >= kFinestGrid; finer *= 0.5) {
           GridSearch along = search_on(finer, target, access);
           along.follow(guide);
@@ -577,12 +565,12 @@ Centerline find_centerline(const Surface& surface, const Vec3& access, const Vec
   return measured(wall, line);
 }
 
-std::optional<Vec3> find_shortcut(const Surface& surface, const Centerline& line,
-                                  const std::vector<Vec3>& guide) {
+std::optional<Vec3> find_departure(const Surface& surface, const Centerline& line,
+                                   const std::vector<Vec3>& guide) {
   const NearestWall wall(surface);
   Points points;
   for (const Vec3& p : line.points.colwise()) points.push_back(p);
-  return shortcut_on(wall, Guide(wall, guide), points);
+  return Guide(wall, guide).departure_of(points);
 }
 
 Vec3 start_tangent(const Centerline& line, double span) {

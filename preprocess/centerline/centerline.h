@@ -15,8 +15,9 @@ struct CenterlineOptions {
   double sample_mm = 0.5;  // spacing of the points handed on                           [mm]
   double beyond_mm = 0.0;  // the line goes on behind the target, along the ridge       [mm]
   /// The way from access to target if it is known, as by the levels of a volume. A route that takes
-  /// a shortcut from one part of it to another, through a place where vessels touch, is then found
-  /// again along it, where the surface lets it pass. Empty: the shortest route.
+  /// a shortcut from one part of it to another, through a place where vessels touch, or leads
+  /// through another vessel beside it, is then found again along it, where the surface lets it
+  /// pass. Empty: the shortest route.
   std::vector<Vec3> guide = {};
 };
 
@@ -35,9 +36,10 @@ struct CenterlineOptions {
 Centerline find_centerline(const Surface& surface, const Vec3& access, const Vec3& target,
                            const CenterlineOptions& options = {});
 
-/// Where a line takes a shortcut that its guide does not, if it does. Expects a line with points.
-std::optional<Vec3> find_shortcut(const Surface& surface, const Centerline& line,
-                                  const std::vector<Vec3>& guide);
+/// Where a line takes a shortcut that its guide does not, or has run in another vessel beside it
+/// for long, if it does. Expects a line with points.
+std::optional<Vec3> find_departure(const Surface& surface, const Centerline& line,
+                                   const std::vector<Vec3>& guide);
 
 /// A part of a branch's line, up to the next part or the end, as people call the vessel there.
 struct NamedPart {

@@ -39,7 +39,7 @@ void GridSearch::stay_near(const Points& route) {
   for (const int end : {kStart, kGoal}) nodes_[static_cast<std::size_t>(end)].allowed = true;
 }
 
-Guide::Guide(const NearestWall& wall, const Points& way) {
+Guide::Guide(const NearestWall& wall, const Points& way) : wall_(wall) {
   constexpr double kApart = 1.0;  // of balls, about; chosen                               [mm]
   const auto add = [&](const Vec3& p, double arc) {
     const Vec3 center = leave_wall(wall, p, kInfinite);
@@ -59,20 +59,57 @@ Guide::Guide(const NearestWall& wall, const Points& way) {
   if (!way.empty()) add(way.back(), arc);
 }
 
-double Guide::arc_of(const Vec3& p) const {
-  double least = kInfinite, arc = 0.0;
+const Guide::Ball& Guide::nearest(const Vec3& p) const {
+  double least = kInfinite;
+  const Ball* best = &balls_.front();
   for (const Ball& ball : balls_) {
-    const double beside = (p - ball.center).norm() - ball.radius;
-    if (beside >= least) continue;
-    least = beside;
-    arc = ball.arc;
+    const double away = (p - ball.center).norm() - ball.radius;
+    if (away >= least) continue;
+    least = away;
+    best = &ball;
   }
-  return arc;
+  return *best;
+}
+
+double Guide::arc_of(const Vec3& p) const { return empty() ? 0.0 : nearest(p).arc; }
+
+bool Guide::is_beside(const Vec3& p) const {
+  constexpr double kNeck = 0.6;                         // of the lesser side; chosen
+  constexpr double kSample = 0.25, kLeastSample = 0.1;  // of the ball's radius, but so much  [mm]
+  if (empty()) return false;
+  const Ball& ball = nearest(p);
+  const Vec3 on = ball.center - p;
+  const double sample = std::max(kSample * ball.radius, kLeastSample);
+  const int steps = static_cast<int>(std::ceil(on.norm() / sample));
+  double widest = 0.0;
+  Nearest here = wall_.find(ball.center);
+  for (int k = steps; k >= 0; --k) {  // from `p`
+    here = wall_.find(ball.center - on * k / std::max(steps, 1), here);
+    if (here.distance < kNeck * std::min(widest, ball.radius)) return true;
+    widest = std::max(widest, here.distance);
+  }
+  return false;
+}
+
+std::optional<Vec3> Guide::departure_of(const Points& path) const {
+  if (empty()) return std::nullopt;
+  double arc_before = arc_of(path.front()), radius = 0.0, beside = 0.0;
+  Vec3 before = path.front();
+  for (const Vec3& p : path) {
+    const double arc = arc_of(p), here = wall_.find(p).distance;
+    if (is_shortcut(arc_before, arc, std::max(radius, here))) return p;
+    beside = is_beside(p) ? beside + (p - before).norm() : 0.0;
+    if (beside > long_for(here)) return p;
+    arc_before = arc;
+    radius = here;
+    before = p;
+  }
+  return std::nullopt;
 }
 
 void GridSearch::follow(const Guide& guide) {
   guide_ = &guide;
-  for (Node& n : nodes_) n.arc = guide.arc_of(n.point);
+  for (Node& n : nodes_) place_along_guide(n);
 }
 
 }  // namespace wireplan::preprocess

@@ -6,6 +6,7 @@
 #include <functional>
 #include <limits>
 #include <memory>
+#include <optional>
 #include <queue>
 #include <utility>
 #include <vector>
@@ -39,6 +40,7 @@ struct Node {
   bool settled = false;
   bool allowed = true;  // may the path pass here?
   double arc = 0.0;     // along the guide, if there is one                                [mm]
+  bool beside = false;  // in another vessel than the guide
 };
 
 /// Which cost a path has per length, for inscribed radius r [mm]. kRoute, 1 + 1/r^2, finds the
@@ -57,14 +59,26 @@ class Guide {
  public:
   Guide(const NearestWall& wall, const Points& way);
 
+  bool empty() const { return balls_.empty(); }
   double arc_of(const Vec3& p) const;  // of the part that a place belongs to             [mm]
+
+  /// Whether the straight way from a place of the lumen to the part that it belongs to leads
+  /// through a neck or a wall, as from a vessel that runs along the guide's and may touch it.
+  bool is_beside(const Vec3& p) const;
+
+  /// The first place at which a path takes a shortcut of the guide, or where it has run in another
+  /// vessel beside it for long.
+  std::optional<Vec3> departure_of(const Points& path) const;
 
   /// Whether a step between places of these arcs leads to a part much further along, as where
   /// vessels touch; `radius` is the larger distance from the wall. A branch that leaves a wide
   /// vessel at a sharp angle is none.
   static bool is_shortcut(double a, double b, double radius) {
-    return std::abs(a - b) > 2.5 * radius + 5.0;  // chosen
+    return std::abs(a - b) > long_for(radius);
   }
+
+  /// A length along a vessel of this radius that is long for it [mm]; chosen.
+  static double long_for(double radius) { return 2.5 * radius + 5.0; }
 
  private:
   /// In the middle of the vessel: the way itself may run along the wall.
@@ -72,6 +86,9 @@ class Guide {
     Vec3 center;
     double radius, arc;  //                                                                [mm]
   };
+  const Ball& nearest(const Vec3& p) const;  // expects one
+
+  const NearestWall& wall_;
   std::vector<Ball> balls_;
 };
 
@@ -166,7 +183,8 @@ class GridSearch {
   /// From now on paths stay in the vessel round `route`: within 1.5 radii of its middle.
   void stay_near(const Points& route);
 
-  /// From now on no step of a path is a shortcut of the guide, which outlives the search.
+  /// From now on no step of a path is a shortcut of the guide, which outlives the search, and
+  /// places beside it cost ten times as much.
   void follow(const Guide& guide);
 
   /// From the goal back to the start.
@@ -195,6 +213,7 @@ class GridSearch {
   // Two inscribed balls on either side of a flat wall just touch, up to rounding. So points are
   // joined only if their balls overlap by more than that.
   static constexpr double kOverlap = 1.0 + 1e-6;
+  static constexpr double kBesideFactor = 10.0;  // chosen
   using Brick = std::array<int, kBrick * kBrick * kBrick>;
 
   const Node& node(int i) const { return nodes_[static_cast<std::size_t>(i)]; }
@@ -208,6 +227,11 @@ class GridSearch {
     const double half = std::sqrt(std::max(0.0, squared));
     return {static_cast<int>(std::ceil(place.x() - half)) - margin,
             static_cast<int>(std::floor(place.x() + half)) + margin};
+  }
+
+  void place_along_guide(Node& n) const {
+    n.arc = guide_->arc_of(n.point);
+    n.beside = guide_->is_beside(n.point);
   }
 
   void visit_neighbours(int here) {
@@ -238,7 +262,7 @@ class GridSearch {
       there = static_cast<int>(nodes_.size());
       const Vec3 point = origin_ + spacing_ * ijk.cast<double>();
       nodes_.push_back({.point = point, .ijk = ijk, .wall = wall_.find(point, node(here).wall)});
-      if (guide_ != nullptr) nodes_.back().arc = guide_->arc_of(point);
+      if (guide_ != nullptr) place_along_guide(nodes_.back());
     }
     relax(here, there);
   }
@@ -251,7 +275,9 @@ class GridSearch {
     const double r_a = a.wall.distance, r_b = b.wall.distance;
     if (!b.allowed || r_a + r_b < kOverlap * length) return;  // the wall may be between them
     if (Guide::is_shortcut(a.arc, b.arc, std::max(r_a, r_b))) return;
-    const double cost = a.cost + 0.5 * length * (cost_per_mm(kind_, r_a) + cost_per_mm(kind_, r_b));
+    const double price_a = cost_per_mm(kind_, r_a) * (a.beside ? kBesideFactor : 1.0);
+    const double price_b = cost_per_mm(kind_, r_b) * (b.beside ? kBesideFactor : 1.0);
+    const double cost = a.cost + 0.5 * length * (price_a + price_b);
     if (cost >= b.cost) return;
     b.cost = cost;
     b.parent = here;

@@ -170,12 +170,12 @@ TEST(Centerline, FollowsItsGuideWhereVesselsTouch) {
 
   const Centerline shortest = find_centerline(vessel, access, target);
   EXPECT_LT(length_of(shortest), 50.0);
-  const std::optional<Vec3> shortcut = find_shortcut(vessel, shortest, guide);
+  const std::optional<Vec3> shortcut = find_departure(vessel, shortest, guide);
   ASSERT_TRUE(shortcut.has_value());
   EXPECT_LT((*shortcut - Vec3(0.0, 0.0, 20.0)).norm(), 6.0);
 
   const Centerline guided = find_centerline(vessel, access, target, {.guide = guide});
-  EXPECT_FALSE(find_shortcut(vessel, guided, guide).has_value());
+  EXPECT_FALSE(find_departure(vessel, guided, guide).has_value());
   EXPECT_NEAR(length_of(guided), round_the_top, 0.02 * round_the_top);
   expect_well_formed(guided, 0.5);
 
@@ -184,6 +184,42 @@ TEST(Centerline, FollowsItsGuideWhereVesselsTouch) {
   EXPECT_EQ(find_centerline(vessel, access, target, {.guide = guide}).points, guided.points);
   const std::vector<Vec3> along = {access, Vec3(-6.0, 0.0, 20.0), Vec3(6.0, 0.0, 20.0), target};
   EXPECT_EQ(find_centerline(vessel, access, target, {.guide = along}).points, shortest.points);
+}
+
+double from_segment(const Vec3& p, const Vec3& a, const Vec3& b) {
+  const double t = std::clamp((p - a).dot(b - a) / (b - a).squaredNorm(), 0.0, 1.0);
+  return (p - a - t * (b - a)).norm();
+}
+
+TEST(Centerline, KeepsToItsGuidesVesselWhereAnotherRunsBesideIt) {
+  // A bent artery of 3 mm in radius, and a wider vein that it runs into at both ends of its bend.
+  const std::vector<Vec3> bent = {Vec3(0.0, 0.0, 0.0),   Vec3(0.0, 0.0, 10.0),
+                                  Vec3(-8.0, 0.0, 25.0), Vec3(-8.0, 0.0, 55.0),
+                                  Vec3(0.0, 0.0, 70.0),  Vec3(0.0, 0.0, 80.0)};
+  const Surface vessel = shapes::level_set(
+      [&](const Vec3& p) {
+        double inside = 4.5 - from_segment(p, Vec3(2.0, 0.0, 12.0), Vec3(2.0, 0.0, 68.0));
+        for (std::size_t k = 0; k + 1 < bent.size(); ++k) {
+          inside = std::max(inside, 3.0 - from_segment(p, bent[k], bent[k + 1]));
+        }
+        return inside;
+      },
+      Vec3(-12.0, -6.0, -4.0), Vec3(8.0, 6.0, 84.0), 0.5);
+  const Vec3 access = bent.front(), target = bent.back();
+  const auto at_middle = [](const Centerline& line) {
+    Eigen::Index nearest = 0;
+    (line.points.row(2).array() - 40.0).abs().minCoeff(&nearest);
+    return line.points(0, nearest);
+  };
+
+  const Centerline shortest = find_centerline(vessel, access, target);
+  EXPECT_NEAR(at_middle(shortest), 2.0, 0.3);
+  ASSERT_TRUE(find_departure(vessel, shortest, bent).has_value());
+
+  const Centerline guided = find_centerline(vessel, access, target, {.guide = bent});
+  EXPECT_NEAR(at_middle(guided), -8.0, 0.3);
+  EXPECT_FALSE(find_departure(vessel, guided, bent).has_value());
+  expect_well_formed(guided, 0.5);
 }
 
 TEST(Centerline, TakesTheShortestWayWhereTheGuidesIsClosed) {
@@ -201,7 +237,7 @@ TEST(Centerline, TakesTheShortestWayWhereTheGuidesIsClosed) {
   for (double z = 49.0; z > 8.0; z -= 1.0) guide.emplace_back(6.0, 0.0, z);
   const Centerline line = find_centerline(vessel, access, target, {.guide = guide});
   EXPECT_LT(length_of(line), 50.0);
-  EXPECT_TRUE(find_shortcut(vessel, line, guide).has_value());
+  EXPECT_TRUE(find_departure(vessel, line, guide).has_value());
 }
 
 TEST(Centerline, HasTheLumensRadiusNearCaps) {
