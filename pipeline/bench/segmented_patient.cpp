@@ -64,6 +64,7 @@ std::vector<Vec3> told_places(const SegmentStatistics& statistics) {
   for (const preprocess::Leak& part : statistics.doubtful) places.push_back(part.place);
   for (const preprocess::Leak& branch : statistics.branches) places.push_back(branch.place);
   for (const preprocess::Touch& touch : statistics.touches) places.push_back(touch.place);
+  for (const preprocess::Loop& loop : statistics.loops.left) places.push_back(loop.place);
   for (const preprocess::WayDoubt& doubt : statistics.way_doubts) places.push_back(doubt.place);
   return places;
 }
@@ -73,8 +74,8 @@ int count_warnings(const SegmentStatistics& statistics, int handles) {
   return static_cast<int>(std::min(statistics.search.leaks.size(), kLeaksTold) +
                           statistics.doubtful.size() + statistics.touches.size() +
                           statistics.way_doubts.size()) +
-         (statistics.branches.empty() ? 0 : 1) + (statistics.touches_border ? 1 : 0) +
-         (handles > 0 ? 1 : 0);
+         (statistics.branches.empty() ? 0 : 1) + (statistics.loops.left.empty() ? 0 : 1) +
+         (statistics.touches_border ? 1 : 0) + (handles > 0 ? 1 : 0);
 }
 
 /// What the mask holds that neither is nor is next to truth, corners included: all of it, and that
