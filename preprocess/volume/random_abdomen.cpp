@@ -70,7 +70,7 @@ void add_aorta(const AbdomenSizes& r, Draws& draws, DrawnAnatomy& body) {
 
 /// Both limbs of the bifurcation; `kissing` is the gap of limbs that run side by side, or 0.
 void add_iliacs(const AbdomenSizes& r, double kissing, Draws& draws, DrawnAnatomy& body) {
-  const double wall = kissing > 0.0 ? 0.5 * kissing : draws.between(0.6, 1.1);
+  const double wall = kissing > 0.0 ? 0.85 : draws.between(0.6, 1.1);
   const double half = r.common + 0.5 * kissing;
   const std::vector<Vec3> apart = {
       {-2, 0, 2}, {-9, -1, -13}, {-21, 4, -29}, {-32, 14, -44}, {-39, 22, -56}};
@@ -342,7 +342,6 @@ DrawnAnatomy draw_abdomen(Draws& draws, const DrawnScan& scan) {
     // Slices would not show a thin artery that lies in them.
     const bool external = first.name.find("external") != std::string::npos && scan.slice_mm <= 3.0;
     if (!side_by_side && external) {
-      first.wall_mm = 0.5 * gap;
       body.loops.push_back({first.name, {first.points(0, 0) < 0.0 ? 1.0 : -1.0, -1.0, 0.3}, gap});
       body.access_at = draws.between(0.82, 0.92);
     }

@@ -204,7 +204,6 @@ DrawnAnatomy draw_arch(Draws& draws, const DrawnScan& scan) {
   const double amplitude = draws.between(5.0, 12.0), waves = draws.between(1.0, 1.9);
   const double gap = draws.between(0.3, 1.0);
   if (kissing && choice >= 2 && !thin && scan.slice_mm <= 3.0) {
-    body.tube(bent).wall_mm = 0.5 * gap;
     body.loops.push_back({bent, {side == "left" ? 1.0 : -1.0, -0.6, 0.0}, gap});
     body.target_at = std::max(body.target_at, body.way.back() == bent ? 0.86 : 0.3);
     body.features.emplace_back("kissing limbs");
