@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 #include <utility>
 
 #include "preprocess/segment/side_branches.h"
@@ -12,8 +11,6 @@ namespace wireplan::preprocess {
 namespace {
 
 constexpr double kEdgePart = 0.4;   // of the contrast
-constexpr double kFatHu = -100.0;   // beyond an artery's wall, as dark as it gets
-constexpr double kWallMm = 0.9;     // of arteries: aortas have more, their branches less; assumed
 constexpr double kNearWayMm = 3.0;  // where less of it is enough
 constexpr double kSpeckMm3 = 15.0;
 constexpr float kMiddlePart = 0.6F;  // of a part's depth: what is deeper is surely its own
@@ -98,14 +95,6 @@ double value_beyond(const LumenField& field, const std::vector<float>& away, std
     least = std::min(least, static_cast<double>(field.values[index_of(grid, next)]));
   }
   return least;
-}
-
-/// The darkest that a vessel's surroundings look from its edge: half way from the lumen's level to
-/// this lies what blur leaves of a wall before fat [HU].
-double darkest_beside(const LumenField& field) {
-  if (!field.hounsfield) return field.surroundings;
-  const double fat = std::erfc(kWallMm / (std::numbers::sqrt2 * LevelRule(field).blur()));
-  return field.surroundings + fat * (kFatHu - field.surroundings);
 }
 
 /// The least value that an artery of this level has at its edge, where `beyond` lies behind it:

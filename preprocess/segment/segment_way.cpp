@@ -4,6 +4,7 @@
 #include <cmath>
 #include <functional>
 #include <limits>
+#include <numbers>
 #include <queue>
 #include <tuple>
 #include <utility>
@@ -13,6 +14,8 @@
 namespace wireplan::preprocess {
 namespace {
 
+constexpr double kFatHu = -100.0;  // beyond an artery's wall, as dark as it gets
+constexpr double kWallMm = 0.9;    // of arteries: aortas have more, their branches less; assumed
 constexpr double kCandidatePart = 0.45;  // of the least contrast
 constexpr double kBlurMm = 0.6;          // sigma of a scanner's point spread, assumed
 constexpr double kVoxelBlur = 0.4;       // sigma that sampling adds, in voxels, about
@@ -119,11 +122,33 @@ std::vector<float> seen_parts(const LumenField& field, const Candidates& candida
   return seen;
 }
 
-/// Step 1: 0 outside the candidates, else at least 1.
+/// The least of the smoothed values within two voxels of each candidate, between what blur leaves
+/// of fat beside a vessel and the surroundings: what its contrast counts from where it is thin.
+std::vector<float> dark_beside(const LumenField& field, const Candidates& candidates) {
+  const auto most = static_cast<float>(field.surroundings);
+  const auto least = static_cast<float>(darkest_beside(field));
+  const double reach = 2.01 * std::cbrt(field.grid.spacing.prod());
+  std::vector<float> dark(candidates.labels.size(), most);
+  for (std::size_t n = 0; n < dark.size(); ++n) {
+    if (candidates.labels[n] == 0) continue;
+    for (const std::size_t m : voxels_in_ball(field.grid, center_of(field.grid, n), reach)) {
+      dark[n] = std::min(dark[n], field.values[m]);
+    }
+    dark[n] = std::max(dark[n], least);
+  }
+  return dark;
+}
+
+/// Step 1: 0 outside the candidates, else at least 1. The neighbours' contrast counts from `dark`
+/// [HU], each voxel's own from the surroundings.
 std::vector<std::uint8_t> bright_parts(const LumenField& field, const Candidates& candidates,
-                                       const std::vector<float>& expected) {
+                                       const std::vector<float>& expected,
+                                       const std::vector<float>& dark) {
   const Grid& grid = field.grid;
   const double reach = 1.01 * grid.spacing.minCoeff();
+  const auto part_of = [](float value, float level, double from) {
+    return (static_cast<double>(value) - from) / (static_cast<double>(level) - from);
+  };
   std::vector<std::uint8_t> parts(candidates.labels.size(), 0);
   for (std::size_t n = 0; n < parts.size(); ++n) {
     if (candidates.labels[n] == 0) continue;
@@ -132,8 +157,8 @@ std::vector<std::uint8_t> bright_parts(const LumenField& field, const Candidates
       const Vec3 away = grid.spacing.cwiseProduct(Vec3(step[0], step[1], step[2]));
       if (away.norm() <= reach) least = std::min(least, field.values[m]);
     });
-    const double part = (static_cast<double>(least) - field.surroundings) /
-                        (static_cast<double>(expected[n]) - field.surroundings);
+    const double own = part_of(field.values[n], expected[n], field.surroundings);
+    const double part = std::min(own, part_of(least, expected[n], static_cast<double>(dark[n])));
     parts[n] = static_cast<std::uint8_t>(std::clamp(kPartSteps * part, 1.0, 250.0));
   }
   return parts;
@@ -351,6 +376,12 @@ void average_levels(const LumenField& field, const Candidates& candidates,
 
 }  // namespace
 
+double darkest_beside(const LumenField& field) {
+  if (!field.hounsfield) return field.surroundings;
+  const double fat = std::erfc(kWallMm / (std::numbers::sqrt2 * LevelRule(field).blur()));
+  return field.surroundings + fat * (kFatHu - field.surroundings);
+}
+
 LevelRule::LevelRule(const LumenField& field)
     : surroundings_(field.surroundings),
       half_voxel_(0.5 * field.grid.spacing.minCoeff()),
@@ -393,23 +424,37 @@ std::vector<std::vector<WayLevel>> find_level_ways(const LumenField& field,
   const WayMap map = {.expected = expected_levels(field, candidates, points),
                       .mean = local_means(field, candidates),
                       .seen = seen_parts(field, candidates)};
-  const std::vector<std::uint8_t> parts = bright_parts(field, candidates, map.expected);
+  const std::vector<float> even(candidates.labels.size(), static_cast<float>(field.surroundings));
+  const std::vector<std::uint8_t> usual = bright_parts(field, candidates, map.expected, even);
+  std::vector<std::uint8_t> before_fat;
   const int slack = find_slack(field, points, kSlackNoises);
   const int far_slack = find_slack(field, points, kFarNoises);
   std::vector<std::vector<WayLevel>> ways;
   for (const WayLevel& end : points) {
-    const int most = find_bottleneck(field.grid, parts, points.front().voxel, end.voxel);
+    const std::vector<std::uint8_t>* parts = &usual;
+    const auto bottleneck = [&] {
+      return find_bottleneck(field.grid, *parts, points.front().voxel, end.voxel);
+    };
+    int most = bottleneck();
+    if (most < kLeastBottleneck && field.hounsfield) {
+      if (before_fat.empty()) {
+        before_fat = bright_parts(field, candidates, map.expected, dark_beside(field, candidates));
+      }
+      parts = &before_fat;
+      most = bottleneck();
+    }
     ways.emplace_back();
     if (most < kLeastBottleneck) continue;
     const auto cheapest = [&](const std::vector<std::uint8_t>& over, int least, double widening) {
       return find_way(field, candidates, map, over, least, widening, points.front(), end.voxel);
     };
-    PricedWay way = cheapest(parts, std::max(kLeastBottleneck, most - slack), kWideningMm);
+    PricedWay way = cheapest(*parts, std::max(kLeastBottleneck, most - slack), kWideningMm);
     if (far_slack > slack && way.least > kLeastBottleneck) {
-      PricedWay darker = cheapest(parts, std::max(kLeastBottleneck, most - far_slack), kWideningMm);
+      PricedWay darker =
+          cheapest(*parts, std::max(kLeastBottleneck, most - far_slack), kWideningMm);
       if (darker.cost < kFarCheaper * way.cost) way = std::move(darker);
     }
-    std::vector<std::uint8_t> vessels = parts;
+    std::vector<std::uint8_t> vessels = *parts;
     keep_vessels(field.grid, candidates.depth, way.places, vessels);
     ways.back() = cheapest(vessels, way.least, 0.0).places;
     average_levels(field, candidates, ways.back());

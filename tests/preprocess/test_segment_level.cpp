@@ -85,6 +85,49 @@ TEST(SegmentLevel, AnArteryOfLittleContrastInFatIsAsWideAsInSoftTissue) {
   }
 }
 
+/// A tube upright or aslant round the z axis, with a narrow place of this radius in its middle, or
+/// closed there: inside, in its wall of 1 mm, or beyond.
+struct NarrowTube {
+  double narrow = 0.0, lean = 0.0;  // [mm], and mm along x and y per mm along z
+  bool closed = false;
+  double off(const Vec3& p) const {
+    const double shift = lean * (p.z() - 45.0);
+    const Vec3 along = Vec3(lean, lean, 1.0).normalized(), q(p.x() - shift, p.y() - shift, 0.0);
+    return (q - q.dot(along) * along).norm();
+  }
+  double radius(double z) const {
+    const double u = std::min(1.0, std::abs(z - 45.0) / 8.0);
+    const double part = std::pow(std::cos(0.5 * std::numbers::pi * u), 2);
+    return 2.6 - (2.6 - narrow) * part;
+  }
+  double hu(const Vec3& p, double level, double around) const {
+    const double radius_here = radius(p.z());
+    if (off(p) < radius_here) return closed && std::abs(p.z() - 45.0) < 3.0 ? kAround : level;
+    return off(p) < radius_here + 1.0 ? kAround : around;
+  }
+};
+
+TEST(SegmentLevel, ANarrowPlaceInFatOfLittleContrastIsPassedAndAClosedOneIsNot) {
+  // The fat, which smoothing draws into what is thin, makes its outer voxels darker than soft
+  // tissue is.
+  for (const double lean : {0.0, 0.2}) {
+    for (const double around : {kAround, -100.0}) {
+      SCOPED_TRACE(around);
+      NarrowTube tube{.narrow = 1.4, .lean = lean};
+      const SegmentOptions asked = {.seeds = {Vec3(-40.0 * lean, -40.0 * lean, 5)},
+                                    .target = Vec3(40.0 * lean, 40.0 * lean, 85)};
+      const auto hu = [&](const Vec3& p) { return tube.hu(p, 160.0, around); };
+      const Segmentation found = segment(scanned(20.0, hu), asked);
+      EXPECT_EQ(measure_shape(found.mask.grid, found.mask.labels).pieces, 1U);
+      for (const Vec3& place : found.statistics.search.route.points) {
+        EXPECT_LT(tube.off(place), tube.radius(place.z())) << place.transpose();
+      }
+      tube.closed = true;
+      EXPECT_TRUE(has(error_of(scanned(20.0, hu), asked), "is not connected with the access"));
+    }
+  }
+}
+
 TEST(SegmentLevel, WhereContrastFallsTheArteryGoesOnBehindTheTarget) {
   // Up to a quarter of the contrast is noise: a way seeks bright voxels, and what it found
   // of the level at its end was so high that the artery behind it counted as another vessel.
