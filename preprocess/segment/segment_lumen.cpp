@@ -158,6 +158,23 @@ void add_rim(const LumenField& field, std::vector<float>& level, Labels& artery,
   }
 }
 
+/// The balls that fit in round the ways' voxels, as far as they lie in the same part: where a wide
+/// vein touches as widely as the artery is wide, a flood from there would leave the bare way.
+std::vector<std::size_t> vessel_round(const Grid& grid, const VesselParts& parts,
+                                      const std::vector<float>& depth,
+                                      const std::vector<std::vector<WayLevel>>& ways) {
+  std::vector<std::size_t> round;
+  for (const auto& way : ways) {
+    for (const WayLevel& place : way) {
+      const auto radius = static_cast<double>(depth[place.voxel]);
+      for (const std::size_t n : voxels_in_ball(grid, center_of(grid, place.voxel), radius)) {
+        if (parts.of[n] != 0 && parts.of[n] == parts.of[place.voxel]) round.push_back(n);
+      }
+    }
+  }
+  return round;
+}
+
 /// Pieces of doubtful parts that were kept, the largest first.
 std::vector<Leak> find_doubtful(const LumenField& field, const VesselParts& parts,
                                 const std::vector<float>& depth, const Labels& artery) {
@@ -229,6 +246,7 @@ LocalLumen find_local_lumen(const LumenField& field, const Candidates& candidate
       other[place.voxel] = 0;
     }
   }
+  for (const std::size_t n : vessel_round(field.grid, parts, depth, ways)) own[n] = 1;
   LocalLumen found;
   found.labels = core;
   const KnownParts known{.ways = trusted, .own = own, .other = other};

@@ -22,7 +22,8 @@ struct LocalLumen {
 ///      core's part of that contrast is core, within 3 mm of a way also what has as much as the way
 ///      itself. Specks of noise in it are filled.
 ///   2. Parts of it that are other vessels or organs (vessel_parts.h) and leaks (segment_leak.h)
-///      are cut from it, in the neck.
+///      are cut from it, in the neck; the balls that fit in round the ways stay, as far as they lie
+///      in the ways' own parts.
 ///   3. Two layers of voxels are added to either, down to 40 % of the contrast (smoothing makes
 ///      vessels thinner) to what lies there, one and two voxels on, before fat to what blur leaves
 ///      there of a wall of 0.9 mm; between an artery and what was

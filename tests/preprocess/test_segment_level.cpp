@@ -128,6 +128,23 @@ TEST(SegmentLevel, ANarrowPlaceInFatOfLittleContrastIsPassedAndAClosedOneIsNot) 
   }
 }
 
+TEST(SegmentLevel, AnArteryThatAWideVeinLiesOnIsKeptRoundTheWay) {
+  // The vein, as bright and over three times as wide, touches as widely as the artery is wide: cut
+  // off, it took with it what lies round the way.
+  const auto artery = [](const Vec3& p) { return off_axis(p, 0) < 2.8; };
+  for (const double overlap : {1.0, 1.5}) {
+    SCOPED_TRACE(overlap);
+    const auto vein = [&](const Vec3& p) {
+      return std::hypot(p.y() - 11.8 + overlap, p.z() - 45.0) < 9.0;
+    };
+    const Image image =
+        scanned(10.0, [&](const Vec3& p) { return artery(p) || vein(p) ? 300.0 : kAround; });
+    const Segmentation found = segment(image, {.seeds = {kBottom}, .target = kTop});
+    EXPECT_EQ(measure_shape(found.mask.grid, found.mask.labels).pieces, 1U);
+    EXPECT_GT(dice(found.mask, artery), 0.99);
+  }
+}
+
 TEST(SegmentLevel, WhereContrastFallsTheArteryGoesOnBehindTheTarget) {
   // Up to a quarter of the contrast is noise: a way seeks bright voxels, and what it found
   // of the level at its end was so high that the artery behind it counted as another vessel.
