@@ -147,6 +147,29 @@ Centerline widened(Centerline way) {
   return way;
 }
 
+/// The point of a line so far along it.
+Vec3 point_at(const Centerline& line, double arc) {
+  const Eigen::Index last = line.points.cols() - 1;
+  const double* const begin = line.arc_length.data();
+  const auto after = std::clamp<Eigen::Index>(
+      std::upper_bound(begin, begin + last + 1, begin[0] + arc) - begin, 1, last);
+  const double step = begin[after] - begin[after - 1];
+  const double t =
+      step > 0.0 ? std::clamp((begin[0] + arc - begin[after - 1]) / step, 0.0, 1.0) : 0.0;
+  return (1.0 - t) * line.points.col(after - 1) + t * line.points.col(after);
+}
+
+/// Whether all of the straight step from a to b lies in the lumen.
+bool is_open(const Vec3& a, const Vec3& b, const InLumen& in_lumen) {
+  constexpr double kEvery = 0.1;  // mm
+  const int steps = static_cast<int>(std::ceil((b - a).norm() / kEvery));
+  for (int k = 0; k <= steps; ++k) {
+    const double t = steps > 0 ? static_cast<double>(k) / steps : 0.0;
+    if (!in_lumen((1.0 - t) * a + t * b)) return false;
+  }
+  return true;
+}
+
 constexpr double kSameRadius = 0.01;  // of the radius
 
 /// Whether the true lumen at point i of the way is as deep as the way's radius there: mouths of
@@ -199,7 +222,6 @@ void measure_line(const Surface& surface, const Centerline& line, const Centerli
   }
   row.axis_mean_mm = mean_of(off);
   row.axis_p95_mm = p95_of(off);
-  row.way_right = is_way_right(line, way);
   if (asked == 0) return;
   row.radius_within = static_cast<double>(within) / asked;
   row.ball_within = static_cast<double>(ball_within) / asked;
@@ -243,13 +265,15 @@ std::optional<Centerline> find_line(const preprocess::Image& image, const Vec3& 
 
 }  // namespace
 
-bool is_way_right(const Centerline& line, const Centerline& way) {
+bool is_way_right(const Centerline& line, const Centerline& way, const InLumen& in_lumen) {
   const Centerline wide = widened(way);
   preprocess::PathPlace before{.radius = wide.radius(0)};
   const auto skips = [](double arc, double radius) { return arc > 2.5 * radius + 5.0; };
   for (const Vec3& p : line.points.colwise()) {
     const preprocess::PathPlace place = preprocess::find_place(p, wide);
-    if (place.from_axis > place.radius) return false;
+    if (place.from_axis > place.radius && !is_open(p, point_at(wide, place.arc), in_lumen)) {
+      return false;
+    }
     if (skips(place.arc - before.arc, std::max(place.radius, before.radius))) return false;
     before = place;
   }
@@ -288,7 +312,13 @@ PatientRow segment_patient(const preprocess::RandomPatient& patient) {
                   row);
   if (row.outcome == PatientOutcome::kNoSurface) return row;
   measure_surface(surface, grid, way, truth, row);
-  if (line) measure_line(surface, *line, way, std::cbrt(grid.spacing.prod()), truth, row);
+  if (!line) return row;
+  measure_line(surface, *line, way, std::cbrt(grid.spacing.prod()), truth, row);
+  preprocess::PhantomSpec bare = patient.spec;
+  bare.calcium.clear();  // a line that goes round plaque goes down no other artery
+  const preprocess::PhantomLumen arteries(bare);
+  row.way_right =
+      is_way_right(*line, way, [&](const Vec3& p) { return arteries.distance(p) < 0.0; });
   return row;
 }
 

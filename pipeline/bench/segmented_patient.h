@@ -2,6 +2,7 @@
 /// One patient of `wireplan bench segmentation`: segmented from two points, and held against what
 /// is known of it. For use in this folder.
 #include <filesystem>
+#include <functional>
 #include <optional>
 #include <string>
 #include <vector>
@@ -38,12 +39,16 @@ struct PatientRow {
   double segment_s = 0.0, all_s = 0.0;        // CPU time, of all threads
 };
 
+/// Whether a point lies in the true lumen of any artery [mm].
+using InLumen = std::function<bool(const Vec3&)>;
+
 /// Whether a line keeps to the true way: each of its points lies within the way's radius at the
 /// place next to it (where a wider artery's lumen is one with that, as at a mouth, within the
-/// wider one's: lines cut corners); no step skips more of the way than two and a half radii and 5
-/// mm, as those across limbs that kiss do; and it begins and ends with the way, to the same
-/// tolerance.
-bool is_way_right(const Centerline& line, const Centerline& way);
+/// wider one's: lines cut corners), or all of the straight step there lies in the true lumen: at
+/// its end an artery is one with both that go on, and the middle may lie in the other; no step
+/// skips more of the way than two and a half radii and 5 mm, as those across limbs that kiss do;
+/// and it begins and ends with the way, to the same tolerance.
+bool is_way_right(const Centerline& line, const Centerline& way, const InLumen& in_lumen);
 
 /// Segmented from the two clicked points alone, no band given; then its surface and centerline with
 /// the defaults of a case. Never throws `Error`: a refusal is a row.

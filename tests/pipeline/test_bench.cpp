@@ -10,6 +10,7 @@
 #include "pipeline/bench/bench_walls.h"
 #include "pipeline/bench/measured_frames.h"
 #include "pipeline/bench/segmented_patient.h"
+#include "preprocess/centerline/path_place.h"
 #include "preprocess/surface/surface.h"
 #include "preprocess/surface/surface_repair.h"
 #include "preprocess/volume/image.h"
@@ -353,25 +354,32 @@ TEST(Bench, MeasuredWiresThatAreNotThereAreToldAndMistakesInThem) {
   if (before == nullptr) ::unsetenv("WIREPLAN_DATA");
 }
 
+/// Whether a point lies in the tube round a line.
+bool is_in(const Vec3& p, const Centerline& axis) {
+  const preprocess::PathPlace place = preprocess::find_place(p, axis);
+  return place.from_axis < place.radius;
+}
+
 TEST(Bench, AWayIsRightThatKeepsToTheTrueOneAndSkipsNothingOfIt) {
+  const auto is_right = [](const Centerline& line, const Centerline& truth) {
+    const auto in_way = [&](const Vec3& p) { return is_in(p, truth); };
+    return is_way_right(line, truth, in_way);
+  };
   // Up a trunk of 10 mm radius, then into a branch of 3 mm across it.
   Centerline way = line_through({{0, 0, 0}, {0, 0, 60}, {50, 0, 60}}, 10.0);
   for (Eigen::Index i = 0; i < way.points.cols(); ++i) {
     if (way.points(0, i) > 0.0) way.radius(i) = 3.0;
   }
-  EXPECT_TRUE(is_way_right(way, way));
+  EXPECT_TRUE(is_right(way, way));
   // Cut through the corner, within the trunk.
-  EXPECT_TRUE(
-      is_way_right(line_through({{0, 0, 0}, {0, 0, 52}, {12, 0, 60}, {50, 0, 60}}, 3.0), way));
+  EXPECT_TRUE(is_right(line_through({{0, 0, 0}, {0, 0, 52}, {12, 0, 60}, {50, 0, 60}}, 3.0), way));
   // Beside the branch by more than its radius, where the trunk is far.
-  EXPECT_FALSE(is_way_right(
+  EXPECT_FALSE(is_right(
       line_through({{0, 0, 0}, {0, 0, 60}, {25, 0, 60}, {30, 4, 60}, {35, 0, 60}, {50, 0, 60}},
                    3.0),
       way));
-  EXPECT_FALSE(
-      is_way_right(line_through({{0, 0, 0}, {0, 0, 60}, {35, 0, 60}}, 3.0), way));  // short
-  EXPECT_FALSE(is_way_right(line_through({{0, 0, 40}, {0, 0, 60}, {50, 0, 60}}, 3.0), way))
-      << "late";
+  EXPECT_FALSE(is_right(line_through({{0, 0, 0}, {0, 0, 60}, {35, 0, 60}}, 3.0), way));  // short
+  EXPECT_FALSE(is_right(line_through({{0, 0, 40}, {0, 0, 60}, {50, 0, 60}}, 3.0), way)) << "late";
 
   // A branch that leaves a trunk of 14 mm radius backwards, at 25 degrees: its lumen is one with
   // the trunk's for 40 mm. A line that crosses within that, and one that crosses beyond.
@@ -381,16 +389,41 @@ TEST(Bench, AWayIsRightThatKeepsToTheTrueOneAndSkipsNothingOfIt) {
   for (Eigen::Index i = 0; i < acute.points.cols(); ++i) {
     if (acute.points(0, i) > 0.0) acute.radius(i) = 3.0;
   }
-  EXPECT_TRUE(is_way_right(line_through({{0, 0, 0}, {0, 0, 44}, {7.46, 0, 44}, tip}, 3.0), acute));
-  EXPECT_FALSE(is_way_right(line_through({{0, 0, 0}, {0, 0, 19}, {19, 0, 19.2}, tip}, 3.0), acute));
+  EXPECT_TRUE(is_right(line_through({{0, 0, 0}, {0, 0, 44}, {7.46, 0, 44}, tip}, 3.0), acute));
+  EXPECT_FALSE(is_right(line_through({{0, 0, 0}, {0, 0, 19}, {19, 0, 19.2}, tip}, 3.0), acute));
 
   // Limbs of 4 mm radius that come back to 0.5 mm from each other, and a line that steps across.
   const Centerline loop = line_through(
       {{0, 0, 0}, {0, 0, 40}, {-20, 0, 60}, {4, 0, 80}, {28, 0, 60}, {8.5, 0, 40}, {8.5, 0, 0}},
       4.0);
-  EXPECT_TRUE(is_way_right(loop, loop));
+  EXPECT_TRUE(is_right(loop, loop));
   EXPECT_FALSE(
-      is_way_right(line_through({{0, 0, 0}, {0, 0, 40}, {8.5, 0, 40}, {8.5, 0, 0}}, 4.0), loop));
+      is_right(line_through({{0, 0, 0}, {0, 0, 40}, {8.5, 0, 40}, {8.5, 0, 0}}, 4.0), loop));
+}
+
+TEST(Bench, AWayIsRightThatGoesThroughTheMouthOfTheOtherArteryAndNotDownIt) {
+  // A trunk of 5 mm radius ends in an artery of 3 mm, the way's, and one of 4.4 mm, which part by
+  // 40 degrees: their lumens are one as far as 9 mm from there.
+  const double half = 20.0 * kPi / 180.0;
+  const auto along = [&](double side, double by) {
+    return Vec3(side * by * std::sin(half), 0, 40.0 + by * std::cos(half));
+  };
+  Centerline way = line_through({{0, 0, 0}, {0, 0, 40}, along(1, 60)}, 5.0);
+  for (Eigen::Index i = 0; i < way.points.cols(); ++i) {
+    if (way.points(2, i) > 40.0) way.radius(i) = 3.0;
+  }
+  const Centerline other = line_through({{0, 0, 40}, along(-1, 60)}, 4.4);
+  // Down the middle of the other artery so far, then across to the way.
+  const auto swings = [&](double by) {
+    return line_through({{0, 0, 0}, {0, 0, 40}, along(-1, by), along(1, by + 4.0), along(1, 60)},
+                        3.0);
+  };
+  const InLumen both = [&](const Vec3& p) { return is_in(p, way) || is_in(p, other); };
+  const InLumen alone = [&](const Vec3& p) { return is_in(p, way); };
+  EXPECT_TRUE(is_way_right(swings(8.0), way, both));
+  EXPECT_FALSE(is_way_right(swings(8.0), way, alone)) << "through what is no lumen, as a vein";
+  EXPECT_FALSE(is_way_right(swings(20.0), way, both));
+  EXPECT_FALSE(is_way_right(line_through({{0, 0, 0}, {0, 0, 40}, along(-1, 60)}, 3.0), way, both));
 }
 
 TEST(Bench, PatientsAreForSegmentationAlone) {
