@@ -90,6 +90,35 @@ bool press_aside(PhantomTube& vein, const Centerline& artery, double wall) {
   return near.missing.maxCoeff() > 0.0;
 }
 
+/// Moves the organ within its slices, away from the artery's point that lies deepest in it, until
+/// that is further out than the organ's surface by the artery's wall and half its radius. Tells
+/// whether there was one.
+bool press_aside(PhantomEllipsoid& organ, const Centerline& artery, double wall) {
+  const auto round = [&](Eigen::Index i) -> Vec3 {  // half axes that the point is to lie beyond
+    return organ.semi_axes.array() + wall + 0.5 * artery.radius(i);
+  };
+  double least = 1.0;
+  Eigen::Index deepest = -1;
+  for (Eigen::Index i = 0; i < artery.points.cols(); ++i) {
+    const double part = (artery.points.col(i) - organ.center).cwiseQuotient(round(i)).norm();
+    if (part >= least) continue;
+    least = part;
+    deepest = i;
+  }
+  if (deepest < 0) return false;
+  constexpr double kFurther = 1e-6;  // so that it is not found again
+  const Vec3 axes = round(deepest), off = organ.center - artery.points.col(deepest);
+  Vec3 side(off.x(), off.y(), 0.0);
+  side = side.norm() > 1e-3 ? side.normalized() : Vec3::UnitX();
+  // |(off + by side) / axes| = 1
+  const Vec3 from = off.cwiseQuotient(axes), step = side.cwiseQuotient(axes);
+  const double along = from.dot(step), squared = step.squaredNorm();
+  const double by =
+      (std::sqrt(along * along + squared * (1.0 - from.squaredNorm())) - along) / squared;
+  organ.center += (by + kFurther) * side;
+  return true;
+}
+
 }  // namespace
 
 double DrawnScan::arterial_hu() const { return kBloodHu + contrast_hu * (1.0 - 0.5 * fall); }
@@ -154,7 +183,7 @@ void add_vein(PhantomTube vein, double level, const DrawnScan& scan, Draws& draw
   if (scan.veins) body.level.back() = own;
 }
 
-void press_veins_aside(DrawnAnatomy& body) {
+void press_aside(DrawnAnatomy& body) {
   constexpr double kSpacing = 2.5;  // of points of what was moved                      [mm]
   constexpr int kRounds = 12;       // away from one artery may be toward another
   std::vector<std::pair<Centerline, double>> arteries;  // axis and wall
@@ -163,14 +192,21 @@ void press_veins_aside(DrawnAnatomy& body) {
       arteries.emplace_back(phantom_axis(tube), tube.wall_mm);
     }
   }
+  const auto press = [&](auto& vein_or_gland) {
+    bool moved = false;
+    for (const auto& [axis, wall] : arteries) {
+      moved = press_aside(vein_or_gland, axis, wall) || moved;
+    }
+    return moved;
+  };
   for (PhantomTube& tube : body.tubes) {
     if (tube.kind != PhantomTubeKind::kVein) continue;
-    for (int round = 0; round < kRounds; ++round) {
-      bool moved = false;
-      for (const auto& [axis, wall] : arteries) moved = press_aside(tube, axis, wall) || moved;
-      if (!moved) break;
+    for (int round = 0; round < kRounds && press(tube); ++round) {
       tube = with_points_every(tube, kSpacing);
     }
+  }
+  for (PhantomEllipsoid& organ : body.organs) {
+    for (int round = 0; organ.name == kThyroid && round < kRounds && press(organ);) ++round;
   }
 }
 

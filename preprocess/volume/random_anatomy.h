@@ -79,9 +79,12 @@ PhantomTube vein_beside(const std::string& name, const PhantomTube& artery, doub
 void add_vein(PhantomTube vein, double level, const DrawnScan& scan, Draws& draws,
               DrawnAnatomy& body);
 
-/// Moves veins off arteries and their thrombus, so that lumens overlap by no more than half the
-/// radius of the thinner: an artery dents a vein that it presses on, and never runs inside of it.
-void press_veins_aside(DrawnAnatomy& body);
+inline constexpr const char* kThyroid = "thyroid";  // either lobe
+
+/// Moves veins and the lobes of the thyroid off arteries and their thrombus, so that lumens overlap
+/// by no more than half the radius of the thinner, and lobes by half the artery's: an artery dents
+/// what it presses on, and never runs inside of it.
+void press_aside(DrawnAnatomy& body);
 
 /// Bends part of a tube to either side of its course: by a sine of this amplitude across it that is
 /// zero at both ends.

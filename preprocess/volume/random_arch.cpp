@@ -133,7 +133,7 @@ void add_chest(const DrawnScan& scan, Draws& draws, DrawnAnatomy& body) {
   organ("fat of the neck", -90.0, {0, -6, 140}, {46, 34, 90});
   for (const double side : {-1.0, 1.0}) {
     organ("lung", -850.0, {side * 92, 2, -50}, {44, 76, 116});
-    organ("thyroid", thyroid, {side * 15, -22, 104}, {8, 9, 22});
+    organ(kThyroid, thyroid, {side * 15, -22, 104}, {8, 9, 22});
     organ("clavicle", 300.0, {side * 70, -48, 64}, {58, 6, 6}, 1.5);
     organ("first rib", 280.0, {side * 52, 6, 46}, {5, 34, 5}, 1.3);
   }

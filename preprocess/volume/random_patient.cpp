@@ -175,7 +175,7 @@ DrawnAnatomy draw_body(bool abdomen, const DrawnScan& scan, Draws& draws) {
   }
   if (draws.chance(0.35)) add_narrow_place(draws, scan, body);
   resample_all();
-  press_veins_aside(body);
+  press_aside(body);
   return body;
 }
 

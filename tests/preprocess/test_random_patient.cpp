@@ -283,5 +283,30 @@ TEST(RandomPatient, ArteriesDentVeinsAndNeverRunInsideOfThem) {
   }
 }
 
+TEST(RandomPatient, NoArteryRunsInsideOfTheThyroid) {
+  int lobes = 0;
+  // In 10040, 10042 and 10092 a carotid's axis lay up to a third of the way to a lobe's middle.
+  for (std::uint64_t seed = 10030; seed < 10100; ++seed) {
+    SCOPED_TRACE(seed);
+    const RandomPatient patient = draw_patient(seed);
+    for (const PhantomEllipsoid& lobe : patient.spec.organs) {
+      if (lobe.name != "thyroid") continue;
+      ++lobes;
+      for (const PhantomTube& tube : patient.spec.tubes) {
+        if (tube.kind != PhantomTubeKind::kArtery) continue;
+        const Centerline artery = phantom_axis(tube);
+        double deepest = 1.0;
+        for (Eigen::Index i = 0; i < artery.points.cols(); ++i) {
+          const Vec3 axes = lobe.semi_axes.array() + tube.wall_mm + 0.5 * artery.radius(i);
+          const Vec3 off = artery.points.col(i) - lobe.center;
+          deepest = std::min(deepest, off.cwiseQuotient(axes).norm());
+        }
+        EXPECT_EQ(deepest, 1.0) << tube.name;
+      }
+    }
+  }
+  EXPECT_GT(lobes, 30);
+}
+
 }  // namespace
 }  // namespace wireplan::preprocess
