@@ -159,6 +159,28 @@ void smooth_boundary(const LumenField& field, Labels& labels) {
   }
 }
 
+/// Takes off what lies on bone like a film, but for the ways' own vessel. In a CT alone: elsewhere
+/// the vessel itself may be brighter than its points.
+void drop_films(const LumenField& field, const std::vector<std::vector<WayLevel>>& ways,
+                Labels& labels) {
+  if (!field.hounsfield) return;
+  const Grid& grid = field.grid;
+  Labels bright(labels.size(), 0), kept(labels.size(), 0);
+  for (std::size_t n = 0; n < labels.size(); ++n) {
+    bright[n] = static_cast<double>(field.values[n]) > field.upper ? 1 : 0;
+  }
+  const std::vector<float> depth = measure_depth(grid, labels);
+  for (const auto& way : ways) {
+    for (const WayLevel& place : way) {
+      const double reach = static_cast<double>(depth[place.voxel]) + grid.spacing.maxCoeff();
+      for (const std::size_t n : voxels_in_ball(grid, center_of(grid, place.voxel), reach)) {
+        kept[n] = 1;
+      }
+    }
+  }
+  cut_films(grid, bright, kept, labels);
+}
+
 /// The levels along a way, every 10 mm and at its end.
 void tell_levels(const Grid& grid, const std::vector<WayLevel>& way,
                  std::vector<LevelAlong>& along) {
@@ -292,6 +314,7 @@ Region find_by_level(const Image& image, const SegmentOptions& options, bool bou
   smooth_boundary(field, region.labels);
   close_tunnels(field.grid, kTunnelVoxels * std::cbrt(field.grid.spacing.prod()), lumen.other,
                 region.labels);
+  drop_films(field, ways, region.labels);
   region.values = std::move(field.values);
   region.labels =
       flood(region.grid, region.seeds, [&](std::size_t n) { return region.labels[n] != 0; });

@@ -1,5 +1,5 @@
 #pragma once
-/// Tunnels of noise through a mask, closed.
+/// Tunnels of noise through a mask, closed, and films on bone, cut.
 #include "preprocess/volume/voxels.h"
 
 namespace wireplan::preprocess {
@@ -8,5 +8,11 @@ namespace wireplan::preprocess {
 /// where that closes tunnels: where it makes handles fewer (by the Euler number). Pits stay, and so
 /// do gaps between limbs, which would become handles. `blocked` voxels are never filled.
 void close_tunnels(const Grid& grid, double radius, const Labels& blocked, Labels& labels);
+
+/// Takes off films, as lie on bone whose blurred rim has the level of a vessel: parts (connected
+/// through corners) more than a voxel away from where the mask is three voxels thick in each
+/// direction, of which half or more lie within two voxels of `bright` ones. Slices of over 1.6 mm
+/// are not counted: an artery may lie in one or two. Voxels of `kept` stay.
+void cut_films(const Grid& grid, const Labels& bright, const Labels& kept, Labels& labels);
 
 }  // namespace wireplan::preprocess

@@ -11,7 +11,6 @@
 #include "preprocess/segment/mask_shape.h"
 #include "preprocess/segment/segment.h"
 #include "preprocess/segment/segment_band.h"
-#include "preprocess/segment/segment_close.h"
 #include "preprocess/segment/segment_way.h"
 #include "tests/preprocess/segment_answers.h"
 
@@ -536,43 +535,6 @@ TEST(SegmentLevel, AFarDetourIsLeftForAPlaceThatNoiseSeldomMakesSoDark) {
     for (const Vec3& place : way) away = std::max(away, off_axis(place, 0.0));
     EXPECT_EQ(away < 3.0, is_far) << away;
   }
-}
-
-// ---- tunnels ------------------------------------------------------------------------------------
-
-/// A block of 12 x 12 x 12 voxels of 1 mm in one of 16, without what `hole` says.
-template <typename Hole>
-Labels block_without(const Grid& grid, Hole hole) {
-  Labels labels(grid.voxels(), 0);
-  for (std::size_t n = 0; n < labels.size(); ++n) {
-    const Voxel v = voxel_at(grid, n);
-    const bool inside = std::min({v[0], v[1], v[2]}) >= 2 && std::max({v[0], v[1], v[2]}) < 14;
-    labels[n] = inside && !hole(v) ? 1 : 0;
-  }
-  return labels;
-}
-
-TEST(CloseTunnels, ATunnelIsFilledAndAGapBetweenLimbsIsNot) {
-  const Grid grid{.size = {16, 16, 16}};
-  const Labels nothing(grid.voxels(), 0);
-  const auto tunnel = [](const Voxel& v) { return v[0] == 7 && v[1] == 7; };
-  Labels labels = block_without(grid, tunnel);
-  EXPECT_EQ(measure_shape(grid, labels).handles, 1U);
-  close_tunnels(grid, 1.8, nothing, labels);
-  EXPECT_EQ(measure_shape(grid, labels).handles, 0U);
-  EXPECT_EQ(count(labels), 1728U);
-
-  // A slit that comes from one side, as between limbs, stays; and a tunnel that is another vessel.
-  const Labels limbs = block_without(grid, [](const Voxel& v) { return v[0] == 7 && v[1] > 4; });
-  labels = limbs;
-  close_tunnels(grid, 1.8, nothing, labels);
-  EXPECT_EQ(labels, limbs);
-  labels = block_without(grid, tunnel);
-  Labels other(grid.voxels(), 0);
-  for (std::size_t n = 0; n < other.size(); ++n) other[n] = tunnel(voxel_at(grid, n)) ? 1 : 0;
-  const Labels before = labels;
-  close_tunnels(grid, 1.8, other, labels);
-  EXPECT_EQ(labels, before);
 }
 
 TEST(LevelRule, BlurTakesWhatItTakesOfACylinder) {
