@@ -204,7 +204,7 @@ std::vector<Stage> stages_from_labels(const Case& given) {
     stages.push_back({.name = "volume", .version = 6, .reads_input = true, .make = make_volume});
   }
   stages.push_back({.name = "segment",
-                    .version = 13,
+                    .version = 14,
                     .reads_input = in_volume,
                     .reads_labels = true,
                     .parameters = {"/mask"},
@@ -235,7 +235,7 @@ std::vector<Stage> stages_to_surface(const Case& given) {
   }
   stages.push_back({.name = "volume", .version = 6, .reads_input = true, .make = make_volume});
   stages.push_back({.name = "segment",
-                    .version = 21,
+                    .version = 22,
                     .reads_input = true,
                     .parameters = {"/segmentation", "/mask"},
                     .make = make_segment});

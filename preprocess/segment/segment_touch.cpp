@@ -16,8 +16,8 @@
 namespace wireplan::preprocess {
 namespace {
 
-constexpr double kRoundMm = 20.0, kRoundRadii = 6.0;  // by which a way round is longer
-constexpr double kDip = 0.75;       // of both sides' level above the edge: what dips has less
+constexpr double kRoundMm = 20.0, kRoundRadii = 5.0;  // by which a way round is longer
+constexpr double kDip = 0.8;        // of both sides' level above the edge: what dips has less
 constexpr double kNarrow = 0.75;    // of both sides' radius
 constexpr double kKeptMm = 2.0;     // a given point so near says that it is open
 constexpr double kLongestMm = 2.5;  // of a touch: between what is undimmed on both sides

@@ -23,8 +23,8 @@ struct Touch {
 ///      and no voxel is taken that would close a loop. Of each loop a sheet is left out, where
 ///      it is darkest.
 ///   2. Where the shortest passable way (grid_search.h, Cost::kRoute) to another end crosses
-///      such a sheet, and the way round is longer by 20 mm and six radii, the sheet is looked at.
-///   3. It is cut if it is darker than both sides by a quarter of what they are above `edge`, the
+///      such a sheet, and the way round is longer by 20 mm and five radii, the sheet is looked at.
+///   3. It is cut if it is darker than both sides by a fifth of what they are above `edge`, the
 ///      value where the lumen ends; if both go on in two directions, as limbs that pass each other
 ///      do (at a stenosis a part ends); and if they come within 2.5 mm or three voxels of each
 ///      other undimmed (a bridge that is dark for longer is a thin vessel).
