@@ -1,6 +1,7 @@
 #include "preprocess/segment/side_branches.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <functional>
 #include <limits>
@@ -254,6 +255,35 @@ class BranchSearch {
   std::vector<std::size_t> touched_;
 };
 
+/// Whether what was followed is no tube but a film, as the blurred rim of a bone: wide as its
+/// sections are, hardly a voxel has others on both sides along the axes whose voxels are fine.
+bool is_film(const Grid& grid, const std::vector<Section>& sections) {
+  constexpr double kFineMm = 1.6, kLeastAcross = 20.0, kInner = 0.1;
+  std::vector<std::size_t> voxels;
+  for (const Section& section : sections) {
+    voxels.insert(voxels.end(), section.voxels.begin(), section.voxels.end());
+  }
+  const auto all = static_cast<double>(voxels.size());
+  const double across = all * std::cbrt(grid.spacing.prod()) / section_length(grid) /
+                        static_cast<double>(sections.size());
+  if (across < kLeastAcross) return false;
+  std::sort(voxels.begin(), voxels.end());
+  const std::array<std::size_t, 3> stride = {1, grid.index(0, 1, 0), grid.index(0, 0, 1)};
+  const auto is_inner = [&](std::size_t n) {
+    for (int axis = 0; axis < 3; ++axis) {
+      if (grid.spacing[axis] > kFineMm) continue;
+      const std::size_t by = stride[static_cast<std::size_t>(axis)];
+      if (!std::binary_search(voxels.begin(), voxels.end(), n + by) ||
+          !std::binary_search(voxels.begin(), voxels.end(), n - by)) {
+        return false;
+      }
+    }
+    return true;
+  };
+  const auto inner = std::count_if(voxels.begin(), voxels.end(), is_inner);
+  return static_cast<double>(inner) < kInner * all;
+}
+
 /// Inscribed radius of the artery [mm] in its middle beside voxel n, uphill from there.
 double radius_beside(const Grid& grid, const std::vector<float>& depth, std::size_t n) {
   for (bool climbs = true; climbs;) {
@@ -355,7 +385,7 @@ void add_branches(const LumenField& field, double part, std::vector<float>& leve
                                    [&](std::size_t n) { return artery[n] != 0; });
     if (taken) continue;
     const std::vector<Section> sections = search.follow(contact);
-    if (sections.empty()) continue;
+    if (sections.empty() || is_film(field.grid, sections)) continue;
     added.push_back(add_branch(field, contact, sections, level, artery, other));
   }
 }

@@ -15,11 +15,11 @@ namespace wireplan::preprocess {
 /// and narrower than the artery (0.7 of its radius, or 2 mm; 2.5 mm with three quarters of its
 /// contrast). Where what touches falls into pieces within 5 mm, each that is so bright is followed
 /// by itself: a branch whose mouth touches something else. A vein that passes by goes on in two
-/// directions, an organ widens, rims of bone lead back to the artery, and veins that end at it are
-/// wide. It is kept as far as it does so, and down to half of its own contrast. `level` [HU] is
-/// that of the artery in its voxels; what is added takes its own, and leaves `other`. Returns what
-/// was added, with the place of the contact, the radius of its cross-section and the mean of the
-/// volume in it, the largest first.
+/// directions, an organ widens, rims of bone lead back to the artery or are films, and veins that
+/// end at it are wide. It is kept as far as it does so, and down to half of its own contrast.
+/// `level` [HU] is that of the artery in its voxels; what is added takes its own, and leaves
+/// `other`. Returns what was added, with the place of the contact, the radius of its cross-section
+/// and the mean of the volume in it, the largest first.
 std::vector<Leak> add_side_branches(const LumenField& field, std::vector<float>& level,
                                     Labels& artery, Labels& other);
 

@@ -357,6 +357,26 @@ TEST(SegmentLevel, InOtherUnitsAVesselBrighterThanItsPointsIsNoBone) {
   EXPECT_EQ(found.statistics.along.front().arc_mm, 0.0);
 }
 
+TEST(SegmentLevel, TheRimOfABoneIsNoBranch) {
+  // Blur gives the bone's rim each level between its own and that of what lies round it.
+  for (const double level : {180.0, 220.0}) {
+    const Image image = scanned(20.0, [&](const Vec3& p) {
+      if (off_axis(p, 0) < 5.0) return level;
+      return p.x() > 5.3 && std::abs(p.y()) < 15.0 && std::abs(p.z() - 45.0) < 12.0 ? 700.0
+                                                                                    : kAround;
+    });
+    const Segmentation found = segment(image, {.seeds = {kBottom}, .target = kTop});
+    EXPECT_GT(dice(found.mask, [](const Vec3& p) { return off_axis(p, 0) < 5.0; }), 0.95) << level;
+    EXPECT_TRUE(found.statistics.branches.empty()) << level;
+    double farthest = 0.0;
+    for (std::size_t n = 0; n < found.mask.labels.size(); ++n) {
+      if (found.mask.labels[n] == 0) continue;
+      farthest = std::max(farthest, off_axis(preprocess::center_of(image.grid, n), 0));
+    }
+    EXPECT_LT(farthest, 8.5) << level;
+  }
+}
+
 TEST(SegmentLevel, LittleContrastIsRefusedByWhatItHasOverBlood) {
   const auto with_level = [](double level) {
     return scanned(10.0, [&](const Vec3& p) { return off_axis(p, 0) < 5.0 ? level : kAround; });
