@@ -39,7 +39,6 @@ int euler_change(const Grid& grid, const Box& box, const Labels& labels,
 
 /// What is labelled with all that it shares a face or an edge with, along axes of fine voxels.
 Labels middle_of(const Grid& grid, const Labels& labels) {
-  constexpr double kFineMm = 1.6;
   const auto counts = [&](const Voxel& step) {
     if (step[0] != 0 && step[1] != 0 && step[2] != 0) return false;
     for (int axis = 0; axis < 3; ++axis) {

@@ -9,10 +9,13 @@ namespace wireplan::preprocess {
 /// do gaps between limbs, which would become handles. `blocked` voxels are never filled.
 void close_tunnels(const Grid& grid, double radius, const Labels& blocked, Labels& labels);
 
+/// Slices that are thicker may hold an artery in one or two, so they tell nothing of films.
+inline constexpr double kFineMm = 1.6;
+
 /// Takes off films, as lie on bone whose blurred rim has the level of a vessel: parts (connected
 /// through corners) more than a voxel away from where the mask is three voxels thick in each
-/// direction, of which half or more lie within two voxels of `bright` ones. Slices of over 1.6 mm
-/// are not counted: an artery may lie in one or two. Voxels of `kept` stay.
+/// direction in which voxels are fine (kFineMm), of which half or more lie within two voxels of
+/// `bright` ones. Voxels of `kept` stay.
 void cut_films(const Grid& grid, const Labels& bright, const Labels& kept, Labels& labels);
 
 }  // namespace wireplan::preprocess

@@ -9,6 +9,8 @@
 #include <queue>
 #include <utility>
 
+#include "preprocess/segment/segment_close.h"
+
 namespace wireplan::preprocess {
 namespace {
 
@@ -258,7 +260,7 @@ class BranchSearch {
 /// Whether what was followed is no tube but a film, as the blurred rim of a bone: wide as its
 /// sections are, hardly a voxel has others on both sides along the axes whose voxels are fine.
 bool is_film(const Grid& grid, const std::vector<Section>& sections) {
-  constexpr double kFineMm = 1.6, kLeastAcross = 20.0, kInner = 0.1;
+  constexpr double kLeastAcross = 20.0, kInner = 0.1;  // voxels; of all
   std::vector<std::size_t> voxels;
   for (const Section& section : sections) {
     voxels.insert(voxels.end(), section.voxels.begin(), section.voxels.end());
