@@ -165,10 +165,7 @@ void drop_films(const LumenField& field, const std::vector<std::vector<WayLevel>
                 Labels& labels) {
   if (!field.hounsfield) return;
   const Grid& grid = field.grid;
-  Labels bright(labels.size(), 0), kept(labels.size(), 0);
-  for (std::size_t n = 0; n < labels.size(); ++n) {
-    bright[n] = static_cast<double>(field.values[n]) > field.upper ? 1 : 0;
-  }
+  Labels kept(labels.size(), 0);
   const std::vector<float> depth = measure_depth(grid, labels);
   for (const auto& way : ways) {
     for (const WayLevel& place : way) {
@@ -178,7 +175,7 @@ void drop_films(const LumenField& field, const std::vector<std::vector<WayLevel>
       }
     }
   }
-  cut_films(grid, bright, kept, labels);
+  cut_films(grid, field.values, field.upper, kept, labels);
 }
 
 /// The levels along a way, every 10 mm and at its end.

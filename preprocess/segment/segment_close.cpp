@@ -95,13 +95,15 @@ void close_tunnels(const Grid& grid, double radius, const Labels& blocked, Label
   }
 }
 
-void cut_films(const Grid& grid, const Labels& bright, const Labels& kept, Labels& labels) {
-  expects(bright.size() == labels.size() && kept.size() == labels.size());
+void cut_films(const Grid& grid, const std::vector<float>& values, double upper, const Labels& kept,
+               Labels& labels) {
+  expects(values.size() == labels.size() && kept.size() == labels.size());
   const Labels thick = grown_twice(grid, middle_of(grid, labels));
   const auto is_beside = [&](std::size_t n) {
     constexpr int kBeside = 2;
     const std::vector<std::size_t> round = neighbourhood(grid, voxel_at(grid, n), kBeside);
-    return std::any_of(round.begin(), round.end(), [&](std::size_t m) { return bright[m] != 0; });
+    return std::any_of(round.begin(), round.end(),
+                       [&](std::size_t m) { return static_cast<double>(values[m]) > upper; });
   };
   Labels thin(labels.size(), 0), seen(labels.size(), 0);
   for (std::size_t n = 0; n < labels.size(); ++n) {

@@ -15,7 +15,8 @@ inline constexpr double kFineMm = 1.6;
 /// Takes off films, as lie on bone whose blurred rim has the level of a vessel: parts (connected
 /// through corners) more than a voxel away from where the mask is three voxels thick in each
 /// direction in which voxels are fine (kFineMm), of which half or more lie within two voxels of
-/// `bright` ones. Voxels of `kept` stay.
-void cut_films(const Grid& grid, const Labels& bright, const Labels& kept, Labels& labels);
+/// `values` [HU] above `upper`, the end of the band. Voxels of `kept` stay.
+void cut_films(const Grid& grid, const std::vector<float>& values, double upper, const Labels& kept,
+               Labels& labels);
 
 }  // namespace wireplan::preprocess

@@ -50,6 +50,17 @@ double section_length(const Grid& grid) {
   return std::max(kSectionVoxels * std::cbrt(grid.spacing.prod()), grid.spacing.maxCoeff());
 }
 
+double mean_voxels(const std::vector<Section>& sections) {
+  double sum = 0.0;
+  for (const Section& section : sections) sum += static_cast<double>(section.voxels.size());
+  return sum / std::max(1.0, static_cast<double>(sections.size()));
+}
+
+/// Voxels of a cross-section, in the mean.
+double voxels_across(const Grid& grid, const std::vector<Section>& sections) {
+  return mean_voxels(sections) * std::cbrt(grid.spacing.prod()) / section_length(grid);
+}
+
 /// By how much a voxel stands out of the noise that smoothing leaves [HU].
 double least_contrast(const LumenField& field) {
   const double left =
@@ -89,17 +100,10 @@ class BranchSearch {
  private:
   using Visit = std::pair<double, std::size_t>;  // distance [mm], voxel
 
-  static double mean_voxels(const std::vector<Section>& sections) {
-    double sum = 0.0;
-    for (const Section& section : sections) sum += static_cast<double>(section.voxels.size());
-    return sum / std::max(1.0, static_cast<double>(sections.size()));
-  }
-
   /// Whether the sections are long, wide and narrow enough for a branch at the contact.
   bool is_branch(const Contact& contact, const std::vector<Section>& sections) const {
     const auto count = static_cast<double>(sections.size());
-    const double across =
-        mean_voxels(sections) * voxel_ / section_mm_;  // voxels of a cross-section
+    const double across = voxels_across(field_.grid, sections);
     const double radius = voxel_ * std::sqrt(across / std::numbers::pi);
     return across >= kLeastVoxels &&
            count * section_mm_ >= std::max(kLeastMm, kLeastRadii * radius) &&
@@ -261,14 +265,11 @@ class BranchSearch {
 /// sections are, hardly a voxel has others on both sides along the axes whose voxels are fine.
 bool is_film(const Grid& grid, const std::vector<Section>& sections) {
   constexpr double kLeastAcross = 20.0, kInner = 0.1;  // voxels; of all
+  if (voxels_across(grid, sections) < kLeastAcross) return false;
   std::vector<std::size_t> voxels;
   for (const Section& section : sections) {
     voxels.insert(voxels.end(), section.voxels.begin(), section.voxels.end());
   }
-  const auto all = static_cast<double>(voxels.size());
-  const double across = all * std::cbrt(grid.spacing.prod()) / section_length(grid) /
-                        static_cast<double>(sections.size());
-  if (across < kLeastAcross) return false;
   std::sort(voxels.begin(), voxels.end());
   const std::array<std::size_t, 3> stride = {1, grid.index(0, 1, 0), grid.index(0, 0, 1)};
   const auto is_inner = [&](std::size_t n) {
@@ -283,7 +284,7 @@ bool is_film(const Grid& grid, const std::vector<Section>& sections) {
     return true;
   };
   const auto inner = std::count_if(voxels.begin(), voxels.end(), is_inner);
-  return static_cast<double>(inner) < kInner * all;
+  return static_cast<double>(inner) < kInner * static_cast<double>(voxels.size());
 }
 
 /// Inscribed radius of the artery [mm] in its middle beside voxel n, uphill from there.

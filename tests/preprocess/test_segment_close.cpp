@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <vector>
 
 #include "preprocess/segment/mask_shape.h"
 #include "preprocess/segment/segment_close.h"
@@ -55,6 +56,18 @@ Labels labels_where(const Grid& grid, Inside inside) {
   return labels;
 }
 
+constexpr double kUpper = 500.0;
+
+/// Bone above the band where `inside` holds, 40 HU elsewhere.
+template <typename Inside>
+std::vector<float> bone_where(const Grid& grid, Inside inside) {
+  std::vector<float> values(grid.voxels(), 40.0F);
+  for (std::size_t n = 0; n < values.size(); ++n) {
+    if (inside(voxel_at(grid, n))) values[n] = 700.0F;
+  }
+  return values;
+}
+
 bool is_in_artery(const Voxel& v) { return std::hypot(v[0] - 8, v[1] - 15) < 5.5; }
 
 bool is_in_bone(const Voxel& v) { return v[0] >= 15 && v[1] >= 5 && v[1] < 25; }
@@ -66,13 +79,14 @@ bool is_in_film(const Voxel& v, int thickness) {
 
 TEST(CutFilms, WhatLiesThinOnBoneGoesAndTheArteryStays) {
   const Grid grid{.size = {40, 30, 30}, .spacing = Vec3(0.8, 0.8, 1.25)};
-  const Labels bone = labels_where(grid, is_in_bone), none(grid.voxels(), 0);
+  const std::vector<float> bone = bone_where(grid, is_in_bone), no_bone(grid.voxels(), 40.0F);
+  const Labels none(grid.voxels(), 0);
   const Labels artery = labels_where(grid, is_in_artery);
   for (const int thickness : {1, 2}) {
     const Labels with_film = labels_where(
         grid, [&](const Voxel& v) { return is_in_artery(v) || is_in_film(v, thickness); });
     Labels labels = with_film;
-    cut_films(grid, bone, none, labels);
+    cut_films(grid, bone, kUpper, none, labels);
     // Of the film stays what lies within two voxels of the artery.
     EXPECT_LT(2 * (count(labels) - count(artery)), count(with_film) - count(artery)) << thickness;
     for (std::size_t n = 0; n < labels.size(); ++n) {
@@ -84,9 +98,9 @@ TEST(CutFilms, WhatLiesThinOnBoneGoesAndTheArteryStays) {
 
     // It stays where no bone lies, and where it is kept.
     labels = with_film;
-    cut_films(grid, none, none, labels);
+    cut_films(grid, no_bone, kUpper, none, labels);
     EXPECT_EQ(labels, with_film);
-    cut_films(grid, bone, with_film, labels);
+    cut_films(grid, bone, kUpper, with_film, labels);
     EXPECT_EQ(labels, with_film);
   }
 }
@@ -97,10 +111,11 @@ TEST(CutFilms, AnArteryInOneThickSliceStaysAndAFilmInOneFineSliceGoes) {
   const auto below = [](const Voxel& v) { return v[2] < 9; };
   for (const double slice : {1.25, 3.0}) {
     const Grid grid{.size = {40, 30, 20}, .spacing = Vec3(0.8, 0.8, slice)};
-    const Labels bone = labels_where(grid, below), none(grid.voxels(), 0);
+    const std::vector<float> bone = bone_where(grid, below);
+    const Labels none(grid.voxels(), 0);
     const Labels before = labels_where(grid, in_slice);
     Labels labels = before;
-    cut_films(grid, bone, none, labels);
+    cut_films(grid, bone, kUpper, none, labels);
     EXPECT_EQ(count(labels), slice < 2.0 ? 0U : count(before));
   }
 }
